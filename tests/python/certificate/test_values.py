@@ -16,8 +16,7 @@ from trueangle.certificate import (
     certify,
     conformity,
 )
-from trueangle.certificate.asleft import corrected_runs
-from trueangle.certificate.values import left_at_places, reversal_halfwidth
+from trueangle.certificate.values import corrected_runs, left_at_places, reversal_halfwidth
 
 SEED = 61_000
 UNITS = (360.0, 1.0, 2.0 * np.pi)
