@@ -114,10 +114,11 @@ def _add_self_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the plan."""
+    orders = None if args.orders is None else parse_orders(args.orders)
     if args.after is not None:
         return run_after(args)
     refuse_without_after(args)
-    plan = _planned(args, None if args.orders is None else parse_orders(args.orders))
+    plan = _planned(args, orders)
     print(plan.to_json() if args.json else plan.summary())
     return 0
 

@@ -38,11 +38,11 @@ def filled(text: str, **values: object) -> str:
 
     Examples
     --------
-    >>> print(filled("{\n    @body@\n    @more@\n    return @x@\n}", body="a()\nb()", more="", x=3))
+    >>> print(filled("{\n    @body@\n    @more@\n    return @x@;\n}", body="1;\n2;", more="", x=3))
     {
-        a()
-        b()
-        return 3
+        1;
+        2;
+        return 3;
     }
     """
     for name, value in values.items():
