@@ -70,7 +70,7 @@ class Report(Page):
     content: dict[str, Any]
     figures: dict[str, dict[str, Any]]
 
-    kind: ClassVar[Kind] = REPORT
+    _kind: ClassVar[Kind] = REPORT
 
     def _written(self) -> str:
         return rendered_report(self)

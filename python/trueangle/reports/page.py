@@ -124,7 +124,7 @@ class Page(Shown):
     """
 
     #: What it is written as.
-    kind: ClassVar[Kind] = PAGE
+    _kind: ClassVar[Kind] = PAGE
 
     @cached_property
     def html(self) -> str:
@@ -156,9 +156,9 @@ class Page(Shown):
             An ending of another format, a place that no file is written to, a file that it was
             made from.
         """
-        check_output(path, self.kind)
+        check_output(path, self._kind)
         html = self.html
-        with written_atomically(path, kind=self.kind, hashes=self._hashes) as file:
+        with written_atomically(path, kind=self._kind, hashes=self._hashes) as file:
             file.write(html)
 
 
