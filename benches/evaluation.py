@@ -15,9 +15,9 @@ import platform
 
 import numpy as np
 
+from latency import histogram, paced
 from trueangle.bench import evaluation
 from trueangle.bench.evaluation import EvaluationRow
-from trueangle.bench.latency import histogram, paced
 
 
 def show(title: str, rows: list[EvaluationRow], base: str, ratio: str) -> None:
@@ -33,7 +33,7 @@ def show(title: str, rows: list[EvaluationRow], base: str, ratio: str) -> None:
         )
 
 
-def latency(seconds: float, save: str | None) -> None:
+def latencies(seconds: float, save: str | None) -> None:
     step = evaluation.harmonics(evaluation.ORDERS["17 orders"]).compensator()
     kept = {}
     for rate in (1e3, 1e4):
@@ -100,7 +100,7 @@ def main() -> None:
     if args.plot is not None:
         plot([*batches, *peers], args.plot)
     if args.latency > 0.0:
-        latency(args.latency, args.save)
+        latencies(args.latency, args.save)
 
 
 if __name__ == "__main__":

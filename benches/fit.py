@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from trueangle import _core
-from trueangle.bench.fit import Case, FitRow, measure, readings
-from trueangle.bench.fitpeers import design, peers
+from trueangle.bench.fit import Case, FitRow, design, measure, peers, readings
 
 
 def show(rows: list[FitRow]) -> None:

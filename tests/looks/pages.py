@@ -4,7 +4,7 @@ import playwright.sync_api as playwright
 
 import trueangle as ta
 from trueangle.certificate.typesetting import certificate_pictures
-from trueangle.reports.pdf import find_browser
+from trueangle.reports.page import find_browser
 
 __all__ = ["WIDTHS", "pages"]
 

@@ -1,25 +1,41 @@
-"""How the time of a correction and of a fit grows: with readings, orders, threads and workers."""
+"""How time grows with readings, orders, threads and workers; with units of a fleet and windows."""
 
 from __future__ import annotations
 
 import math
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import MissingExtraError
+from ..estimation.moments import Moments
 from ..fitting.fit import fit
+from ..fleets.fleet import fleet
+from ..model.model import HarmonicModel
+from ..monitoring.monitor import Monitor
 from ..runs.run import CalibrationRun
 from .evaluation import harmonics
 from .fit import Case, readings
 from .interleaved import Timing, interleave
 
-__all__ = ["Cost", "Measured", "by_orders", "by_readings", "by_workers", "costs"]
+__all__ = [
+    "Cost",
+    "Measured",
+    "by_orders",
+    "by_readings",
+    "by_units",
+    "by_windows",
+    "by_workers",
+    "costs",
+]
+
+Array = NDArray[np.float64]
 
 _Ways: TypeAlias = dict[tuple[str, int], Callable[[], object]]
 
@@ -29,6 +45,14 @@ READINGS: Final = 1_000_000
 
 #: Numbers of orders looked at.
 _STEPS: Final = (1, 4, 16, 64, 256, 1024)
+
+#: Readings and orders of each unit of a fleet.
+READINGS_EACH: Final = 180
+ORDERS_EACH: Final = 4
+
+#: Readings of a window, and orders that are watched.
+WINDOWS: Final = (500, 2000, 20_000)
+WATCHED: Final = 8
 
 #: Readings from which on three rounds are enough.
 _MANY: Final = 30_000_000
@@ -135,6 +159,48 @@ def by_workers(workers: Sequence[int], size: int, files: int = 8) -> list[Measur
     return found
 
 
+def by_units(most: int) -> list[Measured]:
+    """A fleet of 10 units and more, a decade apart, and a fit of each of them: once.
+
+    The units are made one after the other and only their sums are kept.
+    """
+    found = []
+    units = 10
+    while units <= most:
+        for work, way in (
+            ("fleet", partial(fleet, _units(units), orders=range(1, ORDERS_EACH + 1))),
+            ("fit of each", partial(_each, units)),
+        ):
+            start = time.perf_counter()
+            way()
+            taken = time.perf_counter() - start
+            found.append(
+                Measured(work, READINGS_EACH * units, ORDERS_EACH, 1, Timing(taken, taken, taken))
+            )
+        units *= 10
+    return found
+
+
+def by_windows(readings: int, rounds: int = 5) -> list[Measured]:
+    """Watching so many readings in windows of `WINDOWS`, and their sums (`Moments`) alone."""
+    model = harmonics(range(1, WATCHED + 1))
+    rng = np.random.default_rng(0)
+    noise = 1e-5 * rng.normal(size=readings)
+    found = []
+    for window in WINDOWS:
+        angle: Array = np.linspace(0.0, 2.0 * math.pi * readings / window, readings, endpoint=False)
+        error = np.asarray(model.error(angle)) + noise
+        timings = interleave(
+            {
+                "moments": partial(_summed, angle, error),
+                f"watch, {window}": partial(_watched, model, angle, error),
+            },
+            rounds,
+        )
+        found += [Measured(work, readings, WATCHED, 1, taken) for work, taken in timings.items()]
+    return found
+
+
 def costs(measured: Sequence[Measured]) -> list[Cost]:
     """The model of cost of each work and number of threads, by relative least squares."""
     found = []
@@ -154,3 +220,30 @@ def costs(measured: Sequence[Measured]) -> list[Cost]:
 def _measured(ways: _Ways, size: int, orders: int, rounds: int) -> list[Measured]:
     timings = interleave({f"{work} {n}": way for (work, n), way in ways.items()}, rounds)
     return [Measured(work, size, orders, n, timings[f"{work} {n}"]) for work, n in ways]
+
+
+def _summed(angle: Array, error: Array) -> None:
+    Moments(range(1, WATCHED + 1)).update(angle, error, threads=1)
+
+
+def _watched(model: HarmonicModel, angle: Array, error: Array) -> None:
+    Monitor(model).update(angle, error)
+
+
+def _units(count: int) -> Iterator[CalibrationRun]:
+    """Units of one pattern and a spread, one after the other; seed 0."""
+    rng = np.random.default_rng(0)
+    angle: Array = np.linspace(0.0, 2.0 * math.pi, READINGS_EACH, endpoint=False)
+    orders = np.arange(1, ORDERS_EACH + 1)[:, None]
+    columns = np.concatenate([np.cos(orders * angle), np.sin(orders * angle)])
+    for unit in range(count):
+        own = 1e-4 * rng.normal(1.0, 0.3, len(columns))
+        error = own @ columns + 1e-5 * rng.normal(size=angle.size)
+        yield CalibrationRun(angle, angle + error, 2.0 * np.pi, unit=str(unit))
+
+
+def _each(count: int) -> None:
+    for run in _units(count):
+        _ = fit(
+            run, orders=range(1, ORDERS_EACH + 1)
+        ).model  # what a fit is asked for last is made then

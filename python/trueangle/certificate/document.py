@@ -20,11 +20,18 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.display_units import ErrorsIn
 from ..support.kinds import told_kinds
 from ..support.plainresult import finite
-from .asleft import corrected_runs, is_of_these, model_as_left
 from .budget import LEVEL, Budget, Contribution
 from .conformity import conformity
 from .identity import ENTRIES, Identity, load_identity
-from .values import left_at_places, nominal_positions, reversal_halfwidth, values_at
+from .values import (
+    corrected_runs,
+    is_of_these,
+    left_at_places,
+    model_as_left,
+    nominal_positions,
+    reversal_halfwidth,
+    values_at,
+)
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult

@@ -1,4 +1,4 @@
-"""The PDF of a certificate, set by typst; figures are vectors."""
+"""The PDF of a certificate, set by typst; its figure, of vectors, by matplotlib."""
 
 from __future__ import annotations
 
@@ -6,16 +6,31 @@ import io
 import json
 import os
 import tempfile
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from ..errors import MissingExtraError
+from ..plots import palette
+from ..plots.canvas import described, new_axes, new_figure, turn_axis
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.display_units import ErrorsIn, error_unit, significant, sine_of_rms
 from ..support.files import CERTIFICATE, check_output, external_output, read_whole
 from .language import certificate_texts, note_in
 
-__all__ = ["certificate_pictures", "lay_out", "typeset_certificate", "write_pdf"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = [
+    "certificate_pictures",
+    "certified_errors",
+    "lay_out",
+    "typeset_certificate",
+    "write_pdf",
+]
 
 #: Part of the span of the errors below which bars of U are not seen beside them.
 _SMALL: Final = 0.04
@@ -79,30 +94,77 @@ def _compiled(content: dict[str, Any], logo: str | None, **how: Any) -> Any:
 
 def _picture(content: dict[str, Any], said: dict[str, Any], small: bool) -> bytes:
     """Value and U at every position as SVG; what would be too small to see on axes of its own."""
-    from ..plots.certified import certified_errors, certified_pair
-
     shown = content["errors_in"]
     counts = shown["per_arcsec"] * ARCSEC_PER_TURN
     unit: Any = counts if shown["unit"] == "count" else shown["unit"]
     rows, left = content["positions"], content["as_left"]
-    below = None if left is None else left["positions"]
-    if below is None and small:
-        below = [row | {"error_arcsec": 0.0} for row in rows]
-    axes = (
-        [certified_errors(rows, errors_in=unit)]
-        if below is None
-        else certified_pair(rows, below, errors_in=unit)
-    )
+    parts = [rows] if left is None else [rows, left["positions"]]
+    if left is None and small:
+        parts.append([row | {"error_arcsec": 0.0} for row in rows])
+    # One below the other, each at a scale of its own.
+    figure, axes = new_figure(len(parts), 1, 7.5, (2.8, 4.6)[len(parts) - 1], sharey=False)
     result = said["result"]
     names = [result["axis_error"], "U / #unit" if left is None else result["axis_left"]]
-    for ax, name in zip(axes, names, strict=False):
+    for ax, some, name in zip(axes, parts, names, strict=False):
+        certified_errors(some, ax, unit)
         ax.set_ylabel(name.replace("#unit", shown["unit"]))
+        ax.set_xlabel("")
     axes[-1].set_xlabel(result["axis"])
-    figure = axes[0].get_figure(root=True)
-    assert figure is not None
+    figure.align_ylabels()
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg")
     from matplotlib import pyplot
 
     pyplot.close(figure)
     return buffer.getvalue()
+
+
+def certified_errors(
+    positions: Sequence[Mapping[str, float]],
+    ax: Axes | None = None,
+    errors_in: ErrorsIn = "auto",
+) -> Axes:
+    """Error at every nominal position with bars of its expanded uncertainty.
+
+    Parameters
+    ----------
+    positions : sequence of mappings
+        ``angle_deg, error_arcsec, expanded_arcsec``, as a certificate's content has them.
+    ax : matplotlib Axes, optional
+    errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+        Unit of the errors, as for summaries.
+
+    Returns
+    -------
+    matplotlib Axes
+    """
+    ax = new_axes(ax, height=2.8)
+    angle, error, expanded = (
+        np.array([row[name] for row in positions])
+        for name in ("angle_deg", "error_arcsec", "expanded_arcsec")
+    )
+    unit = error_unit(errors_in, sine_of_rms(float(np.std(error))))
+    error, expanded = unit.per_arcsec * error, unit.per_arcsec * expanded
+    ax.axhline(0.0, color=palette.MUTED, linewidth=0.8)
+    ax.errorbar(
+        angle,
+        error,
+        yerr=expanded,
+        linestyle="none",
+        marker="o",
+        markersize=3.0,
+        color=palette.AFTER,
+        ecolor=palette.ink(ax),
+        elinewidth=0.9,
+        capsize=2.0,
+    )
+    margin = 0.02 * max(float(np.ptp(angle)), 1.0)
+    turn_axis(ax, float(angle.min()) - margin, float(angle.max()) + margin)
+    ax.set_xlabel("position / deg")
+    ax.set_ylabel(f"error / {unit.name}")
+    return described(
+        ax,
+        f"Error at {len(positions)} positions with expanded uncertainty, from "
+        f"{significant(float(error.min()))} to {significant(float(error.max()))} {unit.name}, "
+        f"U at most {significant(float(expanded.max()), 2)} {unit.name}.",
+    )

@@ -1,17 +1,22 @@
-"""What a fit says of the error at nominal positions, and what it leaves there."""
+"""Errors at nominal positions: what a fit says, what it leaves; readings as a model leaves them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..estimation.reference import design_matrix
+from ..model.file import load_model
+from ..model.model import HarmonicModel
 from ..plots.curves import seen_span
 from ..runs.aliasing import distinct_positions
+from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from .budget import Contribution
 from .propagation import propagated
@@ -22,7 +27,10 @@ if TYPE_CHECKING:
 __all__ = [
     "POSITIONS",
     "Values",
+    "corrected_runs",
+    "is_of_these",
     "left_at_places",
+    "model_as_left",
     "nominal_positions",
     "reversal_halfwidth",
     "values_at",
@@ -202,3 +210,44 @@ def _by_place(
     sizes = np.bincount(inverse).astype(np.float64)
     sums = np.bincount(inverse, weights=fit.residuals[used])
     return cells % _PLACES, cells // _PLACES, sizes, np.asarray(sums, dtype=np.float64)
+
+
+def model_as_left(model: HarmonicModel | str | PathLike[str]) -> HarmonicModel:
+    """The model itself, or that of a file."""
+    if isinstance(model, HarmonicModel):
+        return model
+    return load_model(model)
+
+
+def corrected_runs(model: HarmonicModel, runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
+    """Runs whose indicated angle is the model's correction of it, signals included.
+
+    Raises
+    ------
+    ArgumentError
+        The model needs a signal that a run does not have.
+    """
+    return [_corrected(model, run) for run in runs]
+
+
+def _corrected(model: HarmonicModel, run: CalibrationRun) -> CalibrationRun:
+    turn = model.period / run.period
+    signals: dict[str, Any] = {}
+    for name in model.uses_signals:
+        values = {"direction": run.direction, "velocity": run.speed}.get(name)
+        values = run.signal(name) if values is None else values
+        if values is None and name in model.signals:
+            raise ArgumentError(
+                f"the model needs {name}, which the readings lack: record it, or take a model of "
+                "the angle alone"
+            )
+        if values is not None:
+            signals[name] = values * turn if name == "velocity" else values
+    angle = np.asarray(model.correct(run.indicated * turn, **signals)) / turn
+    return replace(run, indicated=angle)
+
+
+def is_of_these(model: HarmonicModel, runs: Sequence[CalibrationRun]) -> bool:
+    """Whether files of these readings are among those that the model was fitted to."""
+    fitted = {source.sha256 for source in model.provenance.inputs} if model.provenance else set()
+    return any(run.source is not None and run.source.sha256 in fitted for run in runs)

@@ -18,8 +18,13 @@ from ..errors import ArgumentError, TrueAngleError, shortened
 from ..support.layout import wrapped
 from .parser import Parser
 from .paths import check_paths
-from .signals import Ending, ending_by_signals
-from .terminal import STANDARD_OUTPUT, plain_streams, silence_output
+from .terminal import (
+    STANDARD_OUTPUT,
+    Ending,
+    ending_by_signals,
+    plain_streams,
+    silence_output,
+)
 from .wording import Wording
 
 __all__ = ["COMMANDS", "main", "process"]

@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     """Measure and print."""
     if args.scaling:
         return _scaling(args)
-    from ..bench import evaluation, fit, fitpeers
+    from ..bench import evaluation, fit
     from ..errors import ArgumentError
 
     if args.samples < 1 or args.rounds < 1:
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         "single_samples": evaluation.single(rounds=20 * args.rounds),
     }
     fits = fit.quick(min(args.samples, 100_000), args.rounds)
-    missing = sorted({*missing, *fitpeers.peers()[1]})
+    missing = sorted({*missing, *fit.peers()[1]})
     path = evaluation.harmonics([1])._series.path
     if args.json:
         medians = {
@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _scaling(args: argparse.Namespace) -> int:
     """Measure how time grows, print and draw it."""
-    from ..bench import scaling, units
+    from ..bench import scaling
     from ..errors import ArgumentError
 
     try:
@@ -115,8 +115,8 @@ def _scaling(args: argparse.Namespace) -> int:
     some = min(size, scaling.READINGS)
     orders = scaling.by_orders(args.rounds, some // 64, some)
     shared = scaling.by_workers(workers, size) if workers else []
-    shared += units.by_units(size // _READINGS_TO_A_UNIT)
-    shared += units.by_windows(some, args.rounds)
+    shared += scaling.by_units(size // _READINGS_TO_A_UNIT)
+    shared += scaling.by_windows(some, args.rounds)
     costs = scaling.costs(grown)
     if args.plot is not None:
         _draw(args.plot, grown, costs)
@@ -154,14 +154,37 @@ def _scaling_values(points: list[Any], costs: list[Any]) -> dict[str, Any]:
 
 
 def _draw(path: str, points: list[Any], costs: list[Any]) -> None:
-    from ..plots.costcurves import cost_curves
+    """Medians as dots and the model of cost as lines, both axes logarithmic."""
+    import numpy as np
+
+    from ..plots import palette
+    from ..plots.canvas import described, grid, legend, new_axes
 
     measured: dict[str, list[tuple[float, float]]] = {}
     for point in points:
         label = _label(point.work, point.threads)
         measured.setdefault(label, []).append((point.readings, point.timing.median))
-    models = {_label(cost.work, cost.threads): (cost.call, cost.reading) for cost in costs}
-    save_picture(cost_curves(measured, models), path)
+    models = {_label(cost.work, cost.threads): cost for cost in costs}
+    ax = new_axes(None, height=4.5)
+    for number, (label, pairs) in enumerate(measured.items()):
+        n, seconds = np.array(pairs, dtype=np.float64).T
+        colour, marker = palette.run_colour(number), palette.MARKERS[number % len(palette.MARKERS)]
+        ax.plot(n, seconds, marker, color=colour, markersize=5.0, label=label)
+        if label in models:
+            over = np.geomspace(n.min(), n.max(), 100)
+            cost = models[label]
+            ax.plot(over, cost.call + cost.reading * over, color=colour, linewidth=1.0)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlabel("readings")
+    ax.set_ylabel("seconds: medians, and the model of cost")
+    grid(ax)
+    legend(ax)
+    told = "; ".join(
+        f"{label}: " + ", ".join(f"{x:.0e} in {t:.2g} s" for x, t in pairs)
+        for label, pairs in measured.items()
+    )
+    save_picture(described(ax, f"Seconds over readings: {told}."), path)
 
 
 def _label(work: str, threads: int) -> str:

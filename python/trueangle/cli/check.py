@@ -59,7 +59,7 @@ def _tell_columns(error: FileError, args: argparse.Namespace) -> None:
 
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
     """Check every joint; 1 where the data of one are unusable."""
-    from ..reports.ranking import checked_rank, plain_ranking, ranked
+    from ..reports.robot import checked_rank, plain_ranking, ranked
     from ..runs.checks import check
     from ..runs.files import read_runs
 

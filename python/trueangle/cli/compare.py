@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from .error_units import add_errors_in, errors_in
+from .options import add_errors_in, errors_in
 from .paths import Input
 from .robotmodel import model_asked
 

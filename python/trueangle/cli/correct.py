@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ArgumentError, TrueAngleError
 from ..support.display_units import ErrorsIn, error_unit
 from ..support.suggestions import did_you_mean, listed_names
-from .error_units import add_errors_in, errors_in
+from .options import add_errors_in, errors_in
 from .paths import Input, ModelInput
 from .robots import add_robot, joints_asked
 from .signal_options import add_signals, signals_by_joint

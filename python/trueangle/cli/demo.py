@@ -12,6 +12,8 @@ from .paths import Output
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from .paperstudy.study import Reduction, Study
+
 
 HELP = "fit, correct and diagnose simulated joints; needs no files"
 EXAMPLE = "trueangle demo --report demo.html"
@@ -75,7 +77,6 @@ def _corrected(seed: int) -> str:
 
 def _between(seed: int) -> str:
     """What the 36 positions cannot tell."""
-    from .paperstudy.report import short_report
     from .paperstudy.study import paper_study
 
     return (
@@ -83,6 +84,43 @@ def _between(seed: int) -> str:
         "   correction may then be right at the positions and wrong between them.\n\n"
         f"{short_report(paper_study(seed))}"
     )
+
+
+def _change(found: Reduction, where: str) -> str:
+    before, after = found.positions if where == "positions" else found.dense
+    change = found.at_positions if where == "positions" else found.in_between
+    return f"{before:4.0f} -> {after:3.0f} ({change:+.0f} %)"
+
+
+def short_report(study: Study) -> str:
+    """The whole study in ten lines: what 36 positions say, and what lies between."""
+    plan = study.plan
+    lines = [
+        "The paper's study repeated (6 groups at 36 positions, peak-to-peak in arcsec)",
+        "  joint, true orders       at 36 positions     everywhere",
+    ]
+    for name, found in study.published.items():
+        lines.append(
+            f"  {name} as published           {_change(found, 'positions'):18}  "
+            f"{_change(found, 'dense')}"
+        )
+    for name, found in study.gear.items():
+        lines.append(
+            f"  {name} gear orders instead    {_change(found, 'positions'):18}  "
+            f"{_change(found, 'dense')}"
+        )
+    lines.append("  The 36 readings of both are the same: only others can tell.")
+    offset = plan.mount_offsets_deg[-1]
+    for name, found in study.planned.items():
+        lines.append(
+            f"  {name} read {offset:g} deg apart too  {_change(found, 'positions'):18}  "
+            f"{_change(found, 'dense')}"
+        )
+    lines.append(
+        f"  `ta.plan_mounts(gear_ratio=100)`: mounts at 0 and {offset:g} deg, "
+        f"noise factor {plan.worst_noise_factor:.2f}"
+    )
+    return "\n".join(lines)
 
 
 def _diagnosed(seed: int) -> str:

@@ -9,15 +9,13 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError, NoModelError, TrueAngleError
-from ..support.deadline import STYLES, ending_early
+from ..support.deadline import ending_early
 from ..support.files import MODEL, SENSOR, SIMULATION
-from .durations import seconds
-from .error_units import add_errors_in, errors_in
-from .fit import add_argument_choice, add_joint
-from .order_lists import declared_shafts
+from .options import add_argument_choice, add_errors_in, add_joint, add_progress, errors_in
 from .paths import Input, Output
-from .robots import add_robot, each_joint, joints_asked, robot_messages
+from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
 from .signal_options import reading, signals_by_joint
+from .values import declared_shafts, seconds
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -98,12 +96,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the best account in that time, as 10s, 2min or seconds; it says what is missing "
         "(default: 5 s of the processor, or 0.5 ms a reading of many)",
     )
-    add(
-        "--progress",
-        choices=STYLES,
-        default="auto",
-        help="on stderr after one second (default: text on a terminal, nothing elsewhere)",
-    )
+    add_progress(parser)
     add_errors_in(parser)
     add("--json", action="store_true", help="print the diagnosis as JSON")
     add(
@@ -164,8 +157,7 @@ def run(args: argparse.Namespace) -> int:
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
     """Diagnose every joint against its simulation, or an empty one of its gear."""
     from ..diagnosis import diagnose
-    from ..model.robot import Robot
-    from ..reports.ranking import diagnosed_rank, plain_ranking, ranked
+    from ..reports.robot import diagnosed_rank, plain_ranking, ranked
     from .run_lists import read_checked
 
     if any(given is not None for given in (args.simulated, args.extend, args.model, args.plan)):
@@ -196,8 +188,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
         }
         if not models:
             raise ArgumentError("no cause of any joint is confirmed: there is nothing to correct")
-        signals = {joint.name: joint.signals for joint in joints if joint.name in models}
-        Robot(models, name=name, signals=signals).save(args.corrected_model)
+        save_models(args.corrected_model, name, joints, models)
         if not args.json:
             print(f"\nCorrection models of {', '.join(models)}: {args.corrected_model}")
     return 0

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from .error_units import add_errors_in, errors_in
+from .options import add_errors_in, errors_in
 from .paths import Input, Output
 from .robotmodel import model_asked
 

@@ -7,13 +7,20 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
-from ..support.files import MODEL
-from .error_units import add_errors_in, errors_in
 from .onepass import add_one_pass, log_options, wants_one_pass
-from .order_lists import declared_shafts, orders_by_shaft, parse_orders
-from .paths import Input, Output
-from .robots import add_robot, each_joint, joints_asked, robot_messages
-from .signal_options import add_signals
+from .options import (
+    add_argument_choice,
+    add_covariance,
+    add_errors_in,
+    add_joint,
+    add_labels,
+    add_model_output,
+    add_nuisance,
+    errors_in,
+)
+from .paths import Input
+from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
+from .values import declared_shafts, orders_by_shaft, parse_orders
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -27,22 +34,16 @@ EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument(
+    add = parser.add_argument
+    add(
         "runs",
         nargs="+",
         type=Input,
         metavar="RUNS",
         help="files of readings: CSV, Parquet, HDF5, MATLAB, numpy, ROS bags and others",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        required=True,
-        type=Output.of(MODEL),
-        metavar="MODEL",
-        help="model file to write",
-    )
-    parser.add_argument(
+    add_model_output(parser)
+    add(
         "--orders",
         default="auto",
         help="auto (default: by evidence), 1-17, 1,4,8, or per shaft: output:1-3;motor:1,2",
@@ -52,19 +53,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_argument_choice(parser)
     add_covariance(parser)
     add_nuisance(parser)
-    parser.add_argument(
+    add(
         "--loss",
         choices=("auto", "linear", "huber", "tukey"),
         default="auto",
         help="auto (default): least squares with outliers set aside and reported",
     )
-    parser.add_argument(
-        "--run",
-        action="append",
-        metavar="GLOB",
-        help="use the runs of this label only, or of those that match (fwd-*)",
-    )
-    parser.add_argument(
+    add_labels(parser)
+    add(
         "--prior",
         type=Input,
         metavar="FLEET",
@@ -72,73 +68,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "ten readings may do",
     )
     add_one_pass(parser)
-    parser.add_argument(
+    add(
         "--checksums",
         action="store_true",
         help="keep the sha256 of the files in the model, also of a fit in one pass",
     )
     add_errors_in(parser)
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
-
-
-def add_joint(parser: argparse.ArgumentParser) -> None:
-    """Options that tell what joint the readings are of; shared by several commands."""
-    from ..joint.members import FIXED_MEMBERS
-
-    parser.add_argument("--gear-ratio", type=float, metavar="R", help="motor turns per output turn")
-    parser.add_argument(
-        "--fixed-member",
-        choices=FIXED_MEMBERS,
-        default="circular_spline",
-        help="of the strain wave gear (default: circular_spline)",
-    )
-    parser.add_argument(
-        "--shaft",
-        action="append",
-        metavar="NAME=CYCLES",
-        help="further shaft and its turns per output turn, as worm=144 (may be repeated)",
-    )
-    add_signals(parser)
-
-
-def add_argument_choice(parser: argparse.ArgumentParser) -> None:
-    """The angle that errors are a function of; shared by several commands."""
-    parser.add_argument(
-        "--argument",
-        choices=("auto", "reference", "indicated"),
-        default="auto",
-        help="angle that the error is a function of (default: the true one, unless the "
-        "reference has an arbitrary zero in every run)",
-    )
-
-
-def add_nuisance(parser: argparse.ArgumentParser) -> None:
-    """What is fitted jointly with the pattern; shared by several commands."""
-    parser.add_argument(
-        "--nuisance",
-        default="none",
-        metavar="auto|none|LIST",
-        help="fit jointly with the pattern, and keep out of the model: ramp, direction, velocity, "
-        "drift (a list with commas), or those that lower the held-out error (auto); default: none",
-    )
-    parser.add_argument(
-        "--reference-orders",
-        metavar="50,100",
-        help="orders that the reference itself makes: fitted jointly with the pattern, not "
-        "retained; with a phase of their own in every run where it was mounted anew",
-    )
-
-
-def add_covariance(parser: argparse.ArgumentParser) -> None:
-    """How standard errors are taken; shared by several commands."""
-    parser.add_argument(
-        "--covariance",
-        choices=("auto", "white", "cluster", "hac"),
-        default="auto",
-        help="standard errors of independent readings (white), by the scatter between runs "
-        "(cluster) or between segments of readings (hac); default: white unless correlation "
-        "is found",
-    )
+    add("--json", action="store_true", help="print the result as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -158,8 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
     """Fit every joint; one file of all models."""
-    from ..model.robot import Robot
-    from ..reports.ranking import fitted_rank, plain_ranking, ranked
+    from ..reports.robot import fitted_rank, plain_ranking, ranked
 
     if args.one_pass or args.scheduler:
         raise ArgumentError("--one-pass and --scheduler go with one joint: leave --robot out")
@@ -174,9 +109,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     fits, failed = each_joint(joints, work)
     every = {**fits, **failed}
     ranking = ranked(fitted_rank(joint, runs[joint], fit) for joint, fit in every.items())
-    signals = {joint.name: joint.signals for joint in joints if joint.name in fits}
-    robot = Robot({joint: fit.model for joint, fit in fits.items()}, name=name, signals=signals)
-    robot.save(args.output)
+    save_models(args.output, name, joints, {joint: fit.model for joint, fit in fits.items()})
     if args.json:
         plain = {joint: fit.to_dict() for joint, fit in fits.items()}
         rows = plain_ranking(ranking)

@@ -6,11 +6,10 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from ..support.files import FLEET
-from .error_units import add_errors_in, errors_in
-from .fit import add_joint
-from .order_lists import declared_shafts, orders_by_shaft
+from .options import add_errors_in, add_joint, errors_in
 from .paths import Input, Output
 from .signal_options import reading
+from .values import declared_shafts, orders_by_shaft
 
 if TYPE_CHECKING:
     from ..fleets.result import Fleet

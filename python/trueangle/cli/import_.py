@@ -7,10 +7,9 @@ import json
 
 from ..support.angles import zero_text
 from ..support.display_units import error_unit
-from ..support.files import MODEL
-from .error_units import add_errors_in, errors_in
 from .export import add_target_options, target_options
-from .paths import Input, Output
+from .options import add_errors_in, add_model_output, errors_in
+from .paths import Input
 
 HELP = "read a table that firmware has, as a model: what does my present table do?"
 EXAMPLE = "trueangle import printer.cfg --from klipper -o present.json"
@@ -29,14 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--from", required=True, dest="source", choices=tuple(TARGETS), metavar="TARGET",
         help=f"what it is of: {', '.join(TARGETS)}")  # fmt: skip
-    add(
-        "-o",
-        "--output",
-        required=True,
-        type=Output.of(MODEL),
-        metavar="MODEL",
-        help="model file to write",
-    )
+    add_model_output(parser)
     add_target_options(parser)
     add_errors_in(parser)
     add("--json", action="store_true", help="print what the table corrects as JSON")

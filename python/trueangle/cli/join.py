@@ -6,9 +6,8 @@ import argparse
 import json
 from typing import Any
 
-from ..support.files import RUNS
-from .error_units import add_errors_in, errors_in
-from .paths import Input, Output
+from .options import add_errors_in, add_runs_output, errors_in
+from .paths import Input
 from .signal_options import add_signals, signals_by_joint
 
 HELP = "join an indicated and a reference log that have clocks of their own"
@@ -20,14 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("first", type=Input, metavar="A", help="log of the indicated angle (or the reference)")
     add("second", type=Input, metavar="B", help="log of the other; both with their times")
-    add(
-        "-o",
-        "--output",
-        required=True,
-        type=Output.of(RUNS),
-        metavar="RUNS",
-        help="CSV file to write",
-    )
+    add_runs_output(parser)
     add(
         "--offset",
         type=float,

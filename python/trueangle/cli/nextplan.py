@@ -6,9 +6,10 @@ import argparse
 
 from ..errors import ArgumentError
 from ..support.files import SIMULATION
-from .durations import seconds
+from .options import refuse_given
 from .paths import Input, Output
 from .signal_options import add_signals
+from .values import names, seconds
 
 __all__ = ["add_after_arguments", "refuse_without_after", "run_after"]
 
@@ -25,7 +26,7 @@ def add_after_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--between",
-        type=lambda text: [name.strip() for name in text.split(",") if name.strip()],
+        type=names,
         metavar="A,B",
         help="causes to tell apart (default: all that the diagnosis could not)",
     )
@@ -85,19 +86,9 @@ def run_after(args: argparse.Namespace) -> int:
 
 def refuse_without_after(args: argparse.Namespace) -> None:
     """Refuse options that are of ``--after`` only."""
-    given = {
-        "--between": args.between,
-        "--limits": args.limits,
-        "--seeds": args.seeds,
-        "--within": args.within,
-        "--output": args.output,
-        "--signal": args.signal,
-        "--counts-per-turn": args.counts_per_turn,
-        "--counts-per-turn-reference": args.counts_per_turn_reference,
-        "--topic": args.topic,
-        "--facets": args.facets,
-        "--unit-from": args.unit_from,
-    }
-    for option, value in given.items():
-        if value is not None:
-            raise ArgumentError(f"{option} is of plans after a diagnosis: add --after RUNS")
+    after = [
+        *("between", "limits", "seeds", "within", "output"),
+        *("signal", "counts_per_turn", "counts_per_turn_reference"),
+        *("topic", "facets", "unit_from"),
+    ]
+    refuse_given(args, after, "is of plans after a diagnosis: add --after RUNS")

@@ -6,9 +6,9 @@ import argparse
 from typing import Any, Final
 
 from ..errors import ArgumentError
-from .order_lists import declared_shafts
 from .signal_options import reading
 from .terminal import own_interrupts
+from .values import declared_shafts
 
 __all__ = ["add_one_pass", "log_options", "wants_one_pass"]
 

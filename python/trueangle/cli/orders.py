@@ -7,12 +7,19 @@ import json
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
-from .error_units import add_errors_in, errors_in
-from .fit import add_argument_choice, add_covariance, add_joint, add_nuisance
 from .onepass import add_one_pass, log_options, wants_one_pass
-from .order_lists import declared_shafts, parse_orders
+from .options import (
+    add_argument_choice,
+    add_covariance,
+    add_errors_in,
+    add_joint,
+    add_labels,
+    add_nuisance,
+    errors_in,
+)
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked
+from .values import declared_shafts, parse_orders
 
 if TYPE_CHECKING:
     from ..fitting.orders.table import OrderSelection
@@ -39,12 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "range over the runs",
     )
     add_nuisance(parser)
-    add(
-        "--run",
-        action="append",
-        metavar="GLOB",
-        help="use the runs of this label only, or of those that match (fwd-*)",
-    )
+    add_labels(parser)
     add_one_pass(parser)
     add_errors_in(parser)
     add("--json", action="store_true", help="print the table as JSON")

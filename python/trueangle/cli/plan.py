@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import argparse
 import math
+from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from .nextplan import add_after_arguments, refuse_without_after, run_after
+from .options import refuse_given
 from .paths import Input
-from .selfplan import add_self_arguments, run_self
+from .values import angle, arc, parse_orders
+
+if TYPE_CHECKING:
+    from ..fleets.unitplan import UnitPlan
+    from ..planning.arc import ArcPlan
+    from ..planning.plan import CalibrationPlan
+    from ..planning.selfplan import SelfPlan
 
 HELP = "propose calibration positions that keep the wanted orders apart"
+EXAMPLE = "trueangle plan --gear-ratio 100 --positions 36 --mounts 2"
+
 #: Degrees over which an uncertainty is wanted where no arc is stated.
 WHOLE_TURN = (0.0, 360.0)
-
-EXAMPLE = "trueangle plan --gear-ratio 100 --positions 36 --mounts 2"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,31 +55,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--orders", metavar="1-17,202", help="orders wanted (default: 1-17 and the gear's own)")
     add("--noise-arcsec", type=float, metavar="S", help="scatter of one reading")
     add("--std-arcsec", type=float, metavar="U", help="standard error wanted: gives the readings")
-    arc = parser.add_argument_group("a joint that cannot turn once")
-    arc.add_argument(
+    of_arc = parser.add_argument_group("a joint that cannot turn once").add_argument
+    of_arc(
         "--arc",
-        type=_arc,
+        type=arc,
         metavar="START:STOP",
         help="degrees; where to read on this arc (--arc=-135:135 where it starts below zero)",
     )
-    arc.add_argument("--readings", type=int, metavar="N", help="readings to spend (default: 60)")
-    arc.add_argument(
-        "--runs", type=int, metavar="R", help="runs, each with a zero of its own (default: 1)"
-    )
-    arc.add_argument(
-        "--both-directions", action="store_true", help="read every place from either side"
-    )
-    arc.add_argument(
+    of_arc("--readings", type=int, metavar="N", help="readings to spend (default: 60)")
+    of_arc("--runs", type=int, metavar="R", help="runs, each with a zero of its own (default: 1)")
+    of_arc("--both-directions", action="store_true", help="read every place from either side")
+    of_arc(
         "--apart", type=float, metavar="DEG", help="least distance of two places (default: none)"
     )
-    arc.add_argument(
+    of_arc(
         "--uncertainty",
-        type=_angle,
+        type=angle,
         metavar="U",
         help="wanted at every place (k = 2), such as 2arcsec or 0.01deg: gives the readings "
         "(without --arc, over the whole turn)",
     )
-    arc.add_argument(
+    of_arc(
         "--prior",
         type=Input,
         metavar="FLEET.json",
@@ -80,46 +84,81 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--json", action="store_true", help="print the plan as JSON")
     add_after_arguments(parser)
-    add_self_arguments(parser)
+    _add_self_arguments(parser)
 
 
-def _arc(text: str) -> tuple[float, float]:
-    """``START:STOP`` in degrees."""
-    start, colon, stop = text.partition(":")
-    try:
-        if not colon:
-            raise ValueError
-        return float(start), float(stop)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not an arc: START:STOP in degrees, such as 0:270"
-        ) from None
+def _add_self_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of ``--self``."""
+    from ..planning.selfplan import SELF_METHODS
+
+    add = parser.add_argument_group("without a reference").add_argument
+    add(
+        "--self",
+        dest="self_method",
+        choices=SELF_METHODS,
+        metavar="METHOD",
+        help=f"plan a calibration without a reference: {', '.join(SELF_METHODS)}",
+    )
+    add(
+        "--simulation",
+        type=Input,
+        metavar="FILE",
+        help="simulation file whose heads, shifts, coast and noise are planned with",
+    )
+    add("--count", type=int, metavar="N", help="heads or shifts (default: 3)")
+    add("--angles", metavar="0,90,180", help="angles of heads or shifts that are there")
+    add("--speed-ratio", type=float, metavar="R", help="start over end speed (5)")
+    add("--start-speed", type=float, metavar="F", help="turns per second at the start")
+    add("--rate", type=float, metavar="HZ", help="readings per second")
 
 
-def _angle(text: str) -> float:
-    """An angle in arcsec; ``arcsec``, ``arcmin``, ``deg`` or ``mrad`` may follow."""
-    for unit, arcsec in _ARCSEC.items():
-        if text.endswith(unit):
-            number, scale = text.removesuffix(unit), arcsec
-            break
-    else:
-        number, scale = text, 1.0
-    try:
-        return float(number) * scale
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not an angle: a number and {', '.join(_ARCSEC)}, such as 2arcsec"
-        ) from None
+def run(args: argparse.Namespace) -> int:
+    """Print the plan."""
+    orders = None if args.orders is None else parse_orders(args.orders)
+    if args.after is not None:
+        return run_after(args)
+    refuse_without_after(args)
+    plan = _planned(args, orders)
+    print(plan.to_json() if args.json else plan.summary())
+    return 0
 
 
-_ARCSEC = {"arcsec": 1.0, "arcmin": 60.0, "mrad": 648.0 / math.pi, "deg": 3600.0}
+def _planned(
+    args: argparse.Namespace, orders: tuple[float, ...] | None
+) -> CalibrationPlan | ArcPlan | UnitPlan | SelfPlan:
+    """The plan that is asked for: without a reference, of a unit, an arc or whole turns."""
+    from ..planning import plan as planning
+
+    if args.self_method is not None:
+        return _of_self(args, orders)
+    if args.prior is not None:
+        return _of_unit(args, orders)
+    if args.arc is not None or args.uncertainty is not None:
+        return _of_arc(args, orders)
+    of_arc = ("readings", "runs", "both_directions", "apart")
+    refuse_given(args, of_arc, "is of plans for an arc: add --arc START:STOP")
+    common = {
+        "fixed_member": args.fixed_member,
+        "orders": orders,
+        "noise": args.noise_arcsec,
+        "standard_error": args.std_arcsec,
+    }
+    if args.reference == "encoder":
+        return planning.plan_encoder(args.gear_ratio, args.positions, **common)
+    positions = 36 if args.positions is None else args.positions
+    if args.reference == "off-null":
+        return planning.plan_tilts(
+            args.gear_ratio, positions, args.tilts, tilt_arcsec=args.tilt_arcsec, **common
+        )
+    mounts = 2 if args.mounts is None else args.mounts
+    return planning.plan_mounts(args.gear_ratio, positions, mounts, **common)
 
 
-def _run_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
+def _of_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> ArcPlan:
     from ..planning.arc import plan_arc
 
     start, stop = WHOLE_TURN if args.arc is None else args.arc
-    plan = plan_arc(
+    return plan_arc(
         start,
         stop,
         orders,
@@ -131,29 +170,20 @@ def _run_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
         standard_error=args.std_arcsec,
         uncertainty=args.uncertainty,
     )
-    print(plan.to_json() if args.json else plan.summary())
-    return 0
 
 
-def _run_unit(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int:
+def _of_unit(args: argparse.Namespace, orders: tuple[float, ...] | None) -> UnitPlan:
     from ..fleets import load_fleet, plan_unit
 
-    given = {
-        "--runs": args.runs,
-        "--both-directions": args.both_directions or None,
-        "--apart": args.apart,
-        "--std-arcsec": args.std_arcsec,
-    }
-    for option, value in given.items():
-        if value is not None:
-            raise ArgumentError(f"{option} does not go with --prior; leave one of them out")
+    others = ("runs", "both_directions", "apart", "std_arcsec")
+    refuse_given(args, others, "does not go with --prior; leave one of them out")
     if (args.uncertainty is None) == (args.readings is None):
         raise ArgumentError(
             "--prior needs what the readings are for, --uncertainty 2arcsec, or how many there "
             "are, --readings N; one of them"
         )
     start, stop = WHOLE_TURN if args.arc is None else args.arc
-    plan = plan_unit(
+    return plan_unit(
         load_fleet(args.prior),
         start,
         stop,
@@ -162,54 +192,36 @@ def _run_unit(args: argparse.Namespace, orders: tuple[float, ...] | None) -> int
         readings=args.readings,
         noise=args.noise_arcsec,
     )
-    print(plan.to_json() if args.json else plan.summary())
-    return 0
 
 
-def _refuse_without_arc(args: argparse.Namespace) -> None:
-    given = {
-        "--readings": args.readings,
-        "--runs": args.runs,
-        "--both-directions": args.both_directions or None,
-        "--apart": args.apart,
-    }
-    for option, value in given.items():
-        if value is not None:
-            raise ArgumentError(f"{option} is of plans for an arc: add --arc START:STOP")
+def _of_self(args: argparse.Namespace, orders: tuple[float, ...] | None) -> SelfPlan:
+    from ..planning.selfplan import plan_self
 
-
-def run(args: argparse.Namespace) -> int:
-    """Print the plan."""
-    from ..planning import plan as planning
-    from .order_lists import parse_orders
-
-    orders = None if args.orders is None else parse_orders(args.orders)
-    if args.after is not None:
-        return run_after(args)
-    refuse_without_after(args)
-    if args.self_method is not None:
-        return run_self(args, orders)
-    if args.prior is not None:
-        return _run_unit(args, orders)
-    if args.arc is not None or args.uncertainty is not None:
-        return _run_arc(args, orders)
-    _refuse_without_arc(args)
-    common = {
-        "fixed_member": args.fixed_member,
+    told = {
         "orders": orders,
+        "count": args.count,
+        "angles": None if args.angles is None else _angles(args.angles),
+        "speed_ratio": args.speed_ratio,
+        "start_speed": args.start_speed,
+        "rate": args.rate,
+        "gear_ratio": args.gear_ratio,
         "noise": args.noise_arcsec,
         "standard_error": args.std_arcsec,
     }
-    if args.reference == "encoder":
-        plan = planning.plan_encoder(args.gear_ratio, args.positions, **common)
-    else:
-        positions = 36 if args.positions is None else args.positions
-        if args.reference == "off-null":
-            plan = planning.plan_tilts(
-                args.gear_ratio, positions, args.tilts, tilt_arcsec=args.tilt_arcsec, **common
-            )
-        else:
-            mounts = 2 if args.mounts is None else args.mounts
-            plan = planning.plan_mounts(args.gear_ratio, positions, mounts, **common)
-    print(plan.to_json() if args.json else plan.summary())
-    return 0
+    given = {name: value for name, value in told.items() if value is not None}
+    if args.simulation is not None:
+        from ..planning.selfdesigns import designed_selfplan
+        from ..simulation import load_simulation
+
+        given = designed_selfplan(load_simulation(args.simulation), args.self_method) | given
+    return plan_self(args.self_method, **given)
+
+
+def _angles(text: str) -> list[float]:
+    try:
+        found = [float(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) < 2 or not all(map(math.isfinite, found)):
+        raise ArgumentError(f"--angles: two angles or more in degrees, such as 0,90, got {text!r}")
+    return found

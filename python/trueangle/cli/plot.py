@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 from ..errors import ArgumentError
 from ..support.files import PICTURE
 from ..support.layout import laid_out
-from .error_units import add_errors_in, errors_in
-from .fit import add_joint
-from .order_lists import declared_shafts, orders_by_shaft
+from .options import add_errors_in, add_joint, add_orders, errors_in
 from .paths import Input, Output
 from .pictures import save_picture
 from .robotmodel import model_asked
+from .values import declared_shafts, orders_by_shaft
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of runs: errors over the angle (default), amplitudes of the orders, phases over the "
         "runs, or what the fit leaves",
     )
-    add("--orders", default="auto", help="auto (default: by evidence), 1-17, output:1-3;motor:1,2")
+    add_orders(parser)
     add_joint(parser)
     add("--joint", metavar="NAME", help="of the model file of a robot, this joint")
     add_errors_in(parser)

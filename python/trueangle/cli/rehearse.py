@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from ..support.deadline import STYLES, ending_early
+from ..support.deadline import ending_early
 from ..support.files import PICTURE
-from .durations import seconds
+from .options import add_progress
 from .paths import Input, Output
 from .pictures import save_picture
+from .values import names, seconds
 
 HELP = "tell from which size on a diagnosis of planned runs would name each cause"
 EXAMPLE = "trueangle rehearse joint.toml --within 5min --plot detection.png"
@@ -25,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--causes",
-        type=lambda text: [name.strip() for name in text.split(",") if name.strip()],
+        type=names,
         metavar="A,B",
         help="causes to hide (default: all)",
     )
@@ -39,12 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--workers", type=int, metavar="N", help="processes side by side (default: every core)")
     add("--plot", type=Output.of(PICTURE), metavar="FILE", help="write the picture as well")
-    add(
-        "--progress",
-        choices=STYLES,
-        default="auto",
-        help="on stderr after one second (default: text on a terminal, nothing elsewhere)",
-    )
+    add_progress(parser)
     add("--json", action="store_true", help="print the result as JSON")
 
 

@@ -7,13 +7,12 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
-from ..support.deadline import STYLES, with_pace
+from ..support.deadline import with_pace
 from ..support.files import PDF, REPORT
-from .error_units import add_errors_in, errors_in
-from .fit import add_joint
-from .order_lists import declared_shafts, orders_by_shaft
+from .options import add_errors_in, add_joint, add_orders, add_progress, errors_in
 from .paths import Input, Output
 from .robots import add_robot, each_joint, joints_asked
+from .values import declared_shafts, orders_by_shaft
 
 if TYPE_CHECKING:
     from .robots import JointAsked
@@ -40,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="say what this simulation gets wrong, and why",
     )
-    add("--orders", default="auto", help="auto (default: by evidence), 1-17, output:1-3;motor:1,2")
+    add_orders(parser)
     add_joint(parser)
     add_robot(parser)
     add("--title", help="heading of the report")
@@ -83,12 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="print it to a PDF too, by an installed browser",
     )
-    add(
-        "--progress",
-        choices=STYLES,
-        default="auto",
-        help="on stderr after one second (default: text on a terminal, nothing elsewhere)",
-    )
+    add_progress(parser)
     add("--json", action="store_true", help="print the report's numbers as JSON")
 
 

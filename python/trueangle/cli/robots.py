@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
-from typing import Any, TypeVar
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import ArgumentError, NoModelError, NotInvertibleError, RankError, TrueAngleError
 from ..support.display_units import ErrorsIn
 from .signal_options import signal_argument, signals_by_joint
 
-__all__ = ["JointAsked", "add_robot", "each_joint", "joints_asked", "robot_messages"]
+if TYPE_CHECKING:
+    from ..model.model import HarmonicModel
+
+__all__ = [
+    "JointAsked",
+    "add_robot",
+    "each_joint",
+    "joints_asked",
+    "robot_messages",
+    "save_models",
+]
 
 T = TypeVar("T")
 
@@ -170,11 +180,21 @@ def each_joint(
     return found, failed
 
 
+def save_models(
+    path: str, name: str, joints: list[JointAsked], models: Mapping[str, HarmonicModel]
+) -> None:
+    """One file of the models of a robot's joints, with the columns that each was fitted to."""
+    from ..model.robot import Robot
+
+    signals = {joint.name: joint.signals for joint in joints if joint.name in models}
+    Robot(dict(models), name=name, signals=signals).save(path)
+
+
 def robot_messages(
     title: str, ranking: list[Any], texts: dict[str, str], errors_in: ErrorsIn = "auto"
 ) -> str:
     """The ranking in front, and what is said of every joint after it."""
-    from ..reports.ranking import ranking_text
+    from ..reports.robot import ranking_text
 
     parts = [ranking_text(title, ranking, errors_in)]
     parts += [f"--- {joint} ---\n{text}" for joint, text in texts.items()]

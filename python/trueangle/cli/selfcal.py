@@ -8,11 +8,11 @@ import sys
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
-from .error_units import add_errors_in, errors_in
-from .order_lists import parse_orders
-from .paths import Input, Output
-from .robots import add_robot, each_joint, joints_asked
+from .options import add_errors_in, add_model_output, errors_in
+from .paths import Input
+from .robots import add_robot, each_joint, joints_asked, save_models
 from .signal_options import add_signals, reading
+from .values import parse_orders
 
 if TYPE_CHECKING:
     from ..selfcalibration import SelfCalibration
@@ -26,18 +26,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     from ..selfcalibration.calibrate import METHODS
     from ..selfcalibration.loop import LOOPS
-    from ..support.files import MODEL
 
     add = parser.add_argument
     add("logs", nargs="+", type=Input, metavar="LOGS", help="CSV or Parquet logs of the joint")
-    add(
-        "-o",
-        "--output",
-        required=True,
-        type=Output.of(MODEL),
-        metavar="MODEL",
-        help="model file to write",
-    )
+    add_model_output(parser)
     add(
         "--method",
         choices=METHODS,
@@ -98,15 +90,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
     """Calibrate every joint; one file of all models."""
-    from ..model.robot import Robot
 
     def work(joint: JointAsked) -> SelfCalibration:
         return _calibrated(joint.args)
 
     found, _ = each_joint(joints, work)
-    signals = {joint.name: joint.signals for joint in joints if joint.name in found}
-    models = {joint: result.model for joint, result in found.items()}
-    Robot(models, name=name, signals=signals).save(args.output)
+    save_models(args.output, name, joints, {joint: r.model for joint, r in found.items()})
     if args.json:
         plain = {joint: result.to_dict() for joint, result in found.items()}
         print(json.dumps({"model": args.output, "joints": plain}, allow_nan=False))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 
-from ..support.files import RUNS
-from .paths import Input, Output
+from .options import add_runs_output
+from .paths import Input
 
 HELP = "measure a simulated joint: calibration runs from a simulation file"
 EXAMPLE = "trueangle simulate joint.toml -o runs.csv --seed 1"
@@ -21,14 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="simulation file (TOML) with at least one [[run]]",
     )
-    add(
-        "-o",
-        "--output",
-        required=True,
-        type=Output.of(RUNS),
-        metavar="RUNS",
-        help="CSV file to write",
-    )
+    add_runs_output(parser)
     add("--seed", type=int, default=0, metavar="N", help="seed of the noise (default: 0)")
     add("--json", action="store_true", help="print what was written as JSON")
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -12,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from ..support.files import PAGE, PICTURE
-from .error_units import add_errors_in, errors_in
+from .options import add_errors_in, errors_in
 from .paths import Input, Output
 from .pictures import save_picture
 from .robotmodel import joint_asked
 from .robots import add_robot, joints_asked
 from .signal_options import add_signals, reading
+from .values import turns
 
 if TYPE_CHECKING:
     from ..model.model import HarmonicModel
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--every",
-        type=_turns,
+        type=turns,
         default=1.0,
         metavar="1turn",
         help="travel of a window, in turns of the output (default: 1turn)",
@@ -92,18 +92,6 @@ def _log(text: str) -> str:
     return text if text == "-" else Input(text)
 
 
-def _turns(text: str) -> float:
-    """``1turn``, ``5turns`` or ``0.5``."""
-    number = text.strip().removesuffix("s").removesuffix("turn").strip()
-    try:
-        value = float(number)
-    except ValueError:
-        value = math.nan
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"turns above zero, as 1turn, got {text!r}")
-    return value
-
-
 def run(args: argparse.Namespace) -> int:
     """Feed the windows, print each."""
     from ..monitoring.monitor import Monitor
@@ -121,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
     if not watched.windows:
         print("trueangle: warning: not one window ended", file=sys.stderr)
     if kept and args.plot is not None:
-        from ..plots.watchedwindows import watched_windows
+        from ..plots.controlcharts import watched_windows
 
         save_picture(watched_windows(kept, model.period, errors_in(args)), args.plot)
     if kept and args.report is not None:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
-from ..model.records import FitRecord
+from ..model.records import FitRecord, Provenance, TableRecord
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.files import Kind
+from ..support.files import Kind, Source, sha256_of
 from .pattern import TurnPattern
 from .reading import failed
 from .target import CommentBlock, Made, Option, TablePart, Target
@@ -111,7 +111,6 @@ class Admt4000(Target):
                 zero=pattern.zero + mean,
             ),
             floor_arcsec=math.sqrt(len(codes) / 24.0) * step * ARCSEC_PER_TURN,
-            step=step,
             zero_deg=(pattern.zero + mean) * 360.0,
             notes=tuple(notes),
         )
@@ -130,8 +129,6 @@ class Admt4000(Target):
             bits = REGISTERS[order][2]
             sizes.append((codes[order]["MAG"] & ((1 << bits) - 1)) * _MAGNITUDE / _CORDIC)
             phases.append(math.radians((codes[order]["PH"] & 0xFFF) * _PHASE))
-        from ..model.records import Provenance, TableRecord
-        from ..support.files import Source, sha256_of
 
         step = _MAGNITUDE / _CORDIC
         std = step / math.sqrt(12.0)

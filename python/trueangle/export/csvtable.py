@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,7 +25,6 @@ __all__ = ["CsvTable"]
 
 #: Distance of two printed numbers, in degrees: 9 decimals.
 _LAST_DIGIT = 1e-9
-_SIZES = (36, 45, 60, 72, 90, 120, 180, 240, 360, 720, 1440, 3600, 7200, 36000)
 
 
 class CsvTable(Target):
@@ -35,13 +34,11 @@ class CsvTable(Target):
     what = "lines of indicated_deg,correction_deg to interpolate between"
     kind: ClassVar[Kind] = Kind("a table of corrections (CSV)", (".csv",))
     sign = "subtract"
+    tried = (36, 45, 60, 72, 90, 120, 180, 240, 360, 720, 1440, 3600, 7200, 36000)
     options = {
         "bits": Option(int, 20, "2^bits readings are evaluated, and more where entries are many"),
         "entries": Option(int, 360, "lines to a turn (the first one is repeated at 360)"),
     }
-
-    def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
-        return _SIZES
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         entries = options["entries"]
@@ -69,7 +66,6 @@ class CsvTable(Target):
                 pattern, _interpolated(values), zero=pattern.zero, continuous=True
             ),
             floor_arcsec=_LAST_DIGIT / math.sqrt(18.0) / 360.0 * ARCSEC_PER_TURN,
-            step=_LAST_DIGIT / 360.0,
             zero_deg=pattern.zero * 360.0,
             bits=enough_bits(options["bits"], entries),
         )

@@ -23,15 +23,15 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.text import model_text
 from ..support.files import Kind
-from .fmifunctions import fmi_functions
-from .fmudescription import (
+from .fmufiles import (
     IDENTIFIER,
     Variable,
     build_description,
+    fmi_functions,
+    fmu_source,
     model_description,
     variables_of,
 )
-from .fmusource import fmu_source
 from .pattern import TurnPattern
 from .proof import Proof
 from .reading import failed
@@ -112,7 +112,6 @@ class Fmu(Target):
                 continuous=True,
             ),
             floor_arcsec=0.0,
-            step=2.0**-52,
             lost=list,
             notes=tuple(notes),
             bits=12,
@@ -150,8 +149,8 @@ def _source(
         f"{fmi}.0; angles in radians.",
     ]
     head = "/*\n" + "\n".join(header.comment(" * ", *own)) + "\n */\n"
-    bare = fmu_source(model, variables, sensor, "", head)
-    return fmu_source(model, variables, sensor, fmi_functions(fmi, _token(bare + fmi)), head)
+    bare = fmu_source(model, variables, sensor, head)
+    return bare + fmi_functions(fmi, _token(bare + fmi))
 
 
 def _packed(

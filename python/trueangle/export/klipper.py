@@ -103,7 +103,6 @@ class Klipper(Target):
             part=TablePart.at_readings(pattern, _device(knots), zero=-zero),
             # Knots and results are whole counts.
             floor_arcsec=math.sqrt(1.0 / 18.0 + 1.0 / 12.0) / TURN * ARCSEC_PER_TURN,
-            step=1.0 / TURN,
             zero_deg=-zero * 360.0,
             notes=(
                 f"replaces the values of calibrate in [{section}]; the other keys of the section "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,7 +25,6 @@ __all__ = ["LinuxCnc"]
 MOST = 256
 #: Decimals of a degree that are printed.
 _DECIMALS = 7
-_SIZES = (12, 18, 24, 36, 48, 60, 72, 90, 120, 180, 240)
 
 
 class LinuxCnc(Target):
@@ -36,6 +35,7 @@ class LinuxCnc(Target):
     kind: ClassVar[Kind] = Kind("a compensation file of LinuxCNC", (".comp", ".txt", ".dat"))
     sign = "add"
     argument = "reference"
+    tried = (12, 18, 24, 36, 48, 60, 72, 90, 120, 180, 240)
     takes_direction = True
     unknown = (
         "BACKLASH of the joint is ignored where a COMP_FILE is given; outside the table the first "
@@ -47,9 +47,6 @@ class LinuxCnc(Target):
         **ENDS,
         "bits": POSITIONS,
     }
-
-    def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
-        return _SIZES
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         travel = Travel.of(pattern, self.name, options, MOST)
@@ -76,7 +73,6 @@ class LinuxCnc(Target):
             bytes=24 * len(forward),
             part=travel.part(pattern, forward / 360.0, reverse / 360.0),
             floor_arcsec=line_floor(step),
-            step=step,
             zero_deg=pattern.zero * 360.0,
             bits=enough_bits(options["bits"], len(forward)),
             lost=lambda: travel.lost(pattern),

@@ -13,7 +13,8 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.files import Kind, read_whole
-from .oneturn import longest_array, rows
+from .codetext import rows
+from .oneturn import longest_array
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import failed, sampled_model
@@ -77,7 +78,6 @@ class Mechaduino(Target):
             bytes=4 * ENTRIES,
             part=TablePart.at_readings(pattern, _device(table), zero=pattern.zero + zero),
             floor_arcsec=step / math.sqrt(12.0) * ARCSEC_PER_TURN,
-            step=step,
             zero_deg=(pattern.zero + zero) * 360.0,
             notes=tuple(notes),
             bits=_BITS,

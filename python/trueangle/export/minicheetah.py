@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from ..model.model import HarmonicModel
 from ..support.files import Kind
-from .oneturn import rows
+from .codetext import rows
 from .pattern import TurnPattern
 from .reading import failed
 from .target import CommentBlock, Made, Option

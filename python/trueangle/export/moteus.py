@@ -73,7 +73,6 @@ class Moteus(Target):
                 pattern, *_device(table, scale, options["bits"]), zero=pattern.zero
             ),
             floor_arcsec=line_floor(step),
-            step=step,
             zero_deg=pattern.zero * 360.0,
             notes=(
                 "the reading is that of the source with its offset and sign applied, in its own "

@@ -121,7 +121,6 @@ class MuJoCo(Target):
                 pattern, lambda places: pattern.taken_off(places / 2.0**32), zero=0.0
             ),
             floor_arcsec=0.0,
-            step=0.0,
             bits=12,
             lost=list,
         )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from .knots import linear_knots
 from .pattern import TurnPattern
 from .reading import failed
 
-__all__ = ["line_floor", "longest_array", "one_turn_knots", "rows", "without_mean"]
+__all__ = ["line_floor", "longest_array", "one_turn_knots", "without_mean"]
 
 Array = NDArray[np.float64]
 
@@ -45,11 +44,6 @@ def without_mean(knots: Array, pattern: TurnPattern) -> tuple[Array, float]:
 def line_floor(step: float) -> float:
     """Arcsec rms between two rounded numbers: two thirds of the variance of each."""
     return step / math.sqrt(18.0) * ARCSEC_PER_TURN
-
-
-def rows(values: Sequence[str], width: int = 8, lead: str = "    ") -> str:
-    """Numbers in lines, separated by commas."""
-    return ",\n".join(lead + ", ".join(values[i : i + width]) for i in range(0, len(values), width))
 
 
 def longest_array(text: str, path: str, name: str) -> tuple[Array, int, int]:

@@ -109,7 +109,6 @@ class Pmac(Target):
             bytes=3 * entries,
             part=travel.part(pattern, printed, printed),
             floor_arcsec=line_floor(step),
-            step=step,
             zero_deg=(pattern.zero + first) * 360.0,
             bits=enough_bits(options["bits"], entries),
             lost=lambda: travel.lost(pattern),

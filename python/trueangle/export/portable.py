@@ -91,7 +91,6 @@ class PortableTarget(Target):
             bytes=sum(table.bytes for table in chain.tables),
             part=_part(chain, pattern, floating),
             floor_arcsec=math.hypot(*(table.floor_arcsec for table in chain.tables), 0.0),
-            step=1.0 / TURN,
             lost=lambda: _lost(chain, pattern),
             notes=tuple(notes),
             tables=tuple(

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..errors import FileError, NotInvertibleError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
-from ..model.records import FitRecord
+from ..model.records import FitRecord, Provenance, TableRecord
+from ..support.files import Source, sha256_of
 from .chain import Chain
 from .inversion import inverse_rising
 from .proof import Correction
@@ -163,8 +164,6 @@ def _model(
         variances[0] += sigma**2 / table.entries
         residual = math.hypot(residual, sigma)
         samples += table.entries
-    from ..model.records import Provenance, TableRecord
-    from ..support.files import Source, sha256_of
 
     model = HarmonicModel(
         tuple(shafts),

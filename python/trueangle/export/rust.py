@@ -11,6 +11,7 @@ import trueangle._core as _core
 
 from ..support.files import Kind
 from .chain import Chain, source_identifier
+from .codetext import code_parts, filled, float_literal, rows
 from .portable import PortableTarget, self_test, table_lines
 from .runtimeterms import RunTimeTerms
 from .ruststep import rust_step
@@ -20,7 +21,6 @@ from .target import CommentBlock
 __all__ = ["RustModule"]
 
 _TYPES = {"q15": "i16", "q31": "i32", "f32": "f32"}
-_ENDINGS = {"q15": "i16", "q31": "i32", "f32": "f32"}
 
 
 class RustModule(PortableTarget):
@@ -35,7 +35,7 @@ class RustModule(PortableTarget):
         parts = [_comment(chain, terms, header)]
         parts += [_table(table) for table in chain.tables]
         if chain.whole:
-            parts.append(_corrected(chain))
+            parts.append(_part("correct"))
         parts += [_unwrapped(chain), _self_test(chain)]
         if terms is not None:
             whole = chain.whole and terms.whole
@@ -58,68 +58,48 @@ def _comment(chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> 
     return "\n".join(header.comment("//! ", *own)) + "\n"
 
 
+def _part(part: str, **values: object) -> str:
+    return filled(code_parts("module.rs")[part], **values)
+
+
 def _table(table: Table) -> str:
     name = source_identifier(table.shaft)
     # An ending of its own: no shaft has the name of another constant.
     knots = f"{name.upper()}_KNOTS"
     values = np.asarray(table.knots)
     kind = _TYPES[table.number]
-    element = kind if values.ndim == 1 else f"[{kind}; 2]"
-    rows = [_element(value, table.number) for value in values]
-    width = 8 if values.ndim == 1 else 4
-    lines = ",\n".join("    " + ", ".join(rows[i : i + width]) for i in range(0, len(rows), width))
     shift = f", {table.shift}" if table.number == "q15" else ""
-    function = f"{table.method}_{_ENDINGS[table.number]}"
-    call = f"{function}(&{knots}, {table.bits}{shift}, angle)"
+    call = f"{table.method}_{kind}(&{knots}, {table.bits}{shift}, angle)"
     if table.number == "f32":
         call = f"({call} * {float(PER_RADIAN):.1f}) as i32"
-    return f"""\
-#[rustfmt::skip]
-const {knots}: [{element}; {len(rows)}] = [
-{lines},
-];
-
-/// Subtract this, at an angle of the shaft ({table.cycles:g} cycles per output turn).
-#[inline]
-pub fn {name}_correction(angle: u32) -> i32 {{
-    {call}
-}}
-"""
+    return _part(
+        "table",
+        knots=knots,
+        element=kind if values.ndim == 1 else f"[{kind}; 2]",
+        count=len(values),
+        rows=rows([_element(v, table.number) for v in values], 8 if values.ndim == 1 else 4),
+        name=name,
+        cycles=f"{table.cycles:g}",
+        call=call,
+    )
 
 
 def _element(value: Any, number: str) -> str:
     if np.ndim(value):
         return "[" + ", ".join(_element(part, number) for part in value) + "]"
-    if number != "f32":
-        return str(int(value))
-    text = f"{float(np.float32(value)):.9g}"
-    return text if any(c in text for c in ".e") else text + ".0"
+    return float_literal(float(np.float32(value))) if number == "f32" else str(int(value))
 
 
-def _steps(chain: Chain) -> list[str]:
-    """What each table takes off ``left``, an expression in it and in ``start``."""
-    steps = []
-    for table in chain.tables:
-        at, name = "start" if chain.at_indicated else "left", source_identifier(table.shaft)
-        if table.cycles != int(table.cycles):
-            at = f"{name}_place({at})"
-        else:
-            at = f"({at} as u32)" if table.cycles != 1 else f"{at} as u32"
-            if table.cycles != 1:
-                at += f".wrapping_mul({int(table.cycles)})"
-        steps.append(f"{name}_correction({at})")
-    return steps
-
-
-def _corrected(chain: Chain) -> str:
-    lines = [
-        "/// The true angle behind an indicated one.",
-        "#[inline]",
-        "pub fn correct(indicated: u32) -> u32 {",
-        "    correct_unwrapped(0, indicated) as u32",
-        "}",
-    ]
-    return "\n".join([*lines, ""])
+def _step(chain: Chain, table: Table) -> str:
+    """What a table takes off ``left``, an expression in it and in ``start``."""
+    at, name = "start" if chain.at_indicated else "left", source_identifier(table.shaft)
+    if table.cycles != int(table.cycles):
+        at = f"{name}_place({at})"
+    elif table.cycles != 1:
+        at = f"({at} as u32).wrapping_mul({int(table.cycles)})"
+    else:
+        at = f"{at} as u32"
+    return f"{name}_correction({at})"
 
 
 def _unwrapped(chain: Chain) -> str:
@@ -127,51 +107,21 @@ def _unwrapped(chain: Chain) -> str:
     for table in chain.tables:
         if table.cycles != int(table.cycles):
             turns, fraction = table.ratio
-            places.append(
-                f"""\
-/// The angle of a shaft that makes {table.cycles:.17g} turns per output turn.
-#[inline]
-pub fn {source_identifier(table.shaft)}_place(output: i64) -> u32 {{
-    let turns = ((output >> 32) as u64).wrapping_mul({turns});
-    let angle = u64::from(output as u32).wrapping_mul({fraction});
-    (turns.wrapping_add(angle) >> 32) as u32
-}}
-
-"""
-            )
-    lines = [
-        "/// The true angle with its whole turns, in 2^-32 turns, behind an indicated one.",
-        "#[inline]",
-        "pub fn correct_unwrapped(turns: i32, indicated: u32) -> i64 {",
-        f"    let start = (i64::from(turns) << 32) + i64::from(indicated) - ({chain.zero});",
-        "    let left = start;",
-        *(f"    let left = left - i64::from({step});" for step in _steps(chain)),
-        "    left",
-        "}",
-        "",
-    ]
-    return "".join(places) + "\n".join(lines)
+            name, cycles = source_identifier(table.shaft), f"{table.cycles:.17g}"
+            place = _part("place", cycles=cycles, name=name, turns=turns, fraction=fraction)
+            places.append(place)
+    steps = [f"let left = left - i64::from({_step(chain, table)});" for table in chain.tables]
+    corrected = _part("correct unwrapped", zero=chain.zero, steps="\n".join(steps))
+    return "\n".join([*places, corrected])
 
 
 def _self_test(chain: Chain) -> str:
     tests = self_test(chain)
     if chain.whole:
-        pairs = ",\n".join(f"    ({a}, {b})" for _, a, b in tests)
-        return f"""\
-/// Readings and what `correct` makes of them.
-#[rustfmt::skip]
-pub const SELF_TEST: [(u32, u32); 8] = [
-{pairs},
-];
-"""
-    triples = ",\n".join(f"    ({turn}, {a}, {b})" for turn, a, b in tests)
-    return f"""\
-/// Turns and readings, and the angle that `correct_unwrapped` makes of them.
-#[rustfmt::skip]
-pub const SELF_TEST: [(i32, u32, u32); 8] = [
-{triples},
-];
-"""
+        pairs = ",\n".join(f"({a}, {b})" for _, a, b in tests)
+        return _part("self test", tests=f"{pairs},")
+    triples = ",\n".join(f"({turn}, {a}, {b})" for turn, a, b in tests)
+    return _part("self test with turns", tests=f"{triples},")
 
 
 def _different(tables: tuple[Table, ...]) -> list[Table]:
@@ -181,7 +131,7 @@ def _different(tables: tuple[Table, ...]) -> list[Table]:
 def _arithmetic(table: Table) -> str:
     """The functions this table needs, as they stand in the core."""
     source = _core.table_source(table.method)
-    wanted = {f"{table.method}_{_ENDINGS[table.number]}"}
+    wanted = {f"{table.method}_{_TYPES[table.number]}"}
     if table.method == "cubic" and table.number != "f32":
         wanted |= {"scaled", "between"}
     found = re.findall(

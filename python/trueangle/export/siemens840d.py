@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,7 +24,6 @@ __all__ = ["Siemens840d"]
 #: MD38000 MM_ENC_COMP_MAX_POINTS.
 MOST = 5000
 _DECIMALS = 7
-_SIZES = (36, 45, 60, 72, 90, 120, 144, 180, 240, 360, 480, 720, 1440)
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _POINT = re.compile(rf"^\$AA_ENC_COMP\[(\d+),(\d+),(\w+)\]\s*=\s*({_NUMBER})$")
 _SETTING = re.compile(rf"^\$AA_ENC_COMP_(\w+)\[(\d+),(\w+)\]\s*=\s*({_NUMBER})$")
@@ -37,6 +36,7 @@ class Siemens840d(Target):
     what = "the $AA_ENC_COMP table of a rotary axis of a SINUMERIK"
     kind: ClassVar[Kind] = Kind("a compensation file of SINUMERIK", (".ini", ".mpf", ".spf"))
     sign = "add"
+    tried = (36, 45, 60, 72, 90, 120, 144, 180, 240, 360, 480, 720, 1440)
     unknown = (
         "written by the maker's documentation and not run on the device: make the check in the "
         "file before the axis works with it"
@@ -48,9 +48,6 @@ class Siemens840d(Target):
         "encoder": Option(("0", "1"), "0", "measuring system of the axis, from 0"),
         "bits": POSITIONS,
     }
-
-    def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
-        return _SIZES
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         travel = Travel.of(pattern, self.name, options, MOST, pattern.correction)
@@ -94,7 +91,6 @@ class Siemens840d(Target):
             bytes=8 * len(values),
             part=travel.at_readings(pattern, -values / 360.0),
             floor_arcsec=line_floor(step),
-            step=step,
             zero_deg=pattern.zero * 360.0,
             bits=enough_bits(options["bits"], len(values)),
             lost=lambda: travel.lost(pattern),

@@ -15,8 +15,9 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.files import Kind
+from .codetext import rows
 from .knots import rounded_knots
-from .oneturn import line_floor, longest_array, one_turn_knots, rows, without_mean
+from .oneturn import line_floor, longest_array, one_turn_knots, without_mean
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import failed, sampled_model
@@ -99,7 +100,6 @@ class SimpleFoc(Target):
             floor_arcsec=line_floor(step)
             if variant == "minus-u16"
             else step / math.sqrt(12.0) * ARCSEC_PER_TURN,
-            step=step,
             zero_deg=zero_deg,
             notes=(
                 f"variant {variant}: {VARIANTS[variant]}"

@@ -106,12 +106,10 @@ class Made:
         The file's content, which states what was proven.
     entries, bytes : int
         Numbers of the table, and the memory they take on the target.
-    part : Part
+    part : TablePart
         What is proven: how far the corrected angle is off.
     floor_arcsec : float
         rms that the number format alone leaves.
-    step : float
-        Distance of two numbers of the format, in turns.
     zero_deg : float
         A constant by which the corrected angle is larger: left to the target's own zero.
     lost : callable, optional
@@ -130,7 +128,6 @@ class Made:
     bytes: int
     part: TablePart
     floor_arcsec: float
-    step: float
     zero_deg: float = 0.0
     lost: Callable[[], list[dict[str, float]]] | None = None
     notes: tuple[str, ...] = ()
@@ -166,6 +163,9 @@ class Target(ABC):
     argument: ClassVar[str] = "indicated"
     unknown: ClassVar[str] = ""
     options: ClassVar[Mapping[str, Option]] = {}
+    #: Entries that are tried for ``max_arcsec``, where options do not matter.
+    tried: ClassVar[Sequence[int]] = ()
+
     #: Options that name files: read, never written.
     files: ClassVar[tuple[str, ...]] = ()
 
@@ -217,7 +217,7 @@ class Target(ABC):
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
         """Entries to try for ``max_arcsec``, increasing; none where the size is fixed."""
-        return ()
+        return self.tried
 
     def finer(self, options: Mapping[str, Any]) -> Mapping[str, Any] | None:
         """Options to try where no size keeps ``max_arcsec``."""

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.files import Kind
+from .codetext import rows
 from .knots import rounded_knots
-from .oneturn import line_floor, longest_array, one_turn_knots, rows
+from .oneturn import line_floor, longest_array, one_turn_knots
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import failed, sampled_model
@@ -65,7 +66,6 @@ class Tinymovr(Target):
             part=TablePart.at_readings(pattern, _device(table, bits), zero=pattern.zero),
             # Whole ticks: of the entries, and of what is between them.
             floor_arcsec=line_floor(1.0 / ticks) * 2.5**0.5,
-            step=1.0 / ticks,
             zero_deg=pattern.zero * 360.0,
             bits=bits,
         )

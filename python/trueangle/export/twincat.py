@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -30,7 +30,6 @@ MOST = 1500
 #: Units of 0.0001 deg in a turn.
 TENTHS = 3_600_000
 _DECIMALS = 9
-_SIZES = (36, 45, 60, 72, 90, 120, 144, 180, 240, 360, 480, 720, 900, 1200, 1440)
 _LINE = re.compile(r"^\s*kw\.ssfk\.(\w+)(?:\[(\d+)\]\.(\w+))?\s+(-?\d+)")
 
 
@@ -42,6 +41,7 @@ class TwinCat(Target):
     kind: ClassVar[Kind] = Kind("a compensation list of TwinCAT", (".lis", ".txt", ".csv"))
     sign = "subtract"
     argument = "reference"
+    tried = (36, 45, 60, 72, 90, 120, 144, 180, 240, 360, 480, 720, 900, 1200, 1440)
     takes_direction = True
     unknown = (
         "the format is checked against Beckhoff's documentation, not against a control: look at "
@@ -53,9 +53,6 @@ class TwinCat(Target):
         **ENDS,
         "bits": POSITIONS,
     }
-
-    def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
-        return _SIZES
 
     def sign_of(self, options: Mapping[str, Any]) -> str:
         return "add" if options["variant"] == "nc" else "subtract"
@@ -101,7 +98,6 @@ class TwinCat(Target):
             bytes=8 * len(values[0]),
             part=travel.part(pattern, *(-v / TENTHS for v in values)),
             floor_arcsec=line_floor(step),
-            step=step,
             zero_deg=pattern.zero * 360.0,
             lost=lambda: travel.lost(pattern),
             notes=("switch it on by lr_param.ssfk 1 of the axis",),
@@ -125,7 +121,6 @@ class TwinCat(Target):
             bytes=16 * len(travel.nominal),
             part=travel.part(pattern, *(v / 360.0 for v in columns)),
             floor_arcsec=line_floor(step),
-            step=step,
             zero_deg=pattern.zero * 360.0,
             lost=lambda: travel.lost(pattern),
             notes=(

@@ -1,6 +1,6 @@
 """Pictures of runs, fits, order selections, diagnoses and plans.
 
-One file a picture. Every function draws into ``ax`` (a new one when not given) and
+Every function draws into ``ax`` (a new one when not given) and
 returns it, but `detection`, `fleet_overview`, `fleet_patterns`, `fleet_history` and
 `watched_windows`, which make a figure; `text_alternative` says in a sentence what
 it shows. Angles are in degrees, errors in arcsec, or in degrees where one reaches a
@@ -11,23 +11,18 @@ matplotlib is imported at the first picture.
 from __future__ import annotations
 
 from .amplitudespectrum import amplitude_spectrum
-from .beforeafter import before_after
 from .canvas import text_alternative
+from .controlcharts import fleet_history, watched_windows
 from .detection import detection
-from .errorcurves import error_curves
-from .errorleft import error_left
-from .fleetoverview import fleet_overview
-from .fleetpictures import fleet_history, fleet_patterns, fleet_phasors, fleet_sizes
-from .gains import gains
+from .diagnosispictures import error_left, gains
+from .drawnreadings import before_after, error_curves, measured_and_simulated, residuals
+from .fleetpictures import fleet_overview, fleet_patterns, fleet_phasors, fleet_sizes
 from .kinds import drawn as drawn
 from .kinds import fit_plot
 from .kinds import thumbnail as thumbnail
-from .measuredsimulated import measured_and_simulated
 from .modelerror import model_error
 from .phasesoverruns import phases_over_runs
 from .planpictures import plan_factors, plan_positions
-from .residualpictures import residuals
-from .watchedwindows import watched_windows
 
 __all__ = [
     "amplitude_spectrum",

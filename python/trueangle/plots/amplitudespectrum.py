@@ -51,9 +51,8 @@ def amplitude_spectrum(
     result : OrderSelection or FitResult
         A fit that selected its orders shows that selection.
     ax : matplotlib Axes, optional
-    errors_in : str or float
-        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
-        are that large.
+    errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+        Unit of the errors, as for summaries.
 
     Returns
     -------

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from . import palette
-from .canvas import described, grid, legend, turn_axis
+from .canvas import grid, turn_axis
 from .curves import CONFIDENCE, Curve, curve_envelope, thinned_points
-from .panel import Cloud, Panel, PanelPicture
+from .panel import Cloud, Panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_clouds", "draw_curve", "draw_panel", "finish"]
+__all__ = ["draw_clouds", "draw_curve", "draw_panel"]
 
 #: Readings drawn in one picture: more do not show.
 _MOST: Final = 24_000
@@ -37,12 +37,6 @@ def draw_panel(ax: Axes, panel: Panel) -> None:
     grid(ax)
     ax.set_xlabel(panel.x)
     ax.set_ylabel(panel.y)
-
-
-def finish(ax: Axes, picture: PanelPicture) -> Axes:
-    """The legend and the sentence of a picture."""
-    legend(ax)
-    return described(ax, picture.told)
 
 
 def draw_clouds(ax: Axes, clouds: Sequence[Cloud]) -> None:

@@ -1,9 +1,9 @@
-"""A fleet in pictures: phasors of an order, patterns, sizes with their limit, a unit's months."""
+"""A fleet in pictures: phasors of an order, patterns, sizes with their limit, all at a glance."""
 
 from __future__ import annotations
 
 import math
-from datetime import datetime
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -15,27 +15,38 @@ from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.suggestions import check_choice
 from . import palette
 from .canvas import described, grid, legend, new_axes, new_figure, turn_axis
+from .controlcharts import fleet_history
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..fleets.result import Fleet
-    from ..fleets.unit import FleetUnit
+    from ..fleets.result import CommonOrder, Fleet
+    from ..fleets.unit import FleetUnit, UnitOrder
 
-__all__ = ["fleet_history", "fleet_patterns", "fleet_phasors", "fleet_sizes"]
+__all__ = [
+    "RADIUS_OF_95",
+    "fleet_overview",
+    "fleet_patterns",
+    "fleet_phasors",
+    "fleet_plot",
+    "fleet_sizes",
+    "turn_pattern",
+]
+
+Array = NDArray[np.float64]
 
 #: Radius that holds 95 % of a plane normal distribution, in standard deviations of a coordinate.
-_RADIUS: Final = math.sqrt(-2.0 * math.log(0.05))
+RADIUS_OF_95: Final = math.sqrt(-2.0 * math.log(0.05))
+
+#: Orders whose phasors an overview has.
+_ORDERS: Final = 3
 
 #: Units whose patterns are drawn at most, those that need attention first, and in a row.
 _PATTERNS: Final = 20
 _IN_A_ROW: Final = 5
 
-#: Limits beyond which a chart has a scale of logarithms.
-_FAR: Final = 10.0
-
 #: Verdicts in two kinds: their names, colours and marks.
-_KINDS: Final = (("fine", palette.AFTER, "o"), ("not fine", palette.WARNING, "D"))
+_VERDICTS: Final = (("fine", palette.AFTER, "o"), ("not fine", palette.WARNING, "D"))
 
 
 def _of_kind(fleet: Fleet, kind: str) -> list[FleetUnit]:
@@ -82,7 +93,7 @@ def fleet_phasors(
     shown, size = _shown(fleet, largest, errors_in)
     polar: Any = new_axes(ax, polar=True)
     turn = np.linspace(0.0, 2.0 * math.pi, 361)
-    circle = complex(common.sine, common.cosine) + _RADIUS * between.std * np.exp(1j * turn)
+    circle = complex(common.sine, common.cosine) + RADIUS_OF_95 * between.std * np.exp(1j * turn)
     polar.plot(
         np.angle(circle),
         size * np.abs(circle),
@@ -90,7 +101,7 @@ def fleet_phasors(
         linestyle="--",
         label="95 % of units",
     )
-    for kind, colour, marker in _KINDS:
+    for kind, colour, marker in _VERDICTS:
         units = _of_kind(fleet, kind)
         phase = np.radians([unit.orders[at].phase_deg for unit in units])
         amplitude = size * np.array([unit.orders[at].amplitude for unit in units])
@@ -137,7 +148,7 @@ def fleet_sizes(fleet: Fleet, ax: Axes | None = None, errors_in: ErrorsIn = "aut
     if math.isfinite(bound.peak_to_peak):
         label = f"{100 * bound.share:g} % of units, {100 * bound.confidence:g} % confidence"
         ax.axhspan(0.0, size * bound.peak_to_peak, color=palette.MUTED, alpha=0.18, label=label)
-    for kind, colour, marker in _KINDS:
+    for kind, colour, marker in _VERDICTS:
         rows = [
             (i, u) for i, u in enumerate(ranked, 1) if (u.verdict == "fine") == (kind == "fine")
         ]
@@ -181,13 +192,13 @@ def fleet_patterns(fleet: Fleet, errors_in: ErrorsIn = "auto", most: int = _PATT
     figure, axes = new_figure(rows, columns, 2.1 * columns + 0.6, 1.6 * rows + 0.6)
     highest = max(fleet.orders, default=1.0)
     angle = np.linspace(0.0, 360.0, max(361, math.ceil(8.0 * highest) + 1))
-    common = _curve([(row.order, row.amplitude, row.phase_deg) for row in fleet.common], angle)
+    common = turn_pattern(fleet.common, angle)
     for i, ax in enumerate(axes):
         if i >= len(units):
             ax.set_visible(False)
             continue
         unit = units[i]
-        own = _curve([(row.order, row.amplitude, row.phase_deg) for row in unit.orders], angle)
+        own = turn_pattern(unit.orders, angle)
         fine = unit.verdict == "fine"
         ax.plot(angle, size * common, color=palette.MUTED, linewidth=0.9)
         ax.plot(angle, size * own, color=palette.AFTER if fine else palette.WARNING)
@@ -206,61 +217,55 @@ def fleet_patterns(fleet: Fleet, errors_in: ErrorsIn = "auto", most: int = _PATT
     )
 
 
-def fleet_history(fleet: Fleet, unit: str, errors_in: ErrorsIn = "auto") -> Axes:
-    """One unit's control charts: T^2 and cumulative sum of every order on each further date.
+def fleet_overview(fleet: Fleet, errors_in: ErrorsIn = "auto") -> Axes:
+    """Phasors of the orders in which the units differ most, and sizes with the tolerance band.
 
     Parameters
     ----------
     fleet : Fleet
-    unit : str
     errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
-        Unused: the charts have no unit.
 
     Returns
     -------
     matplotlib Axes
-        The upper of a new figure's two.
-
-    Raises
-    ------
-    ArgumentError
-        A unit that was not calibrated again.
+        The first of a new figure's: the sizes.
     """
-    rows = [row for row in fleet.history if row.unit == unit]
-    again = list(dict.fromkeys(row.unit for row in fleet.history))
-    if not rows:
-        check_choice("unit", unit, again or ["(none was calibrated again)"])
-    figure, (upper, lower) = new_figure(2, 1, 7.5, 5.5, sharey=False)
-    when: list[Any] = [datetime.fromisoformat(row.when) for row in rows]
-    for ax, name, limit, values in (
-        (upper, "$T^2$ against the first date", rows[-1].limit, [
-            [one.statistic for one in row.orders] for row in rows
-        ]),
-        (lower, "cumulative sum", rows[-1].cusum_limit, [
-            [one.cusum for one in row.orders] for row in rows
-        ]),
-    ):  # fmt: skip
-        for k, one in enumerate(rows[0].orders):
-            ax.plot(
-                when, [row[k] for row in values], color=palette.run_colour(k),
-                marker=palette.run_marker(k), label=f"order {one.order:g}",
-            )  # fmt: skip
-        ax.axhline(limit, color=palette.ink(ax), linestyle="--", linewidth=1.0, label="limit")
-        if max(map(max, values)) > _FAR * limit:
-            ax.set_yscale("symlog", linthresh=limit)
-        ax.set_ylim(bottom=0.0)
-        ax.set_ylabel(name)
-        grid(ax)
-    legend(upper)
-    figure.autofmt_xdate()
+    spread = np.argsort([-row.std for row in fleet.between], kind="stable")[:_ORDERS]
+    figure, (placeholder,) = new_figure(1, 1, 3.6 * len(spread), 7.2)
+    placeholder.remove()
+    layout = figure.add_gridspec(2, len(spread))
+    sizes = figure.add_subplot(layout[0, :])
+    fleet_sizes(fleet, ax=sizes, errors_in=errors_in)
+    for column, at in enumerate(spread):
+        polar: Any = figure.add_subplot(layout[1, column], projection="polar")
+        polar.tick_params(labelsize="small")
+        fleet_phasors(fleet, fleet.orders[int(at)], ax=polar, errors_in=errors_in)
+    odd = [unit.unit for unit in fleet.units if unit.verdict != "fine"]
     return described(
-        upper, f"Control charts of {unit} on {len(rows)} dates: {rows[-1].verdict} at the last."
+        sizes,
+        f"Sizes of {len(fleet.units)} units and phasors of the orders in which they differ most; "
+        + (f"not fine: {', '.join(odd[:8])}." if odd else "all are fine."),
     )
 
 
-def _curve(rows: list[tuple[float, float, float]], angle: NDArray[np.float64]) -> Any:
-    """The sum of orders, amplitudes and phases over the angle, degrees."""
-    return sum(
-        (a * np.sin(np.radians(order * angle + phase)) for order, a, phase in rows),
-        np.zeros_like(angle),
-    )
+_KINDS: dict[str, Any] = {
+    "overview": fleet_overview,
+    "patterns": fleet_patterns,
+    "phasors": fleet_phasors,
+    "sizes": fleet_sizes,
+    "history": fleet_history,
+}
+
+
+def fleet_plot(fleet: Fleet, kind: str = "overview", **options: Any) -> Axes:
+    """See `trueangle.Fleet.plot`."""
+    axes: Axes = _KINDS[check_choice("kind", kind, _KINDS)](fleet, **options)
+    return axes
+
+
+def turn_pattern(orders: Iterable[UnitOrder | CommonOrder], angle: Array) -> Array:
+    """The sum of a unit's orders, or of those that all share, over the angle in degrees."""
+    found = np.zeros_like(angle)
+    for row in orders:
+        found += row.amplitude * np.sin(np.radians(row.order * angle + row.phase_deg))
+    return found

@@ -30,9 +30,8 @@ def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsI
     ----------
     model : HarmonicModel
     ax : matplotlib Axes, optional
-    errors_in : str or float
-        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
-        are that large.
+    errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+        Unit of the errors, as for summaries.
 
     Returns
     -------

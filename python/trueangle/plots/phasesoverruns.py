@@ -40,9 +40,8 @@ def phases_over_runs(
     ax : matplotlib PolarAxes, optional
     most : int
         Draw only so many orders, the largest.
-    errors_in : str or float
-        Unit of the errors, as for summaries: ``"auto"`` is arcsec, or degrees where they
-        are that large.
+    errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+        Unit of the errors, as for summaries.
 
     Returns
     -------

@@ -1,10 +1,11 @@
-"""What the pictures of a diagnosis show: measured against simulated, what is left, gains."""
+"""What the pictures of a diagnosis show: measured and simulated, gains, what is left; its names."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -12,13 +13,26 @@ from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..support.display_units import ErrorUnit
 from .curves import Points, reference_degrees, run_label
-from .findingnames import finding_names
 
 if TYPE_CHECKING:
-    from ..diagnosis import Diagnosis
+    from ..diagnosis import Diagnosis, Finding
     from ..simulation import Simulation
 
-__all__ = ["ErrorLeft", "GainBar", "error_left_of", "gain_bars", "simulated_points"]
+__all__ = [
+    "ErrorLeft",
+    "GainBar",
+    "error_left_of",
+    "finding_names",
+    "gain_bars",
+    "simulated_points",
+]
+
+#: Names of line counts that a finding may have: parameter, and how it is told.
+_PLACES: Final = {
+    "order": "order {:g}",
+    "carrier": "around order {:g}",
+    "frequency_hz": "{:.3g} Hz",
+}
 
 
 @dataclass(frozen=True)
@@ -96,3 +110,41 @@ def gain_bars(diagnosis: Diagnosis) -> list[GainBar]:
         and gain.reducible_share is not None
         and gain.interval is not None
     ]
+
+
+def finding_names(diagnosis: Diagnosis) -> list[str]:
+    """Names of the findings, strongest first: the cause, and of what line or shaft it is.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from trueangle.reports.demo import demo_simulation
+    >>> believed = replace(demo_simulation(), harmonics=())
+    >>> runs = ta.simulate(demo_simulation(), seed=0)
+    >>> finding_names(ta.diagnose(runs, believed))[:2]
+    ['missing order: wave generator 2', 'missing order: motor 2']
+    """
+    names = [_name(finding) for finding in diagnosis.findings]
+    seen: Counter[str] = Counter()
+    found = []
+    for name in names:
+        seen[name] += 1
+        found.append(f"{name} ({seen[name]})" if seen[name] > 1 else name)
+    return found
+
+
+def _name(finding: Finding) -> str:
+    cause = finding.cause.replace("_", " ")
+    values = {name: quantity.value for name, quantity in finding.parameters.items()}
+    shaft, order = values.get("shaft"), values.get("order")
+    if isinstance(shaft, str):
+        shaft = shaft.replace("_", " ")
+        return f"{cause}: {shaft} {order:g}" if _is_number(order) else f"{cause}: {shaft}"
+    for name, words in _PLACES.items():
+        if _is_number(values.get(name)):
+            return f"{cause}: {words.format(values[name])}"
+    return cause
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float)

@@ -1,7 +1,7 @@
 """The report: one self-contained page from calibration runs, for people to hand on.
 
-Content (plain values, `content.py`), figures (`figures.py`) and the page (`page.py`) are
-apart: every number on the page is a value of the content, which the page carries as JSON.
+Content (plain values, put together by `composition.py`), figures (`figures.py`) and the page
+(`page.py`) are apart: every number on the page is a value of the content, which it carries as JSON.
 """
 
 from __future__ import annotations

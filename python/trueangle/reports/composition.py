@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sized
 from dataclasses import dataclass
-from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TypeAlias, Unpack, overload
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, Unpack, overload
 
 from ..errors import ArgumentError
-from ..fitting.heldout import HeldOut
 from ..model.model import HarmonicModel
-from ..plots.orderlines import order_lines
 from ..runs.checks.check import data_faults
 from ..runs.checks.record import records_of
 from ..runs.files import runs_of
@@ -21,25 +18,27 @@ from ..runs.source import Reading
 from ..support.blas import one_blas_thread
 from ..support.deadline import pace
 from ..support.display_units import ErrorsIn
-from ..support.files import CERTIFICATE, PDF, REPORT, check_output, written_atomically
+from ..support.files import CERTIFICATE, PDF, REPORT, Kind, check_output
 from ..support.kinds import of_type, told_kinds
-from ..support.plainresult import Shown
-from . import figures
 from .diagnosed import diagnosis_content
-from .figures import phase_figure
-from .fitted import extended_correction, fit_or_reason, gain_or_reason, known_gear, known_joint
-from .gained import gain_content
-from .linenames import LineNames, line_names
+from .figures import figures_of_diagnosis, figures_of_runs
+from .fitted import (
+    extended_correction,
+    fit_or_reason,
+    gain_content,
+    gain_or_reason,
+    known_gear,
+    known_joint,
+)
+from .linenames import line_names
 from .measured import measured_content
 from .modelled import given_model, model_content, order_content
-from .scale import Scale, error_scale
-from .spectrum import spectrum_figure
+from .page import Page, print_pdf, rendered_report
+from .scale import error_scale
 from .unknowns import unknown_content
 
 if TYPE_CHECKING:
     from ..certificate import Certificate, Identity
-    from ..fitting.orders.select import OrderSelection
-    from ..fitting.result import FitResult
     from ..simulation import Simulation
 
 __all__ = ["Report", "report"]
@@ -54,7 +53,7 @@ _STAGES = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Report(Shown):
+class Report(Page):
     """A report on calibration runs.
 
     Attributes
@@ -70,19 +69,14 @@ class Report(Shown):
     content: dict[str, Any]
     figures: dict[str, dict[str, Any]]
 
-    @cached_property
-    def html(self) -> str:
-        """One file that needs no network.
+    _kind: ClassVar[Kind] = REPORT
 
-        Raises
-        ------
-        MissingExtraError
-            jinja2 or bokeh is not installed.
-        """
-        from .page import rendered_report
+    def _written(self) -> str:
+        return rendered_report(self)
 
-        # Names of files may hold bytes that are no text.
-        return rendered_report(self).encode("utf-8", "replace").decode("utf-8")
+    @property
+    def _hashes(self) -> list[str]:
+        return [entry["sha256"] for entry in self.content["provenance"]["inputs"]]
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the page, complete or not at all; a name that ends with ``.pdf``, as PDF.
@@ -95,11 +89,8 @@ class Report(Shown):
         """
         if str(path).lower().endswith(PDF.endings):
             self.save_pdf(path)
-            return
-        check_output(path, REPORT)
-        html = self.html
-        with written_atomically(path, kind=REPORT, hashes=self._hashes) as file:
-            file.write(html)
+        else:
+            super().save(path)
 
     def save_pdf(self, path: str | PathLike[str], browser: str | None = None) -> None:
         """Print the page to a PDF by an installed browser (Chromium, Chrome, Edge).
@@ -109,14 +100,8 @@ class Report(Shown):
         ArgumentError
             No such browser is installed, or it failed.
         """
-        from .pdf import print_pdf
-
         check_output(path, PDF, hashes=self._hashes)
         print_pdf(self.html, path, browser)
-
-    @property
-    def _hashes(self) -> list[str]:
-        return [entry["sha256"] for entry in self.content["provenance"]["inputs"]]
 
 
 @overload
@@ -292,11 +277,11 @@ def report(
         "provenance": provenance(found, None if simulation is None else simulation.source),
     }
     at.at("drawing", 3, _STAGES)
-    drawn = _figures(found, fit, selection, held, name, scale)
+    drawn = figures_of_runs(found, fit, selection, held, name, scale)
     if simulation is not None and diagnosis is not None:
         content["diagnosis"] = diagnosis_content(diagnosis)
         content["extended"] = extended_correction(fit, diagnosis, found, simulation)
-        drawn |= figures.figures_of(diagnosis, found, simulation, scale)
+        drawn |= figures_of_diagnosis(diagnosis, found, simulation, scale)
     content["unknowns"] = unknown_content(found, selection, content["diagnosis"])
     made = Report(heading, content, drawn)
     if path is not None:
@@ -307,27 +292,3 @@ def report(
 def _title(runs: list[CalibrationRun]) -> str:
     files = sorted({run.source.file for run in runs if run.source is not None})
     return f"Angle error of {', '.join(files)}" if files else "Angle error of a joint"
-
-
-def _figures(
-    runs: list[CalibrationRun],
-    fit: FitResult | None,
-    selection: OrderSelection | None,
-    held: HeldOut | None,
-    name: LineNames,
-    scale: Scale,
-) -> dict[str, dict[str, Any]]:
-    """Every figure that this report has."""
-    made = {"errors": figures.errors_of_runs(fit, runs, scale)}
-    # At one place no order can be looked for.
-    if fit is not None or (selection is not None and order_lines(selection)):
-        made["spectrum"] = spectrum_figure(fit, selection, name, scale)
-    if held is not None:
-        made["before-after"] = figures.before_after_figure(held, runs, scale)
-    if fit is not None:
-        multiples = phase_figure(fit, name, scale)
-        if multiples is not None:
-            made["phases"] = multiples
-        for signal in figures.signals_present(fit):
-            made[f"residual-{signal}"] = figures.residual_figure(fit, signal, scale)
-    return made

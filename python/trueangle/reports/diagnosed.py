@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from ..plots.findingnames import finding_names
+from ..plots.simulatedcurves import finding_names
 from .numbers import shortened_list
 
 if TYPE_CHECKING:

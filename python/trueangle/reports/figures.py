@@ -12,6 +12,7 @@ from ..errors import RankError
 from ..fitting.phases import Phases, run_phases
 from ..plots import curves
 from ..plots.curves import Points
+from ..plots.orderlines import order_lines
 from ..plots.readingpictures import (
     before_after_picture,
     comparison_picture,
@@ -24,32 +25,47 @@ from .charts import Chart, Figure, chart_figure, chart_run_marker, css_run_colou
 from .linenames import LineNames
 from .panelcharts import panel_figure
 from .scale import Scale
+from .spectrum import spectrum_figure
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
     from ..fitting.heldout import HeldOut
+    from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
     from ..runs.run import CalibrationRun
     from ..simulation import Simulation
 
-__all__ = [
-    "before_after_figure",
-    "errors_of_runs",
-    "figures_of",
-    "phase_figure",
-    "residual_figure",
-    "signals_present",
-]
+__all__ = ["figures_of_diagnosis", "figures_of_runs"]
 
 Array = NDArray[np.float64]
 
 
-def errors_of_runs(fit: FitResult | None, runs: Sequence[CalibrationRun], scale: Scale) -> Figure:
-    """Measured error of every run with the model and its band."""
-    return panel_figure(errors_picture(runs, fit, scale.unit), scale)
+def figures_of_runs(
+    runs: Sequence[CalibrationRun],
+    fit: FitResult | None,
+    selection: OrderSelection | None,
+    held: HeldOut | None,
+    name: LineNames,
+    scale: Scale,
+) -> dict[str, Figure]:
+    """Figures of a report on runs: those that the fit, the selection and the gain allow."""
+    made = {"errors": panel_figure(errors_picture(runs, fit, scale.unit), scale)}
+    # At one place no order can be looked for.
+    if fit is not None or (selection is not None and order_lines(selection)):
+        made["spectrum"] = spectrum_figure(fit, selection, name, scale)
+    if held is not None:
+        made["before-after"] = _before_after(held, runs, scale)
+    if fit is not None:
+        multiples = _phases(fit, name, scale)
+        if multiples is not None:
+            made["phases"] = multiples
+        for signal in _signals_present(fit):
+            picture = residual_picture(fit, signal, scale.unit)
+            made[f"residual-{signal}"] = panel_figure(picture, scale)
+    return made
 
 
-def before_after_figure(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) -> Figure:
+def _before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) -> Figure:
     """Error of every held-out run before and after correction."""
     pairs = []
     for run in held.runs:
@@ -62,12 +78,7 @@ def before_after_figure(held: HeldOut, runs: Sequence[CalibrationRun], scale: Sc
     return panel_figure(before_after_picture(pairs, span, scale.unit), scale)
 
 
-def residual_figure(fit: FitResult, against: curves.Signal, scale: Scale) -> Figure:
-    """What the model leaves, against one signal."""
-    return panel_figure(residual_picture(fit, against, scale.unit), scale)
-
-
-def signals_present(fit: FitResult) -> list[curves.Signal]:
+def _signals_present(fit: FitResult) -> list[curves.Signal]:
     """Signals that the residual can be drawn against: those that any run has and that vary."""
     found = []
     for name in curves.SIGNALS:
@@ -88,7 +99,7 @@ _FLAT = 1e-3
 _HEIGHT_REM = 16.0
 
 
-def figures_of(
+def figures_of_diagnosis(
     diagnosis: Diagnosis,
     runs: Sequence[CalibrationRun],
     sim: Simulation,
@@ -142,7 +153,7 @@ _MOST: Final = 12
 _LEAST: Final = 15.0
 
 
-def phase_figure(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None:
+def _phases(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None:
     """Phase of every order in every run; None where no run holds them, or there is one."""
     try:
         found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST]

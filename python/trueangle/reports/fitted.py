@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from ..errors import NoModelError, TrueAngleError
 from ..fitting.heldout import HeldOut, hold_out
 from ..joint.declared import DeclaredShaft
 from ..joint.joint import Joint
+from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
-from .gained import extended_model
+from .measured import error_size
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -18,7 +20,14 @@ if TYPE_CHECKING:
     from ..fitting.result import FitResult
     from ..simulation import Simulation
 
-__all__ = ["extended_correction", "fit_or_reason", "gain_or_reason", "known_gear", "known_joint"]
+__all__ = [
+    "extended_correction",
+    "fit_or_reason",
+    "gain_content",
+    "gain_or_reason",
+    "known_gear",
+    "known_joint",
+]
 
 
 def known_joint(
@@ -87,6 +96,43 @@ def extended_correction(
 
     try:
         model = diagnosis.correction(fit.model, runs)
-        return extended_model(model, hold_out_extended(fit, sim)) if model.terms else None
+        return _extended_model(model, hold_out_extended(fit, sim)) if model.terms else None
     except TrueAngleError:
         return None
+
+
+def gain_content(held: HeldOut) -> dict[str, Any]:
+    """Error of held-out runs before and after correction, in all and run by run."""
+    interval = held.reduction_interval
+    return {
+        "before": error_size([run.before for run in held.runs]),
+        "after": error_size([run.after for run in held.runs]),
+        "reduction_percent": 100.0 * held.reduction,
+        "reduction_low_percent": None if interval is None else 100.0 * interval[0],
+        "reduction_high_percent": None if interval is None else 100.0 * interval[1],
+        "runs": [
+            {
+                "label": run.label,
+                "corrected": run.model is not None,
+                "before": error_size([run.before]),
+                "after": error_size([run.after]),
+            }
+            for run in held.runs
+        ],
+        "left_in": [{"label": label, "because": why} for label, why in held.left_in],
+    }
+
+
+def _extended_model(model: HarmonicModel, held: HeldOut) -> dict[str, Any]:
+    """Terms of the extended correction, and what they gain on held-out runs."""
+    terms = []
+    for term in model.terms:
+        values = {f.name: getattr(term, f.name) for f in fields(term)}
+        numbers = {name: v for name, v in values.items() if isinstance(v, int | float)}
+        terms.append(
+            {
+                "kind": term.kind,
+                "parameters": [{"name": k, "value": float(v)} for k, v in numbers.items()],
+            }
+        )
+    return {"terms": terms, "orders": [float(m) for m in model.orders], "gain": gain_content(held)}

@@ -8,11 +8,11 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..fleets.history import HistoryRow
 from ..fleets.result import BetweenOrder, CommonOrder, Fleet
-from ..fleets.unit import FleetUnit, UnitOrder
+from ..fleets.unit import FleetUnit
+from ..plots.fleetpictures import RADIUS_OF_95, turn_pattern
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from .chartaxes import ChartAxis
@@ -20,8 +20,6 @@ from .page import Page, filled_template
 from .stills import Mark, StillPicture, still
 
 __all__ = ["FleetReport"]
-
-Array = NDArray[np.float64]
 
 #: Units whose patterns are drawn at most, those that need something first.
 _DRAWN: Final = 24
@@ -31,8 +29,6 @@ _PHASORS: Final = 3
 _ANGLES: Final = (361, 8)
 #: Height, rem, at which a picture of a third of the page is as wide as high between its axes.
 _SQUARE: Final = 14.6
-#: Radius that holds 95 % of a plane normal distribution, in standard deviations of a coordinate.
-_RADIUS: Final = math.sqrt(-2.0 * math.log(0.05))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +59,7 @@ class FleetReport(Page):
     def _scale(self) -> float:
         return arcsec(1.0, self.fleet.period)
 
-    @cached_property
-    def html(self) -> str:
-        """One file that needs no network.
-
-        Raises
-        ------
-        MissingExtraError
-            jinja2 is not installed.
-        """
+    def _written(self) -> str:
         from markupsafe import Markup
 
         odd = [unit for unit in self.fleet.units if unit.verdict != "fine"]
@@ -143,7 +131,7 @@ class FleetReport(Page):
         across.at_angles(0.0, 360.0, 4)
         up = ChartAxis(f"error / {self.unit.name}", (-most or -1.0, most or 1.0))
         colour = "after" if unit.verdict == "fine" else "warning"
-        marks = [Mark("line", (angle, size * _curve(unit.orders, angle)), colour)]
+        marks = [Mark("line", (angle, size * turn_pattern(unit.orders, angle)), colour)]
         said = f"{unit.unit}: {unit.verdict.replace('_', ' ')}"
         ptp = self.unit.text(self._scale * unit.peak_to_peak)
         return StillPicture(
@@ -156,7 +144,7 @@ class FleetReport(Page):
         common: CommonOrder = self.fleet.common[at]
         between: BetweenOrder = self.fleet.between[at]
         turn = np.linspace(0.0, 2.0 * math.pi, 91)
-        circle = _RADIUS * between.std
+        circle = RADIUS_OF_95 * between.std
         marks = [
             Mark(
                 "line",
@@ -181,11 +169,3 @@ class FleetReport(Page):
         title = f"order {common.order:g} of the {common.shaft}"
         alt = f"cosine and sine of {title} of every unit, and the circle that holds 95 % of them"
         return StillPicture(title, alt, still(marks, across, up, _SQUARE, 1.0 / 3.0))
-
-
-def _curve(orders: tuple[UnitOrder, ...], angle: Array) -> Array:
-    """The sum of a unit's orders over the angle, degrees."""
-    found = np.zeros_like(angle)
-    for row in orders:
-        found += row.amplitude * np.sin(np.radians(row.order * angle + row.phase_deg))
-    return found

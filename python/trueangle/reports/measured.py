@@ -62,9 +62,7 @@ def _run(run: CalibrationRun, number: int, error: Array) -> dict[str, Any]:
         "readings": len(run),
         "start_deg": float(angle[0]),
         "travel_deg": float(np.ptp(angle)),
-        "direction": {(-1, 1): "both", (1,): "forward", (-1,): "backward"}.get(
-            tuple(ways), "at rest"
-        ),
+        "direction": _WAYS.get(tuple(ways), "at rest"),
         "speed_deg_s": None if speed is None else float(np.median(speed)),
         "temperature_C": _mean(run.temperature),
         "torque_Nm": _mean(run.torque),

@@ -1,18 +1,21 @@
-"""The page: content and figures set into one HTML file that needs no network."""
+"""The page: content and figures set into one HTML file that needs no network; saved or printed."""
 
 from __future__ import annotations
 
 import base64
 import gzip
 import json
-from functools import lru_cache
+import os
+import shutil
+import subprocess
+from functools import cached_property, lru_cache
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from ..errors import MissingExtraError
-from ..support.files import PAGE, check_output, written_atomically
+from ..errors import ArgumentError, MissingExtraError
+from ..support.files import PAGE, PDF, Kind, check_output, external_output, written_atomically
 from ..support.plainresult import Shown
 from . import charts, wording
 from .numbers import Numbers
@@ -26,16 +29,30 @@ __all__ = [
     "Page",
     "bokeh_library",
     "filled_template",
+    "find_browser",
+    "print_pdf",
     "rendered_report",
-    "report_templates",
     "template_environment",
 ]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
-
 #: Signs of the code that end or escape something in HTML, and those that stand for them.
 _SIGNS = str.maketrans("<>&", "[]:")
+
+#: Names that browsers with Chromium's printing go by.
+_BROWSERS: Final = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "chrome",
+    "msedge",
+    "microsoft-edge",
+)
+_TIMEOUT_S: Final = 120
+#: Of the browser.
+_OPTIONS = ("headless", "disable-gpu", "no-pdf-header-footer", "virtual-time-budget=20000")
 
 
 def rendered_report(report: Report, framed: bool = False) -> str:
@@ -94,19 +111,41 @@ def template_environment() -> Environment:
 
 
 def filled_template(template: str, **values: Any) -> str:
-    """A template with its values and the report's style, as text that UTF-8 holds."""
+    """A template with its values and the report's style."""
     style = (_TEMPLATES / "report.css").read_text("utf-8")
-    text = template_environment().get_template(template).render(style=style, **values)
-    return text.encode("utf-8", "replace").decode("utf-8")
+    text: str = template_environment().get_template(template).render(style=style, **values)
+    return text
 
 
 class Page(Shown):
-    """A result that is a page: one HTML file that needs no network."""
+    """A result that is a page: one HTML file that needs no network.
+
+    A class says by ``_written`` what the page holds.
+    """
+
+    #: What it is written as.
+    _kind: ClassVar[Kind] = PAGE
+
+    @cached_property
+    def html(self) -> str:
+        """One file that needs no network.
+
+        Raises
+        ------
+        MissingExtraError
+            jinja2 or bokeh is not installed.
+        """
+        # Names of files may hold bytes that are no text.
+        return self._written().encode("utf-8", "replace").decode("utf-8")
+
+    def _written(self) -> str:
+        """The page, anew."""
+        raise NotImplementedError
 
     @property
-    def html(self) -> str:
-        """The page."""
-        raise NotImplementedError
+    def _hashes(self) -> list[str]:
+        """Of the files that it was made from, none of which it replaces."""
+        return []
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the page, complete or not at all.
@@ -114,17 +153,13 @@ class Page(Shown):
         Raises
         ------
         FileError
-            An ending of another format, a place that no file is written to.
+            An ending of another format, a place that no file is written to, a file that it was
+            made from.
         """
-        check_output(path, PAGE)
+        check_output(path, self._kind)
         html = self.html
-        with written_atomically(path, kind=PAGE) as file:
+        with written_atomically(path, kind=self._kind, hashes=self._hashes) as file:
             file.write(html)
-
-
-def report_templates() -> Path:
-    """Where the templates lie, and what they include."""
-    return _TEMPLATES
 
 
 def _embedded(value: Any) -> str:
@@ -148,3 +183,41 @@ def _packed(text: str) -> str:
     packed = gzip.compress(text.encode("utf-8"), 9, mtime=0)
     whole = len(packed).to_bytes(4, "big") + packed
     return base64.b85encode(whole, pad=True).decode("ascii").translate(_SIGNS)
+
+
+def find_browser() -> str | None:
+    """Path of an installed browser that can print, or None."""
+    return next((found for name in _BROWSERS if (found := shutil.which(name))), None)
+
+
+def print_pdf(html: str, path: str | PathLike[str], browser: str | None = None) -> None:
+    """Print a page to ``path``; complete or not at all.
+
+    Raises
+    ------
+    ArgumentError
+        No browser is installed, or it did not print.
+    """
+    program = browser or find_browser()
+    if program is None or shutil.which(program) is None:
+        raise ArgumentError(
+            f"a PDF needs an installed browser ({', '.join(_BROWSERS[:3])} ...): install one, "
+            "or open the HTML report and print it"
+        )
+    with external_output(check_output(path, PDF)) as printed:
+        folder = printed.parent
+        page = folder / "report.html"
+        page.write_text(html, encoding="utf-8")
+        options = [*_OPTIONS, f"user-data-dir={Path(folder, 'profile')}", f"print-to-pdf={printed}"]
+        # A browser that runs as root (containers, CI) refuses its own sandbox.
+        options += ["no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
+        # The fragment makes the page lay itself out for paper from the start.
+        address = f"{page.resolve().as_uri()}#print"
+        command = [program, *(f"--{option}" for option in options), address]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            raise ArgumentError(f"{program} did not print within {_TIMEOUT_S} s") from None
+        if not printed.is_file():
+            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+            raise ArgumentError(f"{program} did not print: {last}")

@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..plots.curves import Curve, Points
 from ..runs.run import CalibrationRun
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 
@@ -70,14 +69,6 @@ class Scale:
     def of(self, arcsec: NDArray[np.float64]) -> NDArray[np.float64]:
         """Errors in the unit."""
         return arcsec * self.factor
-
-    def points(self, points: Points) -> Points:
-        """Readings of a run in the unit."""
-        return points.scaled(self.factor)
-
-    def curve(self, curve: Curve) -> Curve:
-        """A model in the unit."""
-        return curve.scaled(self.factor)
 
     def to_dict(self) -> dict[str, Any]:
         """For the content: the unit of the page, beside numbers that stay in arcsec."""

@@ -77,15 +77,7 @@ class WatchReport(Page):
         """The unit of the errors on the page."""
         return error_unit(self.errors_in, self._scale * float(self._sizes.max()), self.period)
 
-    @cached_property
-    def html(self) -> str:
-        """One file that needs no network.
-
-        Raises
-        ------
-        MissingExtraError
-            jinja2 is not installed.
-        """
+    def _written(self) -> str:
         from markupsafe import Markup
 
         highest = np.argsort(-self._sums.max(axis=0), kind="stable")

@@ -10,7 +10,6 @@ __all__ = [
     "FIGURE_TITLES",
     "as_sentence",
     "by_kind",
-    "cause_name",
     "conditions",
     "entry_paths",
     "figure_title",
@@ -82,17 +81,6 @@ def as_sentence(text: str) -> str:
     """
     text = text.strip()
     return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"
-
-
-def cause_name(cause: str) -> str:
-    """A cause of the fixed vocabulary as words.
-
-    Examples
-    --------
-    >>> cause_name("zero_slip")
-    'zero slip'
-    """
-    return cause.replace("_", " ")
 
 
 def joined_list(items: list[Any]) -> str:

@@ -37,6 +37,7 @@ RENAMED: Final = {
     "orders": "fitting.orders",
     "pace": "support.deadline",
     "paperstudy": "cli.paperstudy",
+    "paperstudy.report": "cli.demo",
     "plainresult": "support.plainresult",
     "powersums": "support.powersums",
     "provenance": "runs.provenance",

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import numpy as np
 import pytest
 
-from trueangle.bench import compiled, evaluation, latency, scaling, units
+from conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "benches"))
+
+import latency
+from trueangle.bench import compiled, evaluation, scaling
 from trueangle.bench.evaluationpeers import peers
 from trueangle.bench.interleaved import Timing
 from trueangle.cli import main
@@ -110,7 +116,7 @@ def test_the_model_of_cost_is_found():
 
 
 def test_units_of_a_fleet_and_their_fits_are_timed():
-    found = units.by_units(100)
+    found = scaling.by_units(100)
     assert [(m.work, m.readings) for m in found] == [
         ("fleet", 1800), ("fit of each", 1800), ("fleet", 18_000), ("fit of each", 18_000),
     ]  # fmt: skip

@@ -17,10 +17,14 @@ from trueangle.certificate import (
     certify,
     conformity,
 )
-from trueangle.certificate.asleft import corrected_runs, is_of_these
-from trueangle.certificate.values import left_at_places, reversal_halfwidth
+from trueangle.certificate.values import (
+    corrected_runs,
+    is_of_these,
+    left_at_places,
+    reversal_halfwidth,
+)
 from trueangle.model.records import Provenance
-from trueangle.runs.run import Source
+from trueangle.support.files import Source
 
 SEED = 61_000
 UNITS = (360.0, 1.0, 2.0 * np.pi)

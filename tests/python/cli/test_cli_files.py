@@ -460,14 +460,14 @@ def test_an_ending_of_another_format_is_refused(arguments, advice, desk, capsys)
 
 def test_a_report_named_pdf_is_one(desk, monkeypatch):
     pytest.importorskip("bokeh")
-    from trueangle.reports import pdf
+    from trueangle.reports import composition
 
     def printed(html, path, browser=None):
         assert "<html" in html
         with open(path, "wb") as file:
             file.write(b"%PDF-")
 
-    monkeypatch.setattr(pdf, "print_pdf", printed)
+    monkeypatch.setattr(composition, "print_pdf", printed)
     assert main(["report", "r.csv", "--orders", "1", "-o", "x.pdf"]) == 0
     assert (desk / "x.pdf").read_bytes() == b"%PDF-"
 

@@ -8,7 +8,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.reports.ranking import JointRank, fitted_rank, ranked, ranking_text
+from trueangle.reports.robot import JointRank, fitted_rank, ranked, ranking_text
 
 SEED = 55_300
 THETA = np.arange(0.0, 360.0, 1.5)

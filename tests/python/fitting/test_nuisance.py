@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.cli.order_lists import declared_shafts
+from trueangle.cli.values import declared_shafts
 from trueangle.errors import ArgumentError
 
 SIGMA = 0.002

@@ -8,7 +8,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.cli.plan import _angle
+from trueangle.cli.values import angle as typed_angle
 from trueangle.errors import ArgumentError
 from trueangle.planning.counts import rounded
 from trueangle.planning.doptimal import OrthonormalColumns, d_optimal
@@ -228,4 +228,4 @@ def test_the_command(capsys):
     "text", ["1deg", "60arcmin", "3600arcsec", "3600", f"{1000.0 * math.radians(1.0)!r}mrad"]
 )
 def test_a_wanted_uncertainty_is_the_same_in_every_unit(text):
-    assert _angle(text) == pytest.approx(3600.0, rel=1e-12)
+    assert typed_angle(text) == pytest.approx(3600.0, rel=1e-12)

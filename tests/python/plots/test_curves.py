@@ -11,12 +11,12 @@ from scipy.stats import binomtest, norm
 
 import trueangle as ta
 from trueangle import plots
+from trueangle.certificate.typesetting import certified_errors
 from trueangle.fitting.phases import run_phases
 from trueangle.plots import curves
-from trueangle.plots.certified import certified_errors
 from trueangle.plots.curves import Points
 from trueangle.plots.detection import detection
-from trueangle.plots.gains import gains
+from trueangle.plots.diagnosispictures import gains
 from trueangle.plots.readingpictures import before_after_picture, residual_picture
 from trueangle.rehearsal.result import RehearsedCause
 from trueangle.support.display_units import error_unit

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 import trueangle as ta
 from fleets.made import units
 from monitoring.test_windows import PER, model, readings
-from trueangle.plots.watchedwindows import watched_windows
+from trueangle.plots.controlcharts import watched_windows
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from conftest import ROOT
-from trueangle.reports.pdf import find_browser
+from trueangle.reports.page import find_browser
 
 playwright = pytest.importorskip("playwright.sync_api")
 BROWSER = find_browser()

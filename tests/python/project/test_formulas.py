@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from conftest import ROOT
-from trueangle.reports.pdf import find_browser
+from trueangle.reports.page import find_browser
 
 pytest.importorskip("ziamath")
 pytest.importorskip("docutils")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from trueangle.reports.numbers import formatted_number, lookup
-from trueangle.reports.pdf import find_browser
+from trueangle.reports.page import find_browser
 
 from .scripts import (
     CARDS_BURST,

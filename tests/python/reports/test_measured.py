@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.fitting.heldout import hold_out
-from trueangle.reports.gained import gain_content
+from trueangle.reports.fitted import gain_content
 from trueangle.reports.measured import error_size, measured_content
 from trueangle.reports.modelled import given_model
 from trueangle.reports.unknowns import unknown_content

@@ -134,15 +134,11 @@ def test_every_error_of_a_page_is_in_its_unit(asked, turn, fit):
     """A whole turn is what a turn has, in arrays, readings and curves alike."""
     scale = error_scale(asked, 50.0, 100.0, fit.runs)
     whole = np.array([1_296_000.0, -648_000.0])
-    parts = (
-        scale.of(whole),
-        scale.points(Points("a", np.zeros(2), whole)).y,
-        scale.curve(Curve(np.zeros(2), whole, np.abs(whole))).error,
-    )
-    for values in parts:
+    curve = Curve(np.zeros(2), whole, np.abs(whole)).scaled(scale.factor)
+    readings = Points("a", np.zeros(2), whole).scaled(scale.factor)
+    for values in (scale.of(whole), readings.y, curve.error):
         np.testing.assert_allclose(values, [turn, -turn / 2.0])
-    std = scale.curve(Curve(np.zeros(2), whole, np.abs(whole))).std
-    np.testing.assert_allclose(std, [turn, turn / 2.0])
+    np.testing.assert_allclose(curve.std, [turn, turn / 2.0])
 
 
 @pytest.mark.parametrize("count", [12, 13, 40])

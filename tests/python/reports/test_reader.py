@@ -8,7 +8,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.reports.charts import Chart
-from trueangle.reports.pdf import find_browser
+from trueangle.reports.page import find_browser
 
 playwright = pytest.importorskip("playwright.sync_api")
 pytest.importorskip("jinja2")

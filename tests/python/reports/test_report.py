@@ -15,7 +15,7 @@ from trueangle.cli import main
 from trueangle.errors import ArgumentError, MissingExtraError
 from trueangle.fitting.heldout import hold_out
 from trueangle.reports.numbers import formatted_number, lookup
-from trueangle.reports.pdf import find_browser, print_pdf
+from trueangle.reports.page import find_browser, print_pdf
 
 from .conftest import ORDERS
 

@@ -17,7 +17,7 @@ import pytest
 import trueangle as ta
 from trueangle import write_runs
 from trueangle.cli import main
-from trueangle.cli.durations import seconds
+from trueangle.cli.values import seconds
 from trueangle.errors import ArgumentError
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
 from trueangle.support.deadline import Pace, ending_early, entered, pace, with_pace

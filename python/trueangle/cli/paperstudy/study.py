@@ -50,7 +50,6 @@ GEAR_ORDERS: Final = {8: 100, 7: 101, 16: 200, 15: 201, 14: 202, 12: 300, 4: 400
 
 #: The paper's figures: peak-to-peak before and after in arcsec, reduction in percent.
 PUBLISHED: Final = {"a": (149.53, 26.62, 82.20), "b": (101.35, 18.40, 81.85)}
-PUBLISHED_MEAN: Final = 82.03
 
 
 @dataclass(frozen=True)

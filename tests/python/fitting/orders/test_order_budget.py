@@ -92,7 +92,7 @@ def test_orders_without_end_are_refused_in_python(many, runs, desk):
 
 
 def test_what_the_limit_allows_is_read():
-    from trueangle.cli.order_lists import parse_orders
+    from trueangle.cli.values import parse_orders
 
     assert parse_orders(f"1-{MOST_ORDERS}") == tuple(range(1, MOST_ORDERS + 1))
     assert parse_orders("1-4000,1-4000,5") == tuple(range(1, 4001))

@@ -1,8 +1,9 @@
-"""The windows of a watched joint: its charts with their limit, and what each order is off by."""
+"""Control charts: a unit of a fleet over its dates, a running joint over its windows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import datetime
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -10,18 +11,75 @@ import numpy as np
 from ..errors import ArgumentError
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
+from ..support.suggestions import check_choice
 from . import palette
 from .canvas import described, grid, legend, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from ..fleets.result import Fleet
     from ..monitoring.alarm import WatchedWindow
 
-__all__ = ["watched_windows"]
+__all__ = ["fleet_history", "watched_windows"]
 
-#: Orders that are drawn at most: those whose sums rose highest.
+#: Limits beyond which a chart has a scale of logarithms.
+_FAR: Final = 10.0
+
+#: Orders of a watched joint that are drawn at most: those whose sums rose highest.
 _MOST: Final = 6
+
+
+def fleet_history(fleet: Fleet, unit: str, errors_in: ErrorsIn = "auto") -> Axes:
+    """One unit's control charts: T^2 and cumulative sum of every order on each further date.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    unit : str
+    errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+        Unused: the charts have no unit.
+
+    Returns
+    -------
+    matplotlib Axes
+        The upper of a new figure's two.
+
+    Raises
+    ------
+    ArgumentError
+        A unit that was not calibrated again.
+    """
+    rows = [row for row in fleet.history if row.unit == unit]
+    again = list(dict.fromkeys(row.unit for row in fleet.history))
+    if not rows:
+        check_choice("unit", unit, again or ["(none was calibrated again)"])
+    figure, (upper, lower) = new_figure(2, 1, 7.5, 5.5, sharey=False)
+    when: list[Any] = [datetime.fromisoformat(row.when) for row in rows]
+    for ax, name, limit, values in (
+        (upper, "$T^2$ against the first date", rows[-1].limit, [
+            [one.statistic for one in row.orders] for row in rows
+        ]),
+        (lower, "cumulative sum", rows[-1].cusum_limit, [
+            [one.cusum for one in row.orders] for row in rows
+        ]),
+    ):  # fmt: skip
+        for k, one in enumerate(rows[0].orders):
+            ax.plot(
+                when, [row[k] for row in values], color=palette.run_colour(k),
+                marker=palette.run_marker(k), label=f"order {one.order:g}",
+            )  # fmt: skip
+        ax.axhline(limit, color=palette.ink(ax), linestyle="--", linewidth=1.0, label="limit")
+        if max(map(max, values)) > _FAR * limit:
+            ax.set_yscale("symlog", linthresh=limit)
+        ax.set_ylim(bottom=0.0)
+        ax.set_ylabel(name)
+        grid(ax)
+    legend(upper)
+    figure.autofmt_xdate()
+    return described(
+        upper, f"Control charts of {unit} on {len(rows)} dates: {rows[-1].verdict} at the last."
+    )
 
 
 def watched_windows(

@@ -1,11 +1,10 @@
-"""Times of options in seconds, by their units, and what is no time."""
+"""Times and turns as they are typed, and what is no time."""
 
 import argparse
 
 import pytest
 
-from trueangle.cli.durations import seconds
-from trueangle.cli.watch import _turns
+from trueangle.cli.values import seconds, turns
 
 SECONDS = {
     "10": 10.0, "10s": 10.0, "0.5 s": 0.5, "500ms": 0.5, "2min": 120.0, "1h": 3600.0, "1H": 3600.0,
@@ -26,7 +25,7 @@ def test_what_is_no_time_is_refused(text):
 
 
 @pytest.mark.parametrize(
-    ("text", "turns"), [("1turn", 1.0), ("5turns", 5.0), ("0.5", 0.5), (" 2 turns ", 2.0)]
+    ("text", "wanted"), [("1turn", 1.0), ("5turns", 5.0), ("0.5", 0.5), (" 2 turns ", 2.0)]
 )
-def test_travel_is_in_turns(text, turns):
-    assert _turns(text) == turns
+def test_travel_is_in_turns(text, wanted):
+    assert turns(text) == wanted

@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.joint.pattern import Harmonic
-from trueangle.reports.ranking import (
+from trueangle.reports.robot import (
     JointRank,
     diagnosed_rank,
     fitted_rank,

@@ -1,18 +1,101 @@
-"""Lists of orders on the command line."""
+"""Values as they are typed: times, angles, arcs, turns, names, orders and shafts."""
 
 from __future__ import annotations
 
+import argparse
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..errors import ArgumentError
-from ..joint.shafts import counted_orders
 from ..support.suggestions import did_you_mean
 
-__all__ = ["SHAFTS", "declared_shafts", "orders_by_shaft", "parse_orders"]
+__all__ = [
+    "SHAFTS",
+    "angle",
+    "arc",
+    "declared_shafts",
+    "names",
+    "orders_by_shaft",
+    "parse_orders",
+    "seconds",
+    "turns",
+]
 
 #: Shafts that every joint may have.
 SHAFTS = ("output", "motor", "wave_generator")
+
+#: Seconds of a unit.
+_SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "m": 60.0, "h": 3600.0}
+
+_DURATION = re.compile(r"(?P<number>[0-9.]+(?:e[+-]?[0-9]+)?) *(?P<unit>[a-z]*)", re.IGNORECASE)
+
+#: Arcsec of a unit, the longer names first.
+_ARCSEC = {"arcsec": 1.0, "arcmin": 60.0, "mrad": 648.0 / math.pi, "deg": 3600.0}
+
+
+def seconds(text: str) -> float:
+    """A time above zero, in seconds: ``10``, ``10s``, ``500ms``, ``2min``, ``1h``.
+
+    Examples
+    --------
+    >>> seconds("2min"), seconds("10")
+    (120.0, 10.0)
+    """
+    found = _DURATION.fullmatch(text.strip())
+    try:
+        value = float(found["number"]) * _SECONDS[found["unit"].lower()] if found else math.nan
+    except (ValueError, KeyError):
+        value = math.nan
+    if not (value > 0.0 and math.isfinite(value)):
+        raise argparse.ArgumentTypeError(f"a time above zero, as 10s, 2min or 1h, got {text!r}")
+    return value
+
+
+def turns(text: str) -> float:
+    """``1turn``, ``5turns`` or ``0.5``."""
+    number = text.strip().removesuffix("s").removesuffix("turn").strip()
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"turns above zero, as 1turn, got {text!r}")
+    return value
+
+
+def arc(text: str) -> tuple[float, float]:
+    """``START:STOP`` in degrees."""
+    start, colon, stop = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        return float(start), float(stop)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not an arc: START:STOP in degrees, such as 0:270"
+        ) from None
+
+
+def angle(text: str) -> float:
+    """An angle in arcsec; ``arcsec``, ``arcmin``, ``deg`` or ``mrad`` may follow."""
+    for unit, arcsec in _ARCSEC.items():
+        if text.endswith(unit):
+            number, scale = text.removesuffix(unit), arcsec
+            break
+    else:
+        number, scale = text, 1.0
+    try:
+        return float(number) * scale
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not an angle: a number and {', '.join(_ARCSEC)}, such as 2arcsec"
+        ) from None
+
+
+def names(text: str) -> list[str]:
+    """``A,B`` as a list."""
+    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 def parse_orders(text: str, option: str = "--orders") -> tuple[float, ...]:
@@ -28,6 +111,8 @@ def parse_orders(text: str, option: str = "--orders") -> tuple[float, ...]:
     >>> parse_orders("1-4,8,7.3")
     (1, 2, 3, 4, 7.3, 8)
     """
+    from ..joint.shafts import counted_orders  # takes numpy, which a help does without
+
     found: list[float] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
