@@ -1,0 +1,182 @@
+"""Models of the core as callers hand them over: counts, bounds, states, what is refused."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from trueangle import _core
+from trueangle.errors import ArgumentError, NotInvertibleError
+from trueangle.model.forms import Play, Scaled
+
+TURN = 360.0
+#: Of the angles of a turn, a few operations.
+ROUNDING = 1e-12 * TURN
+
+
+class Term:
+    """A term of nothing but forms."""
+
+    kind = "tried"
+
+    def __init__(self, *forms):
+        self._forms = forms
+
+    def forms(self):
+        return self._forms
+
+
+def series(period=TURN, orders=(1, 2), cosine=(0.3, 0.1), sine=(0.2, -0.05), **more):
+    lists = [list(orders)], [list(cosine)], [list(sine)]
+    return _core.Series(period, 0.0, [1.0], *lists, **more)
+
+
+def corrector(*forms):
+    return _core.Corrector(series(), [Term(*forms)] if forms else [])
+
+
+@pytest.mark.parametrize("factor", [1, 7, 30_000, 50_000])
+def test_the_bound_of_a_slope_counts_common_factors_of_orders_once(factor):
+    """Orders k times as high, k times as small: the same curve k times in a turn, as steep."""
+    orders, cosine, sine = np.array([1, 2, 5]), np.array([0.3, 0.1, 0.2]), np.array([0.2, 0.1, 0.3])
+    size = 1.05 / (orders * np.hypot(cosine, sine)).sum()
+    x = np.linspace(0.0, 2.0 * np.pi, 20_000)[:, None] * orders
+    slope = size * orders * (sine * np.cos(x) - cosine * np.sin(x))
+    true = np.abs(slope.sum(axis=1)).max()
+    assert true < 1.0
+    found = series(
+        2.0 * np.pi, factor * orders, size * cosine / factor, size * sine / factor
+    ).slope_bound
+    # A grid of 32 samples in the period of the highest order: within 1/cos(pi/32).
+    assert true * (1.0 - 1e-6) <= found <= 1.005 * true
+
+
+def test_a_slope_of_one_has_no_inverse():
+    with pytest.raises(NotInvertibleError, match=r"reaches 1\.000000"):
+        series(2.0 * np.pi, (1,), (1.0,), (0.0,)).correct(0.9)
+    assert series(2.0 * np.pi, (1,), (0.9,), (0.0,)).correct(0.9) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("what", ["orders", "cosine", "sine"])
+@pytest.mark.parametrize("count", [0, 2])
+def test_a_series_has_a_list_for_each_shaft(what, count):
+    lists = {"orders": [[1]], "cosine": [[0.1]], "sine": [[0.0]]}
+    lists[what] *= count
+    with pytest.raises(ArgumentError, match=f"{what} has {count} lists, cycles has 1"):
+        _core.Series(TURN, 0.0, [1.0], *lists.values())
+
+
+@pytest.mark.parametrize("method", ["error", "slope", "correct"])
+def test_memory_of_both_sides_is_one_or_apart(method):
+    take = getattr(series(), method)
+    for given, out in (
+        (slice(0, 400), slice(0, 400)),
+        (slice(0, 800, 2), slice(1, 801, 2)),
+        (slice(0, 400), slice(400, 800)),
+        (slice(799, 399, -1), slice(0, 400)),
+        (slice(400, 800), slice(399, None, -1)),
+    ):
+        memory = np.linspace(-300.0, 900.0, 801)
+        expected = take(memory[given].copy())
+        take(memory[given], memory[out])
+        np.testing.assert_array_equal(memory[out], expected)
+    for given, out in (
+        (slice(0, 400), slice(399, 799)),
+        (slice(399, 799), slice(0, 400)),
+        (slice(400, None, -1), slice(0, 401)),
+        (slice(0, 800, 2), slice(0, 400)),
+    ):
+        memory = np.linspace(-300.0, 900.0, 801)
+        with pytest.raises(ArgumentError, match="overlaps"):
+            take(memory[given], memory[out])
+
+
+def test_a_number_has_the_result_of_an_array_of_one():
+    one = corrector(Scaled("temperature", level=0.01), Play(0.02))
+    x = 33.0
+    alone = one.fresh().correct(x, temperature=3.0, direction=1.0)[0]
+    listed = one.fresh().correct([x], temperature=[3.0], direction=[1.0])[0]
+    spread = one.fresh().correct(x, temperature=[3.0, 5.0], direction=1.0)[0]
+    stepped = one.fresh().step(x, temperature=3.0, direction=1.0)
+    assert isinstance(alone, float)
+    assert alone == listed[0] == spread[0] == stepped
+    assert spread[1] == pytest.approx(spread[0] - 0.02, abs=1e-3)
+
+
+def test_joints_alike_forget_one_by_one():
+    """Play of an indicated reversal: a joint that has turned back is on the other side."""
+    alike = corrector(Play(0.05)).alike(3)
+    forth, back = [10.0, 20.0, 30.0], [5.0, 15.0, 25.0]
+    fresh = alike.copy()
+    alike.error(forth)
+    fresh_errors = fresh.error(back)
+    turned = alike.copy()
+    errors = turned.error(back)
+    np.testing.assert_allclose(errors, series().error(np.array(back)) - 0.05, atol=ROUNDING)
+    alike.reset([0, 2])
+    found = alike.error(back)
+    assert found[1] == errors[1]
+    np.testing.assert_array_equal(found[[0, 2]], fresh_errors[[0, 2]])
+    assert not np.isclose(fresh_errors, errors).any()
+
+
+def robot(names=("a", "b"), parts=None):
+    given = [corrector(Scaled("temperature", level=0.01)), series()] if parts is None else parts
+    return _core.RobotStep(list(names), given)
+
+
+def test_signals_of_a_robot_are_one_value_or_one_for_each():
+    x = np.array([12.0, -40.0])
+    expected = [corrector(Scaled("temperature", level=0.01)).step(12.0, temperature=5.0),
+                series().correct(-40.0)]  # fmt: skip
+    for temperature in (5.0, [5.0], np.array([5.0, 5.0]), np.array([5.0, 99.0])):
+        np.testing.assert_array_equal(robot().step(x, temperature=temperature), expected)
+    with pytest.raises(ArgumentError, match="temperature"):
+        robot().step(x, temperature=[1.0, 2.0, 3.0])
+    with pytest.raises(ArgumentError, match="positions"):
+        robot().step(x[:1], temperature=5.0)
+
+
+@pytest.mark.parametrize("names", [(), ("a",), ("a", "b", "c")])
+def test_a_robot_has_a_name_for_each_joint(names):
+    parts = [] if not names else None
+    with pytest.raises(ArgumentError, match="each with a name"):
+        robot(names, parts)
+
+
+def test_a_step_takes_an_angle_and_signals():
+    step = corrector().step
+    held = series().compensator().step
+    assert held(20.0) == pytest.approx(step(20.0), abs=ROUNDING)
+    assert held(20.0, None) == held(20.0)
+    for given in ((), tuple([1.0] * 9)):
+        with pytest.raises(TypeError, match=f"got {len(given)} arguments"):
+            held(*given)
+
+
+THREADS = """\
+import json, os, sys
+import trueangle._core as core
+alone = core.thread_count()
+import multiprocessing as mp
+def told(queue):
+    queue.put(core.thread_count())
+if __name__ == "__main__":
+    context = mp.get_context("fork")
+    queue = context.Queue()
+    child = context.Process(target=told, args=(queue,))
+    child.start()
+    inside = queue.get()
+    child.join()
+    print(json.dumps([alone, core.thread_count(), inside, core.thread_count(3)]))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a child is started by fork")
+def test_a_child_of_multiprocessing_takes_one_thread():
+    done = subprocess.run([sys.executable, "-c", THREADS], capture_output=True, check=True)
+    alone, after, inside, asked = json.loads(done.stdout)
+    assert alone == after >= 1
+    assert (inside, asked) == (1, 3)
