@@ -99,23 +99,28 @@ def drawn(count: int, seed: int, files: list[Path]) -> list[Drawn]:
     chance = random.Random(seed)
     weights = [len(p.read_text("utf-8").splitlines()) for p in files]
     found: dict[tuple[str, str, int], Drawn] = {}
+    beyond: dict[tuple[Path, str], int] = {}
     for _ in range(200 * count):
         if len(found) == count:
             break
         path = chance.choices(files, weights)[0]
         operator = chance.choice(OPERATORS)
-        made = mutation(path, operator, chance.randrange(40))
+        occurrence = chance.randrange(40)
+        if occurrence >= beyond.get((path, operator), 40):
+            continue
+        code = path.read_text("utf-8")
+        changed = mutate_code(code, get_operator(f"core/{operator}")(), occurrence)
+        if changed is None or changed == code:
+            beyond[path, operator] = occurrence
+            continue
+        made = mutation(path, operator, occurrence, code, changed)
         if made is not None:
             found[made.file, made.operator, made.occurrence] = made
     return list(found.values())
 
 
-def mutation(path: Path, operator: str, occurrence: int) -> Drawn | None:
-    """The fault at one occurrence; None where there is none, or none that runs."""
-    code = path.read_text("utf-8")
-    changed = mutate_code(code, get_operator(f"core/{operator}")(), occurrence)
-    if changed is None or changed == code:
-        return None
+def mutation(path: Path, operator: str, occurrence: int, code: str, changed: str) -> Drawn | None:
+    """The fault at one occurrence; None where it is none, or none that runs."""
     old, new = code.splitlines(), changed.splitlines()
     line = next((k for k, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), None)
     # Lengths that never differ: without the guard nothing changes.
@@ -174,7 +179,7 @@ def reached(copy: Copy, tests: list[str], data: Path) -> dict[str, dict[int, lis
     ).fetchall()
     lines: dict[str, dict[int, list[str]]] = {}
     for path, context, bits in rows:
-        test = context.partition("|")[0]
+        test = context.rpartition("|")[0]  # a parameter may hold that sign, too
         if not test or test in unfit:
             continue
         name = "python/trueangle/" + path.partition("python/trueangle/")[2]
