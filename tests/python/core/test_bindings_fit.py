@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from trueangle import _core
+from trueangle.errors import ArgumentError
 
 TURN = 360.0
 SEED = 5
@@ -268,3 +269,23 @@ def test_a_covariance_of_clusters_is_that_of_their_scores():
     assert freedom.shape == (3,)
     assert (freedom < 11.0).all()
     assert (freedom > 4.0).all()
+
+
+def test_the_highest_order_of_sums_is_that_which_is_named():
+    few = np.array([1.0, 2.0, 3.0])
+    most = _core.Moments(TURN, [1.0], [[65_536]])
+    most.update(few, few)
+    assert most.count == 3
+    with pytest.raises(ArgumentError, match="at most 65536, got 65537"):
+        _core.Moments(TURN, [1.0], [[65_537]]).update(few, few)
+
+
+@pytest.mark.parametrize("n", [1, 255, 256, 257, 1100])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_columns_beside_a_fit_of_any_length_are_those_of_numpy(n, order):
+    """What the readings of a fit see, however its table lies in memory and ends."""
+    rng = np.random.default_rng(SEED)
+    table, residual = rng.normal(size=(n, 3)), rng.normal(size=n)
+    found = _core.Beside(np.array(table, order=order), residual, 1.0, 0.0, [(0, n)], 0.0).seen
+    expected = np.column_stack([table, residual]).T
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -180,3 +181,46 @@ def test_a_child_of_multiprocessing_takes_one_thread():
     alone, after, inside, asked = json.loads(done.stdout)
     assert alone == after >= 1
     assert (inside, asked) == (1, 3)
+
+
+@pytest.mark.parametrize("path", [None, "table", "cubics", "exact", "direct"])
+@pytest.mark.parametrize("shift", [-40, 30])
+def test_a_unit_of_a_power_of_two_changes_no_digit(path, shift):
+    """Angles near, a million and 2^52 turns away; a number, few and many of them."""
+    unit = 2.0**shift
+    own = series()
+    sizes = [[[unit * a for a in part]] for part in ((0.3, 0.1), (0.2, -0.05))]
+    other = _core.Series(TURN * unit, 0.0, [1.0], [[1, 2]], *sizes)
+    x = np.linspace(-700.0, 1100.0, 8001)
+    # Exact in both units.
+    near = np.round(x * 1024.0) / 1024.0
+    far = np.round(x / 4.0) * 1024.0 + 2.0**52 * TURN
+    kind = np.float32 if path == "cubics" else np.float64
+    for angles in (near, np.round(x) + 1e6 * TURN, far, near[:3]):
+        angles = angles.astype(kind)
+        for name, scale in (("error", unit), ("slope", 1.0), ("correct", unit)):
+            if name == "slope" and path in ("cubics", "table"):
+                continue
+            found = getattr(other, name)((angles * unit).astype(kind), path=path)
+            expected = getattr(own, name)(angles, path=path)
+            np.testing.assert_array_equal(found, scale * expected)
+    assert other.correct(33.0 * unit) == unit * own.correct(33.0)
+    assert other.slope_bound == pytest.approx(own.slope_bound, rel=1e-14)
+
+
+@pytest.mark.parametrize("path", ["exact", "direct"])
+@pytest.mark.parametrize("cycles", [1.0, 2.5, 0.37, 101.25])
+@pytest.mark.parametrize("turns", [0, 3, -1000, 10**6, 10**9])
+def test_phases_are_those_of_exact_fractions(path, cycles, turns):
+    """Of shafts that do not come back with the turn, too, however many turns there were."""
+    taken = _core.Series(TURN, 0.0, [cycles], [[1, 3]], [[0.4, -0.1]], [[0.3, 0.2]])
+    # Numbers that a double holds.
+    angles = [turns * TURN + k * 11.375 for k in range(-20, 40)]
+    expected = []
+    for x in angles:
+        turn = [k * Fraction(cycles) * Fraction(x) / 360 % 1 for k in (1, 3)]
+        one, three = (2.0 * np.pi * float(t) for t in turn)
+        expected.append(0.4 * np.cos(one) + 0.3 * np.sin(one)
+                        - 0.1 * np.cos(three) + 0.2 * np.sin(three))  # fmt: skip
+    found = taken.error(np.array(angles), path=path)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
