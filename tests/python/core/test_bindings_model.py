@@ -224,3 +224,21 @@ def test_phases_are_those_of_exact_fractions(path, cycles, turns):
                         - 0.1 * np.cos(three) + 0.2 * np.sin(three))  # fmt: skip
     found = taken.error(np.array(angles), path=path)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("argument", ["indicated", "reference"])
+def test_what_correction_takes_off_is_the_error(argument):
+    """Of the indicated angle at once, of the true one where it is found; a batch as its steps."""
+    # Where play is crossed the true angle jumps back: what is taken off is another way's.
+    play = [Play(0.02)] if argument == "indicated" else []
+    terms = [Term(Scaled("temperature", level=0.01), *play)]
+    taken = _core.Corrector(series(argument=argument), terms)
+    x = 300.0 * np.sin(np.linspace(0.0, 7.0, 700))
+    given = {"temperature": 3.0}
+    corrected, _ = taken.fresh().correct(x, **given)
+    at = x if argument == "indicated" else corrected
+    errors = taken.fresh().error(at, **given)
+    np.testing.assert_allclose(errors, x - corrected, rtol=0, atol=ROUNDING)
+    assert np.abs(errors).max() > 0.1
+    alone = taken.fresh()
+    np.testing.assert_array_equal([alone.error(float(v), **given) for v in at], errors)
