@@ -42,8 +42,16 @@ BETWEEN = {
 }
 
 #: Twice the size is no twice the error: noise, a sensor at its other angle, a lag's curve.
-CURVED = {"argument_error", "backlash", "filter_lag", "heteroscedastic_noise", "latency", "outliers",
-          "stiffening_compliance", "wrong_gear_ratio"}  # fmt: skip
+CURVED = {
+    "argument_error",
+    "backlash",
+    "filter_lag",
+    "heteroscedastic_noise",
+    "latency",
+    "outliers",
+    "stiffening_compliance",
+    "wrong_gear_ratio",
+}
 
 
 def drawn(kind, size, number):
