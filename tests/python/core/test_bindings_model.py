@@ -104,6 +104,9 @@ def test_a_number_has_the_result_of_an_array_of_one():
     assert isinstance(alone, float)
     assert alone == listed[0] == spread[0] == stepped
     assert spread[1] == pytest.approx(spread[0] - 0.02, abs=1e-3)
+    warm = corrector(Scaled("temperature", level=0.01))
+    both = [warm.step(x, temperature=value) for value in (3.0, 5.0)]
+    np.testing.assert_array_equal(warm.fresh().correct(x, temperature=[3.0, 5.0])[0], both)
 
 
 def test_joints_alike_forget_one_by_one():
