@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from trueangle import _core
-from trueangle.errors import ArgumentError, NotInvertibleError
+from trueangle.errors import ArgumentError, MissingSignalError, NotInvertibleError
 from trueangle.model.forms import Play, Scaled
 
 TURN = 360.0
@@ -245,3 +245,22 @@ def test_what_correction_takes_off_is_the_error(argument):
     assert np.abs(errors).max() > 0.1
     alone = taken.fresh()
     np.testing.assert_array_equal([alone.error(float(v), **given) for v in at], errors)
+
+
+def test_a_model_is_coupled_to_so_many_joints_and_no_more():
+    joints = [f"coupled_{name}" for name in "abcdefgh"]
+    terms = [Scaled(name, level=1e-3 * (k + 1)) for k, name in enumerate(joints)]
+    most = 0
+    for count in range(1, len(joints) + 1):
+        try:
+            taken = corrector(*terms[:count], *terms[:count])
+        except ArgumentError as error:
+            assert f"coupled to {most} other joints, not to" in str(error)  # noqa: PT017
+            break
+        most = count
+        angles = {name: 10.0 * (k + 1) for k, name in enumerate(joints[:count])}
+        added = 2.0 * sum(1e-2 * (k + 1) ** 2 for k in range(count))
+        assert taken.error(33.0, **angles) == pytest.approx(series().error(33.0) + added)
+        with pytest.raises(MissingSignalError, match=joints[count - 1]):
+            corrector(*terms[:count]).error(33.0, **dict(list(angles.items())[:-1]))
+    assert 2 <= most < len(joints)
