@@ -99,8 +99,14 @@ fn a_large_system_has_the_condition_of_its_singular_values() {
             .wrapping_add(1442695040888963407);
         (state >> 11) as f64 / (1u64 << 53) as f64
     };
-    // The greatest singular value is that of a column, then of the zeros.
-    for (runs, size, least) in [(1, 1.0, 0.1), (3, 1.0, 0.1), (3, 0.01, 0.1), (1, 1.0, 0.0)] {
+    // The greatest singular value is that of a column, then of the zeros, then the least is.
+    for (runs, size, least) in [
+        (1, 1.0, 0.1),
+        (3, 1.0, 0.1),
+        (3, 0.01, 0.1),
+        (3, 100.0, 1.0),
+        (1, 1.0, 0.0),
+    ] {
         let mut dense = DMatrix::zeros(runs * READINGS, runs + COLUMNS);
         let (mut pivots, mut reduction) = (Vec::new(), Reduction::default());
         for run in 0..runs {

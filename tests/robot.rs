@@ -182,3 +182,14 @@ fn a_joint_that_lacks_a_signal_stops_all() {
         (1, [10.0, 20.0], before)
     );
 }
+
+#[test]
+#[should_panic(expected = "couplings of its joints")]
+fn a_coupling_is_of_joints_that_are_there() {
+    let coupling = Coupling {
+        joint: 0,
+        other: 2,
+        ..COUPLINGS[0]
+    };
+    let _ = Robot::coupled(vec![still(0, 1.0), still(1, 1.0)], vec![coupling]);
+}

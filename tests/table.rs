@@ -63,6 +63,50 @@ fn floats_are_radians() {
     );
 }
 
+/// Lines and polynomials of Hermite as they are defined, in double precision, for all number types.
+#[test]
+fn between_knots_stand_lines_and_polynomials_of_hermite() {
+    const ROUNDING: f64 = 3e-7;
+    // Values and slopes per segment that differ in size and sign.
+    let knots: Vec<[i32; 2]> = (0..=8i32)
+        .map(|i| [9000 - 137 * i * i + 3100 * (i % 3), 700 * (i % 4) - 900])
+        .collect();
+    let (values, short): (Vec<i32>, Vec<[i16; 2]>) = knots
+        .iter()
+        .map(|&[y, m]| (y, [y as i16, m as i16]))
+        .unzip();
+    let floats: Vec<[f32; 2]> = knots.iter().map(|&[y, m]| [y as f32, m as f32]).collect();
+    let float_values: Vec<f32> = values.iter().map(|&y| y as f32).collect();
+    let short_values: Vec<i16> = values.iter().map(|&y| y as i16).collect();
+    for step in 0..4000u32 {
+        let angle = step.wrapping_mul(2_654_435_761);
+        let place = f64::from(angle) / f64::from(1u32 << 29);
+        let (i, t) = (place as usize, place.fract());
+        let [[y0, m0], [y1, m1]] = [knots[i], knots[i + 1]].map(|knot| knot.map(f64::from));
+        let line = y0 + t * (y1 - y0);
+        let curve =
+            (2.0 * t - 3.0) * t * t * (y0 - y1) + y0 + t * (1.0 - t) * ((1.0 - t) * m0 - t * m1);
+        assert!((f64::from(linear_i32(&values, 3, angle)) - line).abs() <= 0.5 + 1e-3);
+        let shifted = f64::from(linear_i16(&short_values, 3, 4, angle)) / 16.0;
+        // The place within a segment has 16 bits.
+        assert!((shifted - line).abs() <= 0.5 / 16.0 + (y1 - y0).abs() / 65_536.0);
+        let single = f64::from(linear_f32(&float_values, 3, angle));
+        assert!(
+            (single - line).abs() <= ROUNDING * 2e4,
+            "{angle}: {single} {line}"
+        );
+        // Three products of a cubic are rounded, each by half a unit at most.
+        assert!((f64::from(cubic_i32(&knots, 3, angle)) - curve).abs() <= 2.0);
+        let shifted = f64::from(cubic_i16(&short, 3, 4, angle)) / 16.0;
+        assert!((shifted - curve).abs() <= 2.0 / 16.0);
+        let single = f64::from(cubic_f32(&floats, 3, angle));
+        assert!(
+            (single - curve).abs() <= 2.0 * ROUNDING * 2e4,
+            "{angle}: {single} {curve}"
+        );
+    }
+}
+
 /// Every segment of every size: its first reading meets its knot, its last stays inside.
 #[test]
 fn no_reading_of_any_size_leaves_its_segment() {

@@ -256,6 +256,7 @@ fn every_form_adds_its_formula() {
     let mut bare = corrector(&[]);
     for (form, formula) in all {
         let mut with_form = corrector(&[term(form.clone())]);
+        let mut alone = corrector(&[term(form.clone())]);
         for k in 0..200 {
             let x = 3.7 * f64::from(k) - 300.0;
             let (t, m) = (20.0 + 15.0 * (0.3 * x).sin(), 9.0 * (0.7 * x).cos());
@@ -266,6 +267,9 @@ fn every_form_adds_its_formula() {
             let without = bare.error(x, &signals).unwrap();
             let off = (with - without - formula(x, t, m)).abs();
             assert!(off < ROUNDING, "{form:?} at {x}: {off}");
+            // No other form is there that would have the angle searched for.
+            let back = alone.correct(x + with, &signals).unwrap();
+            assert!((back - x).abs() <= SOLVED, "{form:?} at {x}: {back}");
         }
     }
 }
@@ -392,5 +396,7 @@ fn a_damped_filter_has_the_gain_of_its_equation() {
         let seen = amplitude * size * (order * f64::to_radians(theta) - lag).cos();
         let error = joint.error(theta, &signals).unwrap();
         assert!((error - seen).abs() < SOLVED, "{error} {seen}");
+        let back = joint.correct(theta + error, &signals).unwrap();
+        assert!((back - theta).abs() <= SOLVED, "{back} {theta}");
     }
 }

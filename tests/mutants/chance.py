@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import dataclasses
 import itertools
 import random
 import sqlite3
@@ -29,7 +30,7 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator
 from coverage.numbits import numbits_to_nums
 
-from copies import Copy
+from copies import LATE, Copy, Verdict
 from faults import Fault
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -74,6 +75,9 @@ OPERATORS = (
 #: What stops at lengths that never differ; no test can notice that it is gone.
 GUARD = "strict=True"
 
+#: How pytest begins the line of a test that fails.
+ENDED = ("FAILED ", "ERROR ")
+
 #: Tests of one fault at most, the ones that reach least first: they are the narrowest.
 MOST_TESTS = 60
 
@@ -95,23 +99,28 @@ def drawn(count: int, seed: int, files: list[Path]) -> list[Drawn]:
     chance = random.Random(seed)
     weights = [len(p.read_text("utf-8").splitlines()) for p in files]
     found: dict[tuple[str, str, int], Drawn] = {}
+    beyond: dict[tuple[Path, str], int] = {}
     for _ in range(200 * count):
         if len(found) == count:
             break
         path = chance.choices(files, weights)[0]
         operator = chance.choice(OPERATORS)
-        made = mutation(path, operator, chance.randrange(40))
+        occurrence = chance.randrange(40)
+        if occurrence >= beyond.get((path, operator), 40):
+            continue
+        code = path.read_text("utf-8")
+        changed = mutate_code(code, get_operator(f"core/{operator}")(), occurrence)
+        if changed is None or changed == code:
+            beyond[path, operator] = occurrence
+            continue
+        made = mutation(path, operator, occurrence, code, changed)
         if made is not None:
             found[made.file, made.operator, made.occurrence] = made
     return list(found.values())
 
 
-def mutation(path: Path, operator: str, occurrence: int) -> Drawn | None:
-    """The fault at one occurrence; None where there is none, or none that runs."""
-    code = path.read_text("utf-8")
-    changed = mutate_code(code, get_operator(f"core/{operator}")(), occurrence)
-    if changed is None or changed == code:
-        return None
+def mutation(path: Path, operator: str, occurrence: int, code: str, changed: str) -> Drawn | None:
+    """The fault at one occurrence; None where it is none, or none that runs."""
     old, new = code.splitlines(), changed.splitlines()
     line = next((k for k, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), None)
     # Lengths that never differ: without the guard nothing changes.
@@ -130,16 +139,38 @@ def mutation(path: Path, operator: str, occurrence: int) -> Drawn | None:
     )
 
 
+def recorded(copy: Copy, tests: list[str], data: Path) -> None:
+    """Record which test reaches which line, and beside it which tests fail without a fault."""
+    command = [
+        sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider", "--tb=line",
+        f"--cov={copy.folder / 'python' / 'trueangle'}", "--cov-context=test", "--cov-report=",
+        *tests,
+    ]  # fmt: skip
+    environment = copy.environment() | {"COVERAGE_FILE": str(data)}
+    done = subprocess.run(
+        command, cwd=copy.folder, env=environment, check=False, text=True, stdout=subprocess.PIPE
+    )
+    # A test that fails by itself, as in a copy without history, would notice every fault.
+    failed = [n.split(" - ")[0] for n in done.stdout.splitlines() if n.startswith(ENDED)]
+    print(*failed, done.stdout[-300:], sep="\n", flush=True)
+    beside(data).write_text("\n".join(n.split(" ", 1)[1] for n in failed), "utf-8")
+
+
+def beside(data: Path) -> Path:
+    """Where the tests that fail without a fault are kept."""
+    return data.with_name(data.name + ".failing")
+
+
+def failing(data: Path) -> set[str]:
+    """Tests that fail without a fault."""
+    return set(beside(data).read_text("utf-8").splitlines())
+
+
 def reached(copy: Copy, tests: list[str], data: Path) -> dict[str, dict[int, list[str]]]:
     """Tests that reach each line of each file of the package, the narrowest first."""
     if not data.exists():
-        command = [
-            sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider",
-            f"--cov={copy.folder / 'python' / 'trueangle'}", "--cov-context=test", "--cov-report=",
-            *tests,
-        ]  # fmt: skip
-        environment = copy.environment() | {"COVERAGE_FILE": str(data)}
-        subprocess.run(command, cwd=copy.folder, env=environment, check=False)
+        recorded(copy, tests, data)
+    unfit = failing(data)
     base = sqlite3.connect(data)
     breadth: Counter[str] = Counter()
     rows = base.execute(
@@ -148,8 +179,8 @@ def reached(copy: Copy, tests: list[str], data: Path) -> dict[str, dict[int, lis
     ).fetchall()
     lines: dict[str, dict[int, list[str]]] = {}
     for path, context, bits in rows:
-        test = context.partition("|")[0]
-        if not test:
+        test = context.rpartition("|")[0]  # a parameter may hold that sign, too
+        if not test or test in unfit:
             continue
         name = "python/trueangle/" + path.partition("python/trueangle/")[2]
         for number in numbits_to_nums(bits):
@@ -181,8 +212,8 @@ def excused(fault: Drawn) -> str:
     return ""
 
 
-def judged(copy: Copy, fault: Drawn, tests: list[str]) -> Iterator[str]:
-    """``killed``, ``survived``, ``excused`` or ``unreached``, and what is said of it."""
+def judged(copy: Copy, fault: Drawn, tests: list[str], unfit: set[str]) -> Iterator[str]:
+    """What became of a fault, ``killed`` or one of four other words, and what is said of it."""
     why = excused(fault)
     if why:
         yield from ("excused", why)
@@ -193,9 +224,28 @@ def judged(copy: Copy, fault: Drawn, tests: list[str]) -> Iterator[str]:
     whole = (ROOT / fault.file).read_text("utf-8")
     planted = Fault("chance", fault.file, whole, fault.text, tuple(tests[:MOST_TESTS]))
     verdict = copy.tried(planted, -1)
-    # Tests that cannot even be collected have noticed.
+    if verdict.outcome == "survived":
+        verdict = asked_again(copy, planted, unfit)
+    # Tests that cannot even be collected have noticed, if they can without the fault.
+    if verdict.outcome == "broken" and copy.run(planted.tests).outcome == "broken":
+        yield from ("broken", verdict.told)
+        return
     yield "survived" if verdict.outcome == "survived" else "killed"
     yield verdict.by
+
+
+def asked_again(copy: Copy, planted: Fault, unfit: set[str]) -> Verdict:
+    """What the whole files of the tests say.
+
+    What a fixture of a module or a cache computes, the first test that asks for it reaches alone.
+    """
+    files = dict.fromkeys(test.split("::")[0] for test in planted.tests)
+    left = [f"--deselect={test}" for test in unfit]
+    again = dataclasses.replace(planted, tests=(*files, "-m", "not slow", *left))
+    verdict = copy.tried(again, -1)
+    # Many files may take their time; a loop without an end has been noticed before.
+    noticed = verdict.outcome == "killed" and verdict.by != LATE
+    return verdict if noticed else Verdict("survived")
 
 
 def main() -> int:
@@ -210,6 +260,9 @@ def main() -> int:
         "--file", action="append", type=Path, help="in place of rooms: faults of these files alone"
     )
     parser.add_argument("--tests", action="append", help="folders of tests; by default all")
+    parser.add_argument(
+        "--quick", action="store_true", help="without the slow tests: what is noticed at least"
+    )
     parser.add_argument("--least", type=float, default=0.0, help="share killed, else status 1")
     parser.add_argument("--seconds", type=float, default=300.0, help="for the tests of a fault")
     parser.add_argument("--coverage", type=Path, help="where it is kept for another time")
@@ -226,11 +279,13 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copy = Copy(ROOT, Path(folder), args.seconds)
         data = args.coverage or Path(folder) / "coverage"
-        lines = reached(copy, args.tests or ["tests/python"], data.resolve())
+        asked = [*(args.tests or ["tests/python"]), *(["-m", "not slow"] if args.quick else [])]
+        lines = reached(copy, asked, data.resolve())
+        unfit = failing(data.resolve())
         for fault in faults:
             start = time.monotonic()
             tests = reaching(lines.get(fault.file, {}), fault.line)
-            outcome, said = judged(copy, fault, tests)
+            outcome, said = judged(copy, fault, tests, unfit)
             scores.setdefault(fault.file.split("/")[2], Counter())[outcome] += 1
             print(
                 f"{outcome:9} {fault.file}:{fault.line} {fault.operator} {fault.before!r} -> "

@@ -27,6 +27,9 @@ PARTS = ("src", "benches", "tests", "python", "docs", "examples", ".ci", ".githu
 FILES = ("Cargo.toml", "Cargo.lock", "pyproject.toml", "README.md", "CHANGELOG.md", "LICENSE")
 FILES += ("CITATION.cff", "CONTRIBUTING.md", "SECURITY.md", "Makefile")
 
+#: What is said where the tests did not end in time.
+LATE = "(time is up)"
+
 #: Exit status of pytest where tests failed; others mean that none could run.
 FAILED = 1
 
@@ -115,7 +118,7 @@ class Copy:
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
         status, told = self._done(command, self.environment() | dict(more or {}), self.seconds)
         if status is None:
-            return Verdict("killed", "(time is up)")
+            return Verdict("killed", LATE)
         if status == FAILED:
             lines = [line for line in told.splitlines() if line.startswith(("FAILED", "ERROR"))]
             return Verdict("killed", lines[0].split(" - ")[0] if lines else "", told[-1500:])

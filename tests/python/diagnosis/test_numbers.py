@@ -17,7 +17,7 @@ from trueangle.diagnosis.discrepancy import unfolded_error
 from trueangle.diagnosis.finding import Finding
 from trueangle.diagnosis.forms import SIZES, form_error_columns, with_form_errors
 from trueangle.diagnosis.gain import _exchanged, _level
-from trueangle.diagnosis.gearedlines import GearedLines
+from trueangle.diagnosis.gearedlines import PLAIN, GearedLines
 from trueangle.diagnosis.gearratio import find_ratio
 from trueangle.diagnosis.holdout import reducible_share
 from trueangle.diagnosis.named import _rivals, findings_of
@@ -269,3 +269,16 @@ def test_a_line_in_doubt_has_the_evidence_that_is_left_of_its_search(monkeypatch
     (told,) = spots
     assert told.evidence == pytest.approx(deviance - 2.0 * found.log_n - 2.0 * np.log(3.0))
     assert told.supported
+
+
+@pytest.mark.parametrize(("beyond", "plain"), [(0.6, True), (0.9, True), (1.1, False)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_plain_ratio_is_meant_where_it_leaves_no_more_than_noise_allows(beyond, plain, sign):
+    """A parabola about a ratio a little off 50: at 50 it is higher by a share of what may be."""
+    count, off = 400, sign * 2e-4
+    bend = beyond * PLAIN / count / off**2
+    lines = SimpleNamespace(
+        y=np.zeros(count), left=lambda ratio, common: 1.0 + bend * (ratio - 50.0 - off) ** 2
+    )
+    found = GearedLines.refined(lines, 50.0 + 3e-4 * sign, True, width=1e-2)
+    assert found == (50.0 if plain else pytest.approx(50.0 + off, abs=1e-6))

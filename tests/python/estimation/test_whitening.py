@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -184,3 +185,30 @@ def test_correlation_at_its_bounds() -> None:
     # Half a period in forty readings, far from its cosines: all but one.
     slow = np.repeat(np.random.default_rng(1).normal(size=50), 200)
     assert LagCorrelation(np.arange(10_000.0), [(0, 10_000)])(slow) == 0.98
+
+
+@pytest.mark.parametrize(("share", "counts"), [(0.995, False), (1.005, True)])
+def test_a_correlation_counts_from_four_of_its_standard_errors(share: float, counts: bool) -> None:
+    """Of many short runs, whose ends are no pairs: 4 / sqrt(pairs) is beyond what is white."""
+    runs, n = 150, 40
+    noise = np.random.default_rng(12).normal(size=(runs, n + 1))
+    u = np.arange(n) / (n - 1)
+    x = np.stack([np.cos(np.pi * k * u) for k in range(9)], axis=1)
+    kept = np.eye(n) - x @ np.linalg.pinv(x)
+    threshold = 4.0 / math.sqrt(runs * (n - 1))
+
+    def made(mixed: float) -> np.ndarray:
+        return noise[:, 1:] + mixed * noise[:, :-1]
+
+    def correlation(mixed: float) -> float:
+        e = made(mixed) @ kept
+        return float((e[:, 1:] * e[:, :-1]).sum() / (e**2).sum())
+
+    low, high = 0.0, 1.0
+    assert correlation(low) < share * threshold < correlation(high)
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if correlation(middle) < share * threshold else (low, middle)
+    bounds = [(k * n, (k + 1) * n) for k in range(runs)]
+    found = LagCorrelation(np.tile(np.arange(float(n)), runs), bounds)(made(high).ravel())
+    assert found == (pytest.approx(share * threshold, rel=1e-6) if counts else 0.0)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from trueangle.export.oneturn import line_floor
-from trueangle.export.proof import lost_orders, prove_export, rounded_up
+from trueangle.export.proof import Proof, lost_orders, prove_export, rounded_up
 from trueangle.export.table import make_table
 
 ARCSEC = 1_296_000.0
@@ -60,3 +62,11 @@ def test_a_bound_that_is_printed_stays_one(digits: int) -> None:
         shown = rounded_up(float(value), digits)
         assert value <= shown <= value * (1.0 + 1.001 * 10.0 ** (1 - digits))
         assert float(f"{shown:.{digits}g}") == shown
+
+
+@pytest.mark.parametrize(("turns", "over"), [(1, ""), (2, " over 2 turns")])
+def test_inputs_are_told_with_the_turns_that_they_are_over(turns, over):
+    proof = Proof(0.1, 0.05, 4096, True, 0.02, 7, turns)
+    assert proof.how == f"every one of 4096 inputs{over} evaluated"
+    between = replace(proof, every_input=False).how
+    assert between.startswith(f"4096 inputs{over} evaluated, and 0.02 arcsec for what lies")

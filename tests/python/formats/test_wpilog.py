@@ -98,6 +98,20 @@ def test_entries_with_times_of_their_own_are_joined(tmp_path, capsys):
     assert np.abs(run.error).max() < 1.01 * np.degrees(0.01)
 
 
+def test_times_are_those_of_the_columns_asked_for(tmp_path):
+    """Entries with times of their own: alone each has its own, none asked for those of all."""
+    path = written(tmp_path / "a.wpilog", apart=5000)
+    laser = 1.0 + 0.02 * np.arange(ROWS)
+    for name, times in (
+        ("/arm/laser", laser),
+        ("/arm/angles[1]", laser + 0.005),
+        (None, np.sort([*laser, *(laser + 0.005)])),
+    ):
+        (batch,) = wpilog.read(path, ["time_s", *([name] if name else [])])
+        np.testing.assert_allclose(batch["time_s"], times, rtol=1e-12)
+        assert all(np.isfinite(values).all() for values in batch.values())
+
+
 def test_a_copy_gets_an_entry_and_keeps_its_bytes(tmp_path):
     path = written(tmp_path / "a.wpilog")
     wanted = {"indicated": SIGNALS["indicated"]}

@@ -1,10 +1,12 @@
 """The operators that plant faults in the core, on a few lines of Rust."""
 
 import sys
+import tomllib
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "mutants"))
 
+from conftest import ROOT
 from rustchanges import changes, switched
 
 CODE = """\
@@ -66,3 +68,16 @@ def test_each_fault_stands_behind_its_question_on_its_own_line():
     for place in places:
         assert b"crate::planted::is" in text.encode()[place.start : place.stop]
     assert switched(CODE, []) == (CODE, [])
+
+
+def test_what_is_excused_stands_where_it_is_said():
+    listed = ROOT / "tests" / "mutants" / "equivalent.toml"
+    entries = tomllib.loads(listed.read_text(encoding="utf-8"))["equivalent"]
+    assert len(entries) > 30
+    for entry in entries:
+        lines = (ROOT / entry["file"]).read_text(encoding="utf-8").splitlines()
+        assert entry["before"] in [line.strip() for line in lines], entry
+        assert entry["after"] != entry["before"]
+        assert entry["because"]
+    places = [(entry["file"], entry["before"], entry["after"]) for entry in entries]
+    assert len(places) == len(set(places))

@@ -177,3 +177,13 @@ def test_runs_are_written_in_degrees_whatever_their_unit(period, tmp_path):
     np.testing.assert_allclose(back.signal("head1"), 180.0)
     for name in ("time", "torque", "temperature", "current"):
         np.testing.assert_array_equal(back.signal(name), run.signal(name))
+
+
+@pytest.mark.parametrize("doubled", ["time_s", "note"])
+def test_of_columns_that_appear_twice_that_one_is_named(doubled, tmp_path):
+    lines = [
+        f"{line},{extra}" for line, extra in zip(GOOD.splitlines(), (doubled, 0, 1, 2), strict=True)
+    ]
+    path = written(tmp_path, "\n".join(lines) + "\n")
+    with pytest.raises(FileError, match=rf"{doubled}.*appears twice"):
+        ta.read_runs(path)

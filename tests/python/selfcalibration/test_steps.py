@@ -90,3 +90,16 @@ def test_a_step_is_halved_until_no_angle_would_be_read_twice() -> None:
     found = steps.damped(start, step)
     assert found[2] == 0.25
     np.testing.assert_array_equal(steps.damped(start, 0.3 * step), 0.3 * step)
+
+
+@pytest.mark.parametrize("sets", [1, 2])
+def test_little_is_left_of_a_motion_without_error(sets: int) -> None:
+    """The first spline is near to an even deceleration, but where it ends; turns are not."""
+    steps, unknowns = work(sets, False)
+    knots = steps.readings.knots(40)
+    spline = steps.readings.first_spline(knots)
+    left = steps.residuals(knots, spline, np.zeros_like(unknowns))
+    assert left.shape == steps.readings.angle.shape
+    assert 0.0 < np.abs(left[100:-100]).max() < 0.01
+    moved = steps.residuals(knots, spline, unknowns) - left
+    assert 1e-3 < np.abs(moved).max() < 0.1

@@ -308,3 +308,11 @@ def test_a_folder_that_takes_no_files_ends_the_attempt(model, tmp_path, monkeypa
         model.save(tmp_path / "m.json")
     assert tried
     assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [(3 << 20, "3 MiB"), (1023 << 20, "1023 MiB"), (1 << 30, "1 GiB"), (5 << 30, "5 GiB")],
+)
+def test_limits_are_told_in_the_larger_unit_from_one_of_it(count, said):
+    assert inputs._size(count) == said

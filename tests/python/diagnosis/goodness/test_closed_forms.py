@@ -1,0 +1,150 @@
+"""Numbers of the tests of what is left, against scipy and against matrices written out."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from trueangle.diagnosis.goodness import Leftover
+from trueangle.diagnosis.goodness.noise import _independent, _PatternProducts, _refined, _Sums
+from trueangle.diagnosis.goodness.periodogram import periodogram
+from trueangle.diagnosis.goodness.place import _smallest, unit_sums
+from trueangle.diagnosis.goodness.scatter import normal_kurtosis
+
+SEED = 71
+BOUNDS = [(0, 30), (30, 75), (75, 120)]
+N = 120
+
+
+def rng():
+    print(f"seed {SEED}")
+    return np.random.default_rng(SEED)
+
+
+def about_means(values):
+    out = np.array(values, dtype=float)
+    for a, b in BOUNDS:
+        out[a:b] -= out[a:b].mean(axis=0)
+    return out
+
+
+def leftover(residual, theta=None):
+    run = np.repeat(np.arange(3), [b - a for a, b in BOUNDS])
+    theta = np.linspace(0.0, 9.0, N) if theta is None else theta
+    return Leftover(residual, theta, np.ones(N), run, np.arange(float(N)))
+
+
+@pytest.mark.parametrize("n", [30, 400, 5000])
+@pytest.mark.parametrize("law", ["standard_normal", "standard_cauchy", "random"])
+def test_tails_are_those_of_scipy(n, law):
+    values = getattr(rng(), law)(n)
+    d = values - values.mean()
+    found = normal_kurtosis(float(np.mean(d**4) / np.mean(d**2) ** 2), float(n))
+    assert found == pytest.approx(stats.kurtosistest(values).statistic, rel=1e-9)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.4, -0.3, 0.9])
+def test_products_of_correlated_noise_are_those_of_its_inverse(rho):
+    chance = rng()
+    x, e = chance.normal(size=(N, 3)), chance.normal(size=N)
+    sums = _Sums(_PatternProducts(x, BOUNDS), e)
+    # Of one innovation of variance 1: a stationary chain in every run.
+    covariance = np.zeros((N, N))
+    for a, b in BOUNDS:
+        lag = np.abs(np.subtract.outer(np.arange(a, b), np.arange(a, b)))
+        covariance[a:b, a:b] = rho**lag / (1.0 - rho**2)
+    whole = np.column_stack([_PatternProducts(x, BOUNDS).x, e])
+    expected = whole.T @ np.linalg.solve(covariance, whole)
+    np.testing.assert_allclose(sums.products(rho), expected, rtol=0, atol=1e-9)
+    rest, freedom = sums.fitted(rho, 3)
+    gram, moment = expected[:-1, :-1], expected[:-1, -1]
+    left = expected[-1, -1] - moment @ np.linalg.solve(gram, moment)
+    assert (rest, freedom) == (pytest.approx(left, rel=1e-9), N - 3 - 3)
+
+
+def test_columns_made_independent_span_the_same():
+    x = rng().normal(size=(N, 3)) * [1.0, 1e3, 1e-3]
+    found = _independent(np.column_stack([x, x @ [1.0, 2.0, 3.0]]))
+    assert found.shape == (N, 3)
+    np.testing.assert_allclose(found.T @ found, np.eye(3), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found @ (found.T @ x), x, rtol=1e-9, atol=1e-9)
+
+
+def test_a_valley_is_found():
+    place, value = _refined(lambda t: (t - 0.3) ** 2 + 2.0, -1.0, 1.0)
+    assert place == pytest.approx(0.3, abs=2e-3)
+    assert value == pytest.approx(2.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("within", [True, False])
+def test_a_modulator_alone_is_a_slope_and_its_t_test(within):
+    """Within runs where it changes in them, else between them."""
+    chance = rng()
+    per_run = np.repeat([-0.7, 0.2, 1.1], [b - a for a, b in BOUNDS])
+    g = chance.normal(size=N) + per_run if within else per_run
+    zeros = np.repeat([0.5, -0.4, 0.1] if within else [0.5] * 3, [b - a for a, b in BOUNDS])
+    units = [(a, (a + b) // 2) for a, b in BOUNDS] + [((a + b) // 2, b) for a, b in BOUNDS]
+    units.sort()
+    exact = unit_sums(g, leftover(0.3 * g + zeros), units)
+    if within:
+        assert exact.size == pytest.approx(0.3, rel=1e-9)
+    found = unit_sums(g, leftover(0.3 * g + zeros + chance.normal(size=N)), units)
+    t = stats.ttest_1samp(found.sums, 0.0)
+    assert found.chance() == pytest.approx(t.pvalue, rel=1e-9)
+    signs = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
+    assert found.chance(signs) == pytest.approx(stats.ttest_1samp(found.sums * signs, 0.0).pvalue)
+
+
+def test_a_modulator_that_tells_nothing_has_no_size():
+    g = np.ones(N)
+    units = [(a, b) for a, b in BOUNDS]
+    assert unit_sums(g, leftover(rng().normal(size=N)), units).chance() == 1.0
+
+
+def test_evidence_of_an_order_is_its_share_of_the_units():
+    """Of one order that all units agree on: Hotelling's share, and no more than chance allows."""
+    chance = rng()
+    w = chance.normal(size=(40, 6, 2)) @ [1.0, 1.0j] / np.sqrt(2.0)
+    w[11] = np.exp(0.3j) * chance.uniform(0.9, 1.1, 6)
+    p, statistic, band, k, logs = _smallest(w, None, np.ones(6))
+    coherent, own = abs(w[11].sum()) ** 2, (np.abs(w[11]) ** 2).sum()
+    assert k == 11
+    assert logs[11] == pytest.approx(min(coherent / 6, -5 * np.log1p(-coherent / (6 * own))))
+    assert 0.0 < p <= 1.0
+    # The same units with signs that cancel do not agree.
+    cancel = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+    assert _smallest(w, None, cancel)[4][11] < 0.1 * logs[11]
+    sums = np.cumsum(logs)
+    if band > 0.0:
+        assert statistic == pytest.approx(sums[int(band) - 1] / band)
+
+
+@pytest.mark.parametrize("even", [True, False])
+@pytest.mark.parametrize("amplitude", [3.0, 12.0])
+def test_a_line_is_told_by_its_frequency_and_amplitude(even, amplitude):
+    chance = rng()
+    bounds = [(0, 400), (400, 900)]
+    clock = np.concatenate([np.arange(n) * 0.1 for n in (400, 500)])
+    if not even:
+        clock = np.concatenate([np.sort(chance.uniform(0.0, 0.1 * n, n)) for n in (400, 500)])
+    phase = np.repeat([0.4, 2.9], [400, 500])
+    values = amplitude * np.cos(2.0 * np.pi * 0.83 * clock + phase) + chance.normal(size=900)
+    found = periodogram(values, clock, bounds)
+    assert found.even is even
+    assert found.peak == pytest.approx(0.83, abs=0.5 / 50.0)
+    assert found.amplitude == pytest.approx(amplitude, rel=0.08)
+    assert found.p < 1e-6
+    assert found.power.size == found.frequency.size
+    assert found.statistic == pytest.approx(found.power.max(), rel=1e-9) or found.width > 1
+
+
+def test_of_noise_alone_the_power_is_one_and_p_no_less_than_its_chance():
+    """Widths share readings, so that p is on the safe side: a half is reached, a tenth seldom."""
+    chance = rng()
+    bounds = [(0, 200), (200, 400), (400, 600)]
+    clock = np.concatenate([np.sort(chance.uniform(0.0, 60.0, 200)) for _ in bounds])
+    made = [periodogram(chance.normal(size=600), clock, bounds) for _ in range(60)]
+    assert np.mean([found.power.mean() for found in made]) == pytest.approx(1.0, abs=0.03)
+    p = np.array([found.p for found in made])
+    # Four standard deviations of a binomial count beyond a tenth of 60.
+    assert np.sum(p < 0.1) <= 6 + 4.0 * np.sqrt(60 * 0.1 * 0.9)
+    assert 2 <= np.sum(p < 0.5) <= 30 + 4.0 * np.sqrt(60 * 0.5 * 0.5)
