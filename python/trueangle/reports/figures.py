@@ -56,7 +56,7 @@ def figures_of_runs(
     if held is not None:
         made["before-after"] = _before_after(held, runs, scale)
     if fit is not None:
-        multiples = _phases(fit, name, scale)
+        multiples = phase_figure(fit, name, scale)
         if multiples is not None:
             made["phases"] = multiples
         for signal in _signals_present(fit):
@@ -153,7 +153,7 @@ _MOST: Final = 12
 _LEAST: Final = 15.0
 
 
-def _phases(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None:
+def phase_figure(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None:
     """Phase of every order in every run; None where no run holds them, or there is one."""
     try:
         found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST]

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.export.fmudescription import variables_of
-from trueangle.export.fmusource import fmu_source
+from trueangle.export.fmufiles import fmu_source, variables_of
 
 #: Of powers of two, so that no number is rounded on the way.
 PERIODS = (1.0, 64.0, 4096.0)
@@ -26,7 +25,7 @@ def test_the_source_of_a_unit_is_the_same_in_every_unit_of_angle(argument, senso
     sources = []
     for period in PERIODS:
         one = model(period, argument)
-        sources.append(fmu_source(one, variables_of(one, sensor), sensor, "", "").splitlines())
+        sources.append(fmu_source(one, variables_of(one, sensor), sensor, "").splitlines())
     np.testing.assert_array_equal(sources[1], sources[0])
     np.testing.assert_array_equal(sources[2], sources[0])
     # The zero in turns.

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from trueangle.reports.ranking import JointRank, ranking_text
 
 import trueangle as ta
 from trueangle.monitoring.alarm import WatchedOrder, WatchedWindow
 from trueangle.reports.numbers import Numbers
+from trueangle.reports.robot import JointRank, ranking_text
 from trueangle.reports.scale import error_scale
 from trueangle.reports.unknowns import unknown_content
 from trueangle.reports.watched import WatchReport

@@ -3,9 +3,9 @@
 from datetime import UTC, datetime, timedelta, timezone
 
 import numpy as np
-from trueangle.formats.times import elapsed_seconds, local_day
 
 from trueangle.formats import seriallog
+from trueangle.support.times import elapsed_seconds, local_day
 
 SEED = 5_150
 
