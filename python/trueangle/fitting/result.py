@@ -16,8 +16,7 @@ from ..runs.travel import Span
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn
 from ..support.plainresult import result_picture
-from .coefficients import FittedCoefficients
-from .model import build_model, fit_notes
+from .model import FittedCoefficients, build_model, fit_notes
 from .problem import Fitted, Problem
 from .robust import Weighted
 from .rounding import beside_rounding

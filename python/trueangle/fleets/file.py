@@ -178,13 +178,13 @@ class _FleetReader(Decoder):
 
     def common(self, value: Any, key: str) -> CommonOrder:
         of = self.entries(value, _COMMON, key)
-        size = of(self.angle, "amplitude_arcsec")
+        amplitude = of(self.angle, "amplitude_arcsec")
         phase = math.radians(of(self.number, "phase_deg"))
         return CommonOrder(
             of(self.number, "order"),
             of(self.text, "shaft"),
-            size * math.sin(phase),
-            size * math.cos(phase),
+            amplitude * math.sin(phase),
+            amplitude * math.cos(phase),
             of(self.angle, "std_arcsec"),
         )
 

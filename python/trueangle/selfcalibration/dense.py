@@ -60,6 +60,12 @@ class DenseFit:
     triangle: Array
     """Of nuisances, patterns and target: all that fits of fewer columns need."""
 
+    @property
+    def notes(self) -> list[str]:
+        """What its standard errors are of, where they are not those of independent readings."""
+        told = "neighbouring residuals agree: standard errors are taken from blocks"
+        return [told] if self.correlated else []
+
 
 def fit_dense(
     parts: Sequence[DenseRows],

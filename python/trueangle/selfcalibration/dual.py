@@ -212,11 +212,7 @@ def _blind(
     kept: Sequence[SharedLine], lost: Sequence[SharedLine], ratio: float, turns: float
 ) -> list[Blind]:
     blind = [
-        Blind(
-            (0.0,),
-            "the zero: only the difference of two readings is seen",
-            "set the zero at a mark or an index pulse",
-        ),
+        Blind.zero("the zero: only the difference of two readings is seen"),
         Blind(
             tuple(line.order for line in kept),
             "only sums are seen: output encoder together with gear (orders of the output), motor "
@@ -282,9 +278,7 @@ def _arc_note(span: Span, kept: Sequence[SharedLine], period: float) -> str:
 
 
 def _notes(fit: DualFit, ratio: float, channels: Channels) -> list[str]:
-    notes = []
-    if fit.dense.correlated:
-        notes.append("neighbouring residuals agree: standard errors are taken from blocks")
+    notes = fit.dense.notes
     if not varied(channels, ratio)[0]:
         notes.append("one direction of travel only: reversal error is not seen")
     notes.append(

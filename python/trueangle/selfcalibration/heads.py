@@ -78,7 +78,7 @@ def head_patterns(
     )
     turns = sum(float(np.ptp(np.unwrap(h[0]))) for h in readings) / (2.0 * math.pi)
     notes = _notes(fit, readings, numbers, turns, table)
-    blind.insert(0, _zero())
+    blind.insert(0, Blind.zero("no reading without a reference shows it"))
     model = made_model(
         table,
         "heads",
@@ -102,14 +102,6 @@ def head_patterns(
         readings=count,
         turns=turns,
         beside={"head_angles_deg": [math.degrees(a) % 360.0 for a in angle]},
-    )
-
-
-def _zero() -> Blind:
-    return Blind(
-        (0.0,),
-        "no reading without a reference shows it",
-        "set the zero at a mark or an index pulse",
     )
 
 
@@ -242,9 +234,7 @@ def _notes(
         notes.append("the mean of the heads keeps none of the orders given")
     if turns < 0.95:
         notes.append(f"only {turns:.2f} turns were travelled: orders hang together")
-    if fit.correlated:
-        notes.append("neighbouring residuals agree: standard errors are taken from blocks")
-    return notes
+    return [*notes, *fit.notes]
 
 
 def _held_out(

@@ -67,6 +67,11 @@ class Blind:
     because: str
     measure: str
 
+    @classmethod
+    def zero(cls, because: str) -> Blind:
+        """The zero, which only a mark shows."""
+        return cls((0.0,), because, "set the zero at a mark or an index pulse")
+
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         return {

@@ -84,13 +84,7 @@ def shift_patterns(
             retained[first + 1] = retained[first]
     covariance = fit.covariance[np.ix_(at, at)]
     table = estimates(kept, fit.patterns[at], covariance, retained[at], limit)
-    blind = [
-        Blind(
-            (0.0,),
-            "the zero: only differences of two readings are seen",
-            "set the zero at a mark or an index pulse",
-        )
-    ]
+    blind = [Blind.zero("the zero: only differences of two readings are seen")]
     if lost:
         where = ", ".join(f"{math.degrees(s) % 360.0:.4g}" for s in design.shift)
         what = FACETS if design.facets else OTHER
@@ -253,9 +247,7 @@ def _notes(design: Clampings, fit: DenseFit) -> list[str]:
             f"the coupling changes by {size:.3g} arcsec (rms, orders 1 and 2) from clamping to "
             "clamping"
         )
-    if fit.correlated:
-        notes.append("neighbouring residuals agree: standard errors are taken from blocks")
-    return notes
+    return [*notes, *fit.notes]
 
 
 def _held_out(design: Clampings, orders: Sequence[float], whole: DenseFit) -> dict[str, HeldOut]:

@@ -193,11 +193,9 @@ def _sorted_out(
 ) -> tuple[list[OrderEstimate], list[OrderEstimate], list[Blind]]:
     """Numbers that are the encoder's, numbers of several things, and the blind orders."""
     blind = [
-        Blind(
-            (0.0,),
+        Blind.zero(
             "no reading without a reference shows it; order k turns by k times the "
-            "difference of two zeros",
-            "set the zero at a mark or an index pulse",
+            "difference of two zeros"
         )
     ]
     orders = [o.order for o in table]

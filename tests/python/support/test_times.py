@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta, timezone
 import numpy as np
 
 from trueangle.formats import seriallog
+from trueangle.formats.format import Selection
 from trueangle.support.times import elapsed_seconds, local_day
 
 SEED = 5_150
@@ -57,6 +58,6 @@ def test_a_clock_that_is_set_back_is_not_midnight(tmp_path):
         ]
         path = tmp_path / f"{draw}.log"
         path.write_text("\n".join(lines) + "\n")
-        (batch,) = seriallog.read(path, ["time_s", "b"])
+        (batch,) = seriallog.read(path, Selection(["time_s", "b"]))
         found = batch["time_s"] - batch["time_s"][0]
         np.testing.assert_allclose(found, seconds - seconds[0], atol=2e-3)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Unpack
+
+import numpy as np
 
 from ...errors import ArgumentError
 from ...support.kinds import told_kinds
@@ -11,28 +13,17 @@ from ..run import given_runs
 from ..source import Reading
 from .angles import angle_ratio, mixed_units, suggestion, swapped, wrapped_reference, wrong_ratio
 from .fault import DataFault
-from .record import Record, records_of
-from .rows import duplicate_rows, duplicate_runs, unsorted_time
+from .record import Record, read_records, records_of
 from .still import stuck_readings
 
 if TYPE_CHECKING:
     from .result import Check
 
-#: Every test of the data, in the order in which they are told.
-TESTS = (
-    unsorted_time,
-    mixed_units,
-    wrapped_reference,
-    wrong_ratio,
-    swapped,
-    duplicate_runs,
-    duplicate_rows,
-    stuck_readings,
-)
-
-
 #: Faults after which the angles of a run mean nothing to further tests.
 UNSURE = ("mixed_units", "wrapped_reference", "unsorted_time")
+
+#: Readings that a run must have to be compared as a whole.
+LEAST_READINGS = 3
 
 
 @told_kinds
@@ -100,6 +91,92 @@ def check(data: Any, **reading: Unpack[Reading]) -> Check:
     )
 
 
+def _records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
+    runs, data = given_runs(data)
+    if runs is not None:
+        return records_of(runs)
+    return read_records(data, reading)
+
+
+def duplicate_runs(records: list[Record]) -> Iterator[DataFault]:
+    """Runs whose readings are equal to the last digit."""
+    if len(records) < 2:
+        return
+    import hashlib
+
+    same: dict[bytes, list[str]] = {}
+    for record in records:
+        if len(record) >= LEAST_READINGS and np.ptp(record.indicated) > 0.0:
+            data = np.concatenate([record.reference, record.indicated]).tobytes()
+            same.setdefault(hashlib.sha256(data).digest(), []).append(record.label)
+    for labels in same.values():
+        if len(labels) > 1:
+            yield DataFault.of(
+                "duplicate_runs",
+                labels,
+                (),
+                f"runs {_listed(labels)} hold the same readings, to the last digit: "
+                "noise and repeatability would come out too good",
+                "keep one of them",
+            )
+
+
+def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
+    """Rows with one time stamp and the same readings."""
+    for record in records:
+        if record.time is None:
+            continue
+        table = np.column_stack([record.time, record.reference, record.indicated])
+        order = np.lexsort(table.T)
+        again = np.flatnonzero((np.diff(table[order], axis=0) == 0.0).all(axis=1)) + 1
+        if again.size:
+            rows = np.sort(record.rows[order[again]])
+            yield DataFault.of(
+                "duplicate_rows",
+                [record.label],
+                rows.tolist(),
+                f"{rows.size} row{'s' * (rows.size > 1)} of run {record.label} (first: row "
+                f"{rows[0]}) are there twice, time stamp and readings",
+                "drop the second of each",
+            )
+
+
+def unsorted_time(records: list[Record]) -> Iterator[DataFault]:
+    """Time that runs backwards within a run."""
+    for record in records:
+        if record.time is None:
+            continue
+        back = np.flatnonzero(np.diff(record.time) < 0.0) + 1
+        if back.size:
+            k = int(back[0])
+            yield DataFault.of(
+                "unsorted_time",
+                [record.label],
+                record.rows[back].tolist(),
+                f"time runs backwards in run {record.label}, {back.size} time"
+                f"{'s' * (back.size > 1)} (first in row {record.rows[k]}: "
+                f"{record.time[k]:g} s after {record.time[k - 1]:g} s)",
+                "sort the rows by time, or give what follows another run label",
+            )
+
+
+def _listed(labels: list[str]) -> str:
+    return f"{', '.join(labels[:-1])} and {labels[-1]}"
+
+
+#: Every test of the data, in the order in which they are told.
+TESTS = (
+    unsorted_time,
+    mixed_units,
+    wrapped_reference,
+    wrong_ratio,
+    swapped,
+    duplicate_runs,
+    duplicate_rows,
+    stuck_readings,
+)
+
+
 def data_faults(records: list[Record]) -> list[DataFault]:
     """Faults of the data; where units are mixed, what follows from that is not told twice."""
     found: list[DataFault] = []
@@ -108,12 +185,3 @@ def data_faults(records: list[Record]) -> list[DataFault]:
         angles = test in (wrapped_reference, wrong_ratio, swapped, stuck_readings)
         found += test([r for r in records if not (angles and r.label in mixed)])
     return found
-
-
-def _records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
-    runs, data = given_runs(data)
-    if runs is not None:
-        return records_of(runs)
-    from .record import read_records
-
-    return read_records(data, reading)
