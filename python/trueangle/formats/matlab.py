@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import loadmat, savemat
+from scipy.io import loadmat, savemat, whosmat
 
 from ..errors import FileError
 from .budget import FileExtent
@@ -83,6 +83,7 @@ def copy(
         )
     found = _vectors(source)
     additions = choose(list(found))
+    there = {name for name, _shape, _kind in whosmat(source)}
     made: dict[str, Any] = {}
     rows = 0
     for addition in additions:
@@ -90,7 +91,7 @@ def copy(
         signals = {signal: _values(found[name]) for signal, name in addition.signals.items()}
         after = addition.correct(_values(column), signals)
         name = addition.added.replace("/", "_")
-        if name in found:
+        if name in there:
             raise FileError(source, "is there already: corrected before", column=name)
         made[name] = after[:, None]
         rows = max(rows, len(column))
