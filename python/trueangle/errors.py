@@ -46,12 +46,12 @@ def shortened(text: str) -> str:
 
 
 def printable(text: str) -> str:
-    """A message in one line of characters that a terminal shows: files hold others, and name them.
+    r"""A message in one line of characters that a terminal shows: files hold others, and name them.
 
     Examples
     --------
     >>> printable("column 'a" + chr(27) + "[2J'")
-    "column 'a\\\\x1b[2J'"
+    "column 'a\\x1b[2J'"
     """
     if text.isprintable():
         return text

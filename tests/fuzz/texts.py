@@ -138,7 +138,7 @@ def _firmware(name: str) -> Loader:
 
     def use(path: Path) -> None:
         model = ta.import_model(path, target, **read)
-        given = {name: 1.0 for name in model.uses_signals}
+        given = dict.fromkeys(model.uses_signals, 1.0)
         assert np.isfinite(model.error(np.linspace(0.0, 360.0, 33), **given)).all()
         assert np.isfinite(model.correct(np.linspace(0.0, 360.0, 33), **given)).all()
 

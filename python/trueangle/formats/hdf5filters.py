@@ -42,7 +42,7 @@ def check_filters(path: Path, data: Any, name: str) -> None:
         if number == _NBIT:
             fits = len(given) == _PLAIN and given[0] == _PLAIN and given[2] == count
             fits = fits and given[3] == _NUMBER and given[4] == size
-            fits = fits and 0 < given[6] and given[6] + given[7] <= 8 * size
+            fits = fits and given[6] > 0 and given[6] + given[7] <= 8 * size
         elif number == _SCALE_OFFSET:
             fits = len(given) == _SCALED and given[2] == count and given[4] == size
         if not fits:
