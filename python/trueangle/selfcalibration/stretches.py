@@ -74,8 +74,8 @@ class Segment:
         if not (right > left).all():  # of angles so large that rounding takes a turn
             raise _fault(
                 self.recording,
-                f"its angles are counted up to {last / turn:.3g} turns, where a turn takes no time; "
-                "check their unit, and that they are angles",
+                f"its angles are counted up to {last / turn:.3g} turns, "
+                "where a turn takes no time; check their unit, and that they are angles",
             )
         speed = np.log(1.0 / (right - left))
         middle = 0.5 * (left + right)
