@@ -199,7 +199,8 @@ def refused_by(loader: Any, path: Path) -> str:
         wrong = well_told(error, path)
         if wrong is not None:
             raise AssertionError(f"the message {wrong}: {str(error)[:2000]!r}") from error
-        frames = traceback.extract_tb(error.__traceback__)
+        # Of what a library refuses, the function that was at work in it.
+        frames = traceback.extract_tb((error.__cause__ or error).__traceback__)
         inside = [f for f in frames if "trueangle" in Path(f.filename).parts]
         told = [f for f in inside if f.name not in ("damage_told", "error", "failed")]
         return f"{Path(told[-1].filename).stem}.{told[-1].name}" if told else "elsewhere"
