@@ -30,7 +30,7 @@ COMMANDS: dict[str, list[str]] = {
     "plot": ["plot", "{}", "-o", "made.png"],
     "diagnose": ["diagnose", "{}", "--simulation", "joint.toml"],
     "report": ["report", "{}", "-o", "made.html"],
-    "selfcal": ["selfcal", "{}", "--method", "dual", "--gear-ratio", "50"],
+    "selfcal": ["selfcal", "{}", "-o", "made.json", "--method", "spin-down"],
     "fleet": ["fleet", "{}", "other.npz", "-o", "made.json"],
     "watch": ["watch", "{}", "--model", "model.json"],
     "join": ["join", "{}", "{}", "-o", "made.csv"],
