@@ -20,8 +20,8 @@ __all__ = ["Calibration", "CalibrationSums", "columns_of", "normal_matrix", "out
 
 Array = NDArray[np.float64]
 
-#: Readings whose columns are made together: 220 columns of them take 29 MB.
-_BLOCK = 1 << 14
+#: Readings whose columns are made together: 220 columns of them take 14 MB.
+_BLOCK = 1 << 13
 
 
 def output_orders(shafts: Sequence[ShaftOrders]) -> Array:
