@@ -134,6 +134,8 @@ def mutated_document(document: Any, rng: random.Random) -> Any:
 def _change_gently(made: Any, rng: random.Random) -> None:
     """Put another number, or another text of the document, in the place of one."""
     found = [path for path in places(made) if path]
+    if not found:
+        return
     path = rng.choice(found)
     holder = _inside(made, path[:-1])
     value = holder[path[-1]]
