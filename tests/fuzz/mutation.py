@@ -141,6 +141,8 @@ def _change_gently(made: Any, rng: random.Random) -> None:
     value = holder[path[-1]]
     if isinstance(value, bool):
         holder[path[-1]] = not value
+    elif isinstance(value, int) and abs(value) > 2**1000:  # beyond any float
+        holder[path[-1]] = -value
     elif isinstance(value, int | float):
         step = rng.choice((value + 1, value - 1, -value, 2 * value, 0, 1, value / 2, value * 1e6))
         near = (value + 1e-9, value * 1e-12, 1e300, -1e300, 5e-324, 2**31, 2**53, 10**6)
