@@ -45,6 +45,19 @@ def shortened(text: str) -> str:
     return f"{text[:kept]} ... ({len(text) - 2 * kept} characters) ... {text[-kept:]}"
 
 
+def printable(text: str) -> str:
+    r"""A message in one line of characters that a terminal shows: files hold others, and name them.
+
+    Examples
+    --------
+    >>> printable("column 'a" + chr(27) + "[2J'")
+    "column 'a\\x1b[2J'"
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 class TrueAngleError(ValueError):
     """Base of every error that trueangle raises on bad input."""
 
@@ -131,8 +144,8 @@ class FileError(TrueAngleError):
             place.append(f"line {line}")
         if column is not None:
             place.append(f"column '{column}'")
-        super().__init__(f"{', '.join(place)}: {problem}")
-        self.problem = problem
+        super().__init__(printable(f"{', '.join(place)}: {problem}"))
+        self.problem = printable(problem)
 
     def __reduce__(self) -> tuple[Any, ...]:  # workers of a cluster send errors home
         return _file_error, (type(self), self.path, self.problem, self.line, self.column)

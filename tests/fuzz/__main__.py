@@ -2,14 +2,14 @@
 
 Each case is one damaged file, made from the seed and its number alone. It must end within
 five seconds of the processor and 1 GiB beyond what was in use, either accepted or refused by a
-`TrueAngleError`. What does not is printed with the command that repeats it. Stopped before
-its end (Ctrl-C, or SIGTERM), it says how many cases each loader has reached.
+`TrueAngleError` whose one line names the file. What does not is printed with the command that
+repeats it. Stopped before its end (Ctrl-C, or SIGTERM), it says how many cases each loader has
+reached. ``--places`` tells which functions refused how many: how deep the damage lies.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import gc
 import os
 import random
@@ -23,9 +23,11 @@ import time
 import traceback
 import warnings
 import zlib
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 #: Of the processor, for a case; and of the clock, after which it counts as hanging.
 SECONDS = 5.0
@@ -33,6 +35,8 @@ HANGS = 60.0
 BYTES = 1 << 30
 #: Exit status of a child whose own cases cannot be made.
 BROKEN = 3
+#: What is counted of files that no function refuses.
+READ = "read"
 #: Where cases are written: a file system in memory where there is one, for outputs are synced.
 MEMORY = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
 
@@ -50,12 +54,13 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1, help="loaders at a time")
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--keep", metavar="FOLDER", help="where files that fail are copied to")
+    parser.add_argument("--places", action="store_true", help="print who refused how many")
     parser.add_argument("--child", metavar="STATE", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.seed is None:
         args.seed = random.SystemRandom().randrange(2**32)
     if args.child:
-        return child(args.loader[0], args.seed, args.first, args.cases, args.child, args.keep)
+        return child(args.loader[0], args)
     names = args.loader
     if not names:
         from loaders import loaders
@@ -79,16 +84,17 @@ def stop(number: int, frame: FrameType | None) -> None:
 
 def parent(name: str, args: argparse.Namespace) -> int:
     """Cases of one loader, going on behind one that took its process with it."""
-    first, last, failures, start = args.first, args.first + args.cases, 0, time.monotonic()
-    reached = first
+    first, last, start = args.first, args.first + args.cases, time.monotonic()
+    reached, failures, accepted = first, 0, 0
     with tempfile.TemporaryDirectory(dir=MEMORY) as folder:
         state = Path(folder, "state")
         while first < last and not stopped:
-            state.write_text(f"{first} 0")
+            state.write_text(f"{first} 0 0")
             command = [sys.executable, str(Path(__file__).parent), "--loader", name]
             command += ["--seed", str(args.seed), "--first", str(first)]
             command += ["--cases", str(last - first), "--child", str(state)]
             command += ["--keep", args.keep] if args.keep else []
+            command += ["--places"] if args.places else []
             # A group of its own: Ctrl-C is for the parent, which ends it.
             with subprocess.Popen(command, process_group=0) as process:
                 running.add(process)
@@ -96,8 +102,9 @@ def parent(name: str, args: argparse.Namespace) -> int:
                     process.kill()
                 status = process.wait()
                 running.discard(process)
-            reached, told = (int(x) for x in state.read_text().split()[:2])
+            reached, told, read = (int(x) for x in state.read_text().split()[:3])
             failures += told
+            accepted += read
             if status == 0:
                 reached = last
                 break
@@ -112,7 +119,8 @@ def parent(name: str, args: argparse.Namespace) -> int:
     seconds = time.monotonic() - start
     if stopped or reached > args.first:
         cases = reached - args.first
-        print(f"{name}: {cases} cases, {failures} failed, {seconds:.0f} s", flush=True)
+        told = f"{accepted} read, {failures} failed, {seconds:.0f} s"
+        print(f"{name}: {cases} cases, {told}", flush=True)
     return failures
 
 
@@ -120,15 +128,14 @@ def _again(name: str, seed: int, case: int) -> str:
     return f"python tests/fuzz --loader {name} --seed {seed} --first {case} --cases 1"
 
 
-def child(name: str, seed: int, first: int, cases: int, state: str, keep: str | None) -> int:
+def child(name: str, args: argparse.Namespace) -> int:
     """Cases one after the other; the state file tells which one is in hand."""
     import faulthandler
 
     from loaders import loaders
-    from trueangle.errors import TrueAngleError
 
     loader = loaders()[name]
-    here = Path(state).parent
+    here = Path(args.child).parent
     with tempfile.TemporaryDirectory(dir=here) as folder:  # seeds, before memory is bounded
         try:
             loader.make(Path(folder), random.Random(0))
@@ -136,7 +143,7 @@ def child(name: str, seed: int, first: int, cases: int, state: str, keep: str | 
             traceback.print_exc()
             return BROKEN
     warnings.simplefilter("ignore")
-    failures = 0
+    failures, places = 0, Counter[str]()
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     resource.setrlimit(
         resource.RLIMIT_AS, (pages * resource.getpagesize() + BYTES, resource.RLIM_INFINITY)
@@ -145,28 +152,59 @@ def child(name: str, seed: int, first: int, cases: int, state: str, keep: str | 
     faulthandler.register(signal.SIGALRM, chain=True)
     gc.freeze()
     with tempfile.TemporaryDirectory(dir=here) as folder:
-        handle = os.open(state, os.O_WRONLY | os.O_TRUNC)
-        for case in range(first, first + cases):
-            os.pwrite(handle, f"{case:12d} {failures:8d}".encode(), 0)
-            rng = random.Random(zlib.crc32(f"{name} {seed} {case}".encode()))
+        handle = os.open(args.child, os.O_WRONLY | os.O_TRUNC)
+
+        def note(case: int) -> None:
+            os.pwrite(handle, f"{case:12d} {failures:8d} {places[READ]:12d}".encode(), 0)
+
+        for case in range(args.first, args.first + args.cases):
+            note(case)
+            rng = random.Random(zlib.crc32(f"{name} {args.seed} {case}".encode()))
             path = loader.make(Path(folder), rng)
             signal.setitimer(signal.ITIMER_REAL, HANGS)
             begun = time.process_time()
             try:
-                with contextlib.suppress(TrueAngleError):
-                    loader.use(path)
+                places[refused_by(loader, path)] += 1
                 assert time.process_time() - begun < SECONDS, f"more than {SECONDS:g} s"
             except BaseException:
                 failures += 1
-                os.pwrite(handle, f"{case:12d} {failures:8d}".encode(), 0)
-                print(f"{name}: case {case}: {_again(name, seed, case)}", file=sys.stderr)
+                print(f"{name}: case {case}: {_again(name, args.seed, case)}", file=sys.stderr)
                 traceback.print_exc(limit=-6)
-                if keep:
-                    shutil.copy(path, Path(keep, f"{name}-{case}{path.suffix}"))
+                if args.keep:
+                    shutil.copy(path, Path(args.keep, f"{name}-{case}{path.suffix}"))
             finally:
                 signal.setitimer(signal.ITIMER_REAL, 0.0)
+        note(args.first + args.cases)
         os.close(handle)
+    if args.places:
+        for place, count in places.most_common():
+            print(f"{name}: {100.0 * count / args.cases:5.1f} % {place}", flush=True)
     return 0
+
+
+def refused_by(loader: Any, path: Path) -> str:
+    """Which function of the package refuses a file; `READ` where none does.
+
+    Raises
+    ------
+    AssertionError
+        The message does not name the file, or is more than a line.
+    """
+    from loader import well_told
+    from trueangle.errors import TrueAngleError
+
+    try:
+        loader.use(path)
+    except TrueAngleError as error:
+        wrong = well_told(error, path)
+        if wrong is not None:
+            raise AssertionError(f"the message {wrong}: {str(error)[:2000]!r}") from error
+        # Of what a library refuses, the function that was at work in it.
+        frames = traceback.extract_tb((error.__cause__ or error).__traceback__)
+        inside = [f for f in frames if "trueangle" in Path(f.filename).parts]
+        told = [f for f in inside if f.name not in ("damage_told", "error", "failed")]
+        return f"{Path(told[-1].filename).stem}.{told[-1].name}" if told else "elsewhere"
+    return READ
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import random
+import re
 from typing import Any
 
 #: Values that files were seen with, and those that arithmetic trips over.
@@ -97,8 +98,16 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 def mutated_document(document: Any, rng: random.Random) -> Any:
-    """A copy of ``document`` with one to four of its values changed."""
+    """A copy of ``document`` with one to four of its values changed.
+
+    In two of five, numbers stay numbers and texts stay texts of the document: such a file gets
+    past the checks of types, to those of what belongs together.
+    """
     made = copy.deepcopy(document)
+    if rng.random() < 0.4:
+        for _ in range(rng.choice((1, 1, 2, 4))):
+            _change_gently(made, rng)
+        return made
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         path = rng.choice(places(made))
         if not path:
@@ -119,6 +128,41 @@ def mutated_document(document: Any, rng: random.Random) -> Any:
             holder[name] = copy.deepcopy(rng.choice(NASTY))
         else:
             holder.insert(key, copy.deepcopy(rng.choice((holder[key], *NASTY))))
+    return made
+
+
+def _change_gently(made: Any, rng: random.Random) -> None:
+    """Put another number, or another text of the document, in the place of one."""
+    found = [path for path in places(made) if path]
+    if not found:
+        return
+    path = rng.choice(found)
+    holder = _inside(made, path[:-1])
+    value = holder[path[-1]]
+    if isinstance(value, bool):
+        holder[path[-1]] = not value
+    elif isinstance(value, int) and abs(value) > 2**1000:  # beyond any float
+        holder[path[-1]] = -value
+    elif isinstance(value, int | float):
+        step = rng.choice((value + 1, value - 1, -value, 2 * value, 0, 1, value / 2, value * 1e6))
+        near = (value + 1e-9, value * 1e-12, 1e300, -1e300, 5e-324, 2**31, 2**53, 10**6)
+        number = rng.choice((step, step, rng.choice(near)))
+        whole = isinstance(value, int) and abs(number) < 1e18
+        holder[path[-1]] = int(number) if whole else float(number)
+    elif isinstance(value, str):
+        values = (_inside(made, other) for other in found)
+        holder[path[-1]] = rng.choice([v for v in values if isinstance(v, str)])
+    elif isinstance(value, list) and value:
+        i = rng.randrange(len(value))
+        if rng.random() < 0.5:
+            value.insert(i, copy.deepcopy(rng.choice(value)))
+        else:
+            del value[i]
+
+
+def _inside(made: Any, path: tuple[Any, ...]) -> Any:
+    for step in path:
+        made = made[step]
     return made
 
 
@@ -187,3 +231,37 @@ def mutated_table(lines: list[list[str]], rng: random.Random) -> bytes:
     mark = rng.choice(("", "", "\ufeff"))
     data = (mark + text).encode("utf-8", "surrogatepass")
     return mutated_bytes(data, rng) if rng.random() < 0.15 else data
+
+
+#: A word, a number, a mark or blanks.
+_WORDS = re.compile(r"[-+]?\d[\d.eE+-]*|\w+|[ \t]+|\n|.", re.DOTALL)
+_MARKS = (",", ";", "=", "{", "}", "[", "]", "(", ")", "\n", " ", "//", "/*", "*/", '"', ":", "-")
+_NUMBERS = ("0", "1", "-1", "1e9", "1e308", "-0.0", "0x10", "65535", "2147483648", "360", "0.001")
+
+
+def mutated_words(text: str, rng: random.Random) -> bytes:
+    """A text with words, numbers, marks or lines exchanged, left out or doubled."""
+    words = _WORDS.findall(text)
+    for _ in range(rng.choice((1, 1, 1, 2, 4))):
+        i = rng.randrange(len(words))
+        action = rng.randrange(10)
+        if action < 4:  # a number, most often
+            found = [k for k in range(i, min(i + 40, len(words))) if words[k][-1:].isdigit()]
+            i = found[0] if found else i
+            words[i] = rng.choice((rng.choice(CELLS), rng.choice(_NUMBERS), rng.choice(words)))
+        elif action == 4:
+            words[i] = rng.choice((*_MARKS, rng.choice(words)))
+        elif action == 5:
+            words[i : i + rng.choice((1, 1, 2, 20, 1000))] = []
+        elif action == 6:
+            words[i:i] = words[i : i + rng.choice((1, 5, 40))] * rng.choice((1, 1, 2, 60))
+        elif action == 7:
+            j = rng.randrange(len(words))
+            words[i], words[j] = words[j], words[i]
+        elif action == 8:
+            words.insert(i, rng.choice((*CELLS, *_MARKS)))
+        else:
+            del words[i:]
+        words = words or ["x"]
+    data = "".join(words).encode("utf-8", "surrogatepass")
+    return mutated_bytes(data, rng) if rng.random() < 0.1 else data

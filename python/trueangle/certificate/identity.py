@@ -129,6 +129,8 @@ def load_identity(path: str | PathLike[str]) -> Identity:
         table = tomllib.loads(data.decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as reason:
         raise FileError(path, f"not valid TOML: {reason}") from None
+    except ValueError:  # whole numbers of thousands of digits
+        raise FileError(path, "holds a number or date that cannot be read") from None
     try:
         found = identity_from(table)
         if found.logo is None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TextIO, cast
 
 from .._core import __version__
-from ..errors import ArgumentError, TrueAngleError
+from ..errors import ArgumentError, FileError, NotInvertibleError, TrueAngleError
 from ..model.file import load_model
 from ..model.model import HarmonicModel
 from ..model.text import model_text
@@ -208,10 +208,13 @@ def import_model(
     try:
         text = found.decoded(raw)
     except UnicodeDecodeError:
-        from ..errors import FileError
-
         raise FileError(path, f"is not text: a table of {target} is") from None
-    model = found.read(text.replace("\r\n", "\n"), fspath(path), given)
+    try:
+        model = found.read(text.replace("\r\n", "\n"), fspath(path), given)
+    except (ArgumentError, NotInvertibleError) as error:
+        if fspath(path) in str(error):
+            raise
+        raise FileError(path, f"is no table of {target} that makes a model: {error}") from None
     if output is not None:
         model.save(output)
     return model

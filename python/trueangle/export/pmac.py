@@ -24,6 +24,8 @@ __all__ = ["Pmac"]
 #: Parts of a count in an entry.
 SIXTEENTHS = 16
 _MOST = 5000
+#: Counts and entries, at most.
+_LARGEST = 1 << 53
 _SIZES = (32, 36, 40, 45, 48, 50, 60, 64, 72, 80, 90, 100, 120, 128, 144, 180, 200, 240, 250, 256,
           300, 320, 360, 400, 450, 480, 500, 512, 600, 720, 1000, 1024, 2048)  # fmt: skip
 _DEFINE = re.compile(
@@ -130,8 +132,10 @@ class Pmac(Target):
             values = np.array([int(word) for word in words[:count]])
         except ValueError as error:
             raise failed(path, f"entries are whole numbers: {error}", line) from None
-        if not 4 <= count <= _MOST or len(values) != count or span < 1:
+        if not 4 <= count <= _MOST or len(values) != count or not 1 <= span <= _LARGEST:
             raise failed(path, f"DEFINE COMP {count},{span} with {len(values)} entries", line)
+        if np.max(np.abs(values)) > _LARGEST:
+            raise failed(path, f"an entry is beyond {_LARGEST}: no table of {self.name}", line)
         counts = options["counts_per_turn"] or span
         turned = np.append(values[-1], values) / (SIXTEENTHS * counts)
         places = np.arange(count + 1) / count

@@ -31,6 +31,8 @@ MOST = 1500
 TENTHS = 3_600_000
 _DECIMALS = 9
 _LINE = re.compile(r"^\s*kw\.ssfk\.(\w+)(?:\[(\d+)\]\.(\w+))?\s+(-?\d+)")
+#: Digits of a whole number, at most: a billion turns in 10^-4 deg.
+_DIGITS = 16
 
 
 class TwinCat(Target):
@@ -144,6 +146,8 @@ def _cnc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
             if line.strip().startswith("kw.ssfk."):
                 raise failed(path, f"{line.strip()[:50]!r} is not a whole number of a key", number)
             continue
+        if len(found[4]) > _DIGITS:
+            raise failed(path, f"{found[4][:_DIGITS]}... is no number of a key", number)
         if found[2] is None:
             settings[found[1]] = int(found[4])
         else:

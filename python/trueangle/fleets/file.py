@@ -74,10 +74,14 @@ class _FleetReader(Decoder):
         aligned = common["aligned"]
         if not isinstance(aligned, bool):
             raise self.error("true or false is needed", "common.aligned")
+        shared = tuple(self.each(common["orders"], "common.orders", self.common))
+        scatter = tuple(self.each(between["orders"], "between.orders", self.between))
+        if [order.order for order in scatter] != [order.order for order in shared]:
+            raise self.error("the orders of common.orders are needed", "between.orders")
         return Fleet(
             tuple(self.each(content["units"], "units", self.unit, _MOST_UNITS)),
-            tuple(self.each(common["orders"], "common.orders", self.common)),
-            tuple(self.each(between["orders"], "between.orders", self.between)),
+            shared,
+            scatter,
             self.tolerance(content["tolerance"]),
             tuple(self.each(content["history"], "history", self.history, _MOST_UNITS)),
             aligned,

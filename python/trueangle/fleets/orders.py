@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -13,7 +12,7 @@ from ..joint.joint import Joint
 from ..joint.shafts import ShaftOrders, resolve_orders
 from ..runs.run import CalibrationRun
 from ..support.distributions import chi_squared_tail
-from .calibration import Calibration, CalibrationSums, columns_of, output_orders
+from .calibration import Calibration, CalibrationSums, normal_matrix, output_orders
 
 #: Units by which orders are chosen: of the first so many.
 SAMPLE: Final = 32
@@ -129,10 +128,10 @@ def _told_apart(
             s._replace(orders=tuple(k for k in s.orders if s.name != "output" or k <= highest))
             for s in shafts
         ]
-        columns = columns_of(run.reference, output_orders(part), run.period)
-        columns = np.column_stack([np.full(len(run), math.sqrt(0.5)), columns])
-        if len(run) <= columns.shape[1]:
+        own = output_orders(part)
+        if len(run) <= 2 * own.size + 1:
             continue
-        if float(np.linalg.eigvalsh(columns.T @ columns)[0]) * 2.0 / len(run) >= _TOLD:
+        products = normal_matrix(run.reference, own, run.period)
+        if float(np.linalg.eigvalsh(products)[0]) * 2.0 / len(run) >= _TOLD:
             return [s for s in part if s.orders]
     return [s._replace(orders=s.orders[:1]) for s in shafts if s.name == "output"]

@@ -93,7 +93,8 @@ class _Likelihood(NamedTuple):
 
 def _score(values: Array, own: Array, aligned: bool, tau: float) -> _Likelihood:
     inverse = np.linalg.inv(own + tau * np.eye(2))
-    squared = inverse @ inverse
+    with np.errstate(over="ignore"):  # of units without noise
+        squared = inverse @ inverse
     mean, covariance = np.zeros(2), np.zeros((2, 2))
     if aligned:
         covariance = np.linalg.inv(inverse.sum(axis=0))

@@ -22,6 +22,7 @@ from .budget import FileExtent
 from .checksum import Checksum
 from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, check_lengths, note
+from .hdf5filters import check_filters
 from .hdf5places import Places
 from .stored import ROWS
 
@@ -121,7 +122,8 @@ def copy(task: CopyTask) -> Contents:
                 stop = min(start + _BLOCK, indicated.size)
                 given = _part(indicated, start, stop)
                 signals = {signal: _part(data, start, stop) for signal, data in used.items()}
-                after = channel.correct(given, signals)
+                # Numbers of 16 bits are corrected to 32, and kept in 64.
+                after = channel.correct(given, signals).astype(corrected.dtype, copy=False)
                 _put(corrected, start, stop, after)
                 for check, values in zip(checks, (given, after), strict=True):
                     check.update(values)
@@ -243,6 +245,7 @@ def _check_stored(path: Path, data: h5py.Dataset, name: str) -> None:
         share = 1.0 if data.id.get_storage_size() else 0.0
     else:
         budget.check_part(path, math.prod(data.chunks) * data.dtype.itemsize, "chunk", name)
+        check_filters(path, data, name)
         most = math.prod(-(-n // c) for n, c in zip(data.shape, data.chunks, strict=True))
         share = data.id.get_num_chunks() / most if size > budget.DECODED_BYTES else 1.0
     if size > budget.DECODED_BYTES and share < _LEAST_STORED:
@@ -265,6 +268,7 @@ def _cached(file: h5py.File, name: str) -> h5py.Dataset:
         raise _elsewhere(Path(file.filename), name)
     if data.chunks is None:
         return data
+    check_filters(Path(file.filename), data, name)
     chunk = math.prod(data.chunks) * data.dtype.itemsize
     packed = data.id.get_create_plist().get_nfilters() > 0
     access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)

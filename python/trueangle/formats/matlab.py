@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import loadmat, savemat
+from scipy.io import loadmat, savemat, whosmat
 
 from ..errors import FileError
 from .budget import FileExtent
@@ -63,6 +63,7 @@ def copy(task: CopyTask) -> Contents:
         )
     found = _vectors(task.source)
     additions = task.choose(list(found))
+    there = {name for name, _shape, _kind in whosmat(task.source)}
     made: dict[str, Any] = {}
     rows = 0
     for addition in additions:
@@ -70,7 +71,7 @@ def copy(task: CopyTask) -> Contents:
         signals = {signal: _values(found[name]) for signal, name in addition.signals.items()}
         after = addition.correct(_values(column), signals)
         name = addition.added.replace("/", "_")
-        if name in found:
+        if name in there:
             raise FileError(task.source, "is there already: corrected before", column=name)
         made[name] = after[:, None]
         rows = max(rows, len(column))

@@ -167,6 +167,9 @@ def _check_sizes(path: Path, mdf: MDF) -> None:
         said = int(group.channel_group.cycles_nr) * max(int(record), 1)
         if said > _MOST_COMPRESSED * size:
             raise FileError(path, f"is damaged: of {size} bytes it says to hold {said}")
+        if record > _MOST_COMPRESSED * size:
+            raise FileError(path, f"is damaged: of {size} bytes it says that records have {record}")
+        marks = 8 * int(group.channel_group.invalidation_bytes_nr)
         for channel in group.channels:
             if channel.channel_type not in _VIRTUAL:
                 bits = 8 * int(channel.byte_offset) + int(channel.bit_offset) + channel.bit_count
@@ -177,6 +180,12 @@ def _check_sizes(path: Path, mdf: MDF) -> None:
                         f"{group.channel_group.samples_byte_nr} bytes",
                         column=channel.name,
                     )
+            if channel.flags & _HAS_MARKS and marks <= int(channel.pos_invalidation_bit):
+                raise FileError(
+                    path,
+                    f"is damaged: its mark is bit {channel.pos_invalidation_bit} of {marks}",
+                    column=channel.name,
+                )
 
 
 def _take_in_pieces(mdf: MDF) -> None:
@@ -256,8 +265,19 @@ def _parts(path: Path, mdf: MDF, places: Sequence[tuple[int, int]]) -> Iterator[
     record = int(head.samples_byte_nr) + int(head.invalidation_bytes_nr)
     # Its own reading of a stretch of records goes through all of them.
     mdf.configure(read_fragment_size=_BLOCK * max(record, 1))
+    said, found = _cycles(mdf, places[0][0]), 0
     for records in mdf._mdf._load_data(group):
-        yield [_part(path, mdf, place, records) for place in places]
+        parts = [_part(path, mdf, place, records) for place in places]
+        size = parts[0].samples.size
+        found += size
+        if found > said or (said and not size):
+            break
+        yield parts
+        if found == said:
+            break
+    if found != said:
+        name = group.channels[places[0][1]].name
+        raise FileError(path, f"is damaged: {found} of {said} records are there", column=name)
 
 
 def _part(path: Path, mdf: MDF, place: tuple[int, int], records: Any) -> Signal:

@@ -121,6 +121,10 @@ def _opened(path: Path) -> Iterator[NDArray[Any]]:
             raise FileError(path, "one column, or several side by side, are needed")
         if array.ndim == 2 and array.shape[0] == 1:
             array = array.T  # a row is a column
+        if array.dtype.names is not None and array.ndim == 2:
+            if array.shape[1] > 1:
+                raise FileError(path, f"records one after the other are needed, got {array.shape}")
+            array = array[:, 0]
         if array.dtype.names is None and array.dtype.kind not in "fiu":
             raise FileError(path, f"numbers are needed, the array holds {array.dtype}")
         yield array
@@ -128,7 +132,8 @@ def _opened(path: Path) -> Iterator[NDArray[Any]]:
 
 def _names(array: NDArray[Any]) -> list[str]:
     if array.dtype.names is not None:
-        return list(array.dtype.names)
+        kinds = {name: array.dtype[name] for name in array.dtype.names}
+        return [name for name, kind in kinds.items() if not kind.shape and kind.names is None]
     return [f"column{i + 1}" for i in range(1 if array.ndim == 1 else array.shape[1])]
 
 

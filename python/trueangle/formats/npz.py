@@ -82,9 +82,9 @@ def copy(task: CopyTask) -> Contents:
                 shutil.copyfileobj(given, put, 1 << 20)
             sums[member.filename] = f"{member.CRC:08x}"
         total = max(sum(found[a.column].size for a in additions), 1)
-        rows = done = 0
+        # As `contents` finds them: arrays beside the corrected ones may be longer.
+        rows, done = max((column.size for column in found.values()), default=0), 0
         for addition in additions:
-            size = found[addition.column].size
             name = f"{addition.added}.npy"
             kept = zipfile.ZipInfo(name)
             kept.compress_type = archive.getinfo(f"{addition.column}.npy").compress_type
@@ -96,7 +96,6 @@ def copy(task: CopyTask) -> Contents:
                     done += len(part) // 8
                     task.watch(len(part) // 8, min(done / total, 1.0))
             sums[name] = f"{check:08x}"
-            rows = max(rows, size)
         told = note(additions).encode()
         # Of no time of day: the same log gives the same bytes.
         output.writestr(zipfile.ZipInfo(_NOTE), told)

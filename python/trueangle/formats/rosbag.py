@@ -178,6 +178,10 @@ class Bag:
         self.path = path
         self.reader = reader
         self.is_ros1 = isinstance(reader, Reader1)
+        for connection in reader.connections:
+            if not isinstance(connection.topic, str) or not isinstance(connection.msgtype, str):
+                told = f"{connection.topic!r:.40} of the type {connection.msgtype!r:.40}"
+                raise FileError(path, f"is damaged: a topic is called {told}")
         #: What the writer of a bag of ROS 2 noted beside the messages.
         self.custom = {} if self.is_ros1 else bag_custom_data(reader)
         self.types = get_typestore(Stores.ROS1_NOETIC if self.is_ros1 else Stores.LATEST)

@@ -18,8 +18,10 @@ from ..errors import FileError
 from .format import Batch, Contents, CopyTask, Selection
 from .messages import warn_of_messages
 
-_NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
-_NAME = rb"[A-Za-z_][\w.\[\]/-]*(?: [\w.\[\]/-]+){0,4}"
+# Each has one way to match, and a name begins where a word does: a long line of rubbish costs its
+# length, not the square of it.
+_NUMBER = rb"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
+_NAME = rb"(?<![\w.\[\]/-])[A-Za-z_][\w.\[\]/-]*(?: [\w.\[\]/-]+){0,4}"
 _PAIR = re.compile(rb"(%s)[ \t]*[:=][ \t]*(%s)(?![\w.])" % (_NAME, _NUMBER), re.IGNORECASE)
 _CLOCK = re.compile(rb"(\d\d):(\d\d):(\d\d(?:\.\d+)?)\s*->\s*")
 _BETWEEN = b" \t,;"

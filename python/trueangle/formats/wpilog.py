@@ -30,6 +30,8 @@ _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 _STAMP = np.dtype("<i8")
 #: Elements of an array that become columns, at most.
 _MOST = 256
+#: Microseconds: of a time beyond them a signed number of eight bytes has no room.
+_LATEST = 1 << 63
 #: Control records.
 _START, _FINISH = 0, 1
 
@@ -150,7 +152,12 @@ def _opened(path: Path) -> _Records:
                 )
             entry = started[number]
             if entry is not None:
-                entry.times.append(int.from_bytes(data[size_end:begin], "little", signed=False))
+                time = int.from_bytes(data[size_end:begin], "little")
+                if time >= _LATEST:
+                    raise FileError(
+                        path, f"is damaged: the record at byte {place} is of the time {time} us"
+                    )
+                entry.times.append(time)
                 entry.places.append((begin, end))
         place = end
     return _Records(data, entries, numbers)

@@ -128,6 +128,8 @@ def load_description(path: str | PathLike[str]) -> RobotDescription:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as cause:
         raise FileError(path, f"is not TOML: {cause}") from None
+    except (ValueError, RecursionError):  # whole numbers of thousands of digits, lists in lists
+        raise FileError(path, "holds a number, date or list that cannot be read") from None
     return _DescriptionReader(Path(path)).robot(content)
 
 

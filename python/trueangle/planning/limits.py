@@ -189,8 +189,10 @@ def load_limits(path: str | Path) -> Limits:
     text = read_text(path, _MOST_BYTES, FileError, "a file of limits")
     try:
         document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as cause:
+    except (tomllib.TOMLDecodeError, RecursionError) as cause:
         raise FileError(path, f"not a TOML file: {cause}") from None
+    except ValueError:  # whole numbers of thousands of digits
+        raise FileError(path, "holds a number or date that cannot be read") from None
     for name in document:
         if name != "limits":
             raise FileError(path, f"unknown table {shown(name)}; a file of limits has [limits]")

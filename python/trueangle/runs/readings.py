@@ -306,7 +306,7 @@ def _joined(
             parts[name].append(_plain_values(batch, name))
             size += parts[name][-1].nbytes
         check_decoded(path, size, len(names))
-        rows += len(parts[names[0]][-1])
+        rows += len(parts[names[0]][-1]) if names else 0
     return {name: np.concatenate(found) if found else np.empty(0) for name, found in parts.items()}
 
 

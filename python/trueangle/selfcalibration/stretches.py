@@ -68,6 +68,12 @@ class Segment:
         at = np.linspace(0.0, last - turn, min(4000, max(8, int(16 * last / turn))))
         # Where readings stand still, the mean of their times is as good as any.
         left, right = np.interp(at, x, t), np.interp(at + turn, x, t)
+        if not (right > left).all():  # of angles so large that rounding takes a turn
+            raise _fault(
+                self.recording,
+                f"its angles are counted up to {last / turn:.3g} turns, "
+                "where a turn takes no time; check their unit, and that they are angles",
+            )
         speed = np.log(1.0 / (right - left))
         middle = 0.5 * (left + right)
         result = np.interp(t, middle, speed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,7 +173,7 @@ def simulate(
     KindError
         What is given is no simulation, or a run that is no design of one.
     ArgumentError
-        No run is designed.
+        No run is designed; numbers so large that readings are not finite.
 
     Examples
     --------
@@ -188,14 +189,17 @@ def simulate(
     if not designs:
         raise ArgumentError("the simulation designs no run: add a [[run]] table or pass `runs=`")
     around = sim.whole_surroundings
-    ideal = [design.measure(rng, str(j + 1), sim.pattern) for j, design in enumerate(designs)]
+    ideal = [_measured(sim, design, j, rng) for j, design in enumerate(designs)]
     signals = join_runs(ideal)
     error = sim.pattern.value(signals.theta)
+    endless = [] if np.isfinite(error).all() else ["its harmonics"]
     spread = np.full(len(signals), sim.sigma_arcsec)
     reference = np.zeros(len(signals))
     turned = np.repeat([d.shift_deg is not None for d in designs], [len(run) for run in ideal])
     for effect in sim.effects:
         found = effect.signal(signals, around, rng)
+        if not np.isfinite(found).all():
+            endless.append(f"the effect {effect.kind}")
         error = error + found
         if isinstance(effect, ReferenceLines):
             reference = reference + np.where(turned, found, 0.0)
@@ -208,6 +212,8 @@ def simulate(
     theta = np.concatenate([run.reference for run in ideal])
     own = theta + (error - reference)
     recorded = _written(sim, own)
+    if not (np.isfinite(recorded).all() and np.isfinite(reference).all()):
+        _refuse_endless(sim, " and ".join(endless) or "what is added to the angles")
     beside = _beside(sim, designs, signals, own, spread, rng)
     runs_made = []
     for run, (a, b) in zip(ideal, signals.run_bounds(), strict=True):
@@ -290,6 +296,27 @@ def _meant(value: object) -> str:
     if effect is None:
         return ""
     return f"the effect of kind '{effect.kind}' is trueangle.simulation.{effect.__name__}"
+
+
+def _measured(
+    sim: Simulation, design: RunDesign, j: int, rng: np.random.Generator
+) -> CalibrationRun:
+    """What a run would measure of an ideal joint."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return design.measure(rng, str(j + 1), sim.pattern)
+    except ArgumentError as cause:
+        if "finite" in str(cause):
+            _refuse_endless(sim, f"run {j + 1}")
+        raise
+
+
+def _refuse_endless(sim: Simulation, what: str) -> NoReturn:
+    place = f"{sim.source}: " if sim.source else ""
+    raise ArgumentError(
+        f"{place}simulated readings are not finite: numbers of {what} are too large; make them "
+        "smaller"
+    )
 
 
 def _written(sim: Simulation, degrees: Array) -> Array:

@@ -232,3 +232,10 @@ def _files(folder: Path) -> tuple[Path, Path]:
 def _trueangle(*args: object) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "trueangle", *map(str, args)]
     return subprocess.run(command, capture_output=True, text=True, env=os.environ, check=False)
+
+
+def test_whole_numbers_of_thousands_of_digits_are_told(tmp_path):
+    path = tmp_path / "identity.toml"
+    path.write_text(f"[certificate]\nnumber = {'9' * 5000}\n")
+    with pytest.raises(FileError, match=r"identity\.toml: holds a number or date that cannot"):
+        load_identity(path)

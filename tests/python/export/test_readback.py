@@ -1,6 +1,7 @@
 """Tables read back, steep ones too, and compared as functions of the reading."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -173,3 +174,32 @@ def test_the_tables_own_arithmetic_is_added(target, options, tmp_path, capsys):
     found = json.loads(capsys.readouterr().out)
     assert found["table_max_abs_arcsec"] == pytest.approx(result.table_max_abs_arcsec)
     assert ta.compare(model, model).table_max_abs_arcsec is None
+
+
+def damaged_table(target, options, old, new, folder):
+    """The table of a target with one word exchanged."""
+    shaft = ta.Shaft("output", 1, [1], [0.1], [0.3])
+    model = ta.HarmonicModel([shaft], period=360.0)
+    path = folder / "table.txt"
+    ta.export_model(model, target, path, **options)
+    text = path.read_text()
+    found = re.search(old, text)
+    assert found is not None, text[:500]
+    path.write_text(text[: found.start(1)] + new + text[found.end(1) :])
+    return path
+
+
+@pytest.mark.parametrize(
+    ("target", "options", "old", "told"),
+    [
+        ("twincat", {"variant": "cnc"}, r"pos\s+(-?\d+)", "is no number of a key"),
+        ("pmac", {"counts_per_turn": 65536}, r"\n(-?\d+)", "an entry is beyond"),
+        ("twincat", {"variant": "nc"}, r"\n[^,\n]*,([-\d.]+)", "no table of twincat that makes a"),
+    ],
+)
+def test_numbers_that_no_table_holds_are_refused_by_file(target, options, old, told, tmp_path):
+    number = "9" * (30 if options.get("variant") == "nc" else 400)
+    path = damaged_table(target, options, old, number, tmp_path)
+    with pytest.raises(ta.errors.FileError, match=told) as caught:
+        ta.import_model(path, target, **options)
+    assert caught.value.path == str(path)

@@ -123,6 +123,7 @@ def test_it_is_saved_and_read_back(runs, tmp_path):
         (lambda c: c["units"][0].update(verdict="well"), "units[0].verdict"),
         (lambda c: c["units"][0]["orders"][0].update(amplitude_arcsec=-1.0), "amplitude"),
         (lambda c: c["common"].update(aligned=1), "common.aligned"),
+        (lambda c: c["between"]["orders"].pop(), "key 'between.orders'"),
         (lambda c: c.update(more=1), "more"),
     ],
 )

@@ -119,3 +119,11 @@ def test_only_some_joints_in_the_order_of_the_file() -> None:
     assert [j.name for j in WHOLE.only(["wrist", "base"]).joints] == ["base", "wrist"]
     with pytest.raises(ArgumentError, match=r"no joint 'wirst'.*wrist.*; the joints are base, "):
         WHOLE.only(["wirst"])
+
+
+@pytest.mark.parametrize("value", ["9" * 5000, "[" * 5000 + "]" * 5000])
+def test_numbers_and_lists_that_cannot_be_read_are_told(tmp_path: Path, value: str) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_text(f'[[joint]]\nname = "a"\ngear_ratio = {value}\n')
+    with pytest.raises(FileError, match=r"robot\.toml: holds a number, date or list that cannot"):
+        load_description(path)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.planning.limits import Limits
+from trueangle.errors import FileError
+from trueangle.planning.limits import Limits, load_limits
 
 THETA = np.arange(0.0, 360.0, 2.0)
 
@@ -50,3 +51,12 @@ def test_temperatures_currents_and_mounts_are_those_seen(period):
     assert (found.temperature_C, found.current_A) == ((20.0, 25.0), (-1.0, 2.0))
     assert found.mount_deg == pytest.approx((0.0, 45.0))
     assert found.samples == 360
+
+
+def test_whole_numbers_of_thousands_of_digits_are_told(tmp_path):
+    path = tmp_path / "limits.toml"
+    path.write_text(f"[limits]\nsamples = {'9' * 5000}\n")
+    with pytest.raises(
+        FileError, match=r"limits\.toml: holds a number or date that cannot be read$"
+    ):
+        load_limits(path)

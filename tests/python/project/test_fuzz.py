@@ -52,5 +52,5 @@ def test_a_long_fuzz_that_is_stopped_says_how_far_it_came():
             fuzz.wait(timeout=2.0)
         fuzz.terminate()
         told = fuzz.stdout.read()
-    assert re.fullmatch(r"simulation: \d+ cases, 0 failed, \d+ s\n", told), told
+    assert re.fullmatch(r"simulation: \d+ cases, \d+ read, 0 failed, \d+ s\n", told), told
     assert fuzz.returncode == 1

@@ -189,3 +189,9 @@ def test_readings_of_all_stretches_in_one_list() -> None:
         rate = np.repeat([TURN * 2.3, -TURN * 2.0], np.array(knots.intervals) + 3)
         begin = np.repeat([0.0, 50.0], np.array(knots.intervals) + 3)
         np.testing.assert_allclose(spline, rate * (knots.greville() - begin), atol=1e-6)
+
+
+def test_angles_in_which_a_turn_is_lost_have_no_speed() -> None:
+    time = np.arange(360.0)
+    with pytest.raises(NoModelError, match="where a turn takes no time; check their unit"):
+        segment(time, time * 1e300).turn_speed()

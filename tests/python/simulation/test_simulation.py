@@ -336,3 +336,22 @@ def test_a_reading_is_rounded_with_its_noise():
     expected = math.hypot(sigma, step / math.sqrt(12.0))
     found = float(np.std((run.indicated - run.reference) * 3600.0))
     assert abs(found / expected - 1.0) < 4.0 / math.sqrt(2.0 * 4000)
+
+
+@pytest.mark.parametrize(
+    ("table", "what"),
+    [
+        ('[[effect]]\nkind = "latency"\ndelay_s = 1e308\n', "the effect latency"),
+        ('[[harmonic]]\nshaft = "output"\norder = 1\namplitude_arcsec = 1e308\n'
+         'phase_deg = 20.0\n[[harmonic]]\nshaft = "output"\norder = 1\n'
+         'amplitude_arcsec = 1.7e308\nphase_deg = 20.0\n', "its harmonics"),
+    ],
+)  # fmt: skip
+def test_numbers_without_an_end_are_told_by_what_holds_them(table, what, tmp_path):
+    path = tmp_path / "joint.toml"
+    path.write_text(f"[joint]\ngear_ratio = 50.0\n{table}[[run]]\nsamples = 30\nspeed_deg_s = 20\n")
+    sim = ta.load_simulation(path)
+    with np.errstate(all="ignore"), pytest.raises(ta.errors.ArgumentError) as caught:
+        ta.simulate(sim)
+    assert str(caught.value).startswith(f"{path}: simulated readings are not finite: ")
+    assert f"numbers of {what} are too large" in str(caught.value)

@@ -101,7 +101,7 @@ def choose_forward(
                 left = np.maximum(rest - gain, 1e-200)
                 score = log_tail(gain * dof / left, dof) - log_limits
             else:
-                score = log_tail(gain / noise[0], noise[1]) - log_limits
+                score = log_tail(gain / max(noise[0], 1e-200), noise[1]) - log_limits
             score = np.where(alive, score, math.inf)
             top = int(np.argmin(score))
             if not score[top] <= 0.0:
