@@ -80,7 +80,7 @@ mod _core {
     use super::motion::{PyBanded, harmonic_rows, harmonic_sum};
 
     #[pymodule_export]
-    use super::noise::{clipped, median, whitened};
+    use super::noise::{block_products, clipped, median, two_normals, whitened};
 
     #[pymodule_export]
     use super::robot::PyRobotStep;
