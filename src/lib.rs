@@ -31,6 +31,7 @@ pub mod design;
 pub mod fit;
 pub mod linear;
 pub mod lstsq;
+pub mod mixture;
 pub mod moments;
 pub mod monitor;
 pub mod rank;

@@ -5,6 +5,8 @@
 //! covariance are those of the pseudo-inverse in scaled columns.
 
 mod beside;
+mod blocks;
+mod bump;
 mod clipped;
 mod clusters;
 mod groups;
@@ -15,11 +17,13 @@ mod ridge;
 mod whitening;
 
 pub use beside::{Beside, Powers};
+pub use blocks::{BlockProducts, block_products};
+pub use bump::Bumps;
 pub use clipped::{Clipped, clipped};
 pub use clusters::{Robust, cluster_covariance};
 pub use groups::{Sums, left_out, others};
 pub use model::LinearModel;
-pub use products::Table;
+pub use products::{Order, Table};
 pub use ratio::{Left, RunProducts, best_ratio};
 pub use ridge::{Fold, RidgePath, ridge_path};
 pub use whitening::Correlated;

@@ -80,7 +80,9 @@ mod _core {
     use super::motion::{PyBanded, harmonic_rows, harmonic_sum};
 
     #[pymodule_export]
-    use super::noise::{clipped, median, rounded, rounded_drawn, whitened};
+    use super::noise::{
+        block_products, clipped, median, rounded, rounded_drawn, two_normals, whitened,
+    };
 
     #[pymodule_export]
     use super::robot::PyRobotStep;

@@ -250,6 +250,9 @@ class Beside:
     def seen(self) -> _Array: ...
     def gain(self, columns: NDArray[np.float64]) -> tuple[float, _Array]: ...
     def powers(self, columns: NDArray[np.float64]) -> tuple[_Array, _Array, _Array]: ...
+    def bump(
+        self, phase: NDArray[np.float64], place: float, width: float, widest: float
+    ) -> tuple[float, float]: ...
     def ratio(self, columns: NDArray[np.float64]) -> tuple[float, float]: ...
 
 def clipped(
@@ -266,6 +269,15 @@ def rounded_drawn(
     left: NDArray[np.float64], step: float, sigma: float, shares: NDArray[np.float64]
 ) -> _Array: ...
 def median(values: NDArray[np.float64]) -> float: ...
+def block_products(
+    columns: NDArray[Any],
+    width: int,
+    bounds: Sequence[tuple[int, int]],
+    roots: NDArray[np.float64] | None = None,
+) -> tuple[_Array, _Array, _Array]: ...
+def two_normals(
+    values: NDArray[np.float64], start: float, steps: int, narrowest: float
+) -> tuple[float, float, float, float]: ...
 def left_out(
     grams: NDArray[np.float64],
     moments: NDArray[np.float64],
@@ -392,11 +404,17 @@ def residuals(
 ) -> None: ...
 @overload
 def line_columns(
-    theta: NDArray[np.float64], orders: NDArray[np.float64], single: Literal[False] = False
+    theta: NDArray[np.float64],
+    orders: NDArray[np.float64],
+    single: Literal[False] = False,
+    vanishing: float = 0.0,
 ) -> NDArray[np.float64]: ...
 @overload
 def line_columns(
-    theta: NDArray[np.float64], orders: NDArray[np.float64], single: Literal[True]
+    theta: NDArray[np.float64],
+    orders: NDArray[np.float64],
+    single: Literal[True],
+    vanishing: float = 0.0,
 ) -> NDArray[np.float32]: ...
 def lagged(
     waves: NDArray[np.float64],

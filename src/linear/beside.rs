@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::products::{Products, Table};
+use super::products::{Order, Products, Table};
 use super::ratio::eigensystem;
 use super::{Correlated, Left, RunProducts, best_ratio};
 use crate::simd::{InstructionSet, MOST_LANES, dispatch};
@@ -119,7 +119,8 @@ impl Beside {
     /// Powers of columns one by one, and their products with what the fit leaves.
     pub fn powers(&self, (x, k): Table<'_>) -> Powers {
         let (mut found, width) = (Powers::default(), self.width());
-        let (grams, moments) = self.products(x, k, !self.shares.is_empty(), false);
+        let (grams, moments) =
+            self.products((x, k), Order::Readings, !self.shares.is_empty(), false);
         for j in 0..k {
             let mut before = 0.0;
             let mut own = vec![0.0; self.fitted + 1];
@@ -140,12 +141,46 @@ impl Beside {
 
     /// Best ratio of variances of an error that every run draws anew from these shapes, and the
     /// deviance that it saves; None where a number is not finite. See [`best_ratio`].
-    pub fn ratio(&self, (x, k): Table<'_>) -> Option<(f64, f64)> {
-        let (grams, moments) = self.products(x, k, true, true);
+    pub fn ratio(&self, x: Table<'_>, order: Order) -> Option<(f64, f64)> {
+        let k = x.1;
+        let (grams, moments) = self.products(x, order, true, true);
         let runs: Vec<_> = (0..self.bounds.len())
             .map(|run| self.of_run(run, k, &grams, &moments))
             .collect();
         best_ratio(&runs, self.left)
+    }
+
+    /// Deviance that a column saves alone: none where the fit has nearly all of it.
+    pub fn gain_of_one(&self, x: &[f64]) -> f64 {
+        let found = self.powers((x, 1));
+        let (before, after, moment) = (found.before[0], found.after[0], found.moment[0]);
+        if after > self.excited * before.max(1e-300) {
+            self.left.deviance(moment * moment / after)
+        } else {
+            0.0
+        }
+    }
+
+    /// Coefficients of columns beside the fit, where it has not nearly all of one.
+    pub fn coefficients(&self, (x, k): Table<'_>) -> Option<Vec<f64>> {
+        let products = self.total(x, k);
+        let known = products.moments.columns(0, self.fitted);
+        let beside = &products.gram - known * known.transpose();
+        let counts = |i| beside[(i, i)] > self.excited * products.gram[(i, i)].max(1e-300);
+        if !(0..k).all(counts) {
+            return None;
+        }
+        let lengths = beside.diagonal().map(f64::sqrt);
+        let found = eigensystem(beside.component_div(&(&lengths * lengths.transpose())))?;
+        let scaled = products.moments.column(self.fitted).component_div(&lengths);
+        let moment = found.eigenvectors.tr_mul(&scaled);
+        let limit = super::rank_limit(k) * found.eigenvalues.max();
+        let part = moment.zip_map(
+            &found.eigenvalues,
+            |m, v| if v > limit { m / v } else { 0.0 },
+        );
+        let solved = (found.eigenvectors * part).component_div(&lengths);
+        Some(solved.as_slice().to_vec())
     }
 
     fn noise(&self) -> Correlated<'_> {
@@ -170,7 +205,7 @@ impl Beside {
     /// Products of all runs together.
     fn total(&self, x: &[f64], k: usize) -> RunProducts {
         let each = !self.shares.is_empty();
-        let (grams, moments) = self.products(x, k, each, true);
+        let (grams, moments) = self.products((x, k), Order::Readings, each, true);
         let mut runs = 0..if each { self.bounds.len() } else { 1 };
         let first = runs.next().unwrap_or(0);
         let mut total = self.of_run(first, k, &grams, &moments);
@@ -201,7 +236,13 @@ impl Beside {
 
     /// Products of mapped columns with each other (of the filter alone; the upper triangle) or
     /// their powers, and of columns with what is seen: of each run, or of all together.
-    fn products(&self, x: &[f64], k: usize, each: bool, pairs: bool) -> (Vec<f64>, Vec<f64>) {
+    fn products(
+        &self,
+        (x, k): Table<'_>,
+        order: Order,
+        each: bool,
+        pairs: bool,
+    ) -> (Vec<f64>, Vec<f64>) {
         let runs = if each { self.bounds.len() } else { 1 };
         let size = if pairs { k * k } else { k };
         let mut grams = vec![0.0; runs * size];
@@ -209,6 +250,7 @@ impl Beside {
         let work = Products {
             noise: self.noise(),
             x: (x, k),
+            order,
             seen: (&self.seen, self.width()),
             each,
             pairs,

@@ -14,16 +14,30 @@ const CHUNK: usize = 256;
 /// Columns that one goes over together.
 const TOGETHER: usize = 4;
 
+/// Columns below which readings that none of them tells anything of are passed over.
+const FEW: usize = 4;
+
 /// A table of numbers and how many columns it has.
 pub type Table<'a> = (&'a [f64], usize);
+
+/// The numbers of a table, reading by reading or column by column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Columns of a reading side by side.
+    Readings,
+    /// Readings of a column one after the other.
+    Columns,
+}
 
 /// Products of columns, mapped by a filter, with each other, and of the columns as they are with
 /// others: added to those of each run or of all together.
 pub struct Products<'a> {
     /// The filter.
     pub noise: Correlated<'a>,
-    /// The columns, reading by reading.
+    /// The columns.
     pub x: Table<'a>,
+    /// How they stand.
+    pub order: Order,
     /// The others, so many, column by column; as many numbers as a vector has follow the last.
     pub seen: Table<'a>,
     /// Of each run.
@@ -44,6 +58,10 @@ impl Kernel for Products<'_> {
         let n = bounds.last().map_or(0, |&(_, stop)| stop);
         let size = CHUNK + MOST_LANES;
         let is_white = noise.is_white();
+        let (of_reading, of_column) = match self.order {
+            Order::Readings => (k, 1),
+            Order::Columns => (1, n),
+        };
         let (mut plain, mut white) = (vec![0.0; k * size], vec![0.0; k * size]);
         for run in 0..bounds.len() {
             interrupt::point();
@@ -51,28 +69,43 @@ impl Kernel for Products<'_> {
             let place = if self.each { run } else { 0 };
             for start in (first..stop).step_by(CHUNK) {
                 let some = CHUNK.min(stop - start);
-                for i in 0..some {
+                if of_reading == 1 {
                     for j in 0..k {
-                        plain[j * size + i] = x[(start + i) * k + j];
+                        let column = &x[start + j * of_column..][..some];
+                        plain[j * size..][..some].copy_from_slice(column);
+                    }
+                } else {
+                    for i in 0..some {
+                        for j in 0..k {
+                            plain[j * size + i] = x[(start + i) * k + j];
+                        }
                     }
                 }
                 if !is_white {
                     for j in 0..k {
-                        let before = (start > first).then(|| x[(start - 1) * k + j]);
+                        let at = |i: usize| x[i * of_reading + j * of_column];
+                        let before = (start > first).then(|| at(start - 1));
                         let out = &mut white[j * size..][..some];
                         filtered(noise, start, before, &plain[j * size..][..some], out);
                     }
                 }
                 let mapped = if is_white { &plain } else { &white };
-                let others = (&seen[start..], n);
-                for j in (0..k).step_by(2) {
+                // Columns of one place or of a part of the time tell little of most readings.
+                let (from, to) = if k < FEW {
+                    told(&plain, k, size, some)
+                } else {
+                    (0, some)
+                };
+                let others = (&seen[start + from..], n);
+                for j in (0..if from < to { k } else { 0 }).step_by(2) {
                     let moments = &mut self.moments[(place * k + j) * width..];
+                    let own = &plain[j * size + from..];
                     if j + 1 < k {
-                        let rows = (some, size);
-                        add::<L, true>(&plain[j * size..], rows, others, width, (moments, width));
+                        let rows = (to - from, size);
+                        add::<L, true>(own, rows, others, width, (moments, width));
                     } else {
-                        let rows = (some, 0);
-                        add::<L, false>(&plain[j * size..], rows, others, width, (moments, 0));
+                        let rows = (to - from, 0);
+                        add::<L, false>(own, rows, others, width, (moments, 0));
                     }
                 }
                 for j in 0..k {
@@ -88,6 +121,27 @@ impl Kernel for Products<'_> {
             }
         }
     }
+}
+
+/// The readings of a chunk from the first to the last one of which a column is not zero.
+#[inline(always)]
+fn told(plain: &[f64], k: usize, size: usize, some: usize) -> (usize, usize) {
+    let (mut from, mut to) = (some, 0);
+    for j in 0..k {
+        // What is not a number differs from zero, and stays in the sums.
+        let column = &plain[j * size..][..some];
+        let mut i = 0;
+        while i < from && column[i] == 0.0 {
+            i += 1;
+        }
+        from = i;
+        let mut i = some;
+        while i > to && column[i - 1] == 0.0 {
+            i -= 1;
+        }
+        to = i;
+    }
+    (from, to)
 }
 
 /// A stretch of a column under the filter; `before` is the reading before it, if of the same run.

@@ -10,7 +10,7 @@ use super::linear::{NOT_FINITE, told};
 use super::noise::{Bounds, consecutive};
 use super::release::detached;
 use crate::check::same_length;
-use crate::linear::{Beside, Correlated};
+use crate::linear::{Beside, Bumps, Correlated, Order};
 
 type Vector<'py> = Bound<'py, numpy::PyArray1<f64>>;
 
@@ -106,11 +106,35 @@ impl PyBeside {
         ))
     }
 
+    /// Place and width of the bump near some, no wider than the widest, that saves most: of a shaft
+    /// that stands at `phase` at every reading, all in degrees.
+    fn bump(
+        &self,
+        py: Python<'_>,
+        phase: PyReadonlyArray1<'_, f64>,
+        place: f64,
+        width: f64,
+        widest: f64,
+    ) -> PyResult<(f64, f64)> {
+        same_length("phase", phase.len(), "readings", self.0.readings())?;
+        let phase = phase.as_slice()?;
+        detached(py, || {
+            Bumps::new(&self.0, phase, widest).refined(place, width)
+        })
+    }
+
     /// Best ratio of variances of a run effect and the deviance that it saves.
     fn ratio(&self, py: Python<'_>, columns: PyReadonlyArray2<'_, f64>) -> PyResult<(f64, f64)> {
-        let rows = self.rows(&columns)?;
-        let table = (rows.slice()?, columns.shape()[1]);
-        let found = detached(py, || self.0.ratio(table))?;
+        let k = columns.shape()[1];
+        let found = if columns.is_fortran_contiguous() {
+            same_length("columns", columns.shape()[0], "readings", self.0.readings())?;
+            let table = (columns.as_slice()?, k);
+            detached(py, || self.0.ratio(table, Order::Columns))?
+        } else {
+            let rows = self.rows(&columns)?;
+            let table = (rows.slice()?, k);
+            detached(py, || self.0.ratio(table, Order::Readings))?
+        };
         told(py, found, NOT_FINITE)
     }
 }

@@ -7,19 +7,22 @@ use super::array::{data, empty};
 use super::failure::argument_error;
 use super::release::detached;
 use crate::check::same_length;
+use crate::error::Error;
 use crate::kernel::ladder::{self, Ladder};
 use crate::kernel::lag;
 use crate::kernel::lines::{self, Lines};
 
 /// Cosines and sines of orders times angles, shape (n, 2 orders); in single precision where
-/// that is enough.
+/// that is enough. In double precision a column that is below `vanishing` times its order at every
+/// reading is zeros.
 #[pyfunction]
-#[pyo3(signature = (theta, orders, single = false))]
+#[pyo3(signature = (theta, orders, single = false, vanishing = 0.0))]
 pub fn line_columns<'py>(
     py: Python<'py>,
     theta: PyReadonlyArray1<'py, f64>,
     orders: PyReadonlyArray1<'py, f64>,
     single: bool,
+    vanishing: f64,
 ) -> PyResult<Bound<'py, PyUntypedArray>> {
     let (theta, orders) = (theta.as_slice()?, orders.as_slice()?);
     let shape = [theta.len(), 2 * orders.len()];
@@ -33,7 +36,13 @@ pub fn line_columns<'py>(
     }
     let array = empty::<f64>(py, &shape, false)?;
     let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), size) };
-    detached(py, || lines::columns(theta, orders, out))??;
+    detached(py, || {
+        lines::columns(theta, orders, out)?;
+        if vanishing > 0.0 {
+            lines::vanished(orders, vanishing, out);
+        }
+        Ok::<_, Error>(())
+    })??;
     Ok(array)
 }
 

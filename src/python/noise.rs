@@ -11,6 +11,7 @@ use super::failure::argument_error;
 use super::release::detached;
 use crate::check::same_length;
 use crate::linear::{self, Correlated};
+use crate::mixture;
 use crate::spectrum;
 
 /// Rows of either precision.
@@ -20,6 +21,11 @@ pub enum Rows<'py> {
     Single(PyReadonlyArray2<'py, f32>),
 }
 
+type Three<'py> = (
+    Bound<'py, PyUntypedArray>,
+    Bound<'py, PyUntypedArray>,
+    Bound<'py, PyUntypedArray>,
+);
 type Values<'py, T> = Bound<'py, PyArray1<T>>;
 pub(super) type Bounds = Vec<(usize, usize)>;
 
@@ -55,18 +61,95 @@ fn filtered<'py, T: Element + RealField + Copy>(
         unreachable!("two dimensions")
     };
     consecutive(py, n, &noise)?;
+    // What stands column by column stays so.
+    let by_columns = columns > 1 && rows.is_fortran_contiguous();
     let rows = rows.as_slice()?;
-    let array = empty::<T>(py, &[n, columns], false)?;
+    let array = empty::<T>(py, &[n, columns], by_columns)?;
     // SAFETY: a fresh contiguous array of this type and size.
     let out = unsafe { std::slice::from_raw_parts_mut(data::<T>(&array), rows.len()) };
+    let (size, columns) = if by_columns {
+        (n.max(1), 1)
+    } else {
+        (rows.len().max(1), columns)
+    };
     detached(py, || {
-        if transposed {
-            noise.filtered_back(rows, columns, out);
-        } else {
-            noise.filtered(rows, columns, out);
+        for (rows, out) in rows.chunks_exact(size).zip(out.chunks_exact_mut(size)) {
+            if transposed {
+                noise.filtered_back(rows, columns, out);
+            } else {
+                noise.filtered(rows, columns, out);
+            }
         }
     })?;
     Ok(array)
+}
+
+/// Products of columns within blocks of so many: at one reading, at those that neither begin nor
+/// end a run, and with the reading before, each of shape (blocks, width, width).
+#[pyfunction]
+#[pyo3(signature = (columns, width, bounds, roots=None))]
+pub fn block_products<'py>(
+    py: Python<'py>,
+    columns: Rows<'py>,
+    width: usize,
+    bounds: Bounds,
+    roots: Option<PyReadonlyArray1<'py, f64>>,
+) -> PyResult<Three<'py>> {
+    let noise = Correlated {
+        bounds: &bounds,
+        rho: 0.0,
+        roots: roots.as_ref().map(PyReadonlyArray1::as_slice).transpose()?,
+    };
+    match columns {
+        Rows::Double(columns) => products(py, &columns, width, noise),
+        Rows::Single(columns) => products(py, &columns, width, noise),
+    }
+}
+
+fn products<'py, T: Element + RealField + Copy + Into<f64>>(
+    py: Python<'py>,
+    x: &PyReadonlyArray2<'py, T>,
+    width: usize,
+    noise: Correlated<'_>,
+) -> PyResult<Three<'py>> {
+    let &[n, columns] = x.shape() else {
+        unreachable!("two dimensions")
+    };
+    consecutive(py, n, &noise)?;
+    if width == 0 || columns % width != 0 {
+        let problem = format!("width must divide the {columns} columns, got {width}");
+        return Err(argument_error(py, problem));
+    }
+    let x = x.as_slice()?;
+    let found = detached(py, || linear::block_products(noise, x, columns, width))?;
+    let shaped = |values: &[f64]| -> PyResult<_> {
+        let array = empty::<f64>(py, &[columns / width, width, width], false)?;
+        // SAFETY: a fresh contiguous array of this type and size.
+        let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), values.len()) };
+        out.copy_from_slice(values);
+        Ok(array)
+    };
+    Ok((
+        shaped(&found.same)?,
+        shaped(&found.inner)?,
+        shaped(&found.cross)?,
+    ))
+}
+
+/// A narrow and a wide normal distribution about zero by steps of expectation-maximisation from a
+/// size of the wide one: log-likelihood but for `n ln(2 pi)/2`, share and relative size of the wide
+/// part, scale of the narrow one.
+#[pyfunction]
+pub fn two_normals(
+    py: Python<'_>,
+    values: PyReadonlyArray1<'_, f64>,
+    start: f64,
+    steps: usize,
+    narrowest: f64,
+) -> PyResult<(f64, f64, f64, f64)> {
+    let values = values.as_slice()?;
+    let found = detached(py, || mixture::two_normals(values, start, steps, narrowest))?;
+    Ok((found.value, found.share, found.size, found.scale))
 }
 
 /// Runs follow each other from the first reading to the last.

@@ -75,7 +75,10 @@ def proposed_above(regression: Regression, cause: str, least: float = 0.0) -> Ex
 
     None where the time is up and it has not been searched yet.
     """
-    key = (cause, tuple((term.cause, repr(term.shape)) for term in regression.terms))
+    beside: tuple[tuple[str, str], ...] = regression.cache.of_fit(
+        "shapes", lambda: tuple((term.cause, repr(term.shape)) for term in regression.terms)
+    )
+    key = (cause, beside)
     kept = regression.cache.proposed(key, least)
     if kept is None and pace().over:
         return None
@@ -101,7 +104,8 @@ class Scores:
         if not effect_of(extension.cause).has_exact_form:
             explained += extension.deviance
         after = penalty_of([*start.terms, extension], left_by_forms(explained, start.n))
-        return gain - (after - penalty_of(start.terms, misfit(start)))
+        paid: float = start.cache.of_fit("penalty", lambda: penalty_of(start.terms, misfit(start)))
+        return gain - (after - paid)
 
     def told_score(self, candidate: Candidate) -> float:
         """Score once what bends of the causes found explain as well is taken off."""

@@ -89,9 +89,12 @@ def penalty_of(terms: Sequence[Extension], left: float) -> float:
     """Of causes beyond that of their parameters; their forms may leave ``left``."""
     # A line of a declared shaft is expected, and stands where it was said to stand.
     declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
-    causes = len(finding_groups(terms)) - declared
+    effects = [effect_of(term.cause) for term in terms]
+    separate = [effect for effect in effects if effect.is_separate]
+    # As many findings as `finding_groups` makes.
+    causes = len(separate) + len({*effects} - {*separate}) - declared
     # A cause that contains another one spends a second form on the same error.
-    forms = causes + len({term.cause for term in terms if effect_of(term.cause).contains})
+    forms = causes + len({effect for effect in effects if effect.contains})
     return NEW_CAUSE * causes + left * max(forms - 1, 0)
 
 

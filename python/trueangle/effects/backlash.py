@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -225,10 +224,11 @@ def _crossing_at_rest(signals: Signals) -> Array:
         if moving.size == 0:
             continue
         clock, direction = signals.clock[start:stop], signals.direction[start:stop]
-        for last, following in itertools.pairwise(moving.tolist()):
+        apart = np.flatnonzero(np.diff(moving) > 1)
+        for last, following in zip(moving[apart], moving[apart + 1], strict=True):
             # The last reading before, and the first one after, still stand where they turn.
             ends = direction[[max(last - 1, 0), min(following + 1, stop - start - 1)]]
-            if following - last > 1 and ends[0] != ends[1]:
+            if ends[0] != ends[1]:
                 inside = slice(start + last, start + following + 1)
                 at = clock[[last, following]]
                 crossing[inside] = np.interp(signals.clock[inside], at, ends)

@@ -182,7 +182,7 @@ class DriftWithinRun(Effect):
         columns = regression.cache.of_motion(
             f"{form} {terms}",
             None,
-            lambda: np.ascontiguousarray(cls._shapes(regression, form, terms)),
+            lambda: np.asfortranarray(cls._shapes(regression, form, terms)),
         )
         log_grid = float(np.log(UNLIKE_FORMS))
         shape = {"form": form, "terms": terms}

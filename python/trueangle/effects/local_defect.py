@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, ClassVar, Self
+from functools import cache
+from typing import Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,6 @@ from .missing_order import MissingOrder
 from .search import (
     Array,
     Fitted,
-    golden_maximum,
     tangent_covariance,
 )
 from .sidebands import Sidebands
@@ -51,8 +50,7 @@ VANISHES = 9.0
 #: Peaks of the quick search that are scored exactly.
 PEAKS = 2
 
-#: Steps by which place and width are made exact.
-NEWTON_STEPS = 4
+Waves: TypeAlias = NDArray[np.complex128]
 
 #: Times that a bump whose top was clipped is refined, and its height from which on a reading
 #: is one of its own.
@@ -102,15 +100,13 @@ class LocalDefect(Effect):
     flexible_below: ClassVar[float] = WHOLE_TURN
 
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
-        cycles = around.joint.output_order(self.shaft, 1)
-        return self.height_arcsec * self.bump(
-            signals.theta * cycles, self.place_deg, self.width_deg
-        )
+        phase = self._degrees(signals, around, self.shaft)
+        return self.height_arcsec * self.bump(phase, self.place_deg, self.width_deg)
 
     @staticmethod
     def bump(phase: Array, place_deg: float, width_deg: float) -> Array:
-        """The bump of height 1 at shaft angles ``phase`` (radians)."""
-        away = np.degrees(phase) - place_deg
+        """The bump of height 1 at shaft angles ``phase`` (degrees)."""
+        away = phase - place_deg
         away -= 360.0 * np.round(away / 360.0)
         away /= width_deg
         bump = np.zeros_like(away)
@@ -136,7 +132,7 @@ class LocalDefect(Effect):
             if grid is not None and 2.0 * cycles > grid.positions:
                 continue  # the readings are too few a turn of it to show a place
             reached: list[tuple[float, float]] = []
-            for score, place, width in cls._search(regression, cycles, e):
+            for score, place, width in cls._search(regression, shaft, cycles, e):
                 if pace().over:
                     return best
                 # From within a bump that was found the way leads there.
@@ -171,20 +167,25 @@ class LocalDefect(Effect):
 
     @staticmethod
     def _search(
-        regression: Regression, cycles: float, e: Array
+        regression: Regression, shaft: str, cycles: float, e: Array
     ) -> list[tuple[float, float, float]]:
-        phase = np.mod(regression.signals.theta * (cycles / (2.0 * np.pi)), 1.0)
-        bins = np.minimum((phase * PLACES).astype(np.int64), PLACES - 1)
-        count = np.bincount(bins, minlength=PLACES).astype(np.float64)
-        total = np.asarray(np.bincount(bins, weights=e, minlength=PLACES))
-        away = np.arange(PLACES, dtype=np.float64) * (360.0 / PLACES)
-        away = np.minimum(away, 360.0 - away)
-        found = []
-        for width in WIDTHS:
-            window = np.exp(-0.5 * (away / width) ** 2)
+        def seen_by() -> tuple[NDArray[np.int64], list[Array]]:
+            """The bin of every reading, and the power of a bump of each width at every place."""
+            phase = np.mod(regression.signals.theta * (cycles / (2.0 * np.pi)), 1.0)
+            bins = np.minimum((phase * PLACES).astype(np.int64), PLACES - 1)
+            count = np.fft.rfft(np.bincount(bins, minlength=PLACES))
+            return bins, [
+                _circular(count, square) - _circular(count, window) ** 2 / regression.n
+                for window, square in _windows()
+            ]
 
-            moment = _circular(total - count * (total.sum() / regression.n), window)
-            power = _circular(count, window**2) - _circular(count, window) ** 2 / regression.n
+        bins, powers = regression.cache.of_motion(f"{shaft} bins", None, seen_by)
+        count = np.bincount(bins, minlength=PLACES)
+        total = np.bincount(bins, weights=e, minlength=PLACES)
+        sums = np.fft.rfft(total - count * (total.sum() / regression.n))
+        found = []
+        for width, (window, _), power in zip(WIDTHS, _windows(), powers, strict=True):
+            moment = _circular(sums, window)
             seen = power > 4.0
             score = np.where(seen, moment**2 / np.where(seen, power, 1.0), 0.0)
             k = int(np.argmax(score))
@@ -196,36 +197,9 @@ class LocalDefect(Effect):
     def _refined(
         cls, regression: Regression, shaft: str, place: float, width: float
     ) -> dict[str, Any]:
-        def gain(c: float, w: float) -> float:
-            shape = {"shaft": shaft, "place_deg": c, "width_deg": w}
-            columns = cls.columns(regression.signals, regression.around, shape)
-            return float(regression.gains(columns)[0])
-
-        for _ in range(2):
-            gain_at = partial(gain, w=width)
-            place, _ = golden_maximum(gain_at, place - width, place + width, 8)
-            gain_of = partial(gain, place)
-            log_width = float(np.log(width))
-            log_width, _ = golden_maximum(
-                lambda x, f=gain_of: f(float(np.exp(x))),  # type: ignore[misc]
-                log_width - 0.8,
-                min(log_width + 0.8, float(np.log(WIDEST))),
-                8,
-            )
-            width = float(np.exp(log_width))
-        # The searches stop at some 4 % of the width, a strong bump's place is known better.
-        value = gain(place, width)
-        for _ in range(NEWTON_STEPS):
-            shape = {"shaft": shaft, "place_deg": place, "width_deg": width}
-            x, excited = regression.projected(cls._tangents(regression, shape, 1.0))
-            if not excited.all():
-                break
-            height, *moves = np.linalg.lstsq(x, regression.r, rcond=1e-10)[0]
-            step = np.clip(np.array(moves) / height, -0.3 * width, 0.3 * width)
-            following = gain(place + step[0], min(width + step[1], WIDEST))
-            if not following > value:
-                break
-            place, width, value = place + step[0], min(width + step[1], WIDEST), following
+        """Where a bump near some place saves most."""
+        phase = cls._degrees(regression.signals, regression.around, shaft)
+        place, width = regression.beside.bump(phase, place, width, WIDEST)
         return {"shaft": shaft, "place_deg": float(place % 360.0), "width_deg": float(width)}
 
     @classmethod
@@ -265,9 +239,13 @@ class LocalDefect(Effect):
 
     @classmethod
     def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
-        cycles = around.joint.output_order(shape["shaft"], 1)
-        phase = signals.theta * cycles
-        return LocalDefect.bump(phase, shape["place_deg"], shape["width_deg"])[:, None]
+        phase = cls._degrees(signals, around, shape["shaft"])
+        return cls.bump(phase, shape["place_deg"], shape["width_deg"])[:, None]
+
+    @staticmethod
+    def _degrees(signals: Signals, around: Surroundings, shaft: str) -> Array:
+        """Angles of a shaft."""
+        return np.degrees(signals.theta * around.joint.output_order(shaft, 1))
 
     @classmethod
     def report(
@@ -365,9 +343,18 @@ class LocalDefectTerm(Term):
         return (forms.Bump(self.place, self.width, self.height, self.cycles_per_turn),)
 
 
-def _circular(x: NDArray[Any], window: Array) -> Array:
-    """Sum of ``x`` under a symmetric window put at every place of the turn."""
-    return np.asarray(np.fft.irfft(np.fft.rfft(x) * np.fft.rfft(window), PLACES))
+@cache
+def _windows() -> list[tuple[Waves, Waves]]:
+    """Transforms of a bump of each width about the first place, and of its square."""
+    away = np.arange(PLACES, dtype=np.float64) * (360.0 / PLACES)
+    away = np.minimum(away, 360.0 - away)
+    windows = [np.exp(-0.5 * (away / width) ** 2) for width in WIDTHS]
+    return [(np.fft.rfft(window), np.fft.rfft(window**2)) for window in windows]
+
+
+def _circular(x: Waves, window: Waves) -> Array:
+    """Sum of values under a symmetric window put at every place of the turn, by transforms."""
+    return np.asarray(np.fft.irfft(x * window, PLACES))
 
 
 def _gear_lines(around: Surroundings) -> list[float]:

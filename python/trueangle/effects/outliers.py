@@ -10,6 +10,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+import trueangle._core as _core
+
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.regression import Regression
 from ..estimation.stretches import MOST_IN_ROW, about_level, stretches, within
@@ -117,7 +119,9 @@ class Outliers(Effect):
         n = regression.n
         normal = _normal(e, max(float(np.sqrt(np.mean(e**2))), NARROWEST))
         tails = max(_student(e, nu, s) for nu in TAILS for s in SCALES)
-        value, share, size, scale = max(_two_normals(e, start) for start in SIZES)
+        value, share, size, scale = max(
+            _core.two_normals(e, start, EM_STEPS, NARROWEST) for start in SIZES
+        )
         value -= 0.5 * n * np.log(2.0 * np.pi)
         gain = 2.0 * (value - normal) - 2.0 * regression.log_n
         beyond = 2.0 * (value - tails) - regression.log_n
@@ -293,24 +297,3 @@ def _student(e: Array, nu: float, scale: float) -> float:
     constant = lgamma(0.5 * (nu + 1.0)) - lgamma(0.5 * nu) - 0.5 * float(np.log(np.pi * nu))
     body = -0.5 * (nu + 1.0) * float(np.sum(np.log1p((e / scale) ** 2 / nu)))
     return body + e.size * (constant - float(np.log(scale)))
-
-
-def _two_normals(e: Array, start: float) -> tuple[float, float, float, float]:
-    """Log-likelihood, share and relative size of the wide part, scale of the narrow one.
-
-    Expectation-maximisation from a share of 1 % and a size of ``start``.
-    """
-    share, size, scale = 0.01, start, 1.0
-    square = e**2
-    for _ in range(EM_STEPS):
-        narrow = (1.0 - share) * np.exp(-0.5 * square / scale**2)
-        wide = share / size * np.exp(-0.5 * square / (scale * size) ** 2)
-        chance = wide / np.maximum(narrow + wide, 1e-300)
-        share = float(np.clip(chance.mean(), 1.0 / e.size, 0.2))
-        kept = 1.0 - chance
-        scale = max(float(np.sqrt((kept @ square) / max(kept.sum(), 1e-300))), NARROWEST)
-        size = max(float(np.sqrt((chance @ square) / max(chance.sum(), 1e-300))) / scale, 2.0)
-    log_narrow = np.log1p(-share) - 0.5 * square / scale**2
-    log_wide = np.log(share / size) - 0.5 * square / (scale * size) ** 2
-    value = float(np.logaddexp(log_narrow, log_wide).sum()) - e.size * float(np.log(scale))
-    return value, share, size, scale

@@ -99,6 +99,11 @@ class Factor:
         back = vt[kept].T / s[kept] / lengths[:, None]
         return cls(whiten, blocks, u[:, kept], back, None, lengths)
 
+    def left_of(self, columns: Array) -> Array:
+        """Columns under the noise, less what those of the factor take of them."""
+        x = self.whiten(columns)
+        return np.asarray(x - self.q @ (self.q.T @ x))
+
     def _first(self, count: int) -> Factor:
         """That of the first blocks alone: no column depends on those after it."""
         if count == len(self.blocks):

@@ -181,11 +181,10 @@ class Projection:
         """`block_gains` of cosines and sines side by side, in single precision."""
         before = pairs.under(self.whiten)
         cosines, sines, mixed = before[:, 0, 0], before[:, 1, 1], before[:, 0, 1]
-        q, r = (columns.astype(np.float32) for columns in self.seen)
-        known = (q @ pairs.columns).astype(np.float64)
-        moment = (r @ pairs.columns).astype(np.float64)
-        aa = cosines - (known[:, 0::2] ** 2).sum(axis=0)
-        bb = sines - (known[:, 1::2] ** 2).sum(axis=0)
+        found = self.beside.seen.astype(np.float32) @ pairs.columns
+        known, moment = found[:-1].astype(np.float64), found[-1].astype(np.float64)
+        squares = np.square(known).sum(axis=0)
+        aa, bb = cosines - squares[0::2], sines - squares[1::2]
         ab = mixed - (known[:, 0::2] * known[:, 1::2]).sum(axis=0)
         determinant = aa * bb - ab**2
         c, s = moment[0::2], moment[1::2]

@@ -18,6 +18,9 @@ __all__ = ["ENOUGH_RUNS", "Readings"]
 
 Array = NDArray[np.float64]
 
+#: What does not depend on the errors.
+OF_MOTION = ("bounds", "base", "correlation", "root_weights", "log_n", "log_runs")
+
 #: Runs from which they, and not the readings, are what informs on a variance between runs.
 ENOUGH_RUNS = 8
 
@@ -105,8 +108,11 @@ class Readings:
         return float(np.log(runs)) if runs >= ENOUGH_RUNS else self.log_n
 
     def less(self, error: Array) -> Readings:
-        """The readings with a known error taken off."""
-        return replace(self, residual=self.residual - error)
+        """The readings with a known error taken off; what follows from the motion is kept."""
+        other = replace(self, residual=self.residual - error)
+        made = vars(self)
+        vars(other).update((name, made[name]) for name in OF_MOTION if name in made)
+        return other
 
     def take(self, rows: NDArray[np.bool_]) -> Readings:
         """Some of the readings."""

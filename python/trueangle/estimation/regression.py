@@ -68,10 +68,14 @@ class Regression(Solution):
 
     @classmethod
     def of_readings(
-        cls, readings: Readings, rho: float | None = None, cache: Cache | None = None
+        cls,
+        readings: Readings,
+        rho: float | None = None,
+        cache: Cache | None = None,
+        before: Solution | None = None,
     ) -> Self:
         """The regression of readings without terms, of noise of this correlation if given."""
-        solution = Solution.solve(readings, rho=rho)
+        solution = Solution.solve(readings, rho=rho, before=before)
         cache = Cache() if cache is None else cache
         return cls(**values_of(solution, Solution), start=solution.deviance, cache=cache)
 
@@ -97,8 +101,16 @@ class Regression(Solution):
         return replace(self, terms=terms, cache=self.cache.for_other_terms())
 
     def with_least(self, least: float) -> Self:
-        """The same where only candidates of more evidence matter."""
-        return replace(self, least=least)
+        """The same where only candidates of more evidence matter.
+
+        No figure depends on that: what searches ask of a fit is worked out once for all causes.
+        """
+        if least == self.least:
+            return self
+        _ = self.beside, self.left, self.around
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, least=least)
+        return other
 
     def weighted(self, weights: Array) -> Self:
         """The readings without terms under other weights.
@@ -160,7 +172,9 @@ class Regression(Solution):
         be taken off again by another one.
         """
         saved, coefficients = self.gain(columns)
-        if float(np.std(columns @ coefficients)) > BEYOND_SHOWN * self.readings.scatter:
+        error = columns @ coefficients
+        spread = float(error @ error) / self.n - float(error.mean()) ** 2
+        if spread > (BEYOND_SHOWN * self.readings.scatter) ** 2:
             saved = 0.0
             deviance = None if deviance is None else 0.0
         return Extension(

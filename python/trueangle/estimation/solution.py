@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import Any, Self
 
 import numpy as np
@@ -129,6 +130,14 @@ class Solution(Projection):
             outlying=outlying,
         )
 
+    def factor_with(self, extension: Extension) -> Factor:
+        """All columns and those of an extension, under the noise of this fit and of its effect."""
+        blocks = (*self.blocks, extension.columns)
+        own = [] if extension.run_effect is None else [extension.run_effect]
+        effects = [*self.whiten.effects, *own]
+        bounds, weights = self.bounds, self.readings.weights
+        return Factor.of(blocks, bounds, self.whiten.rho, effects, weights, self.factors)
+
     def with_solution(self, solution: Solution, **changes: Any) -> Self:
         """Another solution with what else this one holds."""
         return replace(self, **values_of(solution, Solution), **changes)
@@ -204,12 +213,20 @@ class Solution(Projection):
 
     def fitted(self) -> list[tuple[Extension, Array]]:
         """Every term with its coefficients."""
-        return [(term, self.coefficients[self.place(k)]) for k, term in enumerate(self.terms)]
+        return [
+            (term, self.coefficients[start : start + term.columns.shape[1]])
+            for term, start in zip(self.terms, self._starts, strict=True)
+        ]
 
     def place(self, k: int) -> NDArray[np.int64]:
         """Columns of term ``k`` among those of the design."""
-        start = sum(block.shape[1] for block in self.blocks[: k + 1])
+        start = self._starts[k]
         return np.arange(start, start + self.terms[k].columns.shape[1])
+
+    @cached_property
+    def _starts(self) -> list[int]:
+        """The first column of every term."""
+        return [*accumulate(block.shape[1] for block in self.blocks)][: len(self.terms)]
 
     def covariance(self, k: int) -> Array:
         """Covariance of the coefficients of term ``k``."""
@@ -303,13 +320,19 @@ def values_of(solution: Projection, of: type[Projection]) -> dict[str, Any]:
 
 
 def _grown(blocks: tuple[Array, ...], before: Solution | None) -> Array:
-    """All columns side by side; those that a fit before has in common are not moved."""
-    if before is None:
-        return np.hstack(blocks)
-    same = in_common(before.blocks, blocks)
-    kept = before.design[:, : sum(block.shape[1] for block in blocks[:same])]
-    further = [block for block in blocks[same:] if block.shape[1]]
-    return np.hstack([kept, *further]) if further else kept
+    """All columns side by side, one after the other; those of a fit before are not made anew."""
+    design = np.empty((len(blocks[0]), sum(block.shape[1] for block in blocks)), order="F")
+    same, at = 0, 0
+    if before is not None:
+        same = in_common(before.blocks, blocks)
+        at = sum(block.shape[1] for block in blocks[:same])
+        if at == design.shape[1] == before.design.shape[1]:
+            return before.design
+        design[:, :at] = before.design[:, :at]
+    for block in blocks[same:]:
+        design[:, at : at + block.shape[1]] = block
+        at += block.shape[1]
+    return design
 
 
 def _left(readings: Readings, design: Array, fit: Projection) -> Array:

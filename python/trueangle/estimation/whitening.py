@@ -171,7 +171,9 @@ class Whitener:
         """Under the weights and the filter alone, or their transpose."""
         if self.rho == 0.0 and self.root_weights is None:
             return x
-        rows = np.ascontiguousarray(x if x.ndim == 2 else x[:, None])
+        rows = x if x.ndim == 2 else x[:, None]
+        if not rows.flags.f_contiguous:
+            rows = np.ascontiguousarray(rows)
         found = _core.whitened(rows, self.bounds, self.rho, self.root_weights, transposed)
         return found.reshape(x.shape)
 
@@ -219,7 +221,7 @@ class Whitener:
         if not self.effects:
             return out
         if out is x:
-            out = x.copy()
+            out = x.copy(order="K")
         self._shrink(out)
         return out
 

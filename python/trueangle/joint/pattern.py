@@ -171,9 +171,6 @@ SOLVED = 1e-9
 #: Rounding of angles of some hundred turns, per order.
 _VANISHES = 1e-11
 
-#: Readings looked at before all of a column are.
-FIRST = 8
-
 
 def line_columns(theta: Array, order: float) -> Array:
     """``cos`` and ``sin`` of ``order * theta``, shape (n, 2).
@@ -186,13 +183,7 @@ def line_columns(theta: Array, order: float) -> Array:
 
 def lines_columns(theta: Array, orders: Array) -> Array:
     """`line_columns` of many orders side by side, shape (n, 2 k)."""
-    columns = _core.line_columns(np.ascontiguousarray(theta), orders)
-    limit = _VANISHES * np.repeat(np.maximum(orders, 1.0), 2)
-    # The first readings tell of nearly every column that it does not vanish.
-    small = np.flatnonzero(np.abs(columns[:FIRST]).max(axis=0, initial=0.0) < limit)
-    for k in small[np.abs(columns[:, small]).max(axis=0, initial=0.0) < limit[small]]:
-        columns[:, k] = 0.0
-    return columns
+    return _core.line_columns(np.ascontiguousarray(theta), orders, vanishing=_VANISHES)
 
 
 def line_sum(theta: Array, lines: tuple[tuple[float, float, float], ...]) -> Array:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,7 +157,7 @@ def evidence_between(
                 imitation = EFFECTS[imitator].propose(alone)
                 left_by = left
                 if imitation is not None and imitation.deviance > 0.0:
-                    left_by = deviance_left(alone.with_terms([imitation]), error, noise)
+                    left_by = deviance_left(alone, error, noise, imitation)
                 gap = left_by + _price(imitation) - price
                 per_rival.setdefault(imitator, []).append((left_by, gap))
         for rival, pairs in per_rival.items():
@@ -184,9 +184,9 @@ def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Blindnes
 
 def _with_error(regression: Regression, error: Array) -> Regression:
     """The same readings with a further error; what follows from the motion is worked out once."""
-    readings = replace(regression.readings, residual=regression.residual + error)
+    readings = regression.readings.less(-error)
     cache = regression.cache.for_other_errors()
-    return Regression.of_readings(readings, regression.whiten.rho, cache)
+    return Regression.of_readings(readings, regression.whiten.rho, cache, regression)
 
 
 def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:
@@ -209,9 +209,14 @@ def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:
     return [*asked, *others]
 
 
-def deviance_left(regression: Regression, error: Array, noise: ReadingNoise) -> float:
-    """Deviance of an error beside all that a regression fits."""
-    x, _ = regression.projected(error[:, None])
+def deviance_left(
+    regression: Regression, error: Array, noise: ReadingNoise, imitation: Extension | None = None
+) -> float:
+    """Deviance of an error beside all that a regression fits, and an imitation."""
+    if imitation is None:
+        x, _ = regression.projected(error[:, None])
+    else:
+        x = regression.factor_with(imitation).left_of(error[:, None])
     return float(np.sum(x**2)) / (noise.sigma**2 * (1.0 - noise.correlation**2))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -64,6 +63,8 @@ def decoded_simulation(path: str | Path) -> Decoded:
 
 
 def _document(path: str | Path, text: str) -> dict[str, Any]:
+    import tomllib  # with its parser some milliseconds, and most commands read no simulation
+
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as cause:
@@ -287,6 +288,8 @@ def simulation_text(sim: Simulation) -> str:
     """The text of a simulation file, as `write_simulation` writes it."""
     whole = to_table(sim)
     if sim.source is not None and Path(sim.source).is_file():
+        import tomllib
+
         text = Path(sim.source).read_text(encoding="utf-8").rstrip("\n")
         old = to_table(decoded_simulation(sim.source))
         appended: dict[str, Any] = {

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.effects.outliers import Outliers, _beside_neighbours, _interpolated
+import trueangle._core as _core
+from trueangle.effects.outliers import (
+    EM_STEPS,
+    NARROWEST,
+    SIZES,
+    Outliers,
+    _beside_neighbours,
+    _interpolated,
+)
 from trueangle.estimation.regression import Regression
 from trueangle.estimation.stretches import MOST_IN_ROW, about_level, short_stretches, stretches
 from trueangle.joint.signals import join_runs
@@ -121,3 +129,29 @@ def test_noise_that_is_narrower_than_normal_has_no_outliers():
     noise[[40, 900]] += (15.0, -25.0)
     found = Outliers.find_scatter(Regression.of(signals, noise, SIM.surroundings, rho=0.0))
     assert [row for _, row in found.parameters["rows"].value] == [40, 900]
+
+
+def two_normals(e: np.ndarray, start: float, steps: int) -> tuple[float, float, float, float]:
+    """Expectation-maximisation by both densities, reading by reading: the slow form."""
+    share, size, scale = 0.01, start, 1.0
+    for _ in range(steps):
+        narrow = (1.0 - share) * np.exp(-0.5 * (e / scale) ** 2)
+        wide = share / size * np.exp(-0.5 * (e / (scale * size)) ** 2)
+        chance = wide / np.maximum(narrow + wide, 1e-300)
+        share = float(np.clip(chance.mean(), 1.0 / e.size, 0.2))
+        scale = max(float(np.sqrt(((1.0 - chance) @ e**2) / (1.0 - chance).sum())), NARROWEST)
+        size = max(float(np.sqrt((chance @ e**2) / max(chance.sum(), 1e-300))) / scale, 2.0)
+    log_narrow = np.log1p(-share) - 0.5 * (e / scale) ** 2
+    log_wide = np.log(share / size) - 0.5 * (e / (scale * size)) ** 2
+    value = float(np.logaddexp(log_narrow, log_wide).sum()) - e.size * float(np.log(scale))
+    return value, share, size, scale
+
+
+@pytest.mark.parametrize("start", SIZES)
+@pytest.mark.parametrize("wild", [0.0, 30.0, 1e3, 1e5])
+def test_a_narrow_and_a_wide_part_are_told_as_by_their_densities(start: float, wild: float) -> None:
+    rng = np.random.default_rng(31)
+    e = rng.normal(size=800)
+    e[::97] *= wild
+    found = _core.two_normals(e, start, EM_STEPS, NARROWEST)
+    assert found == pytest.approx(two_normals(e, start, EM_STEPS), rel=1e-9)

@@ -129,6 +129,8 @@ def test_the_best_ratio_of_a_run_effect_is_that_of_the_likelihood(kind: tuple, s
         return -likelihood - np.linalg.slogdet(wide)[1] + np.linalg.slogdet(v)[1]
 
     ratio, deviance = found.ratio_of(z)
+    # Column by column as well.
+    assert found.ratio_of(np.asfortranarray(z)) == pytest.approx((ratio, deviance), rel=1e-12)
     scan = max((saved(t), t) for t in np.geomspace(1e-4, 1e4, 400))
     assert deviance == pytest.approx(max(scan[0], 0.0), abs=0.02)
     if ratio > 0.0:
@@ -222,3 +224,43 @@ def test_scores_allow_for_a_run_effect_that_is_fitted() -> None:
     # A step between runs is what the effect draws: it saves nothing.
     assert project(factor, np.random.default_rng(1).normal(size=N)).gain(column)[0] < 1e-3
     assert isinstance(factor.whiten, Whitener)
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_columns_that_tell_little_of_most_readings_are_scored_alike(kind: tuple) -> None:
+    found, *_ = fitted(kind)
+    columns = np.random.default_rng(24).normal(size=(N, 3))
+    columns[:13] = columns[31:] = 0.0
+    columns[:, 1] = 0.0
+    for some in (columns[:, :1], columns[:, :2], columns):
+        mapped = found.whiten(some)
+        left = mapped - found.q @ (found.q.T @ mapped)
+        powers = found.beside.powers(np.ascontiguousarray(some))
+        wanted = np.sum(mapped**2, axis=0), np.sum(left * mapped, axis=0), found.r @ mapped
+        for got, expected in zip(powers, wanted, strict=True):
+            np.testing.assert_allclose(got, expected, atol=1e-11)
+    columns[20, 1] = np.nan
+    assert np.isnan(found.gains(columns[:, 1:2])).all() or not found.gains(columns[:, 1:2]).any()
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_no_bump_near_the_one_found_saves_more(kind: tuple) -> None:
+    found, _, y, _ = fitted(kind)
+    phase = np.linspace(-100.0, 250.0, N)
+
+    def bump(place: float, width: float) -> np.ndarray:
+        return np.exp(-0.5 * ((phase - place) / width) ** 2)
+
+    found = found.of_target(y + 9.0 * bump(61.0, 24.0))
+    place, width = found.beside.bump(phase, 66.0, 20.0, 80.0)
+    best = found.gains(bump(place, width)[:, None])[0]
+    assert best > found.gains(bump(66.0, 20.0)[:, None])[0]
+    for step in (-0.02, 0.02):
+        beside = [bump(place + step * width, width), bump(place, width * (1.0 + step))]
+        assert (found.gains(np.column_stack(beside)) < best).all()
+    # A turn further on is the same place.
+    again = found.beside.bump(phase + 720.0, 66.0, 20.0, 80.0)
+    assert again == pytest.approx((place, width), rel=1e-6)
+    assert found.beside.bump(phase, 66.0, 20.0, 18.0)[1] <= 18.0 * (1.0 + 1e-12)
+    with pytest.raises(ValueError, match="phase"):
+        found.beside.bump(phase[:-1], 66.0, 20.0, 80.0)

@@ -254,6 +254,42 @@ def test_a_proposal_is_no_larger_than_the_readings_show() -> None:
     assert huge.deviance == 0.0
 
 
+def test_a_fit_asked_for_more_evidence_is_the_same_fit() -> None:
+    begun = start(rho=0.3)
+    other = begun.with_least(5.0)
+    assert (other.least, begun.least) == (5.0, 0.0)
+    assert other.with_least(5.0) is other
+    assert other.beside is begun.beside
+    assert other.left is begun.left
+    assert other.cache is begun.cache
+
+
+@pytest.mark.parametrize("drawn", [True, False])
+def test_columns_beside_an_extension_are_those_of_the_fit_with_it(drawn: bool) -> None:
+    begun = start(rho=0.3)
+    signals = begun.signals
+    begun = begun.with_terms([term("two", waves(signals, 2.0))])
+    effect = RunEffect(np.ones((180, 1)), 2.5) if drawn else None
+    columns = waves(signals, 3.0)[:, : 0 if drawn else 2]
+    further = term("further", columns, run_effect=effect)
+    asked = np.random.default_rng(11).normal(size=(180, 2))
+    wanted, _ = begun.with_terms([*begun.terms, further]).projected(asked)
+    found = begun.factor_with(further).left_of(asked)
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
+def test_errors_along_a_motion_keep_what_follows_from_it() -> None:
+    readings = start().readings
+    assert readings.base.shape == (180, 3)
+    assert readings.scatter > 0.0
+    other = readings.less(np.ones(180))
+    assert other.base is readings.base
+    np.testing.assert_array_equal(other.residual, readings.residual - 1.0)
+    # What follows from the errors does not stay.
+    doubled = readings.less(-readings.residual)
+    assert doubled.scatter == pytest.approx(2.0 * readings.scatter)
+
+
 @pytest.mark.parametrize("pruned", [True, False])
 def test_coarse_searches_end_where_they_gain_nothing(pruned: bool) -> None:
     begun = start(rho=0.0).with_least(30.0)

@@ -38,6 +38,10 @@ def test_the_map_makes_the_covariance_the_unit_matrix(kind: tuple) -> None:
     np.testing.assert_allclose(whiten(z), m @ z, atol=1e-12)
     np.testing.assert_allclose(whiten(x.astype(np.float32)), m @ x, atol=1e-5)
     assert whiten(x.astype(np.float32)).dtype == np.float32
+    # What stands column by column stays so.
+    turned = whiten(np.asfortranarray(x))
+    assert turned.flags.f_contiguous
+    np.testing.assert_allclose(turned, m @ x, atol=1e-12)
     whiten.beside(x, column, 1.0, 0.0)
     np.testing.assert_array_equal(np.column_stack([x, column]), keep[:, [0, 1, 2, 1]])
     assert whiten.is_identity == (kind == (0.0, (), False))
