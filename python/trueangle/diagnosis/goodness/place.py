@@ -163,6 +163,7 @@ def _judged(
     count, n_units = z.shape
     half = max(HALF_WINDOW, -(-POOLED // (2 * n_units)))
     level = np.sqrt(np.maximum(_level(np.abs(z) ** 2, half), 1e-300))
+    level = np.maximum(level, ROUNDED * level.max())  # a unit of rounding alone tells nothing
     w = np.sqrt(sizes / sizes.mean()) * z / level
     alone = None if modulator.name == "place" else unit_sums(modulator.values, left, units)
     p, statistic, band, k, logs = _smallest(w, alone, np.ones(n_units))

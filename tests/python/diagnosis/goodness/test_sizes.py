@@ -185,3 +185,16 @@ def test_the_chance_of_modulated_sums_is_that_of_student() -> None:
         wanted = ttest_1samp(signs * sums, 0.0).pvalue
         assert ModulatedSums(sums, -1.0).chance(signs) == pytest.approx(wanted, rel=1e-9)
     assert ModulatedSums(sums, 0.0).chance() == 1.0
+
+
+def test_a_run_of_rounding_alone_tells_nothing() -> None:
+    """Exact zeros and 1e-14 in one of ten runs: the same answer of place."""
+    rng = np.random.default_rng(404)
+    left = leftover("grid", "gauss", 404)
+    quiet = left.run == 3
+    found = []
+    for dust in (0.0, 1e-14 * rng.normal(size=len(left)), 1e-14 * np.sin(5.0 * left.theta)):
+        residual = np.where(quiet, dust, left.residual)
+        found.append([e.p for e in place_tests(replace(left, residual=residual, kept={}))])
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-4)
+    np.testing.assert_allclose(found[2], found[0], rtol=1e-4)
