@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from ..model.model import HarmonicModel
 
-__all__ = ["FLAGS", "compiled", "is_available"]
-
 _Array = NDArray[np.float64]
 
 #: With these GCC takes sines and cosines of whole vectors from glibc's libmvec.

@@ -14,8 +14,6 @@ from ..model.model import HarmonicModel
 from .evaluationpeers import peers
 from .interleaved import Timing, interleave
 
-__all__ = ["ORDERS", "EvaluationRow", "batches", "harmonics", "peer_batches", "single", "small"]
-
 #: Orders of the models timed, by name.
 ORDERS: dict[str, Sequence[int]] = {
     "17 orders": range(1, 18),

@@ -14,8 +14,6 @@ from ..estimation import reference
 from ..model.model import HarmonicModel
 from .compiled import compiled, is_available
 
-__all__ = ["peers"]
-
 _Array = NDArray[np.float64]
 _Evaluate = Callable[[_Array], _Array]
 

@@ -17,8 +17,6 @@ from ..fitting.fit import fit
 from ..runs.run import CalibrationRun
 from .interleaved import Timing, interleave
 
-__all__ = ["Case", "FitRow", "design", "measure", "peers", "quick", "readings"]
-
 _Array = NDArray[np.float64]
 #: A fit of angles, errors and the highest order.
 _Fit = Callable[[_Array, _Array, int], _Array]

@@ -7,8 +7,6 @@ import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-__all__ = ["Timing", "interleave"]
-
 
 class Timing(NamedTuple):
     """Seconds of one call."""

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import MissingExtraError
 from ..estimation.moments import Moments
@@ -20,22 +19,10 @@ from ..fleets.fleet import fleet
 from ..model.model import HarmonicModel
 from ..monitoring.monitor import Monitor
 from ..runs.run import CalibrationRun
+from ..support.arrays import Array
 from .evaluation import harmonics
 from .fit import Case, readings
 from .interleaved import Timing, interleave
-
-__all__ = [
-    "Cost",
-    "Measured",
-    "by_orders",
-    "by_readings",
-    "by_units",
-    "by_windows",
-    "by_workers",
-    "costs",
-]
-
-Array = NDArray[np.float64]
 
 _Ways: TypeAlias = dict[tuple[str, int], Callable[[], object]]
 

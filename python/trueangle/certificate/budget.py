@@ -12,8 +12,6 @@ from typing import Final
 from ..errors import ArgumentError
 from ..support.distributions import student_quantile
 
-__all__ = ["DISTRIBUTIONS", "LEVEL", "Budget", "Contribution", "coverage_factor"]
-
 #: Coverage probability of U: two standard deviations of a normal distribution.
 LEVEL: Final = 0.9545
 

@@ -11,8 +11,6 @@ from ..errors import ArgumentError
 from ..support.distributions import student_tail
 from ..support.suggestions import check_choice
 
-__all__ = ["RULES", "Specification", "conformance_probability", "conformity"]
-
 #: Decision rules, and by how many expanded uncertainties the acceptance limit lies inside.
 RULES: Final[Mapping[str, float]] = {"simple": 0.0, "guard_band": 1.0}
 

@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from ..fitting.result import FitResult
     from ..model.model import HarmonicModel
 
-__all__ = ["Certificate", "certify"]
-
 FORMAT: Final = "trueangle-certificate"
 VERSION: Final = 1
 

@@ -20,8 +20,6 @@ from .budget import DISTRIBUTIONS, Contribution
 from .conformity import RULES, Specification
 from .language import LANGUAGES
 
-__all__ = ["ENTRIES", "Identity", "load_identity"]
-
 #: Largest identity file that is read; a real one has a few dozen lines.
 _MOST_BYTES: Final = 1 << 20
 

@@ -8,8 +8,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
-__all__ = ["LANGUAGES", "certificate_texts", "note_in"]
-
 _FOLDER: Final = Path(__file__).parent / "texts"
 
 #: Languages that there are texts in.

@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError
-
-__all__ = ["Estimates", "propagated"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Step of a central difference in standard uncertainties: so far a measurement model has to
 #: be straight anyway for the law of propagation to hold (JCGM 100, 5.1.3 note 2).

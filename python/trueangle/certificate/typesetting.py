@@ -24,14 +24,6 @@ from .language import certificate_texts, note_in
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "certificate_pictures",
-    "certified_errors",
-    "lay_out",
-    "typeset_certificate",
-    "write_pdf",
-]
-
 #: Part of the span of the errors below which bars of U are not seen beside them.
 _SMALL: Final = 0.04
 

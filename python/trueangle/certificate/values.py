@@ -18,25 +18,12 @@ from ..plots.curves import seen_span
 from ..runs.aliasing import distinct_positions
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from .budget import Contribution
 from .propagation import propagated
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
-
-__all__ = [
-    "POSITIONS",
-    "Values",
-    "corrected_runs",
-    "is_of_these",
-    "left_at_places",
-    "model_as_left",
-    "nominal_positions",
-    "reversal_halfwidth",
-    "values_at",
-]
-
-Array = NDArray[np.float64]
 
 #: Nominal positions of a whole turn where none are asked for.
 POSITIONS: Final = 36

@@ -11,8 +11,6 @@ from .paths import Input, Output
 from .signal_options import add_signals
 from .values import names, seconds
 
-__all__ = ["add_after_arguments", "refuse_without_after", "run_after"]
-
 
 def add_after_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of ``--after``."""

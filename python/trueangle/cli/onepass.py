@@ -10,8 +10,6 @@ from .signal_options import reading
 from .terminal import own_interrupts
 from .values import declared_shafts
 
-__all__ = ["add_one_pass", "log_options", "wants_one_pass"]
-
 #: Readings, two numbers of 8 bytes each, that are read into runs: 256 MiB of them.
 _READINGS: Final = (256 << 20) // 16
 

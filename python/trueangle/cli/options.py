@@ -12,21 +12,6 @@ from ..support.files import MODEL, RUNS
 from .paths import Output
 from .signal_options import add_signals
 
-__all__ = [
-    "add_argument_choice",
-    "add_covariance",
-    "add_errors_in",
-    "add_joint",
-    "add_labels",
-    "add_model_output",
-    "add_nuisance",
-    "add_orders",
-    "add_progress",
-    "add_runs_output",
-    "errors_in",
-    "refuse_given",
-]
-
 
 def add_model_output(parser: argparse.ArgumentParser) -> None:
     """The model that a command writes."""

@@ -11,8 +11,6 @@ from typing import Any, Final, NoReturn
 from ..support.suggestions import did_you_mean
 from .paths import Input
 
-__all__ = ["GROUPS", "Parser"]
-
 #: What argparse says of arguments that are not there, and what looks like an option.
 _MISSING: Final = "the following arguments are required"
 _OPTION: Final = r"-{1,2}[A-Za-z]"

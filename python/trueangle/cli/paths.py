@@ -11,8 +11,6 @@ from typing import Any
 from ..errors import ArgumentError
 from ..support.files import Kind, check_input, check_output, same_file
 
-__all__ = ["Input", "ModelInput", "Output", "check_paths"]
-
 
 class Input(str):
     """A file or folder that a command reads: ``type=Input`` of an argument."""

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["save_picture"]
-
 
 def save_picture(drawn: Axes | Figure, path: str) -> None:
     """Write a picture whole or not at all, as its ending says (PNG where it says none)."""

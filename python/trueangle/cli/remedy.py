@@ -17,8 +17,6 @@ from ..errors import (
 )
 from .parser import Parser
 
-__all__ = ["command_that_helps"]
-
 #: Makes the parser of commands: with the arguments of some, of those that are named.
 Build: TypeAlias = Callable[[Sequence[str], Sequence[str]], Parser]
 

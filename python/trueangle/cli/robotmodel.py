@@ -10,8 +10,6 @@ from ..support.suggestions import did_you_mean
 if TYPE_CHECKING:
     from ..model.model import HarmonicModel
 
-__all__ = ["joint_asked", "model_asked"]
-
 
 def model_asked(path: str, joint: str | None = None) -> HarmonicModel:
     """The model of a file, or that of one joint of a robot's file; errors as `joint_asked`."""

@@ -14,15 +14,6 @@ from .signal_options import signal_argument, signals_by_joint
 if TYPE_CHECKING:
     from ..model.model import HarmonicModel
 
-__all__ = [
-    "JointAsked",
-    "add_robot",
-    "each_joint",
-    "joints_asked",
-    "robot_messages",
-    "save_models",
-]
-
 T = TypeVar("T")
 
 #: The name before a role that stands for the log of a simulator, not for a joint.

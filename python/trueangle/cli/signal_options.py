@@ -9,8 +9,6 @@ from typing import Any
 from ..errors import ArgumentError
 from .paths import Input
 
-__all__ = ["ROLES", "add_signals", "reading", "signal_argument", "signals_by_joint"]
-
 #: The roles, as every help names them.
 ROLES = (
     "reference, indicated, error, reference_offset, time, velocity, direction, temperature, "

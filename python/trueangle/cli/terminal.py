@@ -11,19 +11,6 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any, Final, TextIO
 
-__all__ = [
-    "STANDARD_OUTPUT",
-    "Ending",
-    "Plain",
-    "coloured_text",
-    "ending_by_signals",
-    "has_colours",
-    "own_interrupts",
-    "plain_streams",
-    "printable",
-    "silence_output",
-]
-
 STANDARD_OUTPUT: Final = "standard output"
 
 #: Control characters but tab and line end, what turns the direction of text, and halves of

@@ -10,18 +10,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from ..errors import ArgumentError
 from ..support.suggestions import did_you_mean
 
-__all__ = [
-    "SHAFTS",
-    "angle",
-    "arc",
-    "declared_shafts",
-    "names",
-    "orders_by_shaft",
-    "parse_orders",
-    "seconds",
-    "turns",
-]
-
 #: Shafts that every joint may have.
 SHAFTS = ("output", "motor", "wave_generator")
 

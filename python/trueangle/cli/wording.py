@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     import argparse
     import ast
 
-__all__ = ["Wording"]
-
 _CODE: Final = re.compile(r"`([^`\n]{1,300})`")
 _ARGUMENT: Final = re.compile(r"\w+=")
 _CALL: Final = re.compile(r"(?:ta|trueangle)\.[\w.]+\(.*\)")

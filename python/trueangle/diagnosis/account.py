@@ -13,6 +13,7 @@ from ..effects.scatter import NEW_SCATTER, ScatterFinding
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
+from ..support.arrays import Array
 from ..support.deadline import pace
 from .believed import corrected_effects
 from .delay import Delay, error_before, find_delay
@@ -25,10 +26,6 @@ from .remainder import unexplained_after
 from .rounding import beyond_rounding, tells_no_more, unrounded
 from .selection import select
 from .unnamed import is_named
-
-__all__ = ["Account", "account_of"]
-
-Array = NDArray[np.float64]
 
 #: Readings used at most: beyond, one of every so many in a row is drawn at random.
 MOST_READINGS = 40_000

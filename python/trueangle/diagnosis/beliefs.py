@@ -15,14 +15,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, normal_tail
 from ..support.plainresult import Shown
-
-__all__ = ["Belief", "judge_line", "verdict_of_factor"]
-
-Array = NDArray[np.float64]
 
 #: Chance with which a right belief of many is refuted.
 LEVEL = 1e-4

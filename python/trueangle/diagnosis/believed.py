@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
@@ -16,16 +15,13 @@ from ..estimation.regression import ROUNDING, Regression
 from ..joint.pattern import Harmonic, Surroundings
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
+from ..support.arrays import Array
 from ..support.distributions import normal_tail
 from .beliefs import LEVEL, Belief, judge_line, verdict_of_factor
 from .gain import measure_belief_gains
 from .identifiability import doubts_about, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
 from .unnamed import effect_of
-
-__all__ = ["corrected_effects", "judged_beliefs", "scaled_effect"]
-
-Array = NDArray[np.float64]
 
 #: Fields of effects, beside those in arcsec, that their signal is proportional to.
 LINEAR = ("delay_s", "relative_error", "pattern_per_K", "coefficient")

@@ -9,8 +9,6 @@ from ..support.display_units import ErrorUnit, significant
 if TYPE_CHECKING:
     from .finding import Finding
 
-__all__ = ["brief_finding"]
-
 #: Parameters that say how large a finding is, the first that it has; by how much it is multiplied,
 #: and its unit where that is not the unit of errors.
 _SIZED: dict[str, tuple[float, str]] = {

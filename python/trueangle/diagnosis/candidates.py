@@ -13,8 +13,6 @@ from .forms import told_from_forms
 from .penalty import before_forms, left_by_forms, misfit, penalty_of, total_penalty
 from .unnamed import effect_of
 
-__all__ = ["Candidate", "Scores", "extensions", "propose", "proposed_above"]
-
 #: An extension, what it extends, and its net BIC gain.
 Candidate: TypeAlias = tuple[Extension, Regression, float]
 

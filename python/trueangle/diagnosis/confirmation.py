@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects import EFFECTS
 from ..effects.drift_within_run import DriftWithinRun
@@ -13,6 +12,7 @@ from ..effects.local_defect import LocalDefect
 from ..effects.non_integer_order import NonIntegerOrder
 from ..estimation.regression import Regression
 from ..joint.pattern import line_columns
+from ..support.arrays import Array
 from ..support.display_units import brief
 from .forms import FORM
 from .gain import Gain
@@ -23,10 +23,6 @@ from .remainder import free_paths, remainder_of
 from .runzeros import CHANCE, chance_between_runs
 from .selection import is_flexible
 from .unnamed import is_line_in_time, is_line_of, is_named, modulator, modulators
-
-__all__ = ["CONFIRMED", "NOT_CONFIRMED", "status_of"]
-
-Array = NDArray[np.float64]
 
 CONFIRMED, NOT_CONFIRMED = "confirmed", "not_confirmed"
 

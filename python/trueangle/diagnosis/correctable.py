@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ..runs.joining import MeasuredMinusSimulated
     from ..runs.run import CalibrationRun
 
-__all__ = ["Correctable"]
-
 
 class Correctable(PlainResult):
     """A diagnosis that a model can be made of."""

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ..fitting.argument import AnyArgument
     from ..simulation.simulation import Simulation
 
-__all__ = ["NOT_AT_RUN_TIME", "extend_model", "terms_from_effects", "without_terms"]
-
 #: Causes that no corrector can take off while the joint runs, and why.
 NOT_AT_RUN_TIME: dict[str, str] = {
     kind: effect.not_at_run_time for kind, effect in EFFECTS.items() if effect.not_at_run_time

@@ -17,7 +17,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects.latency import Latency
 from ..estimation.estimate import quantity
@@ -29,16 +28,13 @@ from ..joint.pattern import ARCSEC_PER_RAD, Pattern, lines_columns
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from .confirmation import status_of
 from .finding import Finding
 from .gain import measure_delay_gain
 from .goodness import Unexplained
 from .penalty import NEW_CAUSE
 from .unnamed import effect_of
-
-__all__ = ["Delay", "delay_finding", "error_before", "find_delay"]
-
-Array = NDArray[np.float64]
 
 #: Orders of the output that are free beside the delay, where the travel resolves them.
 ORDERS = 32

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects import EFFECTS
 from ..effects.wrong_gear_ratio import WrongGearRatio
@@ -20,6 +19,7 @@ from ..runs.files import runs_of
 from ..runs.run import CalibrationRun
 from ..runs.source import Reading
 from ..simulation.simulation import SIMULATION, Simulation
+from ..support.arrays import Array
 from ..support.blas import one_blas_thread
 from ..support.deadline import Pace, pace, with_pace
 from ..support.kinds import of_type, told_kinds
@@ -42,10 +42,6 @@ from .wrongplace import misplaced_beliefs
 
 if TYPE_CHECKING:
     from ..runs.joining import MeasuredMinusSimulated
-
-__all__ = ["diagnose"]
-
-Array = NDArray[np.float64]
 
 #: Fewest readings that can support a cause.
 LEAST_READINGS = 20

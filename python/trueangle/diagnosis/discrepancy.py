@@ -6,16 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..joint.signals import Signals
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
+from ..support.arrays import Array
 from ..support.plainresult import Shown
-
-__all__ = ["Discrepancy", "discrepancy_of", "unfolded_error"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

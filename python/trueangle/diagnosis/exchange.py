@@ -16,8 +16,6 @@ from .penalty import cause_terms, finding_groups, total_penalty
 from .selection import is_flexible, regrown
 from .unnamed import is_named
 
-__all__ = ["exchanged"]
-
 #: Exchanges at most, and findings up to which others are tried in the place of each: of more, which
 #: are implausible together, that would take as long as the whole choice.
 MOST_EXCHANGES, LOOKED_AT = 3, 2

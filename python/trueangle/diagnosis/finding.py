@@ -11,8 +11,6 @@ from ..support.plainresult import Shown
 from .confirmation import CONFIRMED
 from .gain import Gain
 
-__all__ = ["Finding"]
-
 
 @dataclass(frozen=True)
 class Finding(Shown):

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from ..runs.joining import MeasuredMinusSimulated
     from ..runs.run import CalibrationRun
 
-__all__ = ["Diagnosis"]
-
 
 @dataclass(frozen=True)
 class Diagnosis(Correctable):

@@ -6,15 +6,11 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
+from ..support.arrays import Array
 from .unnamed import effect_of, is_named
-
-__all__ = ["FORM", "beside_bends", "share_beside", "told_from_forms", "with_form_errors"]
-
-Array = NDArray[np.float64]
 
 #: Share of a cause's energy that its form may leave: one known to 3 %.
 FORM = 1e-3

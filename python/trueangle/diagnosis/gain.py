@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
+from ..support.arrays import Array
 from ..support.deadline import pace
 from ..support.plainresult import Shown
 from .holdout import Law, held_out, numbers, rebuilt, reducible_share, residual_at
 from .levels import LEAST_SHARE, LevelGain, gains_by_level
 from .unnamed import effect_of
 
-__all__ = ["Gain", "measure_belief_gains", "measure_delay_gain", "measure_gain"]
-
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 #: Parts of the runs held out in turn; shuffles.

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
@@ -22,10 +21,6 @@ from .finding import Finding
 from .levels import UNITS
 from .overlap import finding_overlaps
 from .penalty import cause_terms
-
-__all__ = ["GATES", "MANY", "alike_columns", "gated_findings", "many_causes"]
-
-Array = NDArray[np.float64]
 
 #: Standard errors by which the size of a cause must differ from zero.
 TOLD = 2.0

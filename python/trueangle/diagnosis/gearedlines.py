@@ -18,16 +18,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects.search import golden_maximum
 from ..joint.pattern import Harmonic, Pattern, line_columns
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
-
-__all__ = ["GearedLines", "Ratio", "plain_denominators"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Trials of a ratio per resolution cell.
 OVERSAMPLING = 4.0

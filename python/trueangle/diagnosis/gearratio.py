@@ -11,16 +11,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..joint.pattern import Pattern
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
+from ..support.arrays import Array
 from .gearedlines import GearedLines, Ratio, plain_denominators
-
-__all__ = ["aligned", "find_ratio", "near_ratio"]
-
-Array = NDArray[np.float64]
 
 #: Share of the believed lines up to which they are missing at the believed ratio, and share of
 #: their power that must be found at another one for that to be the ratio: where less is found,

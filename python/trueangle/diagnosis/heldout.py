@@ -9,8 +9,6 @@ from ..simulation import Simulation
 from .correction import without_terms
 from .diagnose import diagnose
 
-__all__ = ["hold_out_extended"]
-
 #: Most diagnoses: with more runs several are left out together.
 MOST_DIAGNOSES = 3
 

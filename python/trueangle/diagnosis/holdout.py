@@ -12,12 +12,10 @@ from ..estimation.regression import Extension, Regression
 from ..estimation.whitening import RunEffect
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
+from ..support.arrays import Array
 from ..support.deadline import pace
 from .unnamed import effect_of
 
-__all__ = ["Law", "held_out", "numbers", "rebuilt", "reducible_share", "residual_at"]
-
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 #: Resamples of runs for the interval.

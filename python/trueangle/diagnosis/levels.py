@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
+from ..support.arrays import Array
 from ..support.deadline import pace
 from .holdout import held_out, numbers, rebuilt, reducible_share
 from .unnamed import effect_of
 
-__all__ = ["UNITS", "LevelGain", "gains_by_level", "run_levels"]
-
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 #: Factors that have levels, and the unit of each.

@@ -26,8 +26,6 @@ from .penalty import NEW_CAUSE, cause_terms, finding_groups
 from .selection import is_flexible
 from .unnamed import is_named
 
-__all__ = ["findings_of", "reconsidered_findings", "scatter_doubt", "scatter_finding"]
-
 #: Rivals reported for each finding.
 RIVALS = 3
 

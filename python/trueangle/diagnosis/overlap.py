@@ -6,14 +6,9 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..estimation.projection import EXCITED
 from ..estimation.regression import Regression
-
-__all__ = ["finding_overlaps"]
-
-Array = NDArray[np.float64]
 
 
 def finding_overlaps(

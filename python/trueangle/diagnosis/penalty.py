@@ -11,20 +11,6 @@ from ..estimation.regression import Extension, Regression
 from .forms import FORM
 from .unnamed import effect_of
 
-__all__ = [
-    "NEW_CAUSE",
-    "before_forms",
-    "cause_terms",
-    "finding_groups",
-    "left_by_forms",
-    "lost",
-    "misfit",
-    "misfit_of_scatter",
-    "net_loss",
-    "penalty_of",
-    "total_penalty",
-]
-
 #: Evidence (in units of BIC) that a new cause must bring beyond its penalty: 6 is what
 #: Kass and Raftery call strong, odds of 20 to 1.
 NEW_CAUSE = 6.0

@@ -5,22 +5,18 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..estimation.cache import Cache
 from ..estimation.regression import Regression
 from ..estimation.stretches import about_level, short_stretches
 from ..estimation.whitening import Whitener
 from ..joint.signals import Signals
+from ..support.arrays import Array
 from ..support.display_units import brief
 from ..support.distributions import chi_squared_tail
 from .goodness import FREE_PATH, Evidence, Leftover, Unexplained, goodness_of_fit
 from .rounding import unrounded
 from .unnamed import effect_of, is_named
-
-__all__ = ["free_paths", "leftover_of", "remainder_of", "unexplained_after"]
-
-Array = NDArray[np.float64]
 
 
 def leftover_of(signals: Signals, residual: Array, cache: Cache) -> Leftover:

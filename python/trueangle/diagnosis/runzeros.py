@@ -11,16 +11,13 @@ import trueangle._core as _core
 
 from ..effects import EFFECTS
 from ..estimation.regression import Regression
+from ..support.arrays import Array
 from ..support.distributions import f_tail
 from .candidates import propose
 from .goodness import Unexplained
 from .goodness.zeros import ZEROS
 from .penalty import NEW_CAUSE, cause_terms
 from .selection import on_runs
-
-__all__ = ["CHANCE", "chance_between_runs", "scatter_chance"]
-
-Array = NDArray[np.float64]
 
 #: Chance above which what unexplained zeros scatter by may as well have made a cause.
 CHANCE = 0.01

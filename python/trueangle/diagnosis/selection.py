@@ -30,13 +30,6 @@ from .penalty import (
 from .remainder import remainder_of
 from .unnamed import UNNAMED, effect_of, is_named
 
-__all__ = [
-    "is_flexible",
-    "on_runs",
-    "regrown",
-    "select",
-]
-
 #: Terms at most.
 MOST_TERMS = 14
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from .finding import Finding
     from .findings import Diagnosis
 
-__all__ = ["diagnosis_headline", "diagnosis_summary", "finding_text"]
-
 #: Share by which the noise must differ from what the simulation states to be told first.
 MATERIAL = 0.1
 

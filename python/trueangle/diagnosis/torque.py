@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects.backlash import Backlash
 from ..effects.direction_dependent_pattern import DirectionalPattern
@@ -31,10 +30,6 @@ if TYPE_CHECKING:
     from ..runs.joining import MeasuredMinusSimulated
     from .finding import Finding
     from .findings import Diagnosis
-
-__all__ = ["TorqueAccount", "TorqueFinding", "torque_account"]
-
-Array = NDArray[np.float64]
 
 #: Degrees that the largest torque is put into: so small that an angle stays what it is.
 _LARGEST = 0.01

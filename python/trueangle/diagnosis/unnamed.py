@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects import EFFECTS, Effect
 from ..effects.time_periodic import WANDER, TimePeriodic
@@ -19,19 +18,8 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
+from ..support.arrays import Array
 from .goodness.periodogram import periodogram
-
-__all__ = [
-    "UNNAMED",
-    "effect_of",
-    "is_line_in_time",
-    "is_line_of",
-    "is_named",
-    "modulator",
-    "modulators",
-]
-
-Array = NDArray[np.float64]
 
 #: Spread, in shares of its size, from which on a channel counts as changing.
 CHANGES = 0.05

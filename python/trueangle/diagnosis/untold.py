@@ -11,8 +11,6 @@ from ..effects.missing_order import MissingOrder
 if TYPE_CHECKING:
     from .findings import Diagnosis
 
-__all__ = ["ambiguity_entries", "ambiguity_matters"]
-
 #: What adds an entry to a text: how far its further lines are set in, and the first one.
 Entry = tuple[str, int, int]
 

@@ -10,8 +10,6 @@ from ..simulation.simulation import Simulation
 from .beliefs import Belief
 from .finding import Finding
 
-__all__ = ["misplaced_beliefs"]
-
 #: Share of its amplitude by which a line at another order may differ from the believed one.
 AS_LARGE = 0.15
 

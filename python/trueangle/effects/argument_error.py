@@ -21,8 +21,6 @@ from .search import (
 )
 from .sidebands import Sidebands
 
-__all__ = ["ArgumentShift"]
-
 #: How far from -1 the coefficient may be found.
 ALLOWED = 0.5
 

@@ -27,8 +27,6 @@ from .search import (
     Fitted,
 )
 
-__all__ = ["Backlash", "BacklashTerm"]
-
 #: Half width in standard deviations of the noise from which on the crossing of a play is looked
 #: for; steps until the half width and the travel over which it is crossed agree.
 SEEN, SETTLING = 0.5, 5

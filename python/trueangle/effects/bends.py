@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..joint.signals import Signals
-
-__all__ = ["columns_beyond", "departure_columns", "spring_transitions"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Lengths (degrees) of the transitions by which an error of reversal may be softened.
 LENGTHS = (0.1, 0.5, 2.0, 8.0, 30.0)

@@ -6,23 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..estimation.estimate import Parameters
 from ..estimation.factor import orthonormal_basis
 from ..estimation.regression import Regression
+from ..support.arrays import Array
 from ..support.plainresult import Shown
-
-__all__ = [
-    "LEAST_KELVIN",
-    "OWN_OF_VELOCITY",
-    "OWN_POWER",
-    "RUNS_PER_LEVEL",
-    "Blindness",
-    "share_left",
-]
-
-Array = NDArray[np.float64]
 
 #: Share of velocity that direction must leave for latency and backlash to be told apart.
 OWN_OF_VELOCITY = 0.10

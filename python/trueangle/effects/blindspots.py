@@ -6,8 +6,6 @@ from ..estimation.regression import Regression
 from .blindness import Blindness
 from .effect import EFFECTS
 
-__all__ = ["blind_spots", "place_among"]
-
 #: Factors of a design in the order in which their blind spots are told.
 FACTORS = (
     "direction",

@@ -27,8 +27,6 @@ from .latency import UNTIMED, Latency
 from .missing_order import MissingOrder
 from .search import Array, Fitted, line_parameters
 
-__all__ = ["ChannelSkew", "ChannelSkewTerm"]
-
 
 @dataclass(frozen=True)
 class ChannelSkew(Effect):

@@ -20,8 +20,6 @@ from .latency import UNTIMED, Latency
 from .scale_error import ScaleError
 from .search import Array, Fitted
 
-__all__ = ["ClockDrift"]
-
 #: Arcsec that one degree per second makes of a second's millionth.
 ARCSEC_PER_PPM = 3600.0 * 1e-6
 

@@ -23,8 +23,6 @@ from .search import Array, Fitted, known_orders
 from .thermal_drift import ThermalDrift
 from .torsional_compliance import TorsionalCompliance
 
-__all__ = ["CurrentCoupling", "CurrentCouplingTerm"]
-
 
 @dataclass(frozen=True)
 class CurrentCoupling(FactorEffect):

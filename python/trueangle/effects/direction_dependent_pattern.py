@@ -25,8 +25,6 @@ from .latency import Latency
 from .presliding_hysteresis import PreslidingHysteresis
 from .search import Array, Fitted, best_shape, line_parameters
 
-__all__ = ["DirectionalPattern", "DirectionalPatternTerm"]
-
 #: Orders that play has where a gear is eccentric or worn on one side: half of the belief.
 LIKELY = 3
 

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 
-__all__ = ["carrier_order", "free_line", "largest_signal", "phase", "reading_rate", "visited_place"]
-
 #: Low orders of the output that are drawn beside those of its gear.
 LOW_ORDERS = tuple(("output", k) for k in range(1, 9))
 

@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..estimation.regression import Regression
-
-__all__ = ["DrawnLine"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 
 class DrawnLine:

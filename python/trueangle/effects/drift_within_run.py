@@ -36,8 +36,6 @@ from .search import (
 from .thermal_drift import ThermalDrift
 from .zero_slip import ZeroSlip
 
-__all__ = ["DriftWithinRun"]
-
 #: Half periods over one run that make up a wander: at first, and at most.
 WANDER_TERMS, MOST_TERMS = 24, 96
 

@@ -22,8 +22,6 @@ from .parameters import checked_parameters, plain_parameters
 from .scatter import ScatterFinding
 from .search import Array, Fitted
 
-__all__ = ["ALWAYS", "EFFECTS", "Effect", "telling_apart"]
-
 #: Every effect by its kind, in the order in which they are tried: a class joins by being
 #: defined. Where two explain equally much the first is named.
 EFFECTS: dict[str, type[Effect]] = {}

@@ -19,8 +19,6 @@ from .search import (
     line_parameters,
 )
 
-__all__ = ["FactorEffect"]
-
 
 class FactorEffect(Effect):
     """Base: tries every block ``scale * shape(theta)`` and proposes the best.

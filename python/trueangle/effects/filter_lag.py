@@ -34,8 +34,6 @@ from .search import (
     is_gear_order,
 )
 
-__all__ = ["FilterLag", "FilterLagTerm"]
-
 #: Cutoffs searched, in multiples of the highest frequency at which a line passes.
 CUTOFFS = np.geomspace(0.2, 3000.0, 12)
 

@@ -26,8 +26,6 @@ from .search import (
     Array,
 )
 
-__all__ = ["HeteroscedasticNoise"]
-
 #: Logarithm of the largest ratio of a reading's variance to the mean one: a thousand times the
 #: standard deviation is more than noise of one kind does.
 WIDEST = 2.0 * float(np.log(1e3))

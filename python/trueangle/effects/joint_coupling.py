@@ -24,8 +24,6 @@ from .effect import Effect
 from .scale_error import ScaleError
 from .search import Array, Fitted, best_shape
 
-__all__ = ["JointCoupling", "JointCouplingTerm"]
-
 
 class _OfOthers(Effect):
     """Follows the motion of other joints: here, as a parameter of the effect is a factor too."""

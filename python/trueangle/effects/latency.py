@@ -31,8 +31,6 @@ from .search import (
     Fitted,
 )
 
-__all__ = ["Latency", "LatencyTerm"]
-
 TWO_SPEEDS = (
     "move in both directions at two speeds at least a factor of 3 apart, or read at rest as well"
 )

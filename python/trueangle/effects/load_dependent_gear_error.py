@@ -36,8 +36,6 @@ from .search import (
 from .thermal_drift import ThermalDrift
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
-__all__ = ["LoadDependentGearError", "LoadDependentGearErrorTerm"]
-
 
 @dataclass(frozen=True)
 class LoadDependentGearError(FactorEffect):

@@ -34,8 +34,6 @@ from .search import (
 )
 from .sidebands import Sidebands
 
-__all__ = ["LocalDefect", "LocalDefectTerm"]
-
 #: Places per turn of a shaft at which a defect is searched, and its widths in degrees.
 PLACES = 1440
 WIDTHS = (0.35, 0.7, 1.4, 2.8, 5.6, 11.0)

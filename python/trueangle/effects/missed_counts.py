@@ -19,8 +19,6 @@ from .search import (
     Fitted,
 )
 
-__all__ = ["MissedCounts"]
-
 #: Readings a step must have on either side of it within its run, up to the next step: a
 #: few readings that are off and come back are outliers, no lost counts.
 STEP_MARGIN = 5

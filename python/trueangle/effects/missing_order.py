@@ -27,8 +27,6 @@ from .search import (
 )
 from .torsional_compliance import TorsionalCompliance
 
-__all__ = ["MissingOrder"]
-
 FREE_ANGLES = (
     "readings at jittered or free angles, or one more round with the artefact clamped "
     "off the grid (`ta.plan_mounts(...)` proposes them; about 2.14 deg for 36 positions)"

@@ -29,8 +29,6 @@ from .search import (
     grid_doubt,
 )
 
-__all__ = ["NonIntegerOrder"]
-
 #: Trial orders per resolution cell (one order over the turns of a run).
 OVERSAMPLING = 3
 

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-__all__ = ["OrderSpectrum"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Places of the grid that a reading is spread over, and the shape of the kernel that does it:
 #: with a grid of twice the orders they leave 1e-12 of the sum of magnitudes (Barnett, Magland

@@ -24,8 +24,6 @@ from .search import (
     Array,
 )
 
-__all__ = ["Outliers"]
-
 #: Degrees of freedom of heavy-tailed noise, sizes of outliers to start from.
 TAILS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0)
 SIZES = (3.0, 10.0, 100.0)

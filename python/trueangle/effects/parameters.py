@@ -14,8 +14,6 @@ from ..support.suggestions import did_you_mean
 if TYPE_CHECKING:
     from .effect import Effect
 
-__all__ = ["checked_parameters", "plain_parameters"]
-
 
 def checked_parameters(effect: type[Effect], table: Mapping[str, Any]) -> dict[str, Any]:
     """Values for the fields of ``effect`` from a table without its ``kind``.

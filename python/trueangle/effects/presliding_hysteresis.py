@@ -36,8 +36,6 @@ from .search import (
     tangent_covariance,
 )
 
-__all__ = ["PreslidingHysteresis", "PreslidingHysteresisTerm"]
-
 _AFTER_REVERSAL = (
     "record the first 10 to 30 deg after each reversal in steps of 0.3 deg or less, "
     "with several reversal points"

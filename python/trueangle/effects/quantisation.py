@@ -19,8 +19,6 @@ from .heteroscedastic_noise import HeteroscedasticNoise
 from .scatter import ScatterFinding
 from .search import Array
 
-__all__ = ["Quantisation"]
-
 
 @dataclass(frozen=True)
 class Quantisation(Effect):

@@ -29,8 +29,6 @@ from .search import (
 )
 from .torsional_compliance import TorsionalCompliance
 
-__all__ = ["ReferenceLines"]
-
 #: Orders of the reference that are searched.
 REFERENCE_ORDERS = range(1, 37)
 

@@ -23,8 +23,6 @@ from .search import (
     Fitted,
 )
 
-__all__ = ["ScaleError", "ScaleErrorTerm"]
-
 
 @dataclass(frozen=True)
 class ScaleError(Effect):

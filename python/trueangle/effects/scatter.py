@@ -15,11 +15,6 @@ from .search import Array
 if TYPE_CHECKING:
     from .effect import Effect
 
-__all__ = [
-    "CLIPPED_VARIANCE", "NEW_SCATTER", "SQUARE_CLIP", "ScatterFinding", "clipped_squares",
-    "standardised_residuals",
-]  # fmt: skip
-
 #: Squared residuals are taken at most this many of their own variances large.
 SQUARE_CLIP = 9.0
 

@@ -17,19 +17,6 @@ from .blindness import Blindness
 if TYPE_CHECKING:
     from .effect import Effect
 
-__all__ = [
-    "Array",
-    "Fitted",
-    "best_shape",
-    "golden_maximum",
-    "grid_doubt",
-    "is_gear_order",
-    "known_orders",
-    "line_parameters",
-    "of_one_sign",
-    "tangent_covariance",
-]
-
 Array: TypeAlias = NDArray[np.float64]
 
 #: A chosen term with its coefficients and their covariance.

@@ -26,8 +26,6 @@ from .search import (
     line_parameters,
 )
 
-__all__ = ["Sidebands"]
-
 #: Periods of the modulation that a run must cover for sidebands to be looked for.
 RESOLVED = 0.75
 

@@ -31,8 +31,6 @@ from .search import (
 )
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
-__all__ = ["StiffeningCompliance", "StiffeningComplianceTerm"]
-
 #: Knees searched, in shares of the largest torque.
 KNEES = (0.2, 0.35, 0.5, 0.65, 0.8)
 

@@ -29,8 +29,6 @@ from .search import (
 )
 from .torsional_compliance import TorsionalCompliance
 
-__all__ = ["ThermalDrift", "ThermalDriftTerm"]
-
 #: Temperature at which the simulation's lines hold, degrees Celsius.
 REFERENCE_C = 20.0
 

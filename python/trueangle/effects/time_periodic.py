@@ -26,8 +26,6 @@ from .missing_order import MissingOrder
 from .non_integer_order import NonIntegerOrder
 from .search import Array, Fitted, golden_maximum
 
-__all__ = ["TimePeriodic"]
-
 #: Trial frequencies per resolution cell (one over the length of a run), and at most.
 OVERSAMPLING = 3
 MOST_TRIALS = 2**17

@@ -24,8 +24,6 @@ from .scatter import (
 )
 from .search import Array
 
-__all__ = ["TimestampJitter"]
-
 #: Scoring steps, and the least variance in robust ones of the whole.
 STEPS = 25
 FLOOR = 1e-4

@@ -22,8 +22,6 @@ from .effect import Effect
 from .search import Array, Fitted, golden_maximum, of_one_sign, tangent_covariance
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
-__all__ = ["TorqueHysteresis"]
-
 #: Torque in which the loop builds up, in shares of the largest torque: those searched.
 SPANS = np.geomspace(0.02, 1.0, 8)
 

@@ -27,8 +27,6 @@ from .search import (
     Fitted,
 )
 
-__all__ = ["TorsionalCompliance", "TorsionalComplianceTerm"]
-
 
 @dataclass(frozen=True)
 class TorsionalCompliance(FactorEffect):

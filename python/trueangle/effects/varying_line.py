@@ -24,8 +24,6 @@ from .filter_lag import FilterLag
 from .load_dependent_gear_error import LoadDependentGearError
 from .search import Array, Fitted, best_shape, grid_doubt, is_gear_order, line_parameters
 
-__all__ = ["VaryingLine", "VaryingLineTerm"]
-
 #: Lines at most, and the price of a broad cause: one of so many beside every narrow one.
 MOST_LINES = 2
 BROAD = 8.0

@@ -21,8 +21,6 @@ from .missing_order import MissingOrder
 from .search import Array, Fitted
 from .sidebands import Sidebands
 
-__all__ = ["WrongGearRatio"]
-
 #: Lines of geared shafts that one ratio must explain at once: one alone is a missing order.
 LEAST_LINES = 2
 

@@ -29,8 +29,6 @@ from .search import (
 from .thermal_drift import ThermalDrift
 from .torsional_compliance import TorsionalCompliance
 
-__all__ = ["ZeroSlip"]
-
 #: Kelvin from the coldest run of a level on from which a run is at the next one.
 LEVEL_KELVIN = 1.0
 

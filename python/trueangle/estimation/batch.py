@@ -10,11 +10,8 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ..support.arrays import Array
 from .whitening import Whitener
-
-__all__ = ["Blocks", "Products"]
-
-Array = NDArray[np.float64]
 
 
 class Blocks:

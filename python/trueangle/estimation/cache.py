@@ -7,8 +7,6 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from .extension import Extension
 
-__all__ = ["Cache", "Proposal", "ProposalKey"]
-
 T = TypeVar("T")
 
 #: Numbers of the fits that are kept: 32 MiB, some twenty fits of 5000 readings, one of many.

@@ -6,13 +6,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .whitening import RunEffect
-
-__all__ = ["Extension", "penalty_of_parameter"]
-
-Array = NDArray[np.float64]
 
 #: Size at which an effect is expected, in standard deviations of one reading. A coefficient
 #: costs ln(size^2 n) (Kass and Wasserman 1995; size 1 is Schwarz's penalty). Up to

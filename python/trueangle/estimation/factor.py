@@ -6,20 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ..support.arrays import Array
 from .whitening import RunEffect, Whitener
-
-__all__ = [
-    "BandedFactor",
-    "Factor",
-    "in_common",
-    "orthonormal_basis",
-]
-
-Array = NDArray[np.float64]
 
 #: Singular values below this share of the largest do not count.
 DISTINCT = 1e-7

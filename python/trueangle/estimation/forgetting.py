@@ -7,14 +7,10 @@ from collections.abc import Hashable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..support.arrays import Array
 from .momentsfit import MomentsFit
-
-__all__ = ["Forgetting"]
-
-Array = NDArray[np.float64]
 
 
 class Forgetting:

@@ -16,19 +16,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-__all__ = [
-    "NormalEquations",
-    "Robust",
-    "cluster_covariance",
-    "least_squares",
-    "left_out",
-    "pseudo_inverse",
-    "scatter_statistic",
-    "total",
-    "unexplained",
-]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 
 def least_squares(design: Array, target: Array, weights: Array | None = None) -> Array:

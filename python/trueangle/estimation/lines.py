@@ -15,8 +15,6 @@ import trueangle._core as _core
 from ..joint.joint import Joint
 from .batch import Products
 
-__all__ = ["LineBasis", "plausible_orders"]
-
 #: Orders searched at least, and at most: bounds memory and the penalty of the search.
 LEAST_ORDERS, MOST_ORDERS = 128, 1024
 

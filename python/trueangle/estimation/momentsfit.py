@@ -15,8 +15,6 @@ from ..joint.shafts import Shaft, ShaftOrders
 from ..model.model import Argument, HarmonicModel
 from ..support.plainresult import Shown
 
-__all__ = ["MomentsFit", "Spectrum"]
-
 
 class Spectrum(NamedTuple):
     """Sums over the readings of one run from which any orders can be fitted.

@@ -11,13 +11,10 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ..support.arrays import Array
 from .batch import Blocks, Products
 from .factor import Factor
 from .whitening import Whitener
-
-__all__ = ["EXCITED", "ROUNDING", "Projection", "project"]
-
-Array = NDArray[np.float64]
 
 #: Arcsec below which what is left is the rounding of angles (1e-12 of a turn).
 ROUNDING = 1e-6

@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
+from ..support.arrays import Array
 from .extension import penalty_of_parameter
 from .lines import LineBasis
 from .whitening import LagCorrelation
-
-__all__ = ["ENOUGH_RUNS", "Readings"]
-
-Array = NDArray[np.float64]
 
 #: What does not depend on the errors.
 OF_MOTION = ("bounds", "base", "correlation", "root_weights", "log_n", "log_runs")

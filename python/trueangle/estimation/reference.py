@@ -12,16 +12,13 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..runs.run import CalibrationRun, as_runs
+from ..support.arrays import Array
 
 if TYPE_CHECKING:
     from ..model.model import HarmonicModel
-
-__all__ = ["ReferenceFit", "correct", "design_matrix", "error", "fit", "slope"]
-
-Array = NDArray[np.float64]
 
 #: Newton steps allowed; the iteration is quadratic and starts within half a turn.
 _STEPS = 50

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
+from ..support.arrays import Array
 from .cache import Cache
 from .extension import Extension
 from .lines import LineBasis
@@ -22,7 +23,6 @@ from .whitening import RunEffect
 
 __all__ = ["BEYOND_SHOWN", "ROUNDING", "Extension", "Regression"]
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 #: Times the standard deviation of the residual beyond which no cause is as large.

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..joint.signals import Signals
-
-__all__ = ["repeated_part"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Places of a turn at most, and readings per pass and place on average.
 MOST_PLACES, PER_CELL = 180, 2

@@ -7,18 +7,14 @@ import threading
 from collections.abc import Hashable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trueangle._core as _core
 
 from ..errors import ArgumentError
 from ..joint.shafts import ShaftOrders
+from ..support.arrays import Array
 from .forgetting import Forgetting
 from .momentsfit import Spectrum
-
-__all__ = ["Exclusive", "RunSums"]
-
-Array = NDArray[np.float64]
 
 #: Seconds between two looks at whose turn it is.
 _PATIENCE = 0.05

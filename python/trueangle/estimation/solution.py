@@ -15,6 +15,7 @@ import trueangle._core as _core
 
 from ..joint.pattern import Pattern, Surroundings
 from ..joint.signals import Signals
+from ..support.arrays import Array
 from .extension import Extension
 from .factor import Factor, in_common
 from .lines import LineBasis
@@ -22,10 +23,6 @@ from .projection import Projection, project
 from .readings import ENOUGH_RUNS, Readings
 from .stretches import short_stretches
 from .whitening import RunEffect
-
-__all__ = ["Solution", "values_of"]
-
-Array = NDArray[np.float64]
 
 #: Residuals are taken at most this many robust standard deviations large: outliers
 #: must not make causes, and normal ones are not touched.

@@ -6,9 +6,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-__all__ = ["MOST_IN_ROW", "about_level", "short_stretches", "stretches", "within"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Readings in a row up to which a glitch is a glitch: what lasts longer is an error of the mean.
 MOST_IN_ROW = 4

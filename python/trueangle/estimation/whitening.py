@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-__all__ = ["LagCorrelation", "RunEffect", "Whitener", "principal", "wander_basis"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Half periods per run that count as wander and not as correlation of the noise.
 WANDER_TERMS = 8

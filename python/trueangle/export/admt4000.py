@@ -8,19 +8,17 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance, TableRecord
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from ..support.files import Kind, Source, sha256_of
 from .pattern import TurnPattern
 from .reading import failed
 from .target import CommentBlock, Made, Option, TablePart, Target
-
-__all__ = ["Admt4000"]
 
 #: Order: address of magnitude and phase on page 2, bits of the magnitude.
 REGISTERS = {1: (0x15, 0x16, 11), 2: (0x17, 0x18, 11), 3: (0x19, 0x1A, 8), 8: (0x1B, 0x1C, 8)}
@@ -32,8 +30,6 @@ _PHASE = 360.0 / 4096.0
 
 _GRID = 1 << 14
 _LINE = re.compile(r"^\s*H([1238])(MAG|PH)\s+0x([0-9A-Fa-f]+)\s+0x([0-9A-Fa-f]+)\b")
-
-Array = NDArray[np.float64]
 
 
 class Admt4000(Target):

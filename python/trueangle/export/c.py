@@ -15,8 +15,6 @@ from .runtimeterms import RunTimeTerms
 from .table import PER_RADIAN, Table
 from .target import CommentBlock
 
-__all__ = ["CHeader"]
-
 _TYPES = {"q15": "int16_t", "q31": "int32_t", "f32": "float"}
 _READ = {"q15": "TRUEANGLE_I16", "q31": "TRUEANGLE_I32", "f32": "TRUEANGLE_F32"}
 

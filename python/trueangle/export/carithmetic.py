@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from .codetext import code_parts, filled, float_literal
 from .table import TURN
 
-__all__ = ["DOUBLE", "FIXED", "Arithmetic"]
-
 
 @dataclass(frozen=True)
 class Arithmetic:

@@ -17,12 +17,10 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .pattern import TurnPattern
 from .table import TURN, Table, make_table
 
-__all__ = ["Chain", "make_chain", "source_identifier"]
-
-Array = NDArray[np.float64]
 Angles = NDArray[np.uint32]
 Places = NDArray[np.int64] | Angles
 

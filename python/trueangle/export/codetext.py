@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-__all__ = ["code_file", "code_parts", "filled", "float_literal", "rows"]
-
 _FOLDER = Path(__file__).parent / "code"
 
 #: The line before a part, with its name: a comment in C and in Rust.

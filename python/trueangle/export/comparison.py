@@ -8,22 +8,18 @@ from os import PathLike
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.file import load_model
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN, zero_text
+from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.kinds import told_kinds
 from ..support.layout import laid_out
 from ..support.plainresult import PlainResult, counted
 from .equality import FALSE_ALARMS, Equality, pattern_equality
 from .pattern import TurnPattern
-
-__all__ = ["Comparison", "compare"]
-
-Array = NDArray[np.float64]
 
 #: Points per cycle of the fastest order over which the difference is taken.
 _POINTS = 32

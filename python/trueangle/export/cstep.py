@@ -15,9 +15,6 @@ from .codetext import filled, rows
 from .runtimeterms import RunTimeTerms, Waves
 from .table import TURN, ratio_of_cycles
 
-__all__ = ["c_search", "c_state", "c_step", "wave_tables"]
-
-
 _UNITS = {
     "velocity": "turns of the output per second",
     "temperature": "degrees Celsius",

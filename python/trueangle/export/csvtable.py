@@ -21,8 +21,6 @@ from .proof import Correction, Places, enough_bits
 from .reading import failed, sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-__all__ = ["CsvTable"]
-
 #: Distance of two printed numbers, in degrees: 9 decimals.
 _LAST_DIGIT = 1e-9
 

@@ -6,14 +6,9 @@ import math
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..model.model import HarmonicModel
 from ..support.distributions import f_tail
-
-__all__ = ["FALSE_ALARMS", "Equality", "pattern_equality"]
-
-Array = NDArray[np.float64]
 
 #: Chance that two calibrations of one pattern are told to differ.
 FALSE_ALARMS: Final = 0.01

@@ -25,8 +25,6 @@ from .proof import Proof, lost_orders, prove_export, rounded_up
 from .target import CommentBlock, Made, Target
 from .targets import export_target
 
-__all__ = ["export_model", "import_model"]
-
 #: Most bytes of a table that is read: a Mechaduino's takes 200 kB as text.
 TABLE_BYTES = 16 << 20
 

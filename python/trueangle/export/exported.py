@@ -10,8 +10,6 @@ from ..support.layout import laid_out
 from ..support.plainresult import PlainResult
 from .proof import rounded_up
 
-__all__ = ["HEADER_DIGITS", "Exported"]
-
 #: Size below which what the number format leaves is not written out.
 _NOTABLE_ARCSEC = 0.001
 

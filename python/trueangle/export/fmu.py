@@ -38,8 +38,6 @@ from .reading import failed
 from .runtimeterms import is_own
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-__all__ = ["Fmu"]
-
 #: The model that a unit was made of, and its most bytes.
 _MODEL = "resources/trueangle.json"
 _MOST_BYTES = 16 << 20

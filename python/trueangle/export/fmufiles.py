@@ -13,16 +13,6 @@ from .codetext import code_file, code_parts, filled
 from .cstep import c_search, c_state, wave_tables
 from .runtimeterms import RunTimeTerms
 
-__all__ = [
-    "IDENTIFIER",
-    "Variable",
-    "build_description",
-    "fmi_functions",
-    "fmu_source",
-    "model_description",
-    "variables_of",
-]
-
 #: Of the library and of its functions.
 IDENTIFIER = "trueangle_model"
 

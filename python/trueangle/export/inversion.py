@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import NotInvertibleError
-
-__all__ = ["inverse_rising"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Steps of regula falsi. A bracket that holds a line needs one; of a curve each step leaves
 #: the share of it by which the bracket is bent, a hundredth and less.

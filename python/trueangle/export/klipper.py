@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from ..support.files import Kind, read_whole
 from .knots import linear_knots, rounded_knots
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import ReadTable, failed, function_model
 from .target import CommentBlock, Made, Option, TablePart, Target
-
-__all__ = ["Klipper", "calibrated", "solved_knots"]
 
 #: Counts to a turn, and knots that Klipper solves.
 TURN = 65536
@@ -34,7 +33,6 @@ _BUCKET = TURN // KNOTS
 #: Bytes of a printer.cfg, with all that it may include.
 _CONFIG_BYTES = 8 << 20
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 

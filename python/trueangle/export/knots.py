@@ -11,11 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["cubic_knots", "linear_knots", "rounded_knots"]
+from ..support.arrays import Array
 
-Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
 
 #: Gauss points per segment: a cubic times a function whose shortest wave is two segments.

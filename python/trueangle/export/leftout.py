@@ -9,7 +9,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError, OutsideSpanWarning
 from ..model.model import HarmonicModel
@@ -19,10 +18,6 @@ from ..support.signals import coupled_with
 from ..terms import LocalDefect
 from .pattern import TurnPattern
 from .runtimeterms import RunTimeTerms
-
-__all__ = ["ranges_of", "run_time_bound", "term_sizes"]
-
-Array = NDArray[np.float64]
 
 #: Readings to a turn, and turns before those that count: what winds up with travel has done so.
 _GRID = 4096

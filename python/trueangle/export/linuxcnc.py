@@ -19,8 +19,6 @@ from .setpoint import ENDS, NOMINAL_DECIMALS, POSITIONS, Travel, axis_steepness
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
-__all__ = ["LinuxCnc"]
-
 #: EMCMOT_COMP_SIZE.
 MOST = 256
 #: Decimals of a degree that are printed.

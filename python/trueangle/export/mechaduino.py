@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from ..support.files import Kind, read_whole
 from .codetext import rows
 from .oneturn import longest_array
@@ -20,14 +20,10 @@ from .proof import Correction, Places
 from .reading import failed, sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-__all__ = ["Mechaduino"]
-
 ENTRIES = 16384
 _BITS = 14
 _DECIMALS = 4
 _SOURCE_BYTES = 8 << 20
-
-Array = NDArray[np.float64]
 
 
 class Mechaduino(Target):

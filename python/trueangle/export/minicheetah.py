@@ -14,8 +14,6 @@ from .reading import failed
 from .target import CommentBlock, Made, Option
 from .tinymovr import Tinymovr, Whole
 
-__all__ = ["MiniCheetah"]
-
 _ENTRIES = 128
 _BITS = 16
 

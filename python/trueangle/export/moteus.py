@@ -20,8 +20,6 @@ from .proof import Correction, Places
 from .reading import failed, sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-__all__ = ["Moteus", "compensated"]
-
 ENTRIES = 256
 #: Scales tried above the least, for the one whose rounding is kindest to these knots.
 _SCALES = np.linspace(1.0, 1.05, 401)

@@ -20,8 +20,6 @@ from .proof import Proof
 from .reading import failed
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-__all__ = ["NOISE_NAME", "TEXT_NAME", "MuJoCo"]
-
 #: Of the text element that holds the model of a joint, before the joint's name.
 TEXT_NAME = "trueangle:"
 

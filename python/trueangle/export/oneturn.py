@@ -6,16 +6,12 @@ import math
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from .knots import linear_knots
 from .pattern import TurnPattern
 from .reading import failed
-
-__all__ = ["line_floor", "longest_array", "one_turn_knots", "without_mean"]
-
-Array = NDArray[np.float64]
 
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 

@@ -5,19 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from ..terms import LocalDefect
 from .inversion import inverse_rising
-
-__all__ = ["TurnPattern", "of_direction"]
-
-Array = NDArray[np.float64]
 
 
 class TurnPattern:

@@ -19,8 +19,6 @@ from .setpoint import Travel
 from .table import TURN
 from .target import CommentBlock, Made, Option, Target
 
-__all__ = ["Pmac"]
-
 #: Parts of a count in an entry.
 SIXTEENTHS = 16
 _MOST = 5000

@@ -14,6 +14,7 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from .chain import Chain, make_chain, source_identifier
 from .pattern import TurnPattern
 from .proof import lost_orders
@@ -21,10 +22,7 @@ from .runtimeterms import DIRECTIONS, RunTimeTerms, is_own
 from .table import METHODS, NUMBERS, TURN, Table
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int64]
-
-__all__ = ["PortableTarget", "self_test", "table_lines"]
 
 #: Sizes that are tried, where none is asked for up to the largest default.
 _SIZES = tuple(1 << bits for bits in range(3, 17))

@@ -13,17 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..support.angles import ARCSEC_PER_TURN
-
-__all__ = [
-    "EVERY_INPUT_BITS",
-    "Correction",
-    "Places",
-    "Proof",
-    "enough_bits",
-    "lost_orders",
-    "prove_export",
-    "rounded_up",
-]
+from ..support.arrays import Array
 
 #: Readings of so many bits are all evaluated; finer ones on the grid of these, with a bound.
 EVERY_INPUT_BITS = 24
@@ -36,7 +26,6 @@ _INVERSE = 1e-12
 
 _THREADS = min(8, os.cpu_count() or 1)
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 #: Correction in turns at readings in 2^-32 turns, of one turn or of several.
 Correction = Callable[[Places], Array]

@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import FileError, NotInvertibleError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance, TableRecord
+from ..support.arrays import Array
 from ..support.files import Source, sha256_of
 from .chain import Chain
 from .inversion import inverse_rising
@@ -23,9 +23,6 @@ from .table import TURN, Table
 if TYPE_CHECKING:
     from .target import Target
 
-__all__ = ["ReadTable", "failed", "function_model", "portable_model", "sampled_model"]
-
-Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
 
 #: Points per entry of the grid whose spectrum is taken: images of a line's corners alias

@@ -25,8 +25,6 @@ from ..model.term import Term
 from ..support.signals import coupled_with
 from ..terms import LocalDefect
 
-__all__ = ["DIRECTIONS", "RunTimeTerms", "Waves", "is_own"]
-
 #: What tells the direction of travel.
 DIRECTIONS = ("auto", "angle", "velocity", "signal")
 

@@ -18,8 +18,6 @@ from .ruststep import rust_step
 from .table import PER_RADIAN, Table
 from .target import CommentBlock
 
-__all__ = ["RustModule"]
-
 _TYPES = {"q15": "i16", "q31": "i32", "f32": "f32"}
 
 

@@ -8,8 +8,6 @@ from .codetext import code_parts, filled, float_literal
 from .runtimeterms import RunTimeTerms, Waves
 from .table import TURN, ratio_of_cycles
 
-__all__ = ["rust_step"]
-
 _DOCS = {
     "velocity": "Turns of the output per second.",
     "temperature": "Degrees Celsius.",

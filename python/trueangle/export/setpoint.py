@@ -16,14 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..support.arrays import Array
 from .knots import linear_knots
 from .pattern import TurnPattern
 from .proof import Correction, lost_orders
 from .target import Option, TablePart
 
-__all__ = ["ENDS", "NOMINAL_DECIMALS", "POSITIONS", "Travel", "axis_steepness", "calibrated_travel"]
-
-Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
 
 #: Options of such targets: the ends of the travel, and at how many positions a table is checked.

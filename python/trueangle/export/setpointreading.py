@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..model.model import HarmonicModel
+from ..support.arrays import Array
 from .reading import ReadTable, failed, function_model
 from .table import TURN
 from .target import Target
-
-__all__ = ["travel_model"]
-
-Array = NDArray[np.float64]
 
 #: Points to an entry on which the way back over a partial travel is laid.
 _WAY_BACK = 8

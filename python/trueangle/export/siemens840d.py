@@ -19,8 +19,6 @@ from .setpoint import ENDS, POSITIONS, Travel
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
-__all__ = ["Siemens840d"]
-
 #: MD38000 MM_ENC_COMP_MAX_POINTS.
 MOST = 5000
 _DECIMALS = 7

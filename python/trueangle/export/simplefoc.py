@@ -23,8 +23,6 @@ from .proof import Correction, Places
 from .reading import failed, sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-__all__ = ["SimpleFoc", "corrected_float", "corrected_short"]
-
 Single = NDArray[np.float32]
 
 VARIANTS = {

@@ -15,9 +15,8 @@ import trueangle._core as _core
 
 from ..errors import ArgumentError
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from .knots import cubic_knots, linear_knots, rounded_knots
-
-__all__ = ["METHODS", "NUMBERS", "Table", "make_table", "ratio_of_cycles"]
 
 METHODS = ("linear", "cubic")
 NUMBERS = ("q15", "q31", "f32")
@@ -31,8 +30,6 @@ _LARGEST_SHORT = 32700
 _LARGEST_STEP = 32767
 _LARGEST_LINEAR = 2.0**30 - 1.0
 _LARGEST_CUBIC = 2.0**27
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,20 +8,17 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..model.term import Term
+from ..support.arrays import Array
 from ..support.files import Kind
 from ..support.suggestions import check_choice, did_you_mean
 from .pattern import TurnPattern, of_direction
 from .proof import Correction, Proof
 from .runtimeterms import RunTimeTerms
 
-__all__ = ["CommentBlock", "Made", "Option", "TablePart", "Target", "comment_lines"]
-
-Array = NDArray[np.float64]
 #: `Made` has a number of that name.
 Bytes = bytes
 

@@ -22,8 +22,6 @@ from .target import Target
 from .tinymovr import Tinymovr
 from .twincat import TwinCat
 
-__all__ = ["TARGETS", "export_target"]
-
 #: Every target by its name.
 TARGETS: dict[str, Target] = {
     target.name: target

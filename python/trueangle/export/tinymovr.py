@@ -19,8 +19,6 @@ from .proof import Correction, Places
 from .reading import failed, sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
-__all__ = ["Tinymovr", "Whole", "tinymovr_rectified"]
-
 Whole = NDArray[np.int64]
 
 

@@ -23,8 +23,6 @@ from .setpoint import ENDS, POSITIONS, Travel
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
-__all__ = ["TwinCat"]
-
 #: P-COMP-00059, its default.
 MOST = 1500
 #: Units of 0.0001 deg in a turn.

@@ -17,8 +17,6 @@ from ..planning.arc import COVERAGE
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 
-__all__ = ["MOST", "Spread"]
-
 Places = NDArray[np.int64]
 
 #: Places of the grid to a cycle of the highest order, and at least.

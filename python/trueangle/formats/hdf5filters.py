@@ -13,8 +13,6 @@ from typing import Any, Final
 
 from ..errors import FileError
 
-__all__ = ["check_filters"]
-
 _NBIT: Final = 5
 _SCALE_OFFSET: Final = 6
 #: Parameters of a plain number: their count, whether nothing is packed, values in a chunk, its

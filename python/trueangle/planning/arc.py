@@ -8,20 +8,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..joint.shafts import counted_orders
+from ..support.arrays import Array
 from ..support.kinds import told_kinds
 from ..support.plainresult import PlainResult, counted
 from .counts import exchanged, rounded
 from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
 from .noisefactors import noise_factors
 from .plan import readings_needed
-
-__all__ = ["COVERAGE", "ArcPlan", "check_arc", "plain_arc_plan", "plan_arc"]
-
-Array = NDArray[np.float64]
 
 #: Readings where neither their number nor what they are for is given.
 READINGS = 60

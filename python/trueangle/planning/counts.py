@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .doptimal import OrthonormalColumns
-
-__all__ = ["exchanged", "rounded"]
-
-Array = NDArray[np.float64]
 
 #: Passes of exchanges of single readings.
 _PASSES = 20

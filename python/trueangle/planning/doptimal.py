@@ -7,13 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-
-__all__ = ["ArcDesign", "OrthonormalColumns", "d_optimal"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Places of the grid, to a cycle of the highest order and at least.
 _PER_CYCLE = 48

@@ -19,7 +19,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
@@ -28,18 +27,7 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-
-__all__ = [
-    "STRONG",
-    "ExpectedEvidence",
-    "Hypothesis",
-    "ReadingNoise",
-    "deviance_left",
-    "evidence_between",
-    "is_doubted",
-]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Difference of BIC that names a cause: 6 is what Kass and Raftery call strong.
 STRONG = 6.0

@@ -12,16 +12,6 @@ import numpy as np
 from ..simulation.designs import RunDesign
 from .limits import Limits
 
-__all__ = [
-    "base_of",
-    "choices",
-    "count_of_changes",
-    "dialled_number",
-    "run_levels",
-    "run_steps",
-    "seconds_of",
-]
-
 #: Steps in which readings follow a reversal closely, deg.
 CLOSE = 0.25
 

@@ -14,8 +14,6 @@ from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from .evidence import Hypothesis
 
-__all__ = ["Question", "question_of"]
-
 #: Rounds in which the size of an effect is brought to that of the noise, and how near.
 ROUNDS, NEAR = 12, 0.02
 

@@ -17,8 +17,6 @@ from ..support.decoding import finite_float, read_text, shown
 from ..support.kinds import told_kinds
 from ..support.suggestions import did_you_mean
 
-__all__ = ["Limits", "load_limits"]
-
 #: Speeds of a further run where none are stated, deg/s.
 SPEEDS = (1.0, 60.0)
 

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from .noisefactors import facet_noise_factor, mount_noise_factors
 
-__all__ = ["TOLERATED_FACTOR", "offset_tolerance", "search_offsets", "search_shifts"]
-
 Array = NDArray[np.floating[Any]]
 
 #: A mount may be off by the tolerance as long as no factor exceeds this times ideal.

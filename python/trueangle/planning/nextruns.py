@@ -12,8 +12,6 @@ from ..simulation.simulation import Simulation
 from ..support.plainresult import PlainResult, counted
 from .evidence import Hypothesis
 
-__all__ = ["NextRuns", "RivalEvidence", "plain_run"]
-
 
 @dataclass(frozen=True)
 class RivalEvidence:

@@ -15,10 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
 from ..runs.aliasing import fold
-
-__all__ = ["facet_noise_factor", "mount_noise_factors", "noise_factors"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Eigenvalues below this share of the number of readings are zero: an alias.
 _SINGULAR: Final = 1e-9

@@ -18,8 +18,6 @@ from .nextruns import NextRuns, RivalEvidence
 from .scales import Scales
 from .search import Search
 
-__all__ = ["next_runs"]
-
 #: Readings whose diagnosis may take as long by default as a plan may: ten seconds.
 WORK = 20_000
 

@@ -29,8 +29,6 @@ from .hypotheses import Question, question_of
 from .limits import Limits
 from .worth import ALIKE, NOTHING, Answer, Worth, foretold, is_strong, weight
 
-__all__ = ["Scales"]
-
 #: Error of a cause of which nothing is seen, in standard deviations of a reading.
 UNSEEN = 3.0
 

@@ -14,8 +14,6 @@ from .limits import Limits
 from .scales import Scales
 from .worth import NOTHING, Worth
 
-__all__ = ["LEAST", "Search"]
-
 #: Runs in a row that open nothing, after which no further one is tried; by themselves the first
 #: open nothing, whatever they are.
 IN_VAIN = 3

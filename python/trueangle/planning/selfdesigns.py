@@ -9,8 +9,6 @@ from ..errors import ArgumentError
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 
-__all__ = ["designed_selfplan"]
-
 
 def designed_selfplan(sim: Simulation, method: str) -> dict[str, Any]:
     """Arguments of `plan_self` for the heads, shifts or coasts that ``sim`` designs.

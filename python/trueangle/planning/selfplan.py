@@ -8,18 +8,15 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError
 from ..joint.shafts import counted_orders
+from ..support.arrays import Array
 from ..support.kinds import told_kinds
 from ..support.plainresult import PlainResult, counted
 from ..support.suggestions import check_choice
 from .plan import readings_needed
-
-__all__ = ["SELF_METHODS", "SelfPlan", "angle_factors", "best_angles", "plan_self", "speed_factor"]
-
-Array = NDArray[np.float64]
 
 SELF_METHODS: Final = ("spin-down", "heads", "shifts", "dual")
 

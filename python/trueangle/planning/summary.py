@@ -17,16 +17,6 @@ if TYPE_CHECKING:
     from .plan import CalibrationPlan
     from .selfplan import SelfPlan
 
-__all__ = [
-    "arc_summary",
-    "next_summary",
-    "place_table",
-    "plain_plan",
-    "plain_self_plan",
-    "plan_summary",
-    "self_plan_summary",
-]
-
 
 def plan_summary(plan: CalibrationPlan) -> str:
     """A plan of positions and mounts."""

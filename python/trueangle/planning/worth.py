@@ -11,8 +11,6 @@ from ..estimation.regression import Regression
 from .evidence import ExpectedEvidence
 from .hypotheses import Question
 
-__all__ = ["ALIKE", "NOTHING", "WANTED", "Answer", "Worth", "foretold", "is_strong", "weight"]
-
 #: Chance of a strong difference of evidence that is wanted.
 WANTED = 0.95
 

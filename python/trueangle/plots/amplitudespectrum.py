@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..fitting import summary as fitting_summary
 from ..fitting.orders import summary as orders_summary
 from ..fitting.orders.table import OrderSelection
+from ..support.arrays import Array
 from ..support.display_units import ErrorsIn
 from . import palette
 from .canvas import described, grid, legend, new_axes
@@ -22,10 +22,6 @@ if TYPE_CHECKING:
 
     from ..fitting.result import FitResult
 
-
-__all__ = ["amplitude_spectrum"]
-
-Array = NDArray[np.float64]
 
 #: Aliases and explanations written at a dot; the table has them all.
 _MOST_ALIASES = 3

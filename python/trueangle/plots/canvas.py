@@ -18,18 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
-__all__ = [
-    "as_image",
-    "described",
-    "grid",
-    "legend",
-    "new_axes",
-    "new_figure",
-    "small_pictures",
-    "text_alternative",
-    "turn_axis",
-]
-
 #: A small picture as part of the usual one, its dots per inch, and those that a page shows.
 _SMALL: float = 0.8
 _DOTS_PER_INCH: float = 120.0

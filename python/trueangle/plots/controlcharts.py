@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from ..fleets.result import Fleet
     from ..monitoring.alarm import WatchedWindow
 
-__all__ = ["fleet_history", "watched_windows"]
-
 #: Limits beyond which a chart has a scale of logarithms.
 _FAR: Final = 10.0
 

@@ -8,38 +8,18 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..fitting.heldout import correct_held_out
 from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, wrap
+from ..support.arrays import Array
 from ..support.display_units import sine_of_rms
 from ..support.suggestions import check_choice
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
-
-__all__ = [
-    "CONFIDENCE",
-    "SIGNALS",
-    "Curve",
-    "Points",
-    "Signal",
-    "curve_envelope",
-    "error_points",
-    "held_out_points",
-    "model_curve",
-    "residual_points",
-    "rms_amplitude",
-    "seen_span",
-    "strong_gear_order",
-    "thinned_points",
-    "travelled_span",
-]
-
-Array = NDArray[np.float64]
 
 #: Half width of a 95 % band in standard deviations.
 CONFIDENCE: Final = 1.96

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from ..rehearsal import Rehearsal, RehearsedCause
 
-__all__ = ["detection"]
-
 #: Small pictures side by side.
 COLUMNS = 4
 #: Numbers at a size axis.

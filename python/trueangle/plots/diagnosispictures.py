@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from ..diagnosis import Diagnosis
 
-__all__ = ["error_left", "gains"]
-
 _NO_GAIN = "no finding of this diagnosis has a gain that carries over to new runs"
 
 

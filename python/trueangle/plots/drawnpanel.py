@@ -13,8 +13,6 @@ from .panel import Cloud, Panel
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_clouds", "draw_curve", "draw_panel"]
-
 #: Readings drawn in one picture: more do not show.
 _MOST: Final = 24_000
 #: Readings from which on dots are small and faint.

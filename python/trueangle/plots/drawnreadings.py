@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from ..model.model import HarmonicModel
     from ..simulation import Simulation
 
-__all__ = ["before_after", "error_curves", "measured_and_simulated", "residuals"]
-
 
 def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
     """Measured error of every run, the fitted model and its 95 % band.

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..support.angles import arcsec
+from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.suggestions import check_choice
 from . import palette
@@ -22,18 +22,6 @@ if TYPE_CHECKING:
 
     from ..fleets.result import CommonOrder, Fleet
     from ..fleets.unit import FleetUnit, UnitOrder
-
-__all__ = [
-    "RADIUS_OF_95",
-    "fleet_overview",
-    "fleet_patterns",
-    "fleet_phasors",
-    "fleet_plot",
-    "fleet_sizes",
-    "turn_pattern",
-]
-
-Array = NDArray[np.float64]
 
 #: Radius that holds 95 % of a plane normal distribution, in standard deviations of a coordinate.
 RADIUS_OF_95: Final = math.sqrt(-2.0 * math.log(0.05))

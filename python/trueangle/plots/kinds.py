@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from ..fitting.result import FitResult, Picture
 
-__all__ = ["drawn", "fit_plot", "thumbnail"]
-
 _FIT = {
     "errors": error_curves,
     "spectrum": amplitude_spectrum,

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from ..model.model import HarmonicModel
 
-__all__ = ["model_error"]
-
 
 def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
     """Error of a model over the angle, less its constant, with its 95 % band.

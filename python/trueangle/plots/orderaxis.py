@@ -9,16 +9,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..support.arrays import Array
 from .palette import ink
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = ["OrderAxis", "order_groups"]
-
-Array = NDArray[np.float64]
 
 #: Orders between which nothing was looked at over so many orders stand in groups of their own.
 _BREAK: Final = 12.0

@@ -8,27 +8,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..fitting.orders.selection import FALSE_ALARM
 from ..fitting.orders.table import OrderRow, OrderSelection
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 from ..support.display_units import ErrorUnit, significant
 from .curves import CONFIDENCE
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
-
-__all__ = [
-    "OrderLine",
-    "largest_orders_text",
-    "likely_aliases",
-    "order_lines",
-    "seen_sizes",
-    "significance_amplitudes",
-]
-
-Array = NDArray[np.float64]
 
 #: Orders told in words.
 _TOLD: Final = 6

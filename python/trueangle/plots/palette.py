@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["AFTER", "BEFORE", "MARKERS", "MUTED", "RUNS", "WARNING", "ink", "run_colour"]
-
 #: What stays after correction.
 AFTER: Final = "#0072B2"
 #: What was there before: lighter than `AFTER` in grey.

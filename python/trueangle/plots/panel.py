@@ -11,22 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .curves import Curve, Points
-
-__all__ = [
-    "ANGLE",
-    "Cloud",
-    "Panel",
-    "PanelPicture",
-    "Role",
-    "binned_medians",
-    "magnified_segment",
-    "segment_span",
-]
-
-Array = NDArray[np.float64]
 
 #: What the colour of readings stands for: their run, or what was done to them.
 Role: TypeAlias = Literal["run", "before", "after", "measured", "simulated"]

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from ..fitting.result import FitResult
 
-__all__ = ["phases_over_runs"]
-
 #: Orders drawn by default, the largest first: beyond that colours repeat too often.
 _MOST_ORDERS = 12
 

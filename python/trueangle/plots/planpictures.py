@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from ..planning.plan import CalibrationPlan
 
-__all__ = ["plan_factors", "plan_positions"]
-
 
 def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     """Positions of every mount (or tilt) within the first pitch.

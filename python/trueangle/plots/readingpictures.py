@@ -27,13 +27,6 @@ if TYPE_CHECKING:
     from ..fitting.result import FitResult
     from ..simulation import Simulation
 
-__all__ = [
-    "before_after_picture",
-    "comparison_picture",
-    "errors_picture",
-    "residual_picture",
-]
-
 #: Part of a turn in degrees from which on the axis shows a whole one.
 _MOST_OF_A_TURN: Final = 300.0
 #: Part of the way between two directions over which the runs stand beside each other.

@@ -18,15 +18,6 @@ if TYPE_CHECKING:
     from ..diagnosis import Diagnosis, Finding
     from ..simulation import Simulation
 
-__all__ = [
-    "ErrorLeft",
-    "GainBar",
-    "error_left_of",
-    "finding_names",
-    "gain_bars",
-    "simulated_points",
-]
-
 #: Names of line counts that a finding may have: parameter, and how it is told.
 _PLACES: Final = {
     "order": "order {:g}",

@@ -24,8 +24,6 @@ from ..support.kinds import of_type, told_kinds
 from ..support.suggestions import check_choice
 from .trial import trial_outcome
 
-__all__ = ["plan_after"]
-
 #: Simulated diagnoses of every cause in question, where not given.
 SEEDS = 10
 

@@ -17,11 +17,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["Chance", "Threshold", "binomial_interval"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 #: Shares that are never named, and what each is worth beforehand.
 LAPSES = {

@@ -23,8 +23,6 @@ from .trial import FAILED, measured_signals
 from .visibility import blind_causes, size_range
 from .workers import Here, Workers, usable_cores
 
-__all__ = ["rehearse"]
-
 #: Trials of a cause where not given.
 SEEDS = 20
 

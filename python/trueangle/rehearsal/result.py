@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from .trial import TrialOutcome
 
-__all__ = ["Rehearsal", "RehearsedCause"]
-
 #: Shares of the trials that are told.
 SHARES = (0.5, 0.95)
 

@@ -18,8 +18,6 @@ from .result import RehearsedCause, rehearsed_cause
 from .trial import Trial, TrialOutcome
 from .visibility import Range
 
-__all__ = ["SizeSearch", "next_steps"]
-
 #: Trials of a round while the sizes are bracketed, and steps up and down between two rounds.
 BRACKETING, STEP_UP, STEP_DOWN = 2, 8, 6
 

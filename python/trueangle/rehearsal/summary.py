@@ -9,8 +9,6 @@ from ..support.layout import laid_out, wrapped
 if TYPE_CHECKING:
     from .result import Rehearsal, RehearsedCause
 
-__all__ = ["rehearsal_summary"]
-
 #: Names of causes listed of those it is confused with.
 MOST = 3
 

@@ -14,18 +14,6 @@ from ..joint.pattern import Surroundings
 from ..joint.signals import Signals, join_runs
 from ..simulation.simulation import Simulation, simulate
 
-__all__ = [
-    "ENDED",
-    "FAILED",
-    "NAMED",
-    "Trial",
-    "TrialOutcome",
-    "asked",
-    "drawn_effect",
-    "measured_signals",
-    "trial_rng",
-]
-
 #: What a diagnosis may say of a hidden cause: it is confirmed; it is listed and not confirmed; it
 #: is one of several that are not told apart; another cause stands in its place; something is
 #: unexplained; nothing is seen. A diagnosis that failed is a defect; one that was ended no answer.

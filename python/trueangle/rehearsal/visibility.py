@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
@@ -15,10 +14,6 @@ from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_DEG
 from .trial import drawn_effect, trial_rng
-
-__all__ = ["STEPS", "Range", "blind_causes", "size_range"]
-
-Array = NDArray[np.float64]
 
 #: Steps of the search in a factor of two of size.
 STEPS = 4

@@ -10,8 +10,6 @@ from typing import Any, BinaryIO
 
 from .trial import asked, measured_signals
 
-__all__ = ["serve_trials"]
-
 
 def serve_trials(source: BinaryIO, target: BinaryIO) -> None:
     """Answer every trial that comes until there are no more."""

@@ -19,8 +19,6 @@ from ..simulation.simulation import Simulation
 from ..support.deadline import Pace, entered, pace
 from .trial import ENDED, Trial, TrialOutcome, asked
 
-__all__ = ["Here", "WorkerError", "Workers", "usable_cores"]
-
 #: Variables that say how many threads a linear algebra library may use.
 THREADS = (
     "OMP_NUM_THREADS",

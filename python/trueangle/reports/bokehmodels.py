@@ -15,8 +15,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Model", "bokeh_columns", "bokeh_reference", "field", "model", "value"]
-
 #: A model with its kind, identity and attributes.
 Model = dict[str, Any]
 

@@ -10,8 +10,6 @@ import numpy as np
 
 from .bokehmodels import Model, bokeh_reference, model
 
-__all__ = ["ChartAxis"]
-
 #: Decades of a logarithmic axis up to which it has ticks within them.
 _FEW_DECADES: Final = 4
 #: Steps of angles and of whole numbers between ticks.

@@ -13,13 +13,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .bokehmodels import Model, bokeh_columns, bokeh_reference, field, model, value
 from .chartaxes import ChartAxis
 from .stills import Mark, still
-
-__all__ = ["Chart", "Figure", "chart_figure", "chart_run_marker", "css_run_colour", "run_swatch"]
-
-Array = NDArray[np.float64]
 
 #: Part of a chart's width at either border from which texts are turned inwards.
 _EDGE: Final = 0.3

@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from ..certificate import Certificate, Identity
     from ..simulation import Simulation
 
-__all__ = ["Report", "report"]
-
 #: Orders as `trueangle.fit` takes them.
 Orders: TypeAlias = Iterable[float] | Mapping[str, Iterable[float]] | str | None
 

@@ -9,8 +9,6 @@ from ..effects import Backlash, Effect
 from ..simulation import Harmonic, Joint, RunDesign, Simulation, simulate
 from .composition import Report, report
 
-__all__ = ["demo_report", "demo_simulation"]
-
 #: Runs of the demonstration: a turn out and a turn back, two speeds, repeated.
 _RUNS = tuple(
     RunDesign(

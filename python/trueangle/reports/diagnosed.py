@@ -10,8 +10,6 @@ from .numbers import shortened_list
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
 
-__all__ = ["diagnosis_content"]
-
 #: Units by the end of a parameter's name, the longer ones first.
 _UNITS: Final = {
     "arcsec_per_Nm3": "arcsec/Nm³",

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import RankError
 from ..fitting.phases import Phases, run_phases
@@ -20,6 +19,7 @@ from ..plots.readingpictures import (
     residual_picture,
 )
 from ..plots.simulatedcurves import ErrorLeft, error_left_of, simulated_points
+from ..support.arrays import Array
 from ..support.display_units import significant
 from .charts import Chart, Figure, chart_figure, chart_run_marker, css_run_colour
 from .linenames import LineNames
@@ -34,10 +34,6 @@ if TYPE_CHECKING:
     from ..fitting.result import FitResult
     from ..runs.run import CalibrationRun
     from ..simulation import Simulation
-
-__all__ = ["figures_of_diagnosis", "figures_of_runs"]
-
-Array = NDArray[np.float64]
 
 
 def figures_of_runs(

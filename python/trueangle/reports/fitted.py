@@ -20,15 +20,6 @@ if TYPE_CHECKING:
     from ..fitting.result import FitResult
     from ..simulation import Simulation
 
-__all__ = [
-    "extended_correction",
-    "fit_or_reason",
-    "gain_content",
-    "gain_or_reason",
-    "known_gear",
-    "known_joint",
-]
-
 
 def known_joint(
     simulation: Simulation | None,

@@ -19,8 +19,6 @@ from .chartaxes import ChartAxis
 from .page import Page, filled_template
 from .stills import Mark, StillPicture, still
 
-__all__ = ["FleetReport"]
-
 #: Units whose patterns are drawn at most, those that need something first.
 _DRAWN: Final = 24
 #: Orders whose phasors are drawn: those in which units differ most.

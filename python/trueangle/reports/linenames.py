@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, TypeAlias
 if TYPE_CHECKING:
     from ..joint.joint import Joint
 
-__all__ = ["LineNames", "line_names"]
-
 #: What a line of an output order is called.
 LineNames: TypeAlias = Callable[[float], str]
 

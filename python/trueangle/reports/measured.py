@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..runs.aliasing import distinct_positions
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, unit_name, wrap
-
-__all__ = ["error_size", "measured_content"]
-
-Array = NDArray[np.float64]
+from ..support.arrays import Array
 
 _WAYS = {(-1, 1): "both", (1,): "forward", (-1,): "backward"}
 

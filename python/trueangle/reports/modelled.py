@@ -21,12 +21,6 @@ if TYPE_CHECKING:
     from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
 
-__all__ = [
-    "given_model",
-    "model_content",
-    "order_content",
-]
-
 #: Correlations of coefficients below this are not worth a note.
 _NOTABLE: Final = 0.3
 _MOST_CORRELATIONS: Final = 5

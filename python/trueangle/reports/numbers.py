@@ -8,8 +8,6 @@ from typing import Any, Final
 
 from ..support.display_units import ErrorUnit
 
-__all__ = ["MINUS", "NONE", "Numbers", "formatted_number", "lookup", "shortened_list"]
-
 #: Stands where there is no number.
 NONE: Final = "\u2013"
 

@@ -25,16 +25,6 @@ if TYPE_CHECKING:
 
     from .composition import Report
 
-__all__ = [
-    "Page",
-    "bokeh_library",
-    "filled_template",
-    "find_browser",
-    "print_pdf",
-    "rendered_report",
-    "template_environment",
-]
-
 _TEMPLATES = Path(__file__).parent / "templates"
 
 #: Signs of the code that end or escape something in HTML, and those that stand for them.

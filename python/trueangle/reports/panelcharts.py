@@ -9,8 +9,6 @@ from ..plots.panel import ANGLE, Cloud, Panel, PanelPicture
 from .charts import Chart, Figure, chart_figure, chart_run_marker, css_run_colour
 from .scale import Scale
 
-__all__ = ["dots_of_run", "panel_chart", "panel_figure"]
-
 #: Readings drawn in one chart at most: more do not show, and make the page heavy and slow.
 _MOST_POINTS: Final = 2_000
 #: Runs up to which as many are drawn; of more, whose tables are long, fewer: a page weighs 1 MB.

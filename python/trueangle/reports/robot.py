@@ -22,17 +22,6 @@ if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
     from ..fitting.result import FitResult
 
-__all__ = [
-    "JointRank",
-    "RobotReport",
-    "checked_rank",
-    "diagnosed_rank",
-    "fitted_rank",
-    "plain_ranking",
-    "ranked",
-    "ranking_text",
-]
-
 #: What a report's verdict is called in the table.
 _VERDICTS = {
     "gain": "calibrated",

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from ..runs.run import CalibrationRun
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 
-__all__ = ["Scale", "error_scale"]
-
 #: Part of the largest error that hovering over a point still shows.
 _FINEST: Final = 3e-4
 

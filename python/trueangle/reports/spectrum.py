@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
 
-__all__ = ["spectrum_figure"]
-
 #: Half a letter of a name as part of a chart's width, and what parts names above each other.
 _LETTER, _HIGHER = 0.012, 2.0
 #: A dot this much larger than the lowest size shown is whole, and so much above or below another

@@ -12,11 +12,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import Array
 from .chartaxes import ChartAxis
-
-__all__ = ["Mark", "StillPicture", "still"]
-
-Array = NDArray[np.float64]
 
 #: Width of a picture, pixels of its height to a rem, and the margins: left, right, top, bottom.
 _WIDTH: Final = 680.0

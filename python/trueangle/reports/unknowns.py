@@ -14,8 +14,6 @@ from ..support.display_units import ErrorUnit
 if TYPE_CHECKING:
     from ..fitting.orders.select import OrderSelection
 
-__all__ = ["unknown_content"]
-
 #: Speeds (relative), temperatures (K) and torques (Nm) that differ by less are one.
 _SPEED, _TEMPERATURE, _TORQUE = 0.05, 1.0, 0.1
 

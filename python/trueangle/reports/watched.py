@@ -7,20 +7,16 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..monitoring.alarm import WatchedWindow
 from ..support.angles import arcsec
+from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.plainresult import counted
 from .chartaxes import ChartAxis
 from .page import Page, filled_template
 from .stills import Mark, StillPicture, still
-
-__all__ = ["WatchReport"]
-
-Array = NDArray[np.float64]
 
 #: Orders whose windows are drawn at most: those whose sums rose highest.
 _DRAWN: Final = 12

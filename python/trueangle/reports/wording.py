@@ -6,20 +6,6 @@ from typing import Any, Final
 
 from ..support.display_units import ErrorUnit
 
-__all__ = [
-    "FIGURE_TITLES",
-    "as_sentence",
-    "by_kind",
-    "conditions",
-    "entry_paths",
-    "figure_title",
-    "gain_paths",
-    "gain_verdict",
-    "joined_list",
-    "listed_orders",
-    "residual_signals",
-]
-
 FIGURE_TITLES: Final = {
     "errors": "Measured error of every run, and the model",
     "measured-simulated": "Measured error and what the simulation expects",

@@ -17,8 +17,6 @@ from ..support.kinds import told_kinds
 from ..support.signals import COUPLED
 from .rotor import Motion, rotor_angle
 
-__all__ = ["MAX_SAMPLES", "SPACINGS", "RunDesign"]
-
 #: Readings of one run, at most: a simulation holds some 150 bytes of each.
 MAX_SAMPLES = 20_000_000
 #: Turns and degrees, at most: beyond, an angle has no digits left for an arcsec.

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..joint.signals import Signals, join_runs
 from ..runs.run import CalibrationRun
+from ..support.arrays import Array
 from .designs import RunDesign
-
-__all__ = ["design_of"]
-
-Array = NDArray[np.float64]
 
 #: Places at which the way of another joint is kept.
 _PLACES = 65

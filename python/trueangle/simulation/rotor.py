@@ -22,18 +22,14 @@ import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..joint.pattern import Pattern
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.arrays import Array
 
 if TYPE_CHECKING:
     from .designs import RunDesign
-
-__all__ = ["Motion", "rotor_angle"]
-
-Array = NDArray[np.float64]
 
 ARCSEC_PER_RAD: Final = ARCSEC_PER_TURN / (2.0 * math.pi)
 

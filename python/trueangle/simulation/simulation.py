@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects import EFFECTS, Effect, MissingOrder, ReferenceLines
 from ..errors import ArgumentError
@@ -17,14 +16,11 @@ from ..joint.pattern import Harmonic, Pattern, Surroundings
 from ..joint.signals import Signals, join_runs
 from ..runs.run import CalibrationRun, as_runs
 from ..support.angles import ARCSEC_PER_DEG
+from ..support.arrays import Array
 from ..support.distributions import random_numbers
 from ..support.kinds import all_of_type, of_type, told_kinds
 from ..support.plainresult import Shown, counted
 from .designs import RunDesign
-
-__all__ = ["Simulation", "simulate", "simulate_along"]
-
-Array = NDArray[np.float64]
 
 #: What must be given, for messages.
 SIMULATION = "a trueangle.Simulation (trueangle.load_simulation reads one)"

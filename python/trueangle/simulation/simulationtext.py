@@ -20,15 +20,6 @@ from .designs import MAX_SAMPLES, RunDesign
 if TYPE_CHECKING:
     from .simulation import Simulation
 
-__all__ = [
-    "Decoded",
-    "decoded_simulation",
-    "guarded_build",
-    "simulation_text",
-    "to_table",
-    "write_simulation",
-]
-
 _TABLES = ("joint", "shaft", "bearing", "head", "harmonic", "effect", "noise", "run")
 _JOINT_KEYS = ("gear_ratio", "fixed_member", "encoder_side", "pole_pairs")
 

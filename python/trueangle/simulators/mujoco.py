@@ -6,21 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError, MissingSignalError
 from ..export.mujoco import NOISE_NAME, TEXT_NAME
 from ..model.file import embedded_model
 from ..model.model import HarmonicModel
+from ..support.arrays import Array
 from ..support.signals import coupled_with
 from ..support.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from mujoco import MjModel
-
-__all__ = ["SensorLayer"]
-
-Array = NDArray[np.float64]
 
 #: Radians within which the reading of a model at its indicated angle is found, and steps to it.
 _SOLVED = 1e-13

@@ -12,29 +12,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ...fitting.orders.select import select_orders
 from ...fitting.orders.table import OrderSelection
 from ...planning.plan import CalibrationPlan, plan_mounts, wanted_orders
 from ...runs.aliasing import fold
 from ...runs.run import CalibrationRun
-
-__all__ = [
-    "GEAR_ORDERS",
-    "JOINT_A",
-    "JOINT_B",
-    "PUBLISHED",
-    "PaperJoint",
-    "Reduction",
-    "Study",
-    "lifted",
-    "paper_study",
-    "reduction",
-    "simulated_groups",
-]
-
-Array = NDArray[np.float64]
+from ...support.arrays import Array
 
 #: Positions of the paper's prism and the groups it took; the last one verifies.
 POSITIONS: Final = 36

@@ -16,15 +16,11 @@ import itertools
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...support.arrays import Array
 from .evidence import Evidence, drawn_signs, largest_of, made_even
 from .leftover import Leftover
 from .place import ModulatedSums, unit_sums
-
-__all__ = ["AFTER_REVERSALS", "AFTER_START", "reversal_test", "start_test"]
-
-Array = NDArray[np.float64]
 
 #: What the tests say that something looks like.
 AFTER_REVERSALS = "relaxes after reversals"

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from ...support.plainresult import finite
 
-__all__ = ["Evidence", "drawn_signs", "largest_of", "made_even"]
-
 #: Times that a search is repeated with signs at random, and units from which on they differ enough.
 DRAWS, ENOUGH_UNITS = 32, 6
 

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Leftover"]
+from ...support.arrays import Array
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 #: Runs from which on they alone are the independent units; fewer are cut into pieces.

@@ -22,13 +22,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...support.arrays import Array
 from .leftover import Leftover
-
-__all__ = ["Noise", "estimate_noise"]
-
-Array = NDArray[np.float64]
 
 #: Orders of the flexible pattern at most, and readings per column at least.
 MOST_ORDERS, READINGS_PER_COLUMN = 12, 12

@@ -24,14 +24,11 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ...support.arrays import Array
 from ...support.display_units import brief
 from ...support.distributions import f_tail
 from .evidence import Evidence, largest_of
 from .leftover import Leftover
-
-__all__ = ["Periodogram", "order_test", "periodogram", "time_test"]
-
-Array = NDArray[np.float64]
 
 #: Cells of the finest transform, of which a record takes half.
 MOST_BINS = 1 << 17

@@ -29,14 +29,12 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ...support.arrays import Array
 from ...support.display_units import brief
 from ...support.distributions import incomplete_gamma_tail, student_tail
 from .evidence import Evidence, drawn_signs, largest_of, made_even
 from .leftover import Leftover
 
-__all__ = ["ModulatedSums", "place_tests", "unit_sums"]
-
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: Orders tested unless more are asked for.

@@ -14,8 +14,6 @@ from .place import place_tests
 from .steps import steps_test
 from .zeros import run_test
 
-__all__ = ["DECIDING", "Asked", "evidence_of_tests"]
-
 
 @dataclass(frozen=True, eq=False)
 class Asked:

@@ -3,22 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...support.arrays import Array
 from ...support.distributions import chi_squared_tail, f_tail, normal_tail
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise
-
-__all__ = [
-    "AGAINST_STATED",
-    "normal_kurtosis",
-    "scatter_of_repeats",
-    "scatter_tests",
-    "whitened_residual",
-]
-
-Array = NDArray[np.float64]
 
 #: Name of the test of the noise against the sigma of the simulation.
 AGAINST_STATED = "noise against the simulation's"

@@ -16,17 +16,12 @@ increments by ``m/(m + 2)``.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...support.display_units import brief
 from ...support.distributions import normal_tail
 from .evidence import Evidence
 from .leftover import Leftover
 from .scatter import normal_kurtosis
-
-__all__ = ["STEPS", "steps_test"]
-
-Array = NDArray[np.float64]
 
 #: What the test says that something looks like.
 STEPS = "steps between levels"

@@ -15,8 +15,6 @@ from .place import LEAST_ORDERS
 from .registry import Asked, evidence_of_tests
 from .scatter import scatter_tests
 
-__all__ = ["FREE_PATH", "LEVEL", "Unexplained", "goodness_of_fit"]
-
 #: What a path in time looks like that no law prescribes.
 FREE_PATH = "a free path in time"
 

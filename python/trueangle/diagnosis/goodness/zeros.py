@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...support.display_units import brief
 from ...support.distributions import f_tail
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise
-
-__all__ = ["ZEROS", "run_test", "variance_of_mean"]
-
-Array = NDArray[np.float64]
 
 #: The name of the test.
 ZEROS = "zeros of the runs"
