@@ -19,6 +19,17 @@ LEAST_STEP = 1e-9
 #: Chance below which moves on a finer lattice are on it for a reason, and steps of it looked for.
 BY_CHANCE, STEPS_TRIED = 1e-3, 200
 
+#: Cells of a turn beyond which digits that were cut off are not looked behind, steps within the
+#: travel from which on they are a lattice, and share of one that a cell may be.
+MOST_CELLS, LEAST_STEPS, WIDEST_CELL = 400_000, 20, 0.3
+
+#: Coherence of readings on a lattice, in shares of what cutting their digits off leaves of it; that
+#: of the true positions from which on it is the design's.
+ON_COUNTS, OF_DESIGN = 0.97, 0.5
+
+#: Difference of coherences that readings do not tell.
+ALIKE = 0.004
+
 #: Positions beyond which a grid is not looked for.
 MOST_POSITIONS = 10_000
 
@@ -130,6 +141,49 @@ def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
             off = np.abs(moves / step - np.round(moves / step)).max()
             return step if off < ON_LATTICE else 0.0
     return 0.0
+
+
+def step_behind(values: NDArray[np.float64], true: NDArray[np.float64], digit: float) -> float:
+    """Step of the sensor whose readings were cut to a last digit; 0 where none shows.
+
+    ::
+
+        R(N) = |mean exp(2πi N v)| = sinc(N digit)
+
+    for N counts in a turn, and chance, ``exp(-n R²)``, for other N.
+
+    Parameters
+    ----------
+    values, true : ndarray
+        Readings and true angles, turns.
+    digit : float
+        Turns.
+
+    Examples
+    --------
+    >>> places = np.arange(36) / 36.0 + 0.01 * np.sin(np.arange(36))
+    >>> degrees = np.round(np.round(4096 * places) / 4096 * 360.0, 2)
+    >>> 1.0 / step_behind(degrees / 360.0, np.arange(36) / 36.0, 0.01 / 360.0)
+    4096.0
+    """
+    cells = round(1.0 / digit) if digit > 0.0 else 0
+    if not 0 < cells <= MOST_CELLS or abs(cells * digit - 1.0) > LEAST_STEP:
+        return 0.0
+    places = np.unique(np.mod(np.round(values * cells).astype(np.int64), cells))
+    marks = np.zeros(cells)
+    marks[places] = 1.0
+    coherence = np.abs(np.fft.rfft(marks)) / places.size
+    counts = np.arange(coherence.size)
+    possible = (counts * float(np.ptp(values)) > LEAST_STEPS) & (counts * digit < WIDEST_CELL)
+    possible &= cells * np.exp(-places.size * coherence**2) < BY_CHANCE
+    told = np.where(possible, coherence / np.sinc(counts * digit), 0.0)
+    top, lattices = int(np.argmax(told)), np.flatnonzero(told > ON_COUNTS)
+    # Its multiples are as coherent as a lattice; on even places aliases nearly are.
+    count = min((c for c in lattices.tolist() if top % c == 0), default=0)
+    if not count or (np.flatnonzero(told > told[count] - ALIKE) % count).any():
+        return 0.0
+    of_design = abs(np.exp(2j * np.pi * count * true).mean()) > OF_DESIGN
+    return 0.0 if of_design else 1.0 / count
 
 
 def table_move(runs: Sequence[NDArray[np.float64]], step: float) -> float:

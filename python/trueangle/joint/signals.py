@@ -17,7 +17,7 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.quantiles import median
 from ..support.signals import coupled_with
-from .grid import UniformGrid, finer_step, lattice_step, table_move, uniform_grid
+from .grid import UniformGrid, finer_step, lattice_step, step_behind, table_move, uniform_grid
 from .turning import direction_at_turns, velocity_at_turns
 
 Index = NDArray[np.int64]
@@ -257,7 +257,8 @@ def sensor_lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float,
     moves = np.diff(np.unique(values))
     if move or abs(step * table - 1.0) < CLOSES * step or moves.max(initial=0.0) < 1.5 * step:
         step = finer_step(values, step)
-    return (step or finer_step(values)) * ARCSEC_PER_TURN, table
+    step = step or finer_step(values)
+    return (step_behind(values, theta / (2.0 * np.pi), step) or step) * ARCSEC_PER_TURN, table
 
 
 def _common_table(first: Signals, later: Signals) -> int:

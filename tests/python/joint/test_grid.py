@@ -10,6 +10,7 @@ from trueangle.joint.grid import (
     UniformGrid,
     finer_step,
     lattice_step,
+    step_behind,
     table_move,
     uniform_grid,
 )
@@ -186,3 +187,30 @@ def test_no_finer_step_is_told_of_what_has_none():
     # Some places of a table in any order are no counts, however far apart.
     assert finer_step(np.array([3, 9, 4, 20, 1, 0, 27]) / 36.0, 1.0 / 36.0) == 0.0
     assert finer_step(np.array([0.25])) == finer_step(np.zeros(0)) == 0.0
+
+
+@pytest.mark.parametrize("digits", [2, 3])
+@pytest.mark.parametrize("seed", range(6))
+def test_counts_show_behind_digits_that_were_cut_off(digits, seed):
+    """4096 counts printed in hundredths of degrees; or nothing is told, of one place or another."""
+    rng = np.random.default_rng([seed, 12])
+    for n in (36, 72, 150):
+        places = np.sort(rng.uniform(0.0, 1.0, n)) if seed % 2 else np.arange(n) / n
+        error = 0.002 * np.sin(2.0 * np.pi * places + seed)
+        degrees = np.round(np.round(4096 * (places + error)) / 4096 * 360.0, digits)
+        found = step_behind(degrees / 360.0, places, 10.0**-digits / 360.0)
+        assert found in (0.0, pytest.approx(1.0 / 4096))
+        if seed % 2:
+            assert found > 0.0
+
+
+def test_nothing_shows_behind_digits_of_what_has_no_counts():
+    rng = np.random.default_rng(13)
+    for k in range(60):
+        n = int(rng.choice([24, 36, 100, 400]))
+        places = np.sort(rng.uniform(0.0, 1.0, n)) if k % 2 else np.arange(n) / n
+        degrees = np.round(360.0 * places + rng.normal(0.0, 0.02, n), 2)
+        assert step_behind(degrees / 360.0, places, 0.01 / 360.0) == 0.0
+    # No digit, one that does not divide a turn, one too fine to look behind.
+    for digit in (0.0, 0.0123, 1e-7):
+        assert step_behind(places, places, digit) == 0.0
