@@ -48,8 +48,8 @@ def repeated_variance(step: float, scatter: float) -> float:
 
     Examples
     --------
-    >>> round(repeated_variance(1.0, 0.0), 4), round(repeated_variance(1.0, 1.0 / 12.0 + 0.25), 4)
-    (0.0831, 0.0004)
+    >>> [round(repeated_variance(1.0, scatter), 3) for scatter in (0.0, 0.05, 0.2)]
+    [0.083, 0.041, 0.0]
     """
     k = np.arange(1, _TERMS + 1)
 
@@ -81,12 +81,14 @@ def beside_rounding(found: Uncertainty, problem: Problem, fitted: Fitted) -> Unc
     from .orders.zerogroups import zero_units
 
     variance = fitted.solution.residual_variance
-    if problem.readings > COUNTED or not 0.0 < variance < math.inf:  # of summed runs these are few
+    if problem.readings > COUNTED or not 0.0 < variance < math.inf:
         return found
     positions = distinct_positions(problem.runs)
     step = rounding_step(problem.runs, positions)
+    if step == 0.0:
+        return found
     units, places = zero_units(problem.runs, True)
-    scatter = pure_error(units, positions.of_rows(places)) if step else None
+    scatter = pure_error(units, positions.of_rows(places))
     if scatter is None:
         return found
     missing = problem.readings / len(positions) - (1.0 if found.kind == "white" else 0.0)
