@@ -1,7 +1,7 @@
 //! What columns save beside a fit, against products and least squares as they are defined.
 
 use nalgebra::{DMatrix, DVector};
-use trueangle::linear::{Beside, Correlated, Left, RunProducts, best_ratio};
+use trueangle::linear::{Beside, Correlated, Left, Order, RunProducts, best_ratio};
 
 const N: usize = 700;
 /// One longer than what is held at once, one of a single reading, one that ends off a vector.
@@ -123,7 +123,12 @@ fn products_are_those_of_mapped_columns_less_what_run_effects_take() {
                 assert!((found.after[j] - after).abs() < ROUNDING);
                 assert!((found.moment[j] - all[5]).abs() < ROUNDING);
             }
-            let (ratio, deviance) = beside.ratio((&rows(&x), k)).unwrap();
+            let (ratio, deviance) = beside.ratio((&rows(&x), k), Order::Readings).unwrap();
+            // A matrix is held column by column.
+            let columns = beside.ratio((x.as_slice(), k), Order::Columns).unwrap();
+            assert!(
+                (columns.0 - ratio).abs() <= 1e-8 * ratio && (columns.1 - deviance).abs() < 1e-8
+            );
             let left = Left {
                 readings: N as f64,
                 squares: case.r.norm_squared(),
