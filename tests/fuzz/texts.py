@@ -14,6 +14,7 @@ import trueangle as ta
 from loader import Loader, columns, seeds, use_log, use_runs
 from mutation import mutated_table, mutated_words
 from trueangle.errors import TrueAngleError
+from trueangle.formats.format import Selection
 from trueangle.formats.formats import find_format
 
 
@@ -78,7 +79,7 @@ def _use_small(path: Path) -> None:
         use_log(path)
     module = find_format(path).module
     names = module.columns(path)
-    for batch in module.read(path, names):
+    for batch in module.read(path, Selection(names)):
         sizes = {values.size for values in batch.values() if isinstance(values, np.ndarray)}
         assert len(sizes) <= 1 or hasattr(module, "together"), f"unlike lengths: {sizes}"
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import distinct
+
 #: Departure from the grid, in shares of its step, up to which readings lie on it.
 ON_GRID = 0.02
 
@@ -89,7 +91,6 @@ def lattice_step(values: NDArray[np.float64]) -> float:
     >>> lattice_step(np.array([0.5, 1.25, 3.0, 2.6]))
     0.0
     """
-    # Not by `np.unique`, which would import `numpy.ma`.
     steps = np.diff(np.sort(values))
     rounding = LEAST_STEP * float(np.abs(values).max(initial=1.0))
     steps = steps[steps > rounding]
@@ -126,16 +127,16 @@ def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
     >>> finer_step(places, 1.0 / 36.0)
     0.0
     """
-    moves = np.diff(np.unique(values))
+    moves = np.diff(distinct(values))
     rounding = LEAST_STEP * float(np.abs(values).max(initial=1.0))
     moves = moves[moves > rounding]
-    some = np.unique(moves[:: max(1, moves.size // STEPS_TRIED)])
-    tried = np.unique(np.concatenate([some, np.diff(some)]))
+    some = distinct(moves[:: max(1, moves.size // STEPS_TRIED)])
+    tried = distinct(np.concatenate([some, np.diff(some)]))
     tried = tried[(tried > rounding) & (tried < 0.5 * below)][::-1]
     for step in tried.tolist():
         counts = np.round(some / step)
         away = float(np.abs(some / step - counts).max())
-        told = np.unique(counts).size - 1
+        told = distinct(counts).size - 1
         # That each further move is a whole number of counts, as near as they all are.
         if away < ON_LATTICE and tried.size * (2.0 * away) ** told < BY_CHANCE:
             off = np.abs(moves / step - np.round(moves / step)).max()
@@ -169,7 +170,7 @@ def step_behind(values: NDArray[np.float64], true: NDArray[np.float64], digit: f
     cells = round(1.0 / digit) if digit > 0.0 else 0
     if not 0 < cells <= MOST_CELLS or abs(cells * digit - 1.0) > LEAST_STEP:
         return 0.0
-    places = np.unique(np.mod(np.round(values * cells).astype(np.int64), cells))
+    places = distinct(np.mod(np.round(values * cells).astype(np.int64), cells))
     marks = np.zeros(cells)
     marks[places] = 1.0
     coherence = np.abs(np.fft.rfft(marks)) / places.size

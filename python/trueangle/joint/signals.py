@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.arrays import Array
+from ..support.arrays import Array, distinct
 from ..support.quantiles import median
 from ..support.signals import coupled_with
 from .grid import UniformGrid, finer_step, lattice_step, step_behind, table_move, uniform_grid
@@ -254,7 +254,7 @@ def sensor_lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float,
     grid = uniform_grid(theta)
     table = 0 if grid is None else grid.positions
     # Values that all lie one step apart lie on any lattice of that step.
-    moves = np.diff(np.unique(values))
+    moves = np.diff(distinct(values))
     if move or abs(step * table - 1.0) < CLOSES * step or moves.max(initial=0.0) < 1.5 * step:
         step = finer_step(values, step)
     step = step or finer_step(values)

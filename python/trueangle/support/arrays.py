@@ -1,4 +1,4 @@
-"""Arrays as annotations name them."""
+"""Arrays as annotations name them, and their distinct values."""
 
 from __future__ import annotations
 
@@ -9,3 +9,16 @@ from numpy.typing import NDArray
 
 #: Numbers of double precision, of any shape.
 Array: TypeAlias = NDArray[np.float64]
+
+_Kind = TypeVar("_Kind", bound=np.generic)
+
+
+def distinct(values: NDArray[_Kind]) -> NDArray[_Kind]:
+    """Values in ascending order, each once.
+
+    As `numpy.unique`, which would import `numpy.ma` and take longer to start than a small command.
+    """
+    ascending = np.sort(values)
+    first = np.ones(ascending.size, dtype=np.bool_)
+    first[1:] = ascending[1:] != ascending[:-1]
+    return ascending[first]

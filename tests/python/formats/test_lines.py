@@ -7,6 +7,7 @@ import pytest
 import trueangle as ta
 from trueangle.errors import EmptyCellsWarning, FileError
 from trueangle.formats import camonitor, csvfile, csvheader, csvrows, seriallog
+from trueangle.formats.format import Selection
 
 ROWS = 60
 HEAD = "run,reference_deg,indicated_deg"
@@ -101,5 +102,9 @@ def test_of_a_monitor(which, monkeypatch, tmp_path):
     path = tmp_path / "log.txt"
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(FileError, match=rf"line {line}, column 'PV': a number is needed"):
-        list(camonitor.read(path, ["PV"]))
-    assert [batch["STATE"].size for batch in camonitor.read(path, ["STATE"])] == [8, 8, 4]
+        list(camonitor.read(path, Selection(["PV"])))
+    assert [batch["STATE"].size for batch in camonitor.read(path, Selection(["STATE"]))] == [
+        8,
+        8,
+        4,
+    ]

@@ -107,7 +107,7 @@ def test_times_are_those_of_the_columns_asked_for(tmp_path):
         ("/arm/angles[1]", laser + 0.005),
         (None, np.sort([*laser, *(laser + 0.005)])),
     ):
-        (batch,) = wpilog.read(path, ["time_s", *([name] if name else [])])
+        (batch,) = wpilog.read(path, Selection(["time_s", *([name] if name else [])]))
         np.testing.assert_allclose(batch["time_s"], times, rtol=1e-12)
         assert all(np.isfinite(values).all() for values in batch.values())
 

@@ -1,0 +1,15 @@
+"""Distinct values, as numpy tells them."""
+
+import numpy as np
+import pytest
+
+from trueangle.support.arrays import distinct
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.int64])
+@pytest.mark.parametrize("size", [0, 1, 2, 50])
+def test_distinct_values_are_those_of_numpy(kind, size):
+    values = np.random.default_rng(size).integers(-5, 5, size).astype(kind)
+    found = distinct(values)
+    assert found.dtype == values.dtype
+    np.testing.assert_array_equal(found, np.unique(values))
