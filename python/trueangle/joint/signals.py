@@ -253,9 +253,9 @@ def sensor_lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float,
         return finer_step(values, step) * ARCSEC_PER_TURN, round(1.0 / move)
     grid = uniform_grid(theta)
     table = 0 if grid is None else grid.positions
-    # Values that all lie one step apart lie on any lattice of that step.
-    moves = np.diff(distinct(values))
-    if move or abs(step * table - 1.0) < CLOSES * step or moves.max(initial=0.0) < 1.5 * step:
+    # At even places, values that all lie one step apart lie on any lattice of that step.
+    even = grid is not None and np.diff(distinct(values)).max(initial=0.0) < 1.5 * step
+    if move or even or abs(step * table - 1.0) < CLOSES * step:
         step = finer_step(values, step)
     step = step or finer_step(values)
     return (step_behind(values, theta / (2.0 * np.pi), step) or step) * ARCSEC_PER_TURN, table

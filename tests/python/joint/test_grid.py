@@ -214,3 +214,13 @@ def test_nothing_shows_behind_digits_of_what_has_no_counts():
     # No digit, one that does not divide a turn, one too fine to look behind.
     for digit in (0.0, 0.0123, 1e-7):
         assert step_behind(places, places, digit) == 0.0
+
+
+@pytest.mark.parametrize("readings", [3000, 12_000])
+def test_counts_that_are_all_read_are_counts(readings):
+    """A sweep past each count of a sensor moves by one count or by none."""
+    rng = np.random.default_rng(readings)
+    places = (np.arange(readings) + rng.uniform(size=readings)) * 360.0 / readings
+    indicated = np.round((places + 0.1 * np.sin(np.radians(places))) * 1024 / 360.0) * 360.0 / 1024
+    told = join_runs([ta.CalibrationRun(places, indicated, period=360.0)]).count
+    assert told == pytest.approx(1296000.0 / 1024)
