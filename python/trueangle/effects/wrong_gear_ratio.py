@@ -64,6 +64,9 @@ class WrongGearRatio(Effect):
         "put the ratio right in the joint's description: a fit then has its lines"
     )
 
+    def __post_init__(self) -> None:
+        shaft_cycles(self.gear_ratio, "none")  # refuses what is no ratio
+
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         orders = _moved(around.joint, around.pattern, self.gear_ratio)
         pattern = Pattern(np.array(orders), around.pattern.cosine, around.pattern.sine)

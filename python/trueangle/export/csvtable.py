@@ -69,7 +69,10 @@ class CsvTable(Target):
         )
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
-        rows = list(csv.reader(io.StringIO(text)))
+        try:
+            rows = list(csv.reader(text.splitlines()))
+        except csv.Error as cause:
+            raise failed(path, f"is no table: {cause}") from cause
         if not rows or [cell.strip() for cell in rows[0]] != ["indicated_deg", "correction_deg"]:
             raise failed(path, "the header of such a table is indicated_deg,correction_deg", 1)
         numbers = []
