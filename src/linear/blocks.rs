@@ -103,9 +103,7 @@ impl<T: RealField + Copy + Into<f64>> Work<'_, T> {
                                 self.x[at..at + TILE].try_into().expect("as many");
                             row = *all;
                         } else {
-                            for l in 0..count {
-                                row[l] = self.x[at + l];
-                            }
+                            row[..count].copy_from_slice(&self.x[at..at + count]);
                         }
                         if let Some(roots) = self.noise.roots {
                             let root: T = convert(roots[i]);
