@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,7 +14,7 @@ from ..runs.checks import DataFault
 from ..simulation.measured import design_of
 from ..simulation.simulation import Simulation
 from ..support.display_units import ErrorsIn
-from ..support.plainresult import counted, result_picture
+from ..support.plainresult import counted, json_text, result_picture
 from .beliefs import Belief
 from .correctable import Correctable
 from .discrepancy import Discrepancy
@@ -244,7 +243,7 @@ class Diagnosis(Correctable):
 
     def to_json(self, extended_simulation: str | None = None) -> str:
         """`to_dict` as JSON text."""
-        return json.dumps(self.to_dict(extended_simulation), indent=2, allow_nan=False)
+        return json_text(self.to_dict(extended_simulation), indent=2)
 
     def _brief(self) -> str:
         sure = [finding.cause for finding in self.findings if finding.confirmed]

@@ -13,7 +13,7 @@ from ..errors import ArgumentError
 from ..joint.shafts import counted_orders
 from ..support.arrays import Array
 from ..support.kinds import told_kinds
-from ..support.plainresult import PlainResult, counted
+from ..support.plainresult import PlainResult, counted, finite
 from .counts import exchanged, rounded
 from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
 from .noisefactors import noise_factors
@@ -117,7 +117,9 @@ def plain_arc_plan(plan: Any, kind: str) -> dict[str, Any]:
 
     def plain(value: Any) -> Any:
         if isinstance(value, dict):
-            return {f"{order:g}": one for order, one in value.items()}
+            return {f"{order:g}": plain(one) for order, one in value.items()}
+        if isinstance(value, float):
+            return finite(value)
         return list(value) if isinstance(value, tuple) else value
 
     fields = {name: plain(value) for name, value in vars(plan).items()}

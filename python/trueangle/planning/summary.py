@@ -132,7 +132,14 @@ def next_summary(plan: NextRuns) -> str:
             times = f" to {labels[-1]}, {len(labels)} times the same" if len(labels) > 1 else ""
             lines.append(f"  {labels[0]}{times}")
             lines += [f"    - {step}" for step in steps]
+    shown = {
+        entry.causes[0]: None
+        for entry in plan.between
+        if entry.told and len(entry.causes) == 1 and not entry.seen
+    }
     for entry in plan.between:
+        if entry.told and entry.causes[0] in shown and len(entry.causes) == 1:
+            continue
         names = " or ".join(entry.causes)
         if not entry.told:
             text = f"  not distinguished: {names}"
@@ -144,7 +151,10 @@ def next_summary(plan: NextRuns) -> str:
             text += f": BIC better by {entry.expected_bic:.0f} expected for the true one"
             by = f" ({entry.trials} simulated)" if entry.trials else ""
             text += f", named in {100.0 * entry.chance_named:.0f} %{by}"
-        lines.append(text)
+        if text not in lines:  # of two lines of the pattern the same may be asked
+            lines.append(text)
+    if shown:
+        lines.append(f"  shows {', '.join(shown)}")
     if plan.beyond:
         lines.append(f"  beyond what was seen so far: {', '.join(plan.beyond)}")
     lines += [f"  note: {note}" for note in plan.notes]
