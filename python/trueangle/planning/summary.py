@@ -73,13 +73,14 @@ def self_plan_summary(plan: SelfPlan) -> str:
         lines.append(f"  seconds                {plan.seconds:.3g}")
     if plan.given:
         given: Any = plan.given
+        names = ", ".join(f"{k:g}" for k in given["blind_orders"])
+        factor = f"{given['worst_noise_factor']:.2f}"
+        worse = f"{given['worse_by']:.2f} times the best"
         lines.append(
-            f"  the given angles       factor {given['worst_noise_factor']:.2f}, "
-            f"{given['worse_by']:.2f} times the best"
+            f"  the given angles       cannot see {names}; factor {factor} of the others"
+            if names
+            else f"  the given angles       factor {factor}, {worse}"
         )
-        if given["blind_orders"]:
-            names = ", ".join(f"{k:g}" for k in given["blind_orders"])
-            lines.append(f"                         cannot see {names}")
     lines += ["  noise factor per order", *_table(plan.noise_factors)]
     lines += [f"  note: {note}" for note in plan.notes]
     return laid_out(lines)
