@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.terms import JointCoupling
 
 
 def models(seed, count=6, terms=False):
@@ -54,32 +53,6 @@ def test_joints_together_are_corrected_as_each_alone(terms):
     for j, model in enumerate(made.values()):
         own = {name: values[:, j] for name, values in given.items()}
         np.testing.assert_array_equal(together[:, j], model.correct(angles[:, j], **own))
-
-
-@pytest.mark.parametrize(
-    "periods", [(2.0 * np.pi, 360.0), (360.0, 2.0 * np.pi), (1.0, 360.0), (2.0 * np.pi, 1.0)]
-)
-def test_a_coupled_joint_of_another_unit_is_coupled_by_as_much(periods):
-    """In turns every robot is the same, its step as well: only the units of its joints differ."""
-
-    def corrected(wrist, elbow):
-        turns = np.random.default_rng(72_001).uniform(-2.0, 2.0, (40, 2))
-        robot = ta.Robot({
-            "wrist": ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [1e-4 * wrist])],
-                                      period=wrist),
-            "elbow": ta.HarmonicModel([ta.Shaft("output", 1, [2], [1e-4 * elbow], [0.0])],
-                                      period=elbow, terms=[JointCoupling("wrist", 0.01)]),
-        })  # fmt: skip
-        units = np.array([wrist, elbow])
-        step = robot.compensator()
-        stepped = np.array([step(row) for row in turns * units])
-        return robot.correct(turns * units) / units, stepped / units, turns
-
-    plain, _, turns = corrected(360.0, 360.0)
-    # What couples is a hundredth of up to two turns of the other joint.
-    assert np.abs(plain - turns).max() > 0.01
-    for found in corrected(*periods)[:2]:
-        np.testing.assert_allclose(found, plain, rtol=0.0, atol=1e-12)
 
 
 def test_one_position_is_a_row():

@@ -70,12 +70,21 @@ def folded(count: int) -> str:
     return unknown_content([run, run], SimpleNamespace(table=rows), None)[0]["what"]
 
 
+def selected(count: int) -> str:
+    """So many candidates, of which the readings show one."""
+    theta = np.arange(0.0, 360.0, 1.0)
+    error = np.sin(np.radians(theta)) + np.random.default_rng(71_001).normal(0.0, 0.1, 360)
+    run = ta.CalibrationRun(theta, theta + error, period=360.0)
+    return ta.select_orders(run, range(1, count + 1)).summary()
+
+
 #: What is said of so many things, and what each of those shown looks like.
 LISTS: dict[str, tuple[Callable[[int], str], str]] = {
     "orders of a model": (lambda n: model(n).summary(), r"^output +\d+ "),
     "orders of a comparison": (
         lambda n: ta.compare(model(n), model(1)).summary(), r"^ +\d+ +\S+ +\d+\.\d +\S+$"
     ),
+    "candidates of a selection": (selected, r"^ +\d+ +\d\S* +\d\S* +\d"),
     "units of a fleet": (lambda n: fleet_of(n).summary(), r"^  name\d+ +fine "),
     "files of an export": (fitted_from, r"\bname\d+"),
     "orders that others look like": (folded, r"order \d+ is really"),
@@ -99,6 +108,8 @@ def test_what_is_shown_and_what_is_told_are_all(what: str) -> None:
     for count in COUNTS:
         text = told(count)
         shown = len(re.findall(one, text, re.M))
-        left = [int(n) for n in re.findall(r"\band (\d+) (?:more|smaller|that are fine)\b", text)]
+        left = [
+            int(n) for n in re.findall(r"\band (\d+) (?:more|smaller|weaker|that are fine)\b", text)
+        ]
         assert 0 < shown < count, text
         assert [shown + n for n in left] == [count], f"{what}: {shown} shown, {left} told: {text}"
