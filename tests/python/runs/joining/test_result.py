@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -39,8 +40,6 @@ def test_every_figure_stands_with_its_own_error(errors_in, per) -> None:
 
 
 def test_what_is_declared_has_no_error() -> None:
-    from dataclasses import replace
-
     declared = replace(FOUND, offset_std_s=None, rate_std_ppm=None)
     assert "+-" not in declared.summary()
     assert declared.to_dict()["offset_std_s"] is declared.to_dict()["rate_std_ppm"] is None
