@@ -115,7 +115,7 @@ class HarmonicModel(Evaluation):
             self._check_terms()
 
     def _check_terms(self) -> None:
-        from .term import TERMS, Term  # most models have none
+        from .terms import TERMS, Term  # most models have none
 
         def meant(value: object) -> str:
             term = TERMS.get(getattr(value, "kind", ""))

@@ -54,6 +54,7 @@ RENAMED: Final = {
     "spanguard": "model.evaluation",
     "step": "model.step",
     "suggestions": "support.suggestions",
+    "terms": "model.terms",
     "turns": "support.unit_periods",
     "units": "runs.follows",
     "validity": "model.validity",

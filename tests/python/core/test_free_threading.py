@@ -13,7 +13,7 @@ import pytest
 
 import trueangle as ta
 from trueangle._core import Series
-from trueangle.terms import Backlash
+from trueangle.model.terms import Backlash
 
 THREADS = 8
 ROUNDS = 40
