@@ -22,7 +22,8 @@ from .drawing import phase
 from .effect import Effect
 from .latency import Latency
 from .presliding_hysteresis import PreslidingHysteresis
-from .search import Array, Fitted, best_shape, line_parameters
+from .search import Array, Fitted, line_parameters
+from .shapes import best_shape
 
 #: Orders that play has where a gear is eccentric or worn on one side: half of the belief.
 LIKELY = 3

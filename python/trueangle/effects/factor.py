@@ -15,9 +15,9 @@ from .effect import Effect
 from .search import (
     Array,
     Fitted,
-    best_shape,
     line_parameters,
 )
+from .shapes import best_shape
 
 
 class FactorEffect(Effect):

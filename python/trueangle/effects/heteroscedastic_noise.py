@@ -13,12 +13,11 @@ from ..estimation.projection import EXCITED
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from .effect import Effect
+from .effect import Effect, ScatterFinding
 from .outliers import Outliers
 from .scatter import (
     CLIPPED_VARIANCE,
     SQUARE_CLIP,
-    ScatterFinding,
     clipped_squares,
     standardised_residuals,
 )

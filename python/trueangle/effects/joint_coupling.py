@@ -19,7 +19,8 @@ from ..support.angles import ARCSEC_PER_DEG
 from .blindness import OWN_POWER, Blindness, share_left
 from .effect import Effect
 from .scale_error import ScaleError
-from .search import Array, Fitted, best_shape
+from .search import Array, Fitted
+from .shapes import best_shape
 
 
 class _OfOthers(Effect):

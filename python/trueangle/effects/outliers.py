@@ -17,9 +17,8 @@ from ..estimation.regression import Regression
 from ..estimation.stretches import MOST_IN_ROW, about_level, stretches, within
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from .effect import Effect
+from .effect import Effect, ScatterFinding
 from .local_defect import LocalDefect
-from .scatter import ScatterFinding
 from .search import (
     Array,
 )

@@ -23,10 +23,10 @@ from .missing_order import MissingOrder
 from .search import (
     Array,
     Fitted,
-    best_shape,
     is_gear_order,
     line_parameters,
 )
+from .shapes import best_shape
 from .torsional_compliance import TorsionalCompliance
 
 #: Orders of the reference that are searched.

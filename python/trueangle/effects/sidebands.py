@@ -21,10 +21,10 @@ from .missing_order import FREE_ANGLES, MissingOrder
 from .search import (
     Array,
     Fitted,
-    best_shape,
     known_orders,
     line_parameters,
 )
+from .shapes import best_shape
 
 #: Periods of the modulation that a run must cover for sidebands to be looked for.
 RESOLVED = 0.75

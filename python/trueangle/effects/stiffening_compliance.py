@@ -26,8 +26,8 @@ from .effect import Effect
 from .search import (
     Array,
     Fitted,
-    best_shape,
 )
+from .shapes import best_shape
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
 #: Knees searched, in shares of the largest torque.

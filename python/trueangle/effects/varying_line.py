@@ -21,7 +21,8 @@ from .drawing import carrier_order, free_line, phase
 from .effect import ALWAYS, Effect
 from .filter_lag import FilterLag
 from .load_dependent_gear_error import LoadDependentGearError
-from .search import Array, Fitted, best_shape, grid_doubt, is_gear_order, line_parameters
+from .search import Array, Fitted, grid_doubt, is_gear_order, line_parameters
+from .shapes import best_shape
 
 #: Lines at most, and the price of a broad cause: one of so many beside every narrow one.
 MOST_LINES = 2
