@@ -255,7 +255,7 @@ def fitted_to(
         problem = Problem(found, wanted, choice.argument, method, threads)
         weighted = fit_robustly(problem, loss, ROUNDING * problem.period)
     else:
-        from .summed import SummedProblem
+        from .summedproblem import SummedProblem
 
         problem = SummedProblem(summed, wanted, threads)
         weighted = fit_without_outliers(problem, len(summed.outliers))
