@@ -1,4 +1,4 @@
-"""An angle error as a constant, harmonics and terms: what a model holds, checked, and its traits."""
+"""An angle error as a constant, harmonics and terms: what a model holds, and what follows of it."""
 
 from __future__ import annotations
 

@@ -24,7 +24,8 @@ from .evidence import log_tail
 from .lookalikes import find_lookalikes
 from .noise import ReadingVariance
 from .phases import circular_range_deg
-from .table import OrderRow, OrderSelection
+from .rows import OrderRow
+from .table import OrderSelection
 from .unitgroups import ZeroGroupReadings
 from .verdicts import explained_row, selection_notes
 from .zerogroups import zero_units
