@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..support.display_units import ErrorUnit, significant
-
-if TYPE_CHECKING:
-    from .finding import Finding
+from .finding import Finding
 
 #: Parameters that say how large a finding is, the first that it has; by how much it is multiplied,
 #: and its unit where that is not the unit of errors.
