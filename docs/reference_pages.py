@@ -63,7 +63,10 @@ def _directive(name: str, members: str) -> list[str]:
         # than "alias of" (`trueangle.model.terms.Backlash` is a `BacklashTerm`).
         what.__name__ = name.rpartition(".")[2]
         kind = "autoexception" if issubclass(what, BaseException) else "autoclass"
-        return [f".. {kind}:: {name}", f"   :members: {members}".rstrip()]
+        options = [f"   :members: {members}".rstrip()]
+        if kind == "autoclass" and not members:  # what it has of the classes below it, too
+            options.append("   :inherited-members: Shown, tuple, Mapping")
+        return [f".. {kind}:: {name}", *options]
     if callable(what):
         return [f".. autofunction:: {name}"]
     return [f".. autodata:: {name}", "   :no-value:"]
