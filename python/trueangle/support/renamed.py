@@ -15,6 +15,7 @@ from typing import Any, Final
 RENAMED: Final = {
     "aliasing": "runs.aliasing",
     "angles": "support.angles",
+    "bench": "cli.benchmarks",
     "blas": "support.blas",
     "checks": "runs.checks",
     "columns": "formats.columns",

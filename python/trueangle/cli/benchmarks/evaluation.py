@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..joint.shafts import Shaft
-from ..model.model import HarmonicModel
+from ...joint.shafts import Shaft
+from ...model.model import HarmonicModel
 from .evaluationpeers import peers
 from .interleaved import Timing, interleave
 
