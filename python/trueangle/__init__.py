@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from .model import terms as terms
     from .model.file import load_model as load_model
     from .model.model import HarmonicModel as HarmonicModel
+    from .model.monitor import Monitor as Monitor
     from .model.robot import Robot as Robot
     from .model.robotfile import load_robot as load_robot
     from .model.terms import Backlash as Backlash
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from .model.terms import StiffeningCompliance as StiffeningCompliance
     from .model.terms import ThermalDrift as ThermalDrift
     from .model.terms import TorsionalCompliance as TorsionalCompliance
-    from .monitoring.monitor import Monitor as Monitor
     from .planning.arc import plan_arc as plan_arc
     from .planning.plan import plan_mounts as plan_mounts
     from .rehearsal import Rehearsal as Rehearsal
@@ -92,7 +92,7 @@ _PUBLIC = {
     "load_model": "model.file",
     "load_robot": "model.robotfile",
     "Moments": "estimation.moments",
-    "Monitor": "monitoring",
+    "Monitor": "model.monitor",
     "read_runs": "runs.files",
     "Rehearsal": "rehearsal",
     "rehearse": "rehearsal",

@@ -52,6 +52,7 @@ RENAMED: Final = {
     "runtables": "runs.tables",
     "shafts": "joint.shafts",
     "signals": "support.signals",
+    "sklearn": "fitting.sklearn",
     "spanguard": "model.evaluation",
     "step": "model.step",
     "suggestions": "support.suggestions",

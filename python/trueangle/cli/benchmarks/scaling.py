@@ -17,7 +17,7 @@ from ...estimation.moments import Moments
 from ...fitting.fit import fit
 from ...fleets.fleet import fleet
 from ...model.model import HarmonicModel
-from ...monitoring.monitor import Monitor
+from ...model.monitor import Monitor
 from ...runs.run import CalibrationRun
 from ...support.arrays import Array
 from .evaluation import harmonics
