@@ -9,9 +9,8 @@ from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 from ..support.layout import laid_out
 from ..support.layout import wrapped as _wrapped
 from .beliefs import Belief
-from .brief import brief_finding
 from .diagnosisdata import DiagnosisData
-from .finding import finding_lines, named_quantity, unit_of
+from .finding import brief_finding, finding_lines, named_quantity, unit_of
 from .goodness.evidence import Evidence
 from .goodness.scatter import AGAINST_STATED
 from .untold import ambiguity_entries

@@ -16,14 +16,9 @@ from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec, line_values
 from ..model.terms.travel import BacklashTerm
 from ..support.angles import ARCSEC_PER_DEG
-from .blindness import (
-    Blindness,
-)
+from .blindness import Blindness
 from .effect import Effect
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 
 #: Half width in standard deviations of the noise from which on the crossing of a play is looked
 #: for; steps until the half width and the travel over which it is crossed agree.

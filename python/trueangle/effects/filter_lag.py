@@ -20,18 +20,11 @@ from ..joint.pattern import Pattern, Surroundings
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import FilterLagTerm
-from .blindness import (
-    Blindness,
-)
+from .blindness import Blindness
 from .effect import Effect
 from .latency import UNTIMED, Latency
 from .missing_order import MissingOrder
-from .search import (
-    Array,
-    Fitted,
-    golden_maximum,
-    is_gear_order,
-)
+from .search import Array, Fitted, golden_maximum, is_gear_order
 
 #: Cutoffs searched, in multiples of the highest frequency at which a line passes.
 CUTOFFS = np.geomspace(0.2, 3000.0, 12)

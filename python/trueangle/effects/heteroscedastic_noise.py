@@ -15,15 +15,8 @@ from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from .effect import Effect, ScatterFinding
 from .outliers import Outliers
-from .scatter import (
-    CLIPPED_VARIANCE,
-    SQUARE_CLIP,
-    clipped_squares,
-    standardised_residuals,
-)
-from .search import (
-    Array,
-)
+from .scatter import CLIPPED_VARIANCE, SQUARE_CLIP, clipped_squares, standardised_residuals
+from .search import Array
 
 #: Logarithm of the largest ratio of a reading's variance to the mean one: a thousand times the
 #: standard deviation is more than noise of one kind does.

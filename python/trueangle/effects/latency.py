@@ -18,17 +18,9 @@ from ..model.term import Term
 from ..model.terms.motion import LatencyTerm
 from ..support.angles import ARCSEC_PER_DEG
 from .backlash import Backlash
-from .blindness import (
-    OWN_OF_VELOCITY,
-    OWN_POWER,
-    Blindness,
-    share_left,
-)
+from .blindness import OWN_OF_VELOCITY, OWN_POWER, Blindness, share_left
 from .effect import Effect
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 
 TWO_SPEEDS = (
     "move in both directions at two speeds at least a factor of 3 apart, or read at rest as well"

@@ -15,22 +15,12 @@ from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.load import LoadDependentGearErrorTerm
-from .blindness import (
-    OWN_OF_VELOCITY,
-    OWN_POWER,
-    Blindness,
-    share_left,
-)
+from .blindness import OWN_OF_VELOCITY, OWN_POWER, Blindness, share_left
 from .drawing import carrier_order, free_line, phase
 from .effect import Effect
 from .factor import FactorEffect
 from .missing_order import MissingOrder
-from .search import (
-    Array,
-    Fitted,
-    is_gear_order,
-    known_orders,
-)
+from .search import Array, Fitted, is_gear_order, known_orders
 from .thermal_drift import ThermalDrift
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 

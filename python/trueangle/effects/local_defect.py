@@ -20,17 +20,11 @@ from ..model.term import Term, from_arcsec
 from ..model.terms.place import LocalDefectTerm
 from ..support.deadline import pace
 from .argument_error import ArgumentShift
-from .blindness import (
-    Blindness,
-)
+from .blindness import Blindness
 from .drawing import visited_place
 from .effect import Effect
 from .missing_order import MissingOrder
-from .search import (
-    Array,
-    Fitted,
-    tangent_covariance,
-)
+from .search import Array, Fitted, tangent_covariance
 from .sidebands import Sidebands
 
 #: Places per turn of a shaft at which a defect is searched, and its widths in degrees.

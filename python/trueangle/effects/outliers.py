@@ -19,9 +19,7 @@ from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from .effect import Effect, ScatterFinding
 from .local_defect import LocalDefect
-from .search import (
-    Array,
-)
+from .search import Array
 
 #: Degrees of freedom of heavy-tailed noise, sizes of outliers to start from.
 TAILS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0)

@@ -15,25 +15,12 @@ from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec
 from ..model.terms.travel import PreslidingHysteresisTerm
-from .backlash import (
-    ONE_WAY,
-    Backlash,
-    goes_both_ways,
-)
+from .backlash import ONE_WAY, Backlash, goes_both_ways
 from .bends import spring_transitions
-from .blindness import (
-    Blindness,
-    share_left,
-)
+from .blindness import Blindness, share_left
 from .effect import Effect
 from .latency import TWO_SPEEDS, Latency
-from .search import (
-    Array,
-    Fitted,
-    golden_maximum,
-    of_one_sign,
-    tangent_covariance,
-)
+from .search import Array, Fitted, golden_maximum, of_one_sign, tangent_covariance
 
 _AFTER_REVERSAL = (
     "record the first 10 to 30 deg after each reversal in steps of 0.3 deg or less, "

@@ -17,10 +17,7 @@ from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.place import ScaleErrorTerm
 from .effect import Effect
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 
 
 @dataclass(frozen=True)

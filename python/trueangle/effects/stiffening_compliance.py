@@ -16,17 +16,10 @@ from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec
 from ..model.terms.load import StiffeningComplianceTerm
 from .bends import columns_beyond
-from .blindness import (
-    OWN_POWER,
-    Blindness,
-    share_left,
-)
+from .blindness import OWN_POWER, Blindness, share_left
 from .drawing import largest_signal
 from .effect import Effect
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 from .shapes import best_shape
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 

@@ -15,17 +15,10 @@ from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec, line_values
 from ..model.terms.place import ThermalDriftTerm
 from .backlash import Backlash
-from .blindness import (
-    LEAST_KELVIN,
-    Blindness,
-)
+from .blindness import LEAST_KELVIN, Blindness
 from .effect import Effect
 from .factor import FactorEffect
-from .search import (
-    Array,
-    Fitted,
-    known_orders,
-)
+from .search import Array, Fitted, known_orders
 from .torsional_compliance import TorsionalCompliance
 
 #: Temperature at which the simulation's lines hold, degrees Celsius.

@@ -14,17 +14,10 @@ from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec, line_values
 from ..model.terms.load import TorsionalComplianceTerm
-from .blindness import (
-    OWN_POWER,
-    Blindness,
-    share_left,
-)
+from .blindness import OWN_POWER, Blindness, share_left
 from .effect import Effect
 from .factor import FactorEffect
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 
 
 @dataclass(frozen=True)

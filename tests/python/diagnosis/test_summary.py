@@ -10,8 +10,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.beliefs import Belief
-from trueangle.diagnosis.brief import brief_finding
-from trueangle.diagnosis.finding import Finding
+from trueangle.diagnosis.finding import Finding, brief_finding
 from trueangle.diagnosis.gain import Gain
 from trueangle.diagnosis.levels import LevelGain
 from trueangle.diagnosis.summary import diagnosis_summary
