@@ -1,12 +1,14 @@
 //! Readings of one segment, added to its moments side by side: a reading to a lane.
 
-use super::chunk::Chunk;
 use super::segment::{LANES, Segment};
 use crate::simd::Lanes;
 
 /// Readings that are added together: the sums over the lanes at the end cost as much as
 /// some thirty.
 pub(super) const TOGETHER: usize = 128;
+
+/// Readings prepared at a time: no more than a row holds.
+pub(super) const CHUNK: usize = 128;
 
 /// As many, and the last of those that come by vectors.
 pub(super) const ROOM: usize = TOGETHER + LANES;
@@ -37,10 +39,16 @@ impl Row {
 
     /// Puts `LEN` readings of a chunk, from the `i`-th, at `at`.
     #[inline(always)]
-    pub(super) fn put<const LEN: usize>(&mut self, at: usize, chunk: &Chunk, i: usize) {
+    pub(super) fn put<const LEN: usize>(
+        &mut self,
+        at: usize,
+        place: &[f64; CHUNK],
+        error: &[f64; CHUNK],
+        i: usize,
+    ) {
         for k in 0..LEN {
-            self.place[at + k] = chunk.place[i + k];
-            self.error[at + k] = chunk.error[i + k];
+            self.place[at + k] = place[i + k];
+            self.error[at + k] = error[i + k];
         }
     }
 

@@ -7,6 +7,8 @@ from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+import trueangle._core as _core
+
 from ..errors import ArgumentError
 from ..support.kinds import of_type, told_kinds
 from ..support.plainresult import result_picture
@@ -111,7 +113,7 @@ class HarmonicModel(ErrorModel):
 
     def _prepared(self) -> Any:
         """What corrects one sample at a time, in the core."""
-        return self._core_corrector() if self.terms else self._series.compensator()
+        return self._core_corrector() if self.terms else _core.Compensator(self._series)
 
     # -- description --------------------------------------------------------------
 
