@@ -3,7 +3,7 @@
 PYTHON ?= .venv/bin/python
 
 .PHONY: check quick format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
-.PHONY: looks nightly exam walks asan kills pythons readings chance chance-core
+.PHONY: looks transcripts nightly exam walks asan kills pythons readings chance chance-core
 
 # Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
 CASES ?= 20000
@@ -59,6 +59,9 @@ quick:              ## what to run while working: style and the quick tests, a m
 
 python:             ## tests of the package
 	$(PYTHON) -m pytest -n auto --dist worksteal
+
+transcripts:        ## write anew what commands print and write, after a change that is meant; read the difference
+	TRUEANGLE_APPROVE=1 $(PYTHON) -m pytest -q -n auto --dist worksteal tests/python/transcripts
 
 exam:               ## the diagnosis' own exam at full size: an hour or more, figures asserted
 	TRUEANGLE_NIGHTLY=1 TRUEANGLE_EXAM_SEEDS=20 $(PYTHON) -m pytest -s \

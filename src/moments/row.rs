@@ -46,10 +46,8 @@ impl Row {
         error: &[f64; CHUNK],
         i: usize,
     ) {
-        for k in 0..LEN {
-            self.place[at + k] = place[i + k];
-            self.error[at + k] = error[i + k];
-        }
+        self.place[at..at + LEN].copy_from_slice(&place[i..i + LEN]);
+        self.error[at..at + LEN].copy_from_slice(&error[i..i + LEN]);
     }
 
     /// Moves what is beyond the full row to its start.

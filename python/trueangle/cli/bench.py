@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from typing import Any
 
 from ..support.files import PICTURE
+from ..support.plainresult import json_text
 from .paths import Output
 from .pictures import save_picture
 
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         medians["fits"] = {
             f"{row.name}, {row.case.samples} readings": 1e9 * row.timing.median for row in fits
         }
-        print(json.dumps({"path": path, "nanoseconds": medians, "missing": missing}, indent=2))
+        print(json_text({"path": path, "nanoseconds": medians, "missing": missing}, indent=2))
         return 0
     print(f"default path: {path}")
     for part, rows in parts.items():
@@ -121,7 +121,7 @@ def _scaling(args: argparse.Namespace) -> int:
     if args.plot is not None:
         _draw(args.plot, grown, costs)
     if args.json:
-        print(json.dumps(_scaling_values([*grown, *orders, *shared], costs), indent=2))
+        print(json_text(_scaling_values([*grown, *orders, *shared], costs), indent=2))
         return 0
     print(
         f"{'work':16}{'readings':>12}{'orders':>8}{'threads':>8}{'seconds':>12}{'ns/reading':>12}"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FileError
+from ..support.plainresult import json_text
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, robot_messages
 from .signal_options import add_signals, reading
@@ -76,7 +76,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     checks = {joint: result for joint, (result, _) in found.items()}
     if args.json:
         plain = {joint: result.to_dict() for joint, result in checks.items()}
-        print(json.dumps({"joints": plain, "ranking": plain_ranking(ranking)}, indent=2))
+        print(json_text({"joints": plain, "ranking": plain_ranking(ranking)}, indent=2))
     else:
         texts = {row.joint: checks[row.joint].summary() for row in ranking}
         print(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import json
 
+from ..support.plainresult import json_text
 from .options import add_errors_in, errors_in
 from .paths import Input
 from .robotmodel import model_asked
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     first, second = (model_asked(path, args.joint) for path in (args.first, args.second))
     result = compare(first, second)
     if args.json:
-        print(json.dumps(result.to_dict(), allow_nan=False))
+        print(json_text(result.to_dict()))
     else:
         print(result.summary(errors_in(args)))
     return 0

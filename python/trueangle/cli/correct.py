@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError, TrueAngleError
 from ..support.display_units import ErrorsIn, error_unit
+from ..support.plainresult import json_text
 from ..support.suggestions import did_you_mean, listed_names
 from .options import add_errors_in, errors_in
 from .paths import Input, ModelInput
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
         report=(lambda log: None) if args.json else (lambda log: _print(log, errors_in(args))),
     )
     if args.json:
-        print(json.dumps(result.to_dict()))
+        print(json_text(result.to_dict()))
     else:
         _total(result)
     return _status(result)

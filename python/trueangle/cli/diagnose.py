@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 from ..errors import ArgumentError, NoModelError, TrueAngleError
 from ..support.deadline import ending_early
 from ..support.files import MODEL, SENSOR, SIMULATION
+from ..support.plainresult import json_text
 from .options import add_argument_choice, add_errors_in, add_joint, add_progress, errors_in
 from .paths import Input, Output
 from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
@@ -175,7 +175,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     ranking = ranked(diagnosed_rank(joint, result) for joint, result in found.items())
     if args.json:
         plain = {joint: result.to_dict() for joint, result in found.items()}
-        print(json.dumps({"joints": plain, "ranking": plain_ranking(ranking)}, allow_nan=False))
+        print(json_text({"joints": plain, "ranking": plain_ranking(ranking)}))
     else:
         texts = {row.joint: found[row.joint].summary(errors_in(args)) for row in ranking}
         title = f"Diagnosis of {name or 'the robot'}, the worst joint first:"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from ..support.plainresult import json_text
 from .options import add_errors_in, errors_in
 from .paths import Input, Output
 from .robotmodel import model_asked
@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
             options.pop("joint", None)
     made = export_model(model, args.to, args.output, max_arcsec=args.max_arcsec, **options)
     if args.json:
-        print(json.dumps(made.to_dict(), allow_nan=False))
+        print(json_text(made.to_dict()))
         for note in made.notes:
             print(f"trueangle: note: {note}", file=sys.stderr)
     else:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
+from ..support.plainresult import json_text
 from .onepass import add_one_pass, log_options, wants_one_pass
 from .options import (
     add_argument_choice,
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     result = _fitted(args)
     result.model.save(args.output)
     if args.json:
-        print(json.dumps({"model": args.output, **result.to_dict()}))
+        print(json_text({"model": args.output, **result.to_dict()}))
     else:
         print(result.summary(errors_in(args)))
         print(f"\nsaved {args.output}")
@@ -113,7 +113,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     if args.json:
         plain = {joint: fit.to_dict() for joint, fit in fits.items()}
         rows = plain_ranking(ranking)
-        print(json.dumps({"model": args.output, "joints": plain, "ranking": rows}))
+        print(json_text({"model": args.output, "joints": plain, "ranking": rows}))
     else:
         told_of = [row.joint for row in ranking if row.joint in fits]
         texts = {joint: fits[joint].summary(errors_in(args)) for joint in told_of}

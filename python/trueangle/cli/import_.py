@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 
 from ..support.angles import zero_text
 from ..support.display_units import error_unit
+from ..support.plainresult import json_text
 from .export import add_target_options, target_options
 from .options import add_errors_in, add_model_output, errors_in
 from .paths import Input
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
             "terms": [term.kind for term in model.terms],
             "resolution_arcsec": (model.fit.residual or 0.0) * unit if model.fit else None,
         }
-        print(json.dumps(content, allow_nan=False))
+        print(json_text(content))
         return 0
     print(
         f"{args.output}: {len(rows)} orders, "

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import json
 from typing import Any
 
+from ..support.plainresult import json_text
 from .options import add_errors_in, add_runs_output, errors_in
 from .paths import Input
 from .signal_options import add_signals, signals_by_joint
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     )
     found.save(args.output)
     if args.json:
-        print(json.dumps({"output": args.output, **found.to_dict()}, allow_nan=False))
+        print(json_text({"output": args.output, **found.to_dict()}))
     else:
         print(found.summary(errors_in(args)))
         print(f"\nsaved {args.output}")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
+from ..support.plainresult import json_text
 from .onepass import add_one_pass, log_options, wants_one_pass
 from .options import (
     add_argument_choice,
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     if asked is not None:
         tables, _ = each_joint(asked[1], _of_joint)
         if args.json:
-            print(json.dumps({"joints": {joint: t.to_dict() for joint, t in tables.items()}}))
+            print(json_text({"joints": {joint: t.to_dict() for joint, t in tables.items()}}))
         else:
             unit = errors_in(args)
             print("\n\n".join(f"--- {j} ---\n{t.summary(unit)}" for j, t in tables.items()))

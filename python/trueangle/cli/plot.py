@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from ..support.files import PICTURE
 from ..support.layout import laid_out
+from ..support.plainresult import json_text
 from .options import add_errors_in, add_joint, add_orders, errors_in
 from .paths import Input, Output
 from .pictures import save_picture
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     save_picture(axes, args.output)
     shows = text_alternative(axes)
     if args.json:
-        print(json.dumps({"output": args.output, "shows": shows}))
+        print(json_text({"output": args.output, "shows": shows}))
     else:
         print(laid_out([shows, f"saved {args.output}"]))
     return 0

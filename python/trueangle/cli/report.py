@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from ..support.deadline import with_pace
 from ..support.files import PDF, REPORT
+from ..support.plainresult import json_text
 from .options import add_errors_in, add_joint, add_orders, add_progress, errors_in
 from .paths import Input, Output
 from .robots import add_robot, each_joint, joints_asked
@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
     if args.pdf is not None:
         made.save_pdf(args.pdf)
     if args.json:
-        print(json.dumps(made.content, indent=2, allow_nan=False))
+        print(json_text(made.content, indent=2))
     else:
         print(args.output)
     return 0
@@ -124,7 +124,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     made = RobotReport(args.title or f"Angle error of {name or 'a robot'}", found, errors_in(args))
     made.save(args.output)
     if args.json:
-        print(json.dumps(made.to_dict(), indent=2, allow_nan=False))
+        print(json_text(made.to_dict(), indent=2))
     else:
         print(f"{made.summary()}\n\n{args.output}")
     return 0

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import json
 
 from ..support.files import SIMULATION
+from ..support.plainresult import json_text
 from .paths import Input, Output
 
 HELP = "write a robot file: names and gear ratios of the joints of a URDF"
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     robot.save(args.output)
     joints = [{"name": joint.name, "gear_ratio": joint.gear_ratio} for joint in robot.joints]
     if args.json:
-        print(json.dumps({"robot": args.output, "name": robot.name, "joints": joints}))
+        print(json_text({"robot": args.output, "name": robot.name, "joints": joints}))
         return 0
     for joint in joints:
         ratio = joint["gear_ratio"]

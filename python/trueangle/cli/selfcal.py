@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
+from ..support.plainresult import json_text
 from .options import add_errors_in, add_model_output, errors_in
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, save_models
@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     if args.json:
-        print(json.dumps({"model": args.output, **result.to_dict()}, allow_nan=False))
+        print(json_text({"model": args.output, **result.to_dict()}))
     else:
         print(result.summary(errors_in(args)))
         print(f"\nsaved {args.output}")
@@ -98,7 +98,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     save_models(args.output, name, joints, {joint: r.model for joint, r in found.items()})
     if args.json:
         plain = {joint: result.to_dict() for joint, result in found.items()}
-        print(json.dumps({"model": args.output, "joints": plain}, allow_nan=False))
+        print(json_text({"model": args.output, "joints": plain}))
     else:
         for joint, result in found.items():
             print(f"--- {joint} ---\n{result.summary(errors_in(args))}\n")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import json
 
+from ..support.plainresult import json_text
 from .options import add_runs_output
 from .paths import Input
 
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     runs = simulate(load_simulation(args.simulation), seed=args.seed)
     samples = write_runs(runs, args.output)
     if args.json:
-        print(json.dumps({"runs": len(runs), "samples": samples, "output": args.output}))
+        print(json_text({"runs": len(runs), "samples": samples, "output": args.output}))
     else:
         print(f"{args.output}: {samples} readings in {len(runs)} run{'s'[: len(runs) != 1]}")
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from ..support.files import PAGE, PICTURE
+from ..support.plainresult import json_text
 from .options import add_errors_in, errors_in
 from .paths import Input, Output
 from .pictures import save_picture
@@ -156,7 +156,7 @@ def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace)
 
     scale = arcsec(1.0, model.period)
     if args.json:
-        return json.dumps(window.plain(scale), allow_nan=False)
+        return json_text(window.plain(scale))
     largest = max(window.orders, key=lambda row: row.amplitude)
     size = scale * largest.amplitude
     shown = error_unit(errors_in(args), size, model.period)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,7 +13,7 @@ from ..joint.signals import join_runs
 from ..runs.checks import DataFault
 from ..simulation.measured import design_of
 from ..simulation.simulation import Simulation
-from ..support.plainresult import counted
+from ..support.plainresult import counted, json_text
 from .beliefs import Belief
 from .correctable import Correctable
 from .discrepancy import Discrepancy
@@ -200,7 +199,7 @@ class DiagnosisData(Correctable):
 
     def to_json(self, extended_simulation: str | None = None) -> str:
         """`to_dict` as JSON text."""
-        return json.dumps(self.to_dict(extended_simulation), indent=2, allow_nan=False)
+        return json_text(self.to_dict(extended_simulation), indent=2)
 
     def _brief(self) -> str:
         sure = [finding.cause for finding in self.findings if finding.confirmed]

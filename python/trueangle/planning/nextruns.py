@@ -121,7 +121,14 @@ class NextRuns(PlainResult):
                 times = f" to {labels[-1]}, {len(labels)} times the same" if len(labels) > 1 else ""
                 lines.append(f"  {labels[0]}{times}")
                 lines += [f"    - {step}" for step in steps]
+        shown = {
+            entry.causes[0]: None
+            for entry in self.between
+            if entry.told and len(entry.causes) == 1 and not entry.seen
+        }
         for entry in self.between:
+            if entry.told and entry.causes[0] in shown and len(entry.causes) == 1:
+                continue
             names = " or ".join(entry.causes)
             if not entry.told:
                 text = f"  not distinguished: {names}"
@@ -133,7 +140,10 @@ class NextRuns(PlainResult):
                 text += f": BIC better by {entry.expected_bic:.0f} expected for the true one"
                 by = f" ({entry.trials} simulated)" if entry.trials else ""
                 text += f", named in {100.0 * entry.chance_named:.0f} %{by}"
-            lines.append(text)
+            if text not in lines:  # of two lines of the pattern the same may be asked
+                lines.append(text)
+        if shown:
+            lines.append(f"  shows {', '.join(shown)}")
         if self.beyond:
             lines.append(f"  beyond what was seen so far: {', '.join(self.beyond)}")
         lines += [f"  note: {note}" for note in self.notes]

@@ -21,22 +21,15 @@ def factor_table(factors: dict[float, float]) -> list[str]:
 
 def plain_arc_plan(plan: Any, kind: str) -> dict[str, Any]:
     """The JSON object of a plan of readings at places: lists, and orders as the keys of objects."""
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {f"{order:g}": one for order, one in value.items()}
-        return list(value) if isinstance(value, tuple) else value
-
-    fields = {name: plain(value) for name, value in vars(plan).items()}
-    return {"kind": kind, **fields, "readings": plan.readings}
+    return {"kind": kind, **plain(vars(plan)), "readings": plan.readings}
 
 
 def plain(value: Any) -> Any:
-    """Orders as keys of an object; what is not finite is None."""
+    """Orders as keys of an object, tuples as lists; what is not finite is None."""
     if isinstance(value, dict):
         return {
             (f"{k:g}" if isinstance(k, (int, float)) else k): plain(v) for k, v in value.items()
         }
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return [plain(entry) for entry in value]
     return value if not isinstance(value, float) or math.isfinite(value) else None

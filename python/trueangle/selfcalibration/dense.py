@@ -13,7 +13,13 @@ from ..support.arrays import Array
 from .projected import NOT_SEEN, Projected, Unknown
 
 #: Variances of random terms that are tried, relative to the noise (powers of ten).
-_VARIANCES: Final = np.concatenate([[-math.inf], np.linspace(-4.0, 10.0, 57)])
+_POWERS: Final = (-math.inf, *np.linspace(-4.0, 10.0, 57).tolist())
+
+#: No variance at all: a prior so tight that the term is nothing.
+_NO_VARIANCE: Final = 1e-24
+
+#: Singular values of patterns below this share of the largest are not seen.
+_RANK: Final = 1e-9
 
 #: Correlation of neighbouring residuals from which standard errors are taken from blocks.
 _CORRELATED: Final = 0.1
@@ -147,65 +153,66 @@ class _Solved:
     right: Array
     noise: float
     freedom: float
-    evidence: float
 
 
 def _solve(
     triangle: Array, p: int, m: int, random: Sequence[int], variance: float, count: float
 ) -> _Solved:
-    rows = [triangle]
-    if len(random):
-        prior = np.zeros((len(random), triangle.shape[1]))
-        # No variance at all: a prior so tight that the term is nothing.
-        prior[np.arange(len(random)), list(random)] = 1.0 / math.sqrt(max(variance, 1e-24))
-        rows.append(prior)
-    r: Array = np.asarray(np.linalg.qr(np.concatenate(rows), mode="r"))
-    root, right = r[p : p + m, p : p + m], r[p : p + m, -1]
-    left = r[p + m :, -1]
-    corner = r[:p, :p]
+    prior = np.zeros((len(random), triangle.shape[1]))
+    prior[np.arange(len(random)), list(random)] = 1.0 / math.sqrt(max(variance, _NO_VARIANCE))
+    r: Array = np.asarray(np.linalg.qr(np.concatenate([triangle, prior]), mode="r"))
+    root, right, left = r[p : p + m, p : p + m], r[p : p + m, -1:], r[p + m :, -1]
     # Patterns that nothing shows leave the sum of squares as it is: pseudo-inverse.
-    values = np.linalg.svd(root, compute_uv=False) if m else np.zeros(0)
-    rank = int((values > 1e-9 * max(float(values.max(initial=0.0)), 1e-300)).sum())
-    fixed = p - len(random) + rank
-    freedom = max(count - fixed, 1.0)
-    squares = float(left @ left)
-    squares += _out_of_reach(root, right)
-    diagonal = np.abs(np.diagonal(corner))
-    seen = diagonal > 1e-12 * max(float(diagonal.max(initial=0.0)), 1e-300)
-    twice = (
-        freedom * math.log(max(squares, 1e-300) / freedom)
-        + 2.0 * float(np.log(diagonal[seen]).sum())
-        + 2.0 * float(np.log(values[values > 1e-9 * values.max(initial=1e-300)]).sum())
-        + len(random) * math.log(max(variance, 1e-24))
-    )
+    seen, lost = _split(root, right)
+    freedom = max(count - (p - len(random) + seen.size), 1.0)
+    squares = float(left @ left) + float(np.sum(lost**2))
     return _Solved(
-        corner,
-        r[:p, p : p + m],
-        r[:p, -1],
-        root,
-        right,
-        squares / freedom,
-        freedom,
-        -0.5 * twice,
+        r[:p, :p], r[:p, p : p + m], r[:p, -1], root, right[:, 0], squares / freedom, freedom
     )
 
 
-def _out_of_reach(root: Array, right: Array) -> float:
-    """Squares along directions in which the patterns have no information."""
+def _split(root: Array, right: Array) -> tuple[Array, Array]:
+    """Singular values that are seen, and what stands beside the directions of the others."""
     if root.size == 0:
-        return 0.0
-    u, s, _ = np.linalg.svd(root)
-    lost = s <= 1e-9 * s.max(initial=1e-300)
-    return float(((u[:, lost].T @ right) ** 2).sum())
+        return np.zeros(0), right
+    u, values, _ = np.linalg.svd(root)
+    seen = values > _RANK * max(float(values.max(initial=0.0)), 1e-300)
+    return values[seen], u[:, ~seen].T @ right
 
 
 def _best_variance(triangle: Array, p: int, m: int, random: Sequence[int], count: float) -> float:
-    found = [
-        (_solve(triangle, p, m, random, 10.0**power if math.isfinite(power) else 0.0, count), power)
-        for power in _VARIANCES
-    ]
-    best = max(found, key=lambda pair: pair[0].evidence)[1]
-    return 10.0**best if math.isfinite(best) else 0.0
+    """The variance of the random nuisances by their evidence, to a quarter of a decade."""
+    return max((10.0**power for power in _POWERS), key=_evidence(triangle, p, m, random, count))
+
+
+def _evidence(
+    triangle: Array, p: int, m: int, random: Sequence[int], count: float
+) -> Callable[[float], float]:
+    """The restricted likelihood of a variance of the random nuisances, up to a constant.
+
+    With their columns last, what a variance changes is the small triangle R of these alone::
+
+        -2 log L = f log(S/f) + log det(R'R + I/v) + k log v
+    """
+    last = list(random)
+    first = np.delete(np.arange(p + m), last)
+    turned: Array = np.asarray(np.linalg.qr(triangle[:, [*first, *last, p + m]], mode="r"))
+    at = first.size
+    seen, lost = _split(turned[:at, :at], turned[:at, at:])
+    small = np.concatenate([lost, turned[at:, at:]])
+    freedom = max(count - seen.size, 1.0)
+
+    def evidence(variance: float) -> float:
+        variance = max(variance, _NO_VARIANCE)
+        prior = np.eye(len(last), len(last) + 1) / math.sqrt(variance)
+        r = np.linalg.qr(np.concatenate([small, prior]), mode="r")
+        squares = float(np.sum(r[len(last) :, -1] ** 2))
+        diagonal = np.abs(np.diagonal(r)[: len(last)])
+        twice = freedom * math.log(max(squares, 1e-300) / freedom)
+        twice += 2.0 * float(np.log(diagonal).sum()) + len(last) * math.log(variance)
+        return -0.5 * twice
+
+    return evidence
 
 
 def fixed_point(fit_at: Callable[[Array], DenseFit], size: int) -> DenseFit:

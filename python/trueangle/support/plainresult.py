@@ -71,7 +71,7 @@ class PlainResult(Shown):
 
     def to_json(self) -> str:
         """`to_dict` as JSON text."""
-        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
+        return json_text(self.to_dict(), indent=2)
 
 
 def counted(things: Sized | int, one: str, several: str = "") -> str:
@@ -89,6 +89,25 @@ def counted(things: Sized | int, one: str, several: str = "") -> str:
 def finite(value: float) -> float | None:
     """A number that JSON can hold, else None."""
     return float(value) if math.isfinite(value) else None
+
+
+def json_text(value: Any, indent: int | None = None) -> str:
+    """Plain values as JSON text; a number that is not finite, which JSON has no word for, is null.
+
+    Examples
+    --------
+    >>> json_text({"factor": math.inf, "orders": (1, 2.5)})
+    '{"factor": null, "orders": [1, 2.5]}'
+    """
+
+    def plain(entry: Any) -> Any:
+        if isinstance(entry, float):
+            return finite(entry)
+        if isinstance(entry, Mapping):
+            return {name: plain(one) for name, one in entry.items()}
+        return [plain(one) for one in entry] if isinstance(entry, (list, tuple)) else entry
+
+    return json.dumps(plain(value), indent=indent, allow_nan=False)
 
 
 def result_picture(result: object, *args: Any, **options: Any) -> Any:

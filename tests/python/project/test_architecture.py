@@ -37,7 +37,7 @@ def test_what_the_page_names_is_there(place):
 
 def test_tests_mirror_rooms():
     """A folder of tests is a room's, or one of those that belong to none."""
-    apart = {"core", "hidden", "injection", "project"}
+    apart = {"core", "hidden", "injection", "project", "transcripts"}
     folders = {path.parent.name for path in (ROOT / "tests" / "python").glob("*/__init__.py")}
     assert folders - apart <= set(rooms_of_the_table())
     assert not [path.name for path in (ROOT / "tests" / "python").glob("test_*.py")]

@@ -1,0 +1,160 @@
+"""What files and figures hold, as lines to be compared: every name, and numbers to six digits."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+
+#: Digits of a number in the view of a file; and below it nothing but rounding is told.
+DIGITS = 6
+NOTHING = 1e-9
+
+#: So many numbers in a row are shown one by one.
+FEW = 12
+
+
+def file_lines(text: str, ending: str) -> list[str]:
+    """The view of a file's text by its ending."""
+    if ending == ".json":
+        return list(_json_lines("", json.loads(text)))
+    if ending in (".csv", ".txt") and "," in text:
+        return _table_lines(text)
+    if ending == ".html":
+        return _page_lines(text)
+    return text.splitlines()
+
+
+def shown(value: Any) -> str:
+    """A number to six digits, anything else as JSON has it."""
+    if isinstance(value, float):
+        if abs(value) < NOTHING:
+            return "0"
+        return f"{value:.{DIGITS}g}"
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+
+
+def numbers_line(values: Any) -> str:
+    """Many numbers as how many they are, their ends, mean, spread and what their order makes."""
+    values = np.asarray(values, dtype=float)
+    whole = values[np.isfinite(values)]
+    if not whole.size:
+        return f"{values.size} numbers, none finite"
+    place = np.linspace(-1.0, 1.0, values.size)[np.isfinite(values)]
+    told = {
+        "first": values[0], "last": values[-1], "least": whole.min(), "most": whole.max(),
+        "mean": whole.mean(), "rms": np.sqrt(np.mean(whole**2)), "slope": np.mean(place * whole),
+    }  # fmt: skip
+    missing = f" ({values.size - whole.size} missing)" if whole.size < values.size else ""
+    return f"{values.size} numbers{missing}: " + ", ".join(
+        f"{name} {shown(float(value))}" for name, value in told.items()
+    )
+
+
+def _plain(value: Any) -> str | None:
+    """What stands on one line: a value, or a list of values."""
+    if isinstance(value, dict):
+        return None
+    if not isinstance(value, list):
+        return shown(value)
+    if len(value) > FEW and all(isinstance(v, int | float) or v is None for v in value):
+        return numbers_line([np.nan if v is None else v for v in value])
+    if any(isinstance(v, dict | list) for v in value):
+        return None
+    return "[" + ", ".join(map(shown, value)) + "]"
+
+
+def _json_lines(path: str, value: Any) -> Iterator[str]:
+    """One line for every object, with its path."""
+    if isinstance(value, dict):
+        told = {name: _plain(entry) for name, entry in value.items()}
+        line = ", ".join(f"{name} {text}" for name, text in told.items() if text is not None)
+        if line or not value:
+            yield f"{path}: {line}"
+        for name, text in told.items():
+            if text is None:
+                yield from _json_lines(f"{path}.{name}", value[name])
+    elif (text := _plain(value)) is not None:
+        yield f"{path}: {text}"
+    else:
+        for k, entry in enumerate(value):
+            yield from _json_lines(f"{path}[{k}]", entry)
+
+
+def _numbers(cells: list[str]) -> list[float] | None:
+    try:
+        return [float(cell) if cell else np.nan for cell in cells]
+    except ValueError:
+        return None
+
+
+def _table_lines(text: str) -> list[str]:
+    """The lines above a table, and a line for each of its columns."""
+    above = [line for line in text.splitlines() if line.startswith("#")]
+    rows = list(csv.reader(line for line in io.StringIO(text) if not line.startswith("#")))
+    lines = [*above, f"{len(rows) - 1} rows"]
+    for name, *cells in zip(*rows, strict=False):
+        numbers = _numbers(cells)
+        if numbers is None or len(numbers) <= FEW:
+            kinds = list(dict.fromkeys(cells))
+            lines.append(f"{name}: " + ", ".join(kinds[:FEW]) + (" ..." * (len(kinds) > FEW)))
+        else:
+            lines.append(f"{name}: {numbers_line(numbers)}")
+    return lines
+
+
+class _Page(HTMLParser):
+    """Words of a page, a line for each of its blocks; data of its scripts are left out."""
+
+    INLINE = frozenset({"a", "abbr", "b", "code", "em", "i", "span", "strong", "sub", "sup", "td"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.words = ""
+        self._silent = 0
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:
+        self._silent += tag in ("script", "style")
+        self.words += " " if tag in self.INLINE else "\n"
+
+    def handle_endtag(self, tag: str) -> None:
+        self._silent -= tag in ("script", "style")
+        self.words += " " if tag in self.INLINE else "\n"
+
+    def handle_data(self, data: str) -> None:
+        if not self._silent:
+            self.words += re.sub(r"\s+", " ", data)
+
+
+def _page_lines(text: str) -> list[str]:
+    page = _Page()
+    page.feed(text)
+    lines = (re.sub(r" +", " ", line).strip() for line in page.words.splitlines())
+    return [line for line in lines if line]
+
+
+def figure_lines(figure: Any) -> Iterator[str]:
+    """Titles, names of axes and legends, and the numbers of every line and heap of points."""
+    for axes in figure.axes:
+        yield " | ".join([axes.get_title(), axes.get_xlabel(), axes.get_ylabel()])
+        legend = axes.get_legend()
+        if legend is not None:
+            yield "  legend: " + "; ".join(text.get_text() for text in legend.get_texts())
+        for text in axes.texts:
+            yield f"  text: {text.get_text()!r}"
+        for kind, drawn in (("line", axes.lines), ("points", axes.collections)):
+            for artist in drawn:
+                data = artist.get_xydata() if kind == "line" else artist.get_offsets()
+                xy = np.asarray(data, dtype=float)
+                if xy.size > 2:
+                    yield f"  {kind} {artist.get_label()!r} x: {numbers_line(xy[:, 0])}"
+                    yield f"  {kind} {artist.get_label()!r} y: {numbers_line(xy[:, 1])}"
+        heights = [patch.get_height() for patch in axes.patches if hasattr(patch, "get_height")]
+        if heights:
+            yield f"  bars: {numbers_line(heights)}"
