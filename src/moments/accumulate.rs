@@ -8,9 +8,8 @@
 //! Readings wait for others of their segment, which are taken side by side in the lanes of
 //! vectors, where the segments are few enough for that.
 
-use super::chunk::Chunk;
+use super::chunk::{CHUNK, Chunk};
 use super::place::{Around, Frame};
-use super::row::CHUNK;
 use super::segment::{LANES, Segment};
 use super::waiting::Waiting;
 use crate::readings::Readings;

@@ -1,9 +1,12 @@
 //! Some readings made ready: their places, and their errors from the centre.
 
 use super::place::{Around, Frame};
-use super::row::{CHUNK, ONES, Row};
+use super::row::{ONES, Row};
 use super::segment::{LANES, Segment};
 use crate::simd::Lanes;
+
+/// Readings prepared at a time: no more than a row holds.
+pub(super) const CHUNK: usize = 128;
 
 /// Readings in one segment from which lanes save more than their sums cost at the end.
 const RUN: usize = 24;
@@ -86,7 +89,7 @@ impl Chunk {
                 let (mut row, mut weights) = (Row::EMPTY, ONES);
                 weights[..run].copy_from_slice(&self.weight[start..start + run]);
                 for i in 0..run {
-                    row.put::<1>(i, &self.place, &self.error, start + i);
+                    self.put::<1>(start + i, &mut row, i);
                 }
                 row.add_some::<L>(run, &mut weights, moments);
             } else {
@@ -95,6 +98,15 @@ impl Chunk {
                 }
             }
             start += run;
+        }
+    }
+
+    /// Puts `LEN` readings, from the `i`-th, into a row at `at`.
+    #[inline(always)]
+    pub(super) fn put<const LEN: usize>(&self, i: usize, row: &mut Row, at: usize) {
+        for k in 0..LEN {
+            row.place[at + k] = self.place[i + k];
+            row.error[at + k] = self.error[i + k];
         }
     }
 

@@ -7,9 +7,6 @@ use crate::simd::Lanes;
 /// some thirty.
 pub(super) const TOGETHER: usize = 128;
 
-/// Readings prepared at a time: no more than a row holds.
-pub(super) const CHUNK: usize = 128;
-
 /// As many, and the last of those that come by vectors.
 pub(super) const ROOM: usize = TOGETHER + LANES;
 
@@ -21,8 +18,8 @@ const ERRORS: u8 = 2;
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct Row {
-    place: [f64; ROOM],
-    error: [f64; ROOM],
+    pub(super) place: [f64; ROOM],
+    pub(super) error: [f64; ROOM],
 }
 
 /// Weights of the readings of a row.
@@ -36,19 +33,6 @@ impl Row {
         place: [0.0; ROOM],
         error: [0.0; ROOM],
     };
-
-    /// Puts `LEN` readings of a chunk, from the `i`-th, at `at`.
-    #[inline(always)]
-    pub(super) fn put<const LEN: usize>(
-        &mut self,
-        at: usize,
-        place: &[f64; CHUNK],
-        error: &[f64; CHUNK],
-        i: usize,
-    ) {
-        self.place[at..at + LEN].copy_from_slice(&place[i..i + LEN]);
-        self.error[at..at + LEN].copy_from_slice(&error[i..i + LEN]);
-    }
 
     /// Moves what is beyond the full row to its start.
     #[inline(always)]
