@@ -16,8 +16,8 @@ import platform
 import numpy as np
 
 from latency import histogram, paced
-from trueangle.bench import evaluation
-from trueangle.bench.evaluation import EvaluationRow
+from trueangle.cli.benchmarks import evaluation
+from trueangle.cli.benchmarks.evaluation import EvaluationRow
 
 
 def show(title: str, rows: list[EvaluationRow], base: str, ratio: str) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from trueangle import _core
-from trueangle.bench.fit import Case, FitRow, design, measure, peers, readings
+from trueangle.cli.benchmarks.fit import Case, FitRow, design, measure, peers, readings
 
 
 def show(rows: list[FitRow]) -> None:

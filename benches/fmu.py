@@ -12,7 +12,7 @@ import numpy as np
 
 import trueangle as ta
 from trueangle import terms as T
-from trueangle.bench.interleaved import interleave
+from trueangle.cli.benchmarks.interleaved import interleave
 
 STEPS, ROUNDS = 100, 1500
 ARCSEC = np.pi / 648_000.0

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from trueangle import terms
-from trueangle.bench.compiled import FLAGS
-from trueangle.bench.evaluation import harmonics
+from trueangle.cli.benchmarks.compiled import FLAGS
+from trueangle.cli.benchmarks.evaluation import harmonics
 
 TURN = 360.0
 SERIES = harmonics(range(1, 18), TURN).shafts[0]

@@ -60,10 +60,13 @@ def _directive(name: str, members: str) -> list[str]:
     what = imported(name)
     if inspect.isclass(what):
         # In full under the name that users import: of a class of another name Sphinx says no more
-        # than "alias of" (`trueangle.terms.Backlash` is a `BacklashTerm`).
+        # than "alias of" (`trueangle.model.terms.Backlash` is a `BacklashTerm`).
         what.__name__ = name.rpartition(".")[2]
         kind = "autoexception" if issubclass(what, BaseException) else "autoclass"
-        return [f".. {kind}:: {name}", f"   :members: {members}".rstrip()]
+        options = [f"   :members: {members}".rstrip()]
+        if kind == "autoclass" and not members:  # what it has of the classes below it, too
+            options.append("   :inherited-members: Shown, tuple, Mapping")
+        return [f".. {kind}:: {name}", *options]
     if callable(what):
         return [f".. autofunction:: {name}"]
     return [f".. autodata:: {name}", "   :no-value:"]

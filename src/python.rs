@@ -21,7 +21,7 @@ mod noise;
 mod number;
 mod release;
 mod robot;
-mod robotcall;
+mod robotparts;
 mod series;
 mod signals;
 mod spectrum;

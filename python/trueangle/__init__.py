@@ -11,7 +11,6 @@ from .support import renamed
 if TYPE_CHECKING:
     from . import errors as errors
     from . import plots as plots
-    from . import terms as terms
     from .diagnosis import Diagnosis as Diagnosis
     from .diagnosis.diagnose import diagnose as diagnose
     from .errors import TrueAngleError as TrueAngleError
@@ -30,11 +29,21 @@ if TYPE_CHECKING:
     from .logs.batch import correct_logs as correct_logs
     from .logs.fitting import fit_logs as fit_logs
     from .logs.frames import correct as correct
+    from .model import terms as terms
     from .model.file import load_model as load_model
     from .model.model import HarmonicModel as HarmonicModel
+    from .model.monitor import Monitor as Monitor
     from .model.robot import Robot as Robot
     from .model.robotfile import load_robot as load_robot
-    from .monitoring.monitor import Monitor as Monitor
+    from .model.terms import Backlash as Backlash
+    from .model.terms import FilterLag as FilterLag
+    from .model.terms import Latency as Latency
+    from .model.terms import LoadDependentGearError as LoadDependentGearError
+    from .model.terms import LocalDefect as LocalDefect
+    from .model.terms import PreslidingHysteresis as PreslidingHysteresis
+    from .model.terms import StiffeningCompliance as StiffeningCompliance
+    from .model.terms import ThermalDrift as ThermalDrift
+    from .model.terms import TorsionalCompliance as TorsionalCompliance
     from .planning.arc import plan_arc as plan_arc
     from .planning.plan import plan_mounts as plan_mounts
     from .rehearsal import Rehearsal as Rehearsal
@@ -52,15 +61,6 @@ if TYPE_CHECKING:
     from .simulation import load_simulation as load_simulation
     from .simulation import simulate as simulate
     from .support.angles import wrap as wrap
-    from .terms import Backlash as Backlash
-    from .terms import FilterLag as FilterLag
-    from .terms import Latency as Latency
-    from .terms import LoadDependentGearError as LoadDependentGearError
-    from .terms import LocalDefect as LocalDefect
-    from .terms import PreslidingHysteresis as PreslidingHysteresis
-    from .terms import StiffeningCompliance as StiffeningCompliance
-    from .terms import ThermalDrift as ThermalDrift
-    from .terms import TorsionalCompliance as TorsionalCompliance
 
 #: Public names and the modules that define them; a module is imported at first use.
 _PUBLIC = {
@@ -92,7 +92,7 @@ _PUBLIC = {
     "load_model": "model.file",
     "load_robot": "model.robotfile",
     "Moments": "estimation.moments",
-    "Monitor": "monitoring",
+    "Monitor": "model.monitor",
     "read_runs": "runs.files",
     "Rehearsal": "rehearsal",
     "rehearse": "rehearsal",
@@ -116,12 +116,12 @@ _PUBLIC = {
             "ThermalDrift",
             "TorsionalCompliance",
         ),
-        "terms",
+        "model.terms",
     ),
 }
 
 #: Modules that are reached as attributes, likewise imported at first use.
-_MODULES = ("errors", "plots", "terms")
+_MODULES = {"errors": "errors", "plots": "plots", "terms": "model.terms"}
 
 renamed.install()
 
@@ -130,7 +130,7 @@ __all__ = ["__version__", *sorted([*_PUBLIC, *_MODULES])]
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES or name in renamed.RENAMED:
-        return importlib.import_module(f".{name}", __name__)
+        return importlib.import_module(f".{_MODULES.get(name, name)}", __name__)
     module = _PUBLIC.get(name)
     if module is None:
         raise AttributeError(f"module 'trueangle' has no attribute {name!r}")

@@ -10,10 +10,10 @@ use super::exact::Exact;
 use super::route::{Path, Route};
 use super::stretch::Stretch;
 use super::table::{Scalar, Table, Together};
-use super::tables::Tables;
 use super::{Argument, Quantity, inverse};
 use crate::direct;
 use crate::error::Error;
+use crate::once::Once;
 use crate::series::HarmonicSeries;
 use crate::simd::InstructionSet;
 use crate::threads;
@@ -53,6 +53,14 @@ enum Method<'e> {
     Cubics(&'e Cubics),
     Exact,
     Direct,
+}
+
+/// What is looked up for one quantity, built at the first use.
+#[derive(Debug, Default)]
+pub(super) struct Tables {
+    pub(super) polynomials: Once<Option<Arc<Table>>>,
+    pub(super) counts: Once<Counts>,
+    pub(super) cubics: Once<Option<Cubics>>,
 }
 
 /// A series made ready for batches: immutable, shared between threads.

@@ -4,20 +4,11 @@ use std::sync::Arc;
 
 use super::counts::{Counts, MOST_COUNTS};
 use super::cubics::{self, Cubics};
-use super::evaluator::{Evaluator, ROUNDING};
+use super::evaluator::{Evaluator, ROUNDING, Tables};
 use super::table::{MOST_SEGMENTS, Table};
 use super::{Argument, Quantity, expansion, inverse};
 use crate::error::Error;
 use crate::memory;
-use crate::once::Once;
-
-/// What is looked up for one quantity, built at the first use.
-#[derive(Debug, Default)]
-pub(super) struct Tables {
-    polynomials: Once<Option<Arc<Table>>>,
-    counts: Once<Counts>,
-    cubics: Once<Option<Cubics>>,
-}
 
 impl Evaluator {
     /// Where a quantity is looked up: the correction of a series of the indicated angle

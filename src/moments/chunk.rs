@@ -89,7 +89,7 @@ impl Chunk {
                 let (mut row, mut weights) = (Row::EMPTY, ONES);
                 weights[..run].copy_from_slice(&self.weight[start..start + run]);
                 for i in 0..run {
-                    row.put::<1>(i, self, start + i);
+                    self.put::<1>(start + i, &mut row, i);
                 }
                 row.add_some::<L>(run, &mut weights, moments);
             } else {
@@ -98,6 +98,15 @@ impl Chunk {
                 }
             }
             start += run;
+        }
+    }
+
+    /// Puts `LEN` readings, from the `i`-th, into a row at `at`.
+    #[inline(always)]
+    pub(super) fn put<const LEN: usize>(&self, i: usize, row: &mut Row, at: usize) {
+        for k in 0..LEN {
+            row.place[at + k] = self.place[i + k];
+            row.error[at + k] = self.error[i + k];
         }
     }
 

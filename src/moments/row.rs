@@ -1,6 +1,5 @@
 //! Readings of one segment, added to its moments side by side: a reading to a lane.
 
-use super::chunk::Chunk;
 use super::segment::{LANES, Segment};
 use crate::simd::Lanes;
 
@@ -19,8 +18,8 @@ const ERRORS: u8 = 2;
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct Row {
-    place: [f64; ROOM],
-    error: [f64; ROOM],
+    pub(super) place: [f64; ROOM],
+    pub(super) error: [f64; ROOM],
 }
 
 /// Weights of the readings of a row.
@@ -34,15 +33,6 @@ impl Row {
         place: [0.0; ROOM],
         error: [0.0; ROOM],
     };
-
-    /// Puts `LEN` readings of a chunk, from the `i`-th, at `at`.
-    #[inline(always)]
-    pub(super) fn put<const LEN: usize>(&mut self, at: usize, chunk: &Chunk, i: usize) {
-        for k in 0..LEN {
-            self.place[at + k] = chunk.place[i + k];
-            self.error[at + k] = chunk.error[i + k];
-        }
-    }
 
     /// Moves what is beyond the full row to its start.
     #[inline(always)]

@@ -157,7 +157,7 @@ impl Rows<'_, '_> {
     fn put<L: Lanes, const WEIGHTED: bool, const LEN: usize>(&mut self, chunk: &Chunk, i: usize) {
         let segment = chunk.segment[i] as usize;
         let (row, at) = (&mut self.rows[segment], self.lens[segment]);
-        row.put::<LEN>(at, chunk, i);
+        chunk.put::<LEN>(i, row, at);
         if WEIGHTED {
             self.weights[segment][at..at + LEN].copy_from_slice(&chunk.weight[i..i + LEN]);
         }

@@ -1,5 +1,7 @@
 //! `_core.Alike`.
 
+use std::sync::Arc;
+
 use numpy::{PyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -13,21 +15,31 @@ use crate::terms::Alike;
 /// Joints of the same terms, each with a past of its own.
 #[pyclass(name = "Alike", module = "trueangle._core")]
 pub struct PyAlike {
-    pub(super) inner: Alike,
-    pub(super) corrector: PyCorrector,
+    inner: Alike,
+    corrector: PyCorrector,
 }
 
 #[pymethods]
 impl PyAlike {
+    /// So many joints of a corrector's terms.
+    #[new]
+    fn new(corrector: &PyCorrector, count: usize, py: Python<'_>) -> Self {
+        Self {
+            inner: Alike::new(Arc::clone(corrector.terms()), count),
+            corrector: corrector.twin(py),
+        }
+    }
+
     fn __len__(&self) -> usize {
         self.inner.len()
     }
 
     /// Others with the same past.
     fn copy(&self, py: Python<'_>) -> Self {
-        let mut made = self.corrector.alike(py, 0);
-        made.inner = self.inner.clone();
-        made
+        Self {
+            inner: self.inner.clone(),
+            corrector: self.corrector.twin(py),
+        }
     }
 
     /// Forget the past of some.

@@ -7,7 +7,6 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use super::alike::PyAlike;
 use super::door::{self, Computation, Computed};
 use super::failure::{argument_error, missing_other};
 use super::number::{is_number, single};
@@ -18,7 +17,7 @@ use super::terms::{OTHER, forms, signal_of};
 use super::threads::{Asked, threads};
 use crate::error::Error;
 use crate::kernel::{Batch, Quantity, Real, Sample, Stretch};
-use crate::terms::{Alike, Columns, Corrector, Signal, Signals, Terms};
+use crate::terms::{Columns, Corrector, Signal, Signals, Terms};
 
 /// Correction by a series and its terms, in the order the samples were taken.
 #[pyclass(name = "Corrector", module = "trueangle._core")]
@@ -142,18 +141,6 @@ impl PyCorrector {
         Err(argument_error(py, problem.to_owned()))
     }
 
-    /// So many joints of these terms, each with a past of its own.
-    pub(super) fn alike(&self, py: Python<'_>, count: usize) -> PyAlike {
-        PyAlike {
-            inner: Alike::new(Arc::clone(self.inner.terms()), count),
-            corrector: Self {
-                inner: self.inner.clone(),
-                parts: self.parts.clone_ref(py),
-                others: self.others.clone(),
-            },
-        }
-    }
-
     /// True angles, and how many of them lie outside a stretch.
     #[pyo3(signature = (indicated, out=None, *, threads=None, path=None, stretch=None, **signals))]
     fn correct<'py>(
@@ -236,6 +223,15 @@ impl PyCorrector {
             )));
         }
         Ok(found)
+    }
+
+    /// The same again, with its past.
+    pub fn twin(&self, py: Python<'_>) -> Self {
+        Self {
+            inner: self.inner.clone(),
+            parts: self.parts.clone_ref(py),
+            others: self.others.clone(),
+        }
     }
 
     /// Refuses to go on without the angle of another joint, by its name.

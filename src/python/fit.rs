@@ -4,10 +4,9 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use super::array::{data, empty, slice, square, vector};
-use super::failure::argument_error;
 use super::number;
 use super::release::{attached, detached};
-use super::series::PySeries;
+use super::series::{PySeries, argument_named, unknown};
 use super::threads::{self, Asked};
 use crate::check::same_length;
 use crate::design::{Design, Frequencies};
@@ -305,12 +304,6 @@ pub fn median_magnitude(values: PyReadonlyArray1<'_, f64>, most: usize) -> PyRes
     Ok(core::median_magnitude(values.as_slice()?, most))
 }
 
-/// The argument of a name.
-pub fn argument_named(py: Python<'_>, name: &str) -> PyResult<Argument> {
-    let wanted = "'reference' or 'indicated'";
-    Argument::named(name).ok_or_else(|| unknown(py, "argument", name, wanted))
-}
-
 /// The harmonics of several shafts.
 pub fn design(period: f64, cycles: Vec<f64>, orders: &Bound<'_, PyAny>) -> PyResult<Design> {
     let orders = number::orders(orders)?;
@@ -336,8 +329,4 @@ fn slices<'a>(run: &'a Readings<'_>) -> PyResult<Run<'a>> {
         indicated: slice(indicated)?,
         weights: weights.as_ref().map(slice).transpose()?,
     })
-}
-
-fn unknown(py: Python<'_>, what: &str, got: &str, wanted: &str) -> PyErr {
-    argument_error(py, format!("{what} must be {wanted}, got {got:?}"))
 }

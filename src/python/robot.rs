@@ -1,11 +1,11 @@
 //! `_core.RobotStep`: one sample of all joints of a robot in one call.
 
-use std::sync::Arc;
+use std::ffi::CStr;
 
+use numpy::npyffi::PyArrayObject;
 use numpy::npyffi::flags::{
     NPY_ARRAY_ALIGNED, NPY_ARRAY_C_CONTIGUOUS, NPY_ARRAY_OWNDATA, NPY_ARRAY_WRITEABLE,
 };
-use numpy::npyffi::{NpyTypes, PY_ARRAY_API, PyArrayObject, get_type_object, npy_intp};
 use numpy::{PyArrayDescr, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods, dtype};
 use pyo3::exceptions::PyTypeError;
 use pyo3::ffi;
@@ -13,16 +13,13 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use super::array::{as_array, data, shown};
-use super::corrector::PyCorrector;
 use super::failure::{argument_error, kind_error};
-use super::release::{attached, detached};
-use super::robotcall::STEP;
-use super::series::PySeries;
+use super::release::attached;
+use super::robotparts::{couplings, fresh, joint, named};
 use super::signals::{as_signal, in_order};
-use super::terms::OTHER;
-use crate::compensator::Compensator;
-use crate::robot::{Coupling, Joint, JointError, Robot};
-use crate::terms::{Columns, Corrector, Signal};
+use super::step::Definition;
+use crate::robot::Robot;
+use crate::terms::{Columns, Signal};
 
 /// Correction of one sample of every joint at a time.
 #[pyclass(name = "RobotStep", module = "trueangle._core")]
@@ -195,57 +192,6 @@ impl PyRobotStep {
 /// What pickle makes a robot's step of: its class, arguments and state.
 type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyTuple>, Vec<Vec<f64>>);
 
-/// The angles of other joints that correctors need, each in the unit of its joint.
-fn couplings(names: &[String], parts: &[Bound<'_, PyAny>]) -> PyResult<Vec<Coupling>> {
-    let mut found = Vec::new();
-    let mut periods = Vec::with_capacity(parts.len());
-    for part in parts {
-        periods.push(match part.cast::<PySeries>() {
-            Ok(series) => series.get().evaluator.series().period().value(),
-            Err(_) => {
-                let corrector: PyRef<'_, PyCorrector> = part.extract()?;
-                corrector.terms().evaluator().series().period().value()
-            }
-        });
-    }
-    for (joint, part) in parts.iter().enumerate() {
-        let Ok(corrector) = part.extract::<PyRef<'_, PyCorrector>>() else {
-            continue;
-        };
-        for (name, &signal) in corrector.others().iter().zip(Signal::OTHERS) {
-            let known = |own: &String| name.strip_prefix(OTHER) == Some(own);
-            let Some(other) = names.iter().position(known) else {
-                let problem = format!(
-                    "joint {}: its model needs {name}, and the robot has no such joint: correct \
-                     it by its own corrector",
-                    names[joint]
-                );
-                return Err(argument_error(part.py(), problem));
-            };
-            let scale = periods[joint] / periods[other];
-            found.push(Coupling {
-                joint,
-                signal,
-                other,
-                scale,
-            });
-        }
-    }
-    Ok(found)
-}
-
-/// The joint that a series, or a corrector without its past, is.
-fn joint(part: &Bound<'_, PyAny>) -> PyResult<Joint> {
-    if let Ok(series) = part.cast::<PySeries>() {
-        let evaluator = Arc::clone(&series.get().evaluator);
-        let made = detached(part.py(), || Compensator::new(evaluator))??;
-        return Ok(Joint::Still(made));
-    }
-    let corrector: PyRef<'_, PyCorrector> = part.extract()?;
-    let terms = Arc::clone(corrector.terms());
-    Ok(Joint::Moving(Box::new(Corrector::new(terms))))
-}
-
 /// Whether the interpreter runs one thread at a time.
 fn has_lock(py: Python<'_>) -> PyResult<bool> {
     let sys = py.import("sys")?;
@@ -253,39 +199,6 @@ fn has_lock(py: Python<'_>) -> PyResult<bool> {
         return Ok(true);
     }
     sys.call_method0("_is_gil_enabled")?.extract()
-}
-
-/// A fresh array of so many doubles.
-fn fresh(py: Python<'_>, size: usize) -> PyResult<Bound<'_, PyUntypedArray>> {
-    let mut length = size as npy_intp;
-    // SAFETY: numpy takes over the reference to the dtype and reads one length.
-    unsafe {
-        let array = PY_ARRAY_API.PyArray_NewFromDescr(
-            py,
-            get_type_object(py, NpyTypes::PyArray_Type),
-            dtype::<f64>(py).into_dtype_ptr(),
-            1,
-            &raw mut length,
-            std::ptr::null_mut(),
-            std::ptr::null_mut(),
-            0,
-            std::ptr::null_mut(),
-        );
-        Ok(Bound::from_owned_ptr_or_err(py, array)?.cast_into_unchecked())
-    }
-}
-
-/// An error under the name of its joint.
-fn named(names: &[String], error: JointError) -> PyErr {
-    let JointError { joint, error } = error;
-    let raised = PyErr::from(error);
-    Python::attach(|py| {
-        let text = format!("joint {}: {}", names[joint], raised.value(py));
-        match raised.get_type(py).call1((text,)) {
-            Ok(value) => PyErr::from_value(value),
-            Err(_) => raised,
-        }
-    })
 }
 
 /// Flags of numpy: elements one after the other, aligned, to be written to.
@@ -324,7 +237,7 @@ impl PyRobotStep {
 
     /// The step of a plain array into a plain array or a new one; `None` of anything else.
     #[inline]
-    pub(super) fn quick<'py>(
+    fn quick<'py>(
         &mut self,
         x: &Bound<'py, PyAny>,
         out: Option<&Bound<'py, PyAny>>,
@@ -357,4 +270,99 @@ impl PyRobotStep {
             Err(error) => Err(named(&self.names, error)),
         })
     }
+}
+
+const DOCUMENTATION: &CStr = c"step(positions, /, out=None, *, velocity=None, temperature=None, \
+torque=None, direction=None, current=None)\n--\n\nThe true angles of all joints, of their indicated \
+ones. Signals are one value per joint, or one for all.";
+
+static STEP: Definition = Definition(ffi::PyMethodDef {
+    ml_name: c"step".as_ptr(),
+    ml_meth: ffi::PyMethodDefPointer {
+        PyCFunctionFastWithKeywords: step,
+    },
+    ml_flags: ffi::METH_FASTCALL | ffi::METH_KEYWORDS,
+    ml_doc: DOCUMENTATION.as_ptr(),
+});
+
+/// `RobotStep.step`: a plain array at once, all else by the way of `_step`.
+///
+/// # Safety
+/// Called by the interpreter, attached, with the robot the function is bound to.
+unsafe extern "C" fn step(
+    robot: *mut ffi::PyObject,
+    arguments: *const *mut ffi::PyObject,
+    given: ffi::Py_ssize_t,
+    keywords: *mut ffi::PyObject,
+) -> *mut ffi::PyObject {
+    unsafe {
+        let py = Python::assume_attached();
+        let bound = Bound::from_borrowed_ptr(py, robot);
+        let by_name = !keywords.is_null() && given == 1 && is_out(keywords);
+        let out = if by_name || given == 2 {
+            Some(Bound::from_borrowed_ptr(py, *arguments.add(1)))
+        } else {
+            None
+        };
+        if (by_name || (keywords.is_null() && (1..=2).contains(&given)))
+            && let Ok(mut own) = bound.cast_unchecked::<PyRobotStep>().try_borrow_mut()
+            && let Some(result) = own.quick(&Bound::from_borrowed_ptr(py, *arguments), out.as_ref())
+        {
+            return match result {
+                Ok(array) => array.into_ptr(),
+                Err(error) => {
+                    error.restore(py);
+                    std::ptr::null_mut()
+                }
+            };
+        }
+        match in_full(&bound, arguments, given, keywords) {
+            Ok(array) => array.into_ptr(),
+            Err(error) => {
+                error.restore(py);
+                std::ptr::null_mut()
+            }
+        }
+    }
+}
+
+/// Whether names of arguments are `out` alone.
+///
+/// # Safety
+/// A tuple of texts, as the calling convention has it.
+unsafe fn is_out(keywords: *mut ffi::PyObject) -> bool {
+    unsafe {
+        ffi::PyTuple_Size(keywords) == 1
+            && ffi::PyUnicode_CompareWithASCIIString(
+                ffi::PyTuple_GetItem(keywords, 0),
+                c"out".as_ptr(),
+            ) == 0
+    }
+}
+
+/// `_step` with the arguments of a quick call.
+///
+/// # Safety
+/// As of [`step`].
+#[cold]
+unsafe fn in_full<'py>(
+    robot: &Bound<'py, PyAny>,
+    arguments: *const *mut ffi::PyObject,
+    given: ffi::Py_ssize_t,
+    keywords: *mut ffi::PyObject,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = robot.py();
+    // SAFETY: so many arguments by place and, after them, one for each name of a tuple.
+    let argument = |i: usize| unsafe { Bound::from_borrowed_ptr(py, *arguments.add(i)) };
+    let given = given as usize;
+    let named = PyDict::new(py);
+    if !keywords.is_null() {
+        // SAFETY: a tuple of names, as the calling convention has it.
+        let names = unsafe { Bound::from_borrowed_ptr(py, keywords) };
+        for (i, name) in names.try_iter()?.enumerate() {
+            named.set_item(name?, argument(given + i))?;
+        }
+    }
+    let placed = PyTuple::new(py, (0..given).map(argument))?;
+    robot.call_method(pyo3::intern!(py, "_step"), placed, Some(&named))
 }

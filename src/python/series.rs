@@ -7,10 +7,8 @@ use pyo3::prelude::*;
 
 use super::door::{self, Computation, Computed};
 use super::failure::argument_error;
-use super::fit::argument_named;
 use super::number::{self, is_number};
 use super::release::attached;
-use super::step::PyCompensator;
 use super::threads::{Asked, threads};
 use crate::error::Error;
 use crate::kernel::{Batch, Evaluator, Quantity, Real, Route, Sample, Stretch, TOLERANCE};
@@ -197,14 +195,6 @@ impl PySeries {
         self.compute(quantity, indicated, out, threads, path, Some(stretch))
     }
 
-    fn compensator(slf: &Bound<'_, Self>) -> PyResult<PyCompensator> {
-        let Self { evaluator, .. } = slf.get();
-        if !evaluator.is_ready(Quantity::Correction) {
-            evaluator.room()?;
-        }
-        PyCompensator::new(slf)
-    }
-
     #[getter]
     fn path(&self) -> String {
         let route = self.evaluator.route::<f64, f64>(Quantity::Error, 1);
@@ -283,4 +273,15 @@ impl PySeries {
         };
         door::anything(x, out, &mut wish)
     }
+}
+
+/// The argument of a name.
+pub fn argument_named(py: Python<'_>, name: &str) -> PyResult<Argument> {
+    let wanted = "'reference' or 'indicated'";
+    Argument::named(name).ok_or_else(|| unknown(py, "argument", name, wanted))
+}
+
+/// An error of a word that is none of those that are known.
+pub fn unknown(py: Python<'_>, what: &str, got: &str, wanted: &str) -> PyErr {
+    argument_error(py, format!("{what} must be {wanted}, got {got:?}"))
 }

@@ -7,12 +7,14 @@ use arc_swap::ArcSwap;
 use pyo3::exceptions::PyTypeError;
 use pyo3::ffi;
 use pyo3::prelude::*;
+use pyo3::types::PyType;
 
 use super::number::single;
 use super::release::detached;
 use super::series::PySeries;
 use super::terms::OTHER;
 use crate::compensator::Compensator;
+use crate::kernel::Quantity;
 use crate::terms::Signal;
 
 /// Correction of one sample at a time.
@@ -38,15 +40,18 @@ impl Held {
     }
 }
 
+#[pymethods]
 impl PyCompensator {
-    pub fn new(series: &Bound<'_, PySeries>) -> PyResult<Self> {
+    #[new]
+    fn new(series: &Bound<'_, PySeries>) -> PyResult<Self> {
+        let evaluator = &series.get().evaluator;
+        if !evaluator.is_ready(Quantity::Correction) {
+            evaluator.room()?;
+        }
         let held = ArcSwap::from_pointee(Held::new(series)?);
         Ok(Self { held })
     }
-}
 
-#[pymethods]
-impl PyCompensator {
     /// A bound function of one float, cheaper to call than a method that PyO3 wraps.
     #[getter]
     fn step<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
@@ -72,9 +77,9 @@ impl PyCompensator {
         indicated
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, ())> {
-        let held = self.held.load();
-        Ok((held.series.bind(py).getattr("compensator")?, ()))
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyType>, (Py<PySeries>,)) {
+        let series = slf.get().held.load().series.clone_ref(slf.py());
+        (slf.get_type(), (series,))
     }
 }
 

@@ -6,9 +6,8 @@
 
 use super::block::{BLOCK, Block, Given, padded};
 use super::prepared::Terms;
-use super::search::{Friction, Pull};
 use super::signals::Signal;
-use super::travel::{Heading, NOWHERE, Travel};
+use super::travel::{Friction, Heading, NOWHERE, Pull, Travel};
 use crate::kernel::Quantity;
 
 /// Fewest readings that are worth solving together.

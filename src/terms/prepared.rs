@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use super::form::{Form, Line, Term};
 use super::lines::Lines;
-use super::search::KINK;
 use super::signals::Signal;
-use super::smooth::Smooth;
+use super::smooth::{KINK, Smooth};
 use super::travel::Element;
 use crate::error::Error;
 use crate::kernel::{Argument, Evaluator, InstructionSet, Pass, Quantity};

@@ -3,6 +3,8 @@
 use super::block::{Given, Rows, Work};
 use super::exponential::exp;
 use super::prepared::Terms;
+use super::smooth::{KINK, NEAR};
+use super::travel::{Friction, Pull};
 use crate::simd::{InstructionSet, Kernel, Lanes, Portable, dispatch};
 
 /// Steps before the signals are taken to leave no unique angle; as a rule two or three do.
@@ -11,37 +13,8 @@ const MOST_STEPS: usize = 60;
 /// Part of a period that steps yet to come may add up to; corrections promise 1e-12.
 const SOLVED: f64 = 3e-13;
 
-/// Part of a period that the last step of a search is below where its bound of the second
-/// derivative is to be relied on.
-pub(super) const NEAR: f64 = 2.5e-5;
-
-/// Part of a period from a kink within which there is no such bound.
-pub(super) const KINK: f64 = 4.0 * NEAR;
-
 /// Steepest error of which one step may be the last.
 const GENTLE: f64 = 0.25;
-
-/// What travel adds to the error.
-pub(super) struct Pull<'a> {
-    /// Of travel at each reading.
-    pub direction: &'a [f64],
-    /// Of the elements of friction.
-    pub friction: Friction<'a>,
-}
-
-/// Error of the elements of friction.
-pub(super) enum Friction<'a> {
-    /// There are none.
-    None,
-    /// It follows the angle from a place on, and is there what it was.
-    From {
-        place: f64,
-        direction: f64,
-        state: &'a [f64],
-    },
-    /// At each reading, whatever the angle.
-    Held(&'a [f64]),
-}
 
 /// Runs a pass over a block or, one lane wide, over a single reading.
 pub(super) fn pass<const N: usize>(set: InstructionSet, kernel: impl Kernel) {

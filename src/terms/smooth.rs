@@ -13,6 +13,13 @@ use crate::error::Error;
 use crate::kernel::{InstructionSet, Wave};
 use crate::series::{HarmonicSeries, Shaft};
 
+/// Part of a period that the last step of a search is below where its bound of the second
+/// derivative is to be relied on.
+pub(super) const NEAR: f64 = 2.5e-5;
+
+/// Part of a period from a kink within which there is no such bound.
+pub(super) const KINK: f64 = 4.0 * NEAR;
+
 /// A form that knows no past: what it adds whatever the angle, and what depends on it.
 #[derive(Debug)]
 pub(super) enum Smooth {

@@ -2,8 +2,8 @@
 
 use super::block::{BLOCK, Block, Given, padded};
 use super::prepared::Terms;
-use super::search::{Friction, Pull};
 use super::signals::Signal;
+use super::travel::{Friction, Pull};
 
 impl Terms {
     /// Goals of the first `len` readings of a block, NaN where they have none, and the way

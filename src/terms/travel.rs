@@ -1,7 +1,28 @@
 //! Travel since the last reversal and what it leaves in the springs of friction.
 
 use super::exponential::exp;
-use super::search::Friction;
+
+/// What travel adds to the error.
+pub(super) struct Pull<'a> {
+    /// Of travel at each reading.
+    pub direction: &'a [f64],
+    /// Of the elements of friction.
+    pub friction: Friction<'a>,
+}
+
+/// Error of the elements of friction.
+pub(super) enum Friction<'a> {
+    /// There are none.
+    None,
+    /// It follows the angle from a place on, and is there what it was.
+    From {
+        place: f64,
+        direction: f64,
+        state: &'a [f64],
+    },
+    /// At each reading, whatever the angle.
+    Held(&'a [f64]),
+}
 
 /// One presliding element: `z` relaxes towards the direction of travel over a length.
 #[derive(Clone, Copy, Debug)]

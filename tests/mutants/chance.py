@@ -39,7 +39,7 @@ PACKAGE = ROOT / "python" / "trueangle"
 #: Rooms that compute or that read, print and draw numbers.
 ROOMS = (
     "certificate", "cli", "diagnosis", "effects", "estimation", "export", "fitting", "fleets",
-    "formats", "joint", "logs", "model", "monitoring", "planning", "plots", "rehearsal", "reports",
+    "formats", "joint", "logs", "model", "planning", "plots", "rehearsal", "reports",
     "runs", "selfcalibration", "simulation", "simulators", "support",
 )  # fmt: skip
 

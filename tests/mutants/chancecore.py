@@ -35,7 +35,7 @@ SOURCES = ROOT / "src"
 FOREIGN = "neon.rs" if platform.machine() in ("x86_64", "AMD64") else "x86.rs"
 
 #: Tests in Python that reach most of the core.
-ASKED = tuple(f"tests/python/{room}" for room in ("core", "model", "monitoring", "estimation"))
+ASKED = tuple(f"tests/python/{room}" for room in ("core", "model", "estimation"))
 
 #: Tests of one fault at most.
 MOST_TESTS = 40

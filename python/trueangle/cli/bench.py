@@ -52,8 +52,8 @@ def run(args: argparse.Namespace) -> int:
     """Measure and print."""
     if args.scaling:
         return _scaling(args)
-    from ..bench import evaluation, fit
     from ..errors import ArgumentError
+    from .benchmarks import evaluation, fit
 
     if args.samples < 1 or args.rounds < 1:
         raise ArgumentError(
@@ -97,8 +97,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _scaling(args: argparse.Namespace) -> int:
     """Measure how time grows, print and draw it."""
-    from ..bench import scaling
     from ..errors import ArgumentError
+    from .benchmarks import scaling
 
     try:
         workers = [int(count) for count in args.workers.split(",")] if args.workers else []

@@ -128,9 +128,8 @@ def _diagnosed(seed: int) -> str:
     from dataclasses import replace
 
     from ..diagnosis import diagnose
-    from ..effects import Backlash
     from ..reports.demo import demo_simulation
-    from ..simulation import simulate
+    from ..simulation import Backlash, simulate
 
     believed = demo_simulation()
     true = replace(believed, effects=(Backlash(half_width_arcsec=8.0),))

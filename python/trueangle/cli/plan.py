@@ -14,9 +14,9 @@ from .values import angle, arc, parse_orders
 
 if TYPE_CHECKING:
     from ..fleets.unitplan import UnitPlan
-    from ..planning.arc import ArcPlan
-    from ..planning.plan import CalibrationPlan
-    from ..planning.selfplan import SelfPlan
+    from ..planning.arcplan import ArcPlan
+    from ..planning.mountplan import CalibrationPlan
+    from ..planning.referencefree import SelfPlan
 
 HELP = "propose calibration positions that keep the wanted orders apart"
 EXAMPLE = "trueangle plan --gear-ratio 100 --positions 36 --mounts 2"

@@ -20,9 +20,9 @@ from .signal_options import add_signals, reading
 from .values import turns
 
 if TYPE_CHECKING:
+    from ..model.alarm import WatchedWindow
+    from ..model.batches import ReadingBatch
     from ..model.model import HarmonicModel
-    from ..monitoring.alarm import WatchedWindow
-    from ..monitoring.readings import ReadingBatch
 
 HELP = "watch a running joint against its model; status 3 where an alarm was raised"
 EXAMPLE = "trueangle watch joint.csv -m joint_a.json --every 1turn"
@@ -94,7 +94,7 @@ def _log(text: str) -> str:
 
 def run(args: argparse.Namespace) -> int:
     """Feed the windows, print each."""
-    from ..monitoring.monitor import Monitor
+    from ..model.monitor import Monitor
 
     joint, args = _of_joint(args)
     model, columns = joint_asked(args.model, joint)
@@ -140,7 +140,7 @@ def _of_joint(args: argparse.Namespace) -> tuple[str | None, argparse.Namespace]
 def _batches(
     args: argparse.Namespace, model: HarmonicModel, columns: Mapping[str, Any]
 ) -> Iterator[ReadingBatch]:
-    from ..monitoring.readings import read_batches, read_lines
+    from ..model.batches import read_batches, read_lines
 
     options: Any = reading(args)
     options["signals"] = {**columns, **(options["signals"] or {})} or None

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
-from ..effects.scatter import NEW_SCATTER, ScatterFinding
+from ..effects.effect import ScatterFinding
+from ..effects.scatter import NEW_SCATTER
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation

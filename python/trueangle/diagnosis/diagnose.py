@@ -28,6 +28,7 @@ from .believed import judged_beliefs
 from .candidates import proposed_above
 from .delay import delay_finding
 from .discrepancy import discrepancy_of, unfolded_error
+from .drive import torque_account
 from .finding import Finding
 from .findings import Diagnosis
 from .gates import many_causes
@@ -37,7 +38,6 @@ from .named import findings_of, reconsidered_findings, scatter_doubt, scatter_fi
 from .penalty import cause_terms
 from .remainder import leftover_of, unexplained_after
 from .rounding import rounding_of
-from .torque import torque_account
 from .wrongplace import misplaced_beliefs
 
 if TYPE_CHECKING:

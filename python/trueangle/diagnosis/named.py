@@ -7,10 +7,9 @@ from dataclasses import replace
 
 from ..effects import EFFECTS, Effect
 from ..effects.blindness import Blindness
-from ..effects.effect import telling_apart
+from ..effects.effect import ScatterFinding, telling_apart
 from ..effects.missing_order import MissingOrder
 from ..effects.scale_error import ScaleError
-from ..effects.scatter import ScatterFinding
 from ..estimation.estimate import Parameters, Quantity, quantity
 from ..estimation.regression import Regression
 from ..support.deadline import pace

@@ -3,47 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
 
-from ..effects import EFFECTS
 from ..effects.blindness import Blindness
-from ..estimation.estimate import Quantity
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 from ..support.layout import laid_out
 from ..support.layout import wrapped as _wrapped
 from .beliefs import Belief
-from .brief import brief_finding
+from .diagnosisdata import DiagnosisData
+from .finding import brief_finding, finding_lines, named_quantity, unit_of
 from .goodness.evidence import Evidence
 from .goodness.scatter import AGAINST_STATED
-from .levels import LevelGain
 from .untold import ambiguity_entries
-
-if TYPE_CHECKING:
-    from .finding import Finding
-    from .findings import Diagnosis
 
 #: Share by which the noise must differ from what the simulation states to be told first.
 MATERIAL = 0.1
 
-#: Difference of BIC below which two fit equally well: nothing worth more than a bare mention.
-ALIKE = 2.0
-
-#: The negative control of a finding, by the factor that it follows.
-_SHUFFLED = {
-    "direction": "directions exchanged at random between runs",
-    "velocity": "speeds turned round at random",
-    "temperature": "temperatures exchanged between runs",
-    "torque": "loads exchanged between runs",
-    "mount": "mounts exchanged between runs",
-    "coupled": "motions of the other joint moved in time and turned round at random",
-}
-
-#: Numbers that are no errors, which `ErrorUnit.pair` rounds as well.
-_PLAIN = ErrorUnit("", 1.0)
-
 
 def diagnosis_summary(
-    diagnosis: Diagnosis, errors_in: ErrorsIn = "auto", verbose: bool = False
+    diagnosis: DiagnosisData, errors_in: ErrorsIn = "auto", verbose: bool = False
 ) -> str:
     """The account of a diagnosis: what is wrong, why, the evidence, the gain, what is open.
 
@@ -71,7 +48,7 @@ def diagnosis_summary(
         used = f"{diagnosis.readings_used} of the readings were used: spread evenly, and none"
         lines += _wrapped(f"{used} at a turning point, where the direction is not known.", 0)
     for k, finding in enumerate(diagnosis.findings, 1):
-        lines += ["", *_finding(f"{k}. ", finding, unit)]
+        lines += ["", *finding_lines(f"{k}. ", finding, unit)]
     wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
     if wrong:
         lines += ["", "What the simulation claims and the readings do not show:"]
@@ -102,11 +79,11 @@ def _if_it_is(spot: Blindness, unit: ErrorUnit) -> Iterator[str]:
     """What each of the causes in question would amount to."""
     for cause, parameters in spot.estimates.items():
         known = {name: q for name, q in parameters.items() if q.value is not None}
-        shown = ", ".join(" ".join(_named(name, q, unit)) for name, q in known.items())
+        shown = ", ".join(" ".join(named_quantity(name, q, unit)) for name, q in known.items())
         yield f"If {cause}: {shown}."
 
 
-def diagnosis_headline(diagnosis: Diagnosis, unit: ErrorUnit) -> list[str]:
+def diagnosis_headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
     """What a reader must know first: faults, what is not understood, what is seen or wrong."""
     lines: list[str] = []
     for note in diagnosis.notes:
@@ -164,7 +141,7 @@ def _seen(spot: Blindness, unit: ErrorUnit) -> str:
     for cause in spot.causes:
         first = next(
             (
-                " ".join(_named(name, q, unit))
+                " ".join(named_quantity(name, q, unit))
                 for name, q in spot.estimates.get(cause, {}).items()
                 if isinstance(q.value, float)
             ),
@@ -181,7 +158,7 @@ def _belief(belief: Belief, unit: ErrorUnit) -> str:
         f"{shown.replace('_', ' ')} {' +- '.join(of.pair(measured[name], std[name]))}, "
         f"believed {of.number(value)}"
         for name, value in believed.items()
-        for shown, of in [_unit_of(name, unit)]
+        for shown, of in [unit_of(name, unit)]
     ]
     text += "; ".join(parts)
     gain = belief.gain
@@ -192,96 +169,3 @@ def _belief(belief: Belief, unit: ErrorUnit) -> str:
 
 def _chance(p: float) -> str:
     return "below 1e-12" if p < 1e-12 else f"{p:.1g}"
-
-
-def finding_text(finding: Finding) -> str:
-    """One finding by itself."""
-    rms = 0.0 if finding.gain is None else finding.gain.before[0]
-    return "\n".join(_finding("", finding, error_unit("auto", sine_of_rms(rms))))
-
-
-def _finding(number: str, finding: Finding, unit: ErrorUnit) -> list[str]:
-    n = unit.number
-    lines = [number + finding.cause]
-    if not finding.confirmed:
-        lines[0] += f" (NOT CONFIRMED: {unit.spoken(finding.reason)})"
-        lines = _wrapped(lines[0], 3)
-    lines += _wrapped(finding.sentence, 3, first=3)
-    for name, entry in finding.parameters.items():
-        lines += _wrapped(": ".join(_named(name, entry, unit)), 7, first=5)
-    text = f"Evidence: BIC better by {finding.evidence['bic_gain']:.1f} than without it"
-    if finding.rivals:
-        text += "; in its place " + ", ".join(_rival(*rival) for rival in finding.rivals)
-    lines += _wrapped(text + ".", 5, first=3)
-    gain = finding.gain
-    if gain is not None:
-        text = (
-            f"Gain on held-out data, {gain.holdout}: rms {n(gain.before[0])} -> "
-            f"{unit.text(gain.after[0])}, peak-to-peak {n(gain.before[1])} -> "
-            f"{n(gain.after[1])}, max abs {n(gain.before[2])} -> {n(gain.after[2])}"
-        )
-        if gain.reducible_share is not None and gain.interval is not None:
-            text += (
-                f"; reducible share {gain.reducible_share:.2f} "
-                f"({gain.interval[0]:.2f} to {gain.interval[1]:.2f})"
-            )
-        if gain.control_share is not None:
-            control = _SHUFFLED.get(EFFECTS[finding.cause].factor, "runs turned to other angles")
-            text += f" (control: {gain.control_share:.2f} with {control})"
-        if gain.note:
-            text += f"; {gain.note}"
-        lines += _wrapped(text + ".", 5, first=3)
-        if gain.by_level is not None:
-            lines += _wrapped(_by_level(gain.by_level, unit), 5, first=3)
-    return lines
-
-
-def _rival(cause: str, gap: float) -> str:
-    """Another cause in the place of a finding, by the difference of their BIC."""
-    if abs(gap) < ALIKE:
-        return f"{cause} fits as well"
-    return f"{cause} fits {'worse' if gap > 0.0 else 'better'} by {abs(gap):.1f}"
-
-
-def _by_level(gain: LevelGain, unit: ErrorUnit) -> str:
-    levels = ", ".join(f"{value:.4g}" for value in gain.held_out or gain.levels)
-    if gain.reducible_share is None or gain.interval is None:
-        return f"Gain by {gain.factor} ({levels} {gain.unit}): {gain.note}."
-    return (
-        f"Gain with each {gain.factor} left out in turn ({levels} {gain.unit}): rms "
-        f"{unit.number(gain.rms_before or 0.0)} -> {unit.text(gain.rms_after or 0.0)}; "
-        "reducible share "
-        f"{gain.reducible_share:.2f} ({gain.interval[0]:.2f} to {gain.interval[1]:.2f}); "
-        f"{gain.note}."
-    )
-
-
-def _unit_of(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
-    """What a parameter is called in ``unit``, and the unit that it is shown in."""
-    # The amplitudes of several lines, whose name says no unit.
-    name = "amplitudes_arcsec" if name == "amplitudes" else name
-    stem = name.removesuffix("_arcsec")
-    return (name, _PLAIN) if stem == name else (f"{stem}_{unit.name}", unit)
-
-
-def _named(name: str, entry: Quantity, unit: ErrorUnit) -> tuple[str, str]:
-    """Name and value of a parameter, an error in ``unit``."""
-    shown, of = _unit_of(name, unit)
-    value, std = entry.value, entry.std
-    if isinstance(value, list):
-        text = ", ".join(_number(item, of) for item in value[:12])
-        if len(value) > 12:
-            text += f" and {len(value) - 12} more"
-        if isinstance(std, list):
-            text += " +- " + ", ".join(_number(item, of) for item in std[:12])
-        return shown, text
-    if isinstance(std, float) and isinstance(value, int | float):
-        pair = of.pair(float(value), std)
-        return shown, " +- ".join(pair) if pair[1] != "-" else pair[0]
-    return shown, _number(value, of)
-
-
-def _number(value: Any, of: ErrorUnit) -> str:
-    if isinstance(value, float) and not (of is _PLAIN and value.is_integer()):
-        return of.number(value)
-    return f"{value:.0f}" if isinstance(value, float) else str(value)

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
 from ..effects.blindness import Blindness
 from ..effects.missing_order import MissingOrder
-
-if TYPE_CHECKING:
-    from .findings import Diagnosis
+from .diagnosisdata import DiagnosisData
 
 #: What adds an entry to a text: how far its further lines are set in, and the first one.
 Entry = tuple[str, int, int]
 
 
-def ambiguity_matters(spot: Blindness, diagnosis: Diagnosis) -> bool:
+def ambiguity_matters(spot: Blindness, diagnosis: DiagnosisData) -> bool:
     """Something is seen, or one of the causes is believed or found beside it."""
     asked = {effect.kind for effect in diagnosis.extended.effects}
     asked |= {belief.what for belief in diagnosis.beliefs}
@@ -25,7 +22,7 @@ def ambiguity_matters(spot: Blindness, diagnosis: Diagnosis) -> bool:
 
 
 def ambiguity_entries(
-    diagnosis: Diagnosis, verbose: bool, sizes: Callable[[Blindness], Iterator[str]]
+    diagnosis: DiagnosisData, verbose: bool, sizes: Callable[[Blindness], Iterator[str]]
 ) -> Iterator[Entry]:
     """Entries on what cannot be told, what is seen first.
 

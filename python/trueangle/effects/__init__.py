@@ -2,8 +2,8 @@
 
 An effect is one frozen dataclass with everything that is known of it: its parameters, the
 physics in one sentence, what it needs and is taken for, its signal (simulate), its columns
-and the search for it (diagnose), and its form or the reason why it has none (correct). To
-add one, write its file and add its line below.
+and the search for it (diagnose), and its term (`trueangle.model.terms`) or the reason why it has
+none (correct). To add one, write its file and add its line below.
 """
 
 from __future__ import annotations
@@ -49,5 +49,10 @@ from .effect import EFFECTS, Effect
 __all__ = ["EFFECTS", "Effect"]
 
 __doc__ = "\n".join(
-    [__doc__, *(f"- ``{kind}``: {effect.sentence}" for kind, effect in EFFECTS.items())]
+    [
+        __doc__,
+        *(f"- ``{kind}``: {effect.sentence}" for kind, effect in EFFECTS.items()),
+        "\nWhat cannot be corrected while the joint runs, and why:\n",
+        *(f"- ``{k}``: {e.not_at_run_time}." for k, e in EFFECTS.items() if e.not_at_run_time),
+    ]
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -14,18 +13,12 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_sum
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term, from_arcsec, line_values
+from ..model.terms.travel import BacklashTerm
 from ..support.angles import ARCSEC_PER_DEG
-from .blindness import (
-    Blindness,
-)
+from .blindness import Blindness
 from .effect import Effect
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 
 #: Half width in standard deviations of the noise from which on the crossing of a play is looked
 #: for; steps until the half width and the travel over which it is crossed agree.
@@ -65,7 +58,7 @@ class Backlash(Effect):
     turns_first: str = ""
     start_state: float = 1.0
 
-    kind: ClassVar[str] = "backlash"
+    kind: ClassVar[str] = BacklashTerm.kind
     sentence: ClassVar[str] = (
         "Play in the gear, a coupling or a key: the output lags by a constant angle "
         "whose sign is the direction of travel, whatever the speed, load and place."
@@ -159,50 +152,6 @@ class Backlash(Effect):
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         width = from_arcsec(self.half_width_arcsec, period)
         return (BacklashTerm(width, **line_values(self.lines, period)),)
-
-
-@dataclass(frozen=True, repr=False)
-class BacklashTerm(Term):
-    """Play of the gear, b in the direction of travel d, and how it varies with the place.
-
-    ::
-
-        ε = d [b + Σ_m A_m cos mφ + B_m sin mφ]
-
-    The direction d is the sign of ``direction`` or ``velocity`` where one is given (0 keeps
-    the last one). Otherwise it is that of the indicated angle, through the play operator:
-    the joint is taken to stand until the indicated angle has crossed the whole play 2b.
-    Before the first motion ``d = 0``, the middle of the play.
-
-    Parameters
-    ----------
-    half_width : float
-        b: half of the error forward minus the error backward, on average over a turn. Play
-        that is negative somewhere (the reference's own) needs a direction, for the angle
-        alone does not tell it.
-    orders, cosine, sine : sequence of float
-        How the play varies with the place: output orders m, and coefficients.
-    """
-
-    half_width: float
-    orders: tuple[float, ...] = ()
-    cosine: tuple[float, ...] = ()
-    sine: tuple[float, ...] = ()
-
-    kind: ClassVar[str] = "backlash"
-    follows_travel: ClassVar[bool] = True
-    optional: ClassVar[tuple[str, ...]] = ("orders", "cosine", "sine")
-
-    def check(self) -> None:
-        self._check_lines()
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        swing = sum(math.hypot(a, b) for a, b in zip(self.cosine, self.sine, strict=True))
-        return ("direction",) if self.half_width - swing < 0.0 else ()
-
-    def forms(self) -> tuple[Form, ...]:
-        return (forms.Play(self.half_width, self.lines),)
 
 
 def _shows_crossing(signals: Signals, first: str, width: float) -> bool:

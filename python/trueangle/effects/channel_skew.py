@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
@@ -15,9 +14,8 @@ from ..estimation.regression import Regression
 from ..joint.joint import Joint
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term
+from ..model.terms.motion import ChannelSkewTerm
 from ..support.angles import ARCSEC_PER_DEG
 from .blindness import OWN_POWER, Blindness, share_left
 from .drawing import phase
@@ -52,7 +50,7 @@ class ChannelSkew(Effect):
     order: float
     phase_deg: float = 0.0
 
-    kind: ClassVar[str] = "channel_skew"
+    kind: ClassVar[str] = ChannelSkewTerm.kind
     size_name: ClassVar[str] = "delay_s"
     sentence: ClassVar[str] = (
         "The two channels of a sine and cosine sensor are read one after the other: a constant "
@@ -144,45 +142,6 @@ class ChannelSkew(Effect):
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         return (ChannelSkewTerm(self.delay_s, self.order, self.phase_deg),)
-
-
-@dataclass(frozen=True, repr=False)
-class ChannelSkewTerm(Term):
-    """Half of the way during the delay, and the line at twice the sensor's order.
-
-    ::
-
-        ε = (v Δt / 2) [1 + sin(mφ + φ₀)]
-
-    Parameters
-    ----------
-    delay_s : float
-        ``Δt``.
-    order : float
-        m > 0, of the output.
-    phase_deg : float
-        ``φ₀``, degrees.
-    """
-
-    delay_s: float
-    order: float
-    phase_deg: float = 0.0
-
-    kind: ClassVar[str] = "channel_skew"
-    signals: ClassVar[tuple[str, ...]] = ("velocity",)
-
-    def check(self) -> None:
-        if self.order <= 0.0:
-            raise self._out_of_range("order", "positive")
-
-    @property
-    def is_periodic(self) -> bool:
-        return self.order == int(self.order)
-
-    def forms(self) -> tuple[Form, ...]:
-        half, phase = 0.5 * self.delay_s, math.radians(self.phase_deg)
-        line = (self.order, half * math.sin(phase), half * math.cos(phase))
-        return (forms.Scaled("velocity", half, (line,)),)
 
 
 def _is_part_of_a_line(regression: Regression) -> bool:

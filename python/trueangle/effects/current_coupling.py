@@ -12,9 +12,8 @@ from ..estimation.estimate import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_sum
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term, from_arcsec, line_values
+from ..model.terms.load import CurrentCouplingTerm
 from .blindness import OWN_OF_VELOCITY, Blindness, share_left
 from .effect import Effect
 from .factor import FactorEffect
@@ -39,7 +38,7 @@ class CurrentCoupling(FactorEffect):
     arcsec_per_A: float = 0.0
     lines_per_A: tuple[tuple[float, float, float], ...] = ()
 
-    kind: ClassVar[str] = "current_coupling"
+    kind: ClassVar[str] = CurrentCouplingTerm.kind
     sentence: ClassVar[str] = (
         "The field of the motor's current reaches the magnetic sensor: the error follows the "
         "current, with its sign, at rest as well."
@@ -119,34 +118,3 @@ class CurrentCoupling(FactorEffect):
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         lines = line_values(self.lines_per_A, period)
         return (CurrentCouplingTerm(from_arcsec(self.arcsec_per_A, period), **lines),)
-
-
-@dataclass(frozen=True, repr=False)
-class CurrentCouplingTerm(Term):
-    """An error in proportion to the motor's current.
-
-    ::
-
-        ε = i (a₀ + Σ_m A_m cos mφ + B_m sin mφ)
-
-    Parameters
-    ----------
-    per_A : float
-        ``a₀``, angle per ampere.
-    orders, cosine, sine : sequence of float
-        Output orders (positive) and coefficients per ampere.
-    """
-
-    per_A: float = 0.0
-    orders: tuple[float, ...] = ()
-    cosine: tuple[float, ...] = ()
-    sine: tuple[float, ...] = ()
-
-    kind: ClassVar[str] = "current_coupling"
-    signals: ClassVar[tuple[str, ...]] = ("current",)
-
-    def check(self) -> None:
-        self._check_lines()
-
-    def forms(self) -> tuple[Form, ...]:
-        return (forms.Scaled("current", self.per_A, self.lines),)

@@ -14,16 +14,16 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term, line_values
+from ..model.terms.travel import DirectionalPatternTerm
 from .backlash import ONE_WAY, Backlash, goes_both_ways
 from .blindness import Blindness
 from .drawing import phase
 from .effect import Effect
 from .latency import Latency
 from .presliding_hysteresis import PreslidingHysteresis
-from .search import Array, Fitted, best_shape, line_parameters
+from .search import Array, Fitted, line_parameters
+from .shapes import best_shape
 
 #: Orders that play has where a gear is eccentric or worn on one side: half of the belief.
 LIKELY = 3
@@ -55,7 +55,7 @@ class DirectionalPattern(Effect):
     amplitudes_arcsec: tuple[float, ...]
     phases_deg: tuple[float, ...]
 
-    kind: ClassVar[str] = "direction_dependent_pattern"
+    kind: ClassVar[str] = DirectionalPatternTerm.kind
     size_name: ClassVar[str] = "amplitudes_arcsec"
     sentence: ClassVar[str] = (
         "Play or friction differs from place to place (an eccentric or worn gear): the curves "
@@ -128,35 +128,3 @@ class DirectionalPattern(Effect):
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         return (DirectionalPatternTerm(**line_values(self.lines, period)),)
-
-
-@dataclass(frozen=True, repr=False)
-class DirectionalPatternTerm(Term):
-    """Play that differs from place to place, without its mean.
-
-    ::
-
-        ε = d Σ_m A_m cos mφ + B_m sin mφ
-
-    It needs the direction of travel d (or the velocity), which the angle alone does not tell
-    where the play is negative.
-
-    Parameters
-    ----------
-    orders, cosine, sine : sequence of float
-        Output orders (positive) and coefficients.
-    """
-
-    orders: tuple[float, ...]
-    cosine: tuple[float, ...]
-    sine: tuple[float, ...]
-
-    kind: ClassVar[str] = "direction_dependent_pattern"
-    signals: ClassVar[tuple[str, ...]] = ("direction",)
-    follows_travel: ClassVar[bool] = True
-
-    def check(self) -> None:
-        self._check_lines()
-
-    def forms(self) -> tuple[Form, ...]:
-        return (forms.Play(0.0, self.lines),)

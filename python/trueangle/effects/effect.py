@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -18,8 +18,7 @@ from ..joint.signals import Signals
 from ..model.term import Term
 from .bends import departure_columns
 from .blindness import Blindness
-from .parameters import checked_parameters, plain_parameters
-from .scatter import ScatterFinding
+from .parameters import Tabled
 from .search import Array, Fitted
 
 #: Every effect by its kind, in the order in which they are tried: a class joins by being
@@ -30,7 +29,7 @@ EFFECTS: dict[str, type[Effect]] = {}
 ALWAYS = math.inf
 
 
-class Effect:
+class Effect(Tabled):
     """Base of the effects; each is a frozen dataclass whose fields are its parameters.
 
     A class with a ``kind`` joins the vocabulary by being defined. What it must say is its
@@ -92,7 +91,6 @@ class Effect:
     """
 
     noun: ClassVar[str] = "the effect of a simulation"
-    kind: ClassVar[str]
     sentence: ClassVar[str]
     needs: ClassVar[tuple[str, ...]] = ()
     factor: ClassVar[str] = "angle"
@@ -283,27 +281,29 @@ class Effect:
         """The pattern is one of the indicated angle."""
         return False
 
-    # -- files ---------------------------------------------------------------------
 
-    @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> Self:
-        """Effect from a table of the simulation file (without ``kind``).
+@dataclass(frozen=True)
+class ScatterFinding:
+    """A cause of the scatter with its evidence.
 
-        Raises
-        ------
-        ArgumentError
-            A parameter that is unknown, missing or of the wrong kind.
-        """
-        return cls(**checked_parameters(cls, table))
+    Attributes
+    ----------
+    cause : str
+    bic_gain : float
+    parameters : dict
+    effects : list of Effect
+    weights : ndarray, shape (n,)
+        Inverse variances, of mean 1 (uneven noise), or 0 for outliers.
+    size : float
+        Of the scatter, in standard deviations of one reading.
+    """
 
-    def to_table(self) -> dict[str, Any]:
-        """The table `from_table` reads, ``kind`` first, defaults left out."""
-        table: dict[str, Any] = {"kind": self.kind}
-        for field in fields(self):  # type: ignore[arg-type]
-            value = getattr(self, field.name)
-            if field.default is MISSING or value != field.default:
-                table[field.name] = plain_parameters(value)
-        return table
+    cause: str
+    bic_gain: float
+    parameters: Parameters
+    effects: list[Effect]
+    weights: Array
+    size: float = 1.0
 
 
 def telling_apart(one: type[Effect], other: type[Effect]) -> str | None:

@@ -12,12 +12,8 @@ from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from .effect import Effect
-from .search import (
-    Array,
-    Fitted,
-    best_shape,
-    line_parameters,
-)
+from .search import Array, Fitted, line_parameters
+from .shapes import best_shape
 
 
 class FactorEffect(Effect):

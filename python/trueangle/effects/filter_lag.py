@@ -18,21 +18,13 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Pattern, Surroundings
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term
-from .blindness import (
-    Blindness,
-)
+from ..model.terms.motion import FilterLagTerm
+from .blindness import Blindness
 from .effect import Effect
 from .latency import UNTIMED, Latency
 from .missing_order import MissingOrder
-from .search import (
-    Array,
-    Fitted,
-    golden_maximum,
-    is_gear_order,
-)
+from .search import Array, Fitted, golden_maximum, is_gear_order
 
 #: Cutoffs searched, in multiples of the highest frequency at which a line passes.
 CUTOFFS = np.geomspace(0.2, 3000.0, 12)
@@ -78,7 +70,7 @@ class FilterLag(Effect):
     cutoff_hz: float
     damping: float | None = None
 
-    kind: ClassVar[str] = "filter_lag"
+    kind: ClassVar[str] = FilterLagTerm.kind
     size_name: ClassVar[str] = "cutoff_hz"
     size_grows: ClassVar[bool] = False
     sentence: ClassVar[str] = (
@@ -249,44 +241,6 @@ class FilterLag(Effect):
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         return (FilterLagTerm(self.cutoff_hz, self.damping),)
-
-
-@dataclass(frozen=True, repr=False)
-class FilterLagTerm(Term):
-    """The harmonics behind a low-pass that has no ramp error.
-
-    At v turns per second a line of output order m is multiplied by
-    ``1/(1 + j m v/f_c)`` or, with damping ``ζ``, by
-    ``1/(1 - w² + 2 j ζ w)`` with ``w = m v/(2 ζ f_c)``. Exact at constant
-    velocity; after a change of velocity the filter itself needs about
-    ``1/(2π f_c)`` to follow.
-
-    Parameters
-    ----------
-    cutoff_hz : float
-        ``f_c > 0``.
-    damping : float, optional
-        ``ζ > 0`` of a filter of second order.
-    """
-
-    cutoff_hz: float
-    damping: float | None = None
-
-    kind: ClassVar[str] = "filter_lag"
-    signals: ClassVar[tuple[str, ...]] = ("velocity",)
-    optional: ClassVar[tuple[str, ...]] = ("damping",)
-    is_built_on_harmonics: ClassVar[bool] = True
-
-    def check(self) -> None:
-        if self.cutoff_hz <= 0.0:
-            raise self._out_of_range("cutoff_hz", "positive")
-        if self.damping is not None and self.damping <= 0.0:
-            raise self._out_of_range("damping", "positive")
-
-    def forms(self) -> tuple[Form, ...]:
-        if self.damping is None:
-            return (forms.Filter(self.cutoff_hz),)
-        return (forms.Filter(2.0 * self.damping * self.cutoff_hz, self.damping),)
 
 
 def low_pass(frequency: Array, cutoff: float, damping: float | None) -> NDArray[np.complex128]:

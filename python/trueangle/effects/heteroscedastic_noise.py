@@ -13,18 +13,10 @@ from ..estimation.projection import EXCITED
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from .effect import Effect
+from .effect import Effect, ScatterFinding
 from .outliers import Outliers
-from .scatter import (
-    CLIPPED_VARIANCE,
-    SQUARE_CLIP,
-    ScatterFinding,
-    clipped_squares,
-    standardised_residuals,
-)
-from .search import (
-    Array,
-)
+from .scatter import CLIPPED_VARIANCE, SQUARE_CLIP, clipped_squares, standardised_residuals
+from .search import Array
 
 #: Logarithm of the largest ratio of a reading's variance to the mean one: a thousand times the
 #: standard deviation is more than noise of one kind does.

@@ -8,21 +8,19 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..errors import ArgumentError
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term
+from ..model.terms.place import JointCouplingTerm
 from ..support.angles import ARCSEC_PER_DEG
-from ..support.signals import COUPLED
 from .blindness import OWN_POWER, Blindness, share_left
 from .effect import Effect
 from .scale_error import ScaleError
-from .search import Array, Fitted, best_shape
+from .search import Array, Fitted
+from .shapes import best_shape
 
 
 class _OfOthers(Effect):
@@ -46,7 +44,7 @@ class JointCoupling(_OfOthers):
     joint: str
     factor: float = field()  # type: ignore[assignment, misc]  # the class keeps its own
 
-    kind: ClassVar[str] = "joint_coupling"
+    kind: ClassVar[str] = JointCouplingTerm.kind
     size_name: ClassVar[str] = "factor"
     sentence: ClassVar[str] = (
         "The joint is driven through another one, as in a wrist: a share of the angle that the "
@@ -156,41 +154,3 @@ def _about_means(signals: Signals, angle: Array) -> Array:
         centred[start:stop] -= angle[start:stop].mean()
     # What is left of a joint at rest is rounding.
     return np.where(np.abs(centred) > 1e-12 * np.abs(angle).max(initial=0.0), centred, 0.0)
-
-
-@dataclass(frozen=True, repr=False)
-class JointCouplingTerm(Term):
-    """A share of another joint's indicated angle.
-
-    ::
-
-        ε = c θ_j
-
-    with ``θ_j`` as that joint counts its turns, in the unit of the model: the signal
-    ``coupled_JOINT``, which `trueangle.Robot` takes from its own angles.
-
-    Parameters
-    ----------
-    joint : str
-        The other joint, j.
-    factor : float
-        c, degrees per degree.
-    """
-
-    joint: str
-    factor: float
-
-    kind: ClassVar[str] = "joint_coupling"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        return (COUPLED + self.joint,)
-
-    def check(self) -> None:
-        if not isinstance(self.joint, str) or not self.joint:
-            raise ArgumentError(
-                f"{self.kind}: joint must be the name of the other joint, got {self.joint!r}"
-            )
-
-    def forms(self) -> tuple[Form, ...]:
-        return (forms.Scaled(COUPLED + self.joint, self.factor),)

@@ -14,22 +14,13 @@ from ..estimation.regression import Regression
 from ..joint.earlier import earlier
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term
+from ..model.terms.motion import LatencyTerm
 from ..support.angles import ARCSEC_PER_DEG
 from .backlash import Backlash
-from .blindness import (
-    OWN_OF_VELOCITY,
-    OWN_POWER,
-    Blindness,
-    share_left,
-)
+from .blindness import OWN_OF_VELOCITY, OWN_POWER, Blindness, share_left
 from .effect import Effect
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 
 TWO_SPEEDS = (
     "move in both directions at two speeds at least a factor of 3 apart, or read at rest as well"
@@ -53,7 +44,7 @@ class Latency(Effect):
 
     delay_s: float
 
-    kind: ClassVar[str] = "latency"
+    kind: ClassVar[str] = LatencyTerm.kind
     sentence: ClassVar[str] = (
         "One of the two readings is older than the other, the joint's (a positive delay) or the "
         "reference's (a negative one): the error is proportional to velocity and the pattern "
@@ -119,29 +110,3 @@ class Latency(Effect):
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         return (LatencyTerm(self.delay_s),)
-
-
-@dataclass(frozen=True, repr=False)
-class LatencyTerm(Term):
-    """The indicated angle is a time ``τ`` old.
-
-    ::
-
-        indicated(t) = θ(t - τ) + ε(θ(t - τ))
-
-    so ``φ = θ - vτ`` is solved for and ``vτ`` added. Exact at
-    constant velocity; an acceleration a leaves ``aτ²/2``.
-
-    Parameters
-    ----------
-    delay_s : float
-        ``τ`` in seconds; negative where the reference is the later one.
-    """
-
-    delay_s: float
-
-    kind: ClassVar[str] = "latency"
-    signals: ClassVar[tuple[str, ...]] = ("velocity",)
-
-    def forms(self) -> tuple[Form, ...]:
-        return (forms.Lag(self.delay_s),)

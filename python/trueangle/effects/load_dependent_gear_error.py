@@ -13,26 +13,14 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term, line_values
-from ..support.suggestions import check_choice
-from .blindness import (
-    OWN_OF_VELOCITY,
-    OWN_POWER,
-    Blindness,
-    share_left,
-)
+from ..model.terms.load import LoadDependentGearErrorTerm
+from .blindness import OWN_OF_VELOCITY, OWN_POWER, Blindness, share_left
 from .drawing import carrier_order, free_line, phase
 from .effect import Effect
 from .factor import FactorEffect
 from .missing_order import MissingOrder
-from .search import (
-    Array,
-    Fitted,
-    is_gear_order,
-    known_orders,
-)
+from .search import Array, Fitted, is_gear_order, known_orders
 from .thermal_drift import ThermalDrift
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
@@ -55,7 +43,7 @@ class LoadDependentGearError(FactorEffect):
     lines_per_Nm: tuple[tuple[float, float, float], ...]
     torque: str = "signed"
 
-    kind: ClassVar[str] = "load_dependent_gear_error"
+    kind: ClassVar[str] = LoadDependentGearErrorTerm.kind
     size_name: ClassVar[str] = "lines_per_Nm"
     sentence: ClassVar[str] = (
         "Load presses the teeth of the gear into each other: its lines (motor and wave "
@@ -193,35 +181,3 @@ class LoadDependentGearError(FactorEffect):
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         lines = line_values(self.lines_per_Nm, period)
         return (LoadDependentGearErrorTerm(**lines, torque=self.torque),)
-
-
-@dataclass(frozen=True, repr=False)
-class LoadDependentGearErrorTerm(Term):
-    """Gear lines that grow with the torque.
-
-    ::
-
-        ε = l Σ_m A_m cos mφ + B_m sin mφ,    l = τ or |τ|
-
-    Parameters
-    ----------
-    orders, cosine, sine : sequence of float
-        Output orders (positive) and coefficients per newton metre.
-    torque : {"signed", "absolute"}
-    """
-
-    orders: tuple[float, ...]
-    cosine: tuple[float, ...]
-    sine: tuple[float, ...]
-    torque: str = "signed"
-
-    kind: ClassVar[str] = "load_dependent_gear_error"
-    signals: ClassVar[tuple[str, ...]] = ("torque",)
-
-    def check(self) -> None:
-        self._check_lines()
-        check_choice(f"{self.kind}: torque", self.torque, ("signed", "absolute"))
-
-    def forms(self) -> tuple[Form, ...]:
-        absolute = self.torque == "absolute"
-        return (forms.Scaled("torque", lines=self.lines, absolute=absolute),)

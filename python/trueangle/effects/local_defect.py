@@ -16,22 +16,15 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term, from_arcsec
+from ..model.terms.place import LocalDefectTerm
 from ..support.deadline import pace
 from .argument_error import ArgumentShift
-from .blindness import (
-    Blindness,
-)
+from .blindness import Blindness
 from .drawing import visited_place
 from .effect import Effect
 from .missing_order import MissingOrder
-from .search import (
-    Array,
-    Fitted,
-    tangent_covariance,
-)
+from .search import Array, Fitted, tangent_covariance
 from .sidebands import Sidebands
 
 #: Places per turn of a shaft at which a defect is searched, and its widths in degrees.
@@ -83,7 +76,7 @@ class LocalDefect(Effect):
     height_arcsec: float
     shaft: str = "output"
 
-    kind: ClassVar[str] = "local_defect"
+    kind: ClassVar[str] = LocalDefectTerm.kind
     size_name: ClassVar[str] = "height_arcsec"
     sentence: ClassVar[str] = (
         "A damaged tooth, pole or graduation line: a bump at one place of one shaft, the same "
@@ -297,48 +290,6 @@ class LocalDefect(Effect):
                 shafts[self.shaft],
             ),
         )
-
-
-@dataclass(frozen=True, repr=False)
-class LocalDefectTerm(Term):
-    """A damaged tooth, pole or graduation line, the same in every pass.
-
-    ::
-
-        ε = h e^(-(a - c)²/2w²),    a = fφ
-
-    with a the angle of a shaft that turns f times per output turn, wrapped around the
-    place.
-
-    Parameters
-    ----------
-    place, width : float
-        c and w (one standard deviation, positive) as angles of that shaft.
-    height : float
-        h.
-    cycles_per_turn : float
-        f > 0.
-    """
-
-    place: float
-    width: float
-    height: float
-    cycles_per_turn: float = 1.0
-
-    kind: ClassVar[str] = "local_defect"
-
-    @property
-    def is_periodic(self) -> bool:
-        return self.cycles_per_turn == int(self.cycles_per_turn)
-
-    def check(self) -> None:
-        if self.width <= 0.0:
-            raise self._out_of_range("width", "positive")
-        if self.cycles_per_turn <= 0.0:
-            raise self._out_of_range("cycles_per_turn", "positive")
-
-    def forms(self) -> tuple[Form, ...]:
-        return (forms.Bump(self.place, self.width, self.height, self.cycles_per_turn),)
 
 
 @cache

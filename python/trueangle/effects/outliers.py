@@ -17,12 +17,9 @@ from ..estimation.regression import Regression
 from ..estimation.stretches import MOST_IN_ROW, about_level, stretches, within
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from .effect import Effect
+from .effect import Effect, ScatterFinding
 from .local_defect import LocalDefect
-from .scatter import ScatterFinding
-from .search import (
-    Array,
-)
+from .search import Array
 
 #: Degrees of freedom of heavy-tailed noise, sizes of outliers to start from.
 TAILS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0)

@@ -4,39 +4,51 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from ..errors import ArgumentError
 from ..support.suggestions import did_you_mean
 
-if TYPE_CHECKING:
-    from .effect import Effect
 
+class Tabled:
+    """What stands as a table of a simulation file: a dataclass whose fields are its parameters."""
 
-def checked_parameters(effect: type[Effect], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Values for the fields of ``effect`` from a table without its ``kind``.
+    kind: ClassVar[str]
 
-    Raises
-    ------
-    ArgumentError
-        A parameter that is unknown, missing or of the wrong kind.
-    """
-    known = {field.name: field for field in fields(effect)}  # type: ignore[arg-type]
-    for name in table:
-        if name not in known:
-            raise ArgumentError(
-                f"effect '{effect.kind}' has no parameter '{name}'{did_you_mean(name, known)}; "
-                f"it has {', '.join(known) or 'none'}"
-            )
-    values: dict[str, Any] = {}
-    for name, field in known.items():
-        if name in table:
-            values[name] = _checked(effect.kind, name, table[name], str(field.type))
-        elif field.default is MISSING and field.default_factory is MISSING:
-            raise ArgumentError(f"effect '{effect.kind}' needs the parameter '{name}'")
-    return values
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> Self:
+        """Effect from a table of the simulation file (without ``kind``).
+
+        Raises
+        ------
+        ArgumentError
+            A parameter that is unknown, missing or of the wrong kind.
+        """
+        known = {field.name: field for field in fields(cls)}  # type: ignore[arg-type]
+        for name in table:
+            if name not in known:
+                raise ArgumentError(
+                    f"effect '{cls.kind}' has no parameter '{name}'{did_you_mean(name, known)}; "
+                    f"it has {', '.join(known) or 'none'}"
+                )
+        values: dict[str, Any] = {}
+        for name, field in known.items():
+            if name in table:
+                values[name] = _checked(cls.kind, name, table[name], str(field.type))
+            elif field.default is MISSING and field.default_factory is MISSING:
+                raise ArgumentError(f"effect '{cls.kind}' needs the parameter '{name}'")
+        return cls(**values)
+
+    def to_table(self) -> dict[str, Any]:
+        """The table `from_table` reads, ``kind`` first, defaults left out."""
+        table: dict[str, Any] = {"kind": self.kind}
+        for field in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if field.default is MISSING or value != field.default:
+                table[field.name] = _plain(value)
+        return table
 
 
 def _checked(kind: str, name: str, value: Any, wanted: str) -> Any:
@@ -73,8 +85,8 @@ def _number(where: str, value: Any) -> float:
     return float(value)
 
 
-def plain_parameters(value: Any) -> Any:
+def _plain(value: Any) -> Any:
     """Tuples as lists, as files have them."""
     if isinstance(value, tuple):
-        return [plain_parameters(item) for item in value]
+        return [_plain(item) for item in value]
     return value

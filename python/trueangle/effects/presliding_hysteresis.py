@@ -13,28 +13,14 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term, from_arcsec
-from .backlash import (
-    ONE_WAY,
-    Backlash,
-    goes_both_ways,
-)
+from ..model.terms.travel import PreslidingHysteresisTerm
+from .backlash import ONE_WAY, Backlash, goes_both_ways
 from .bends import spring_transitions
-from .blindness import (
-    Blindness,
-    share_left,
-)
+from .blindness import Blindness, share_left
 from .effect import Effect
 from .latency import TWO_SPEEDS, Latency
-from .search import (
-    Array,
-    Fitted,
-    golden_maximum,
-    of_one_sign,
-    tangent_covariance,
-)
+from .search import Array, Fitted, golden_maximum, of_one_sign, tangent_covariance
 
 _AFTER_REVERSAL = (
     "record the first 10 to 30 deg after each reversal in steps of 0.3 deg or less, "
@@ -81,7 +67,7 @@ class PreslidingHysteresis(Effect):
     length_deg: float
     start_state: float = 0.0
 
-    kind: ClassVar[str] = "presliding_hysteresis"
+    kind: ClassVar[str] = PreslidingHysteresisTerm.kind
     size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
         "Friction winds up the elastic parts after each reversal: the error moves from one "
@@ -259,48 +245,3 @@ class PreslidingHysteresis(Effect):
         amplitude = from_arcsec(self.amplitude_arcsec, period)
         length = self.length_deg * (period / 360.0)
         return (PreslidingHysteresisTerm(amplitude, length, self.start_state),)
-
-
-@dataclass(frozen=True, repr=False)
-class PreslidingHysteresisTerm(Term):
-    """Friction that winds the gear up over a length: ``ε = h z(s)``.
-
-    ::
-
-        dz / ds = (d - z) / L,    z(s) = d - (d - z₀) e^(-s/L)
-
-    for travel s since the last reversal, where the state was ``z₀`` (Dahl); after a
-    long stretch ``z₀ = -d`` and ``z = d (1 - 2e^(-s/L))``. Several elements of
-    different lengths add up to a Maxwell-slip model.
-
-    Parameters
-    ----------
-    amplitude : float
-        h: half of the reversal error far from the reversal.
-    length : float
-        L > 0: travel in which it builds up.
-    start : float
-        Share of the wind-up that is there at the first motion, in its direction: 0 for a
-        relaxed joint, 1 for one that has been run in.
-
-    Notes
-    -----
-    Without ``direction`` or ``velocity`` every step back is travel: noise at rest then
-    wears the state down. Give one of them where the joint rests between motions.
-    """
-
-    amplitude: float
-    length: float
-    start: float = 0.0
-
-    kind: ClassVar[str] = "presliding_hysteresis"
-    follows_travel: ClassVar[bool] = True
-
-    def check(self) -> None:
-        if self.length <= 0.0:
-            raise self._out_of_range("length", "positive")
-        if not 0.0 <= self.start <= 1.0:
-            raise self._out_of_range("start", "from 0 to 1")
-
-    def forms(self) -> tuple[Form, ...]:
-        return (forms.Friction(self.amplitude, self.length, self.start),)

@@ -14,9 +14,8 @@ from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..support.angles import ARCSEC_PER_DEG
-from .effect import Effect
+from .effect import Effect, ScatterFinding
 from .heteroscedastic_noise import HeteroscedasticNoise
-from .scatter import ScatterFinding
 from .search import Array
 
 

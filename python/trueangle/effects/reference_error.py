@@ -14,19 +14,12 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
-from .blindness import (
-    Blindness,
-)
+from .blindness import Blindness
 from .drawing import phase
 from .effect import Effect
 from .missing_order import MissingOrder
-from .search import (
-    Array,
-    Fitted,
-    best_shape,
-    is_gear_order,
-    line_parameters,
-)
+from .search import Array, Fitted, is_gear_order, line_parameters
+from .shapes import best_shape
 from .torsional_compliance import TorsionalCompliance
 
 #: Orders of the reference that are searched.

@@ -14,14 +14,10 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import ARCSEC_PER_RAD, Surroundings
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term
+from ..model.terms.place import ScaleErrorTerm
 from .effect import Effect
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 
 
 @dataclass(frozen=True)
@@ -40,7 +36,7 @@ class ScaleError(Effect):
     start_deg: float | None = None
     stop_deg: float | None = None
 
-    kind: ClassVar[str] = "scale_error"
+    kind: ClassVar[str] = ScaleErrorTerm.kind
     sentence: ClassVar[str] = (
         "The ratio or the count of the scale is not what the reading is computed with: the "
         "error grows in proportion to the angle turned."
@@ -102,46 +98,3 @@ class ScaleError(Effect):
         return (
             ScaleErrorTerm(self.relative_error, self.start_deg * degree, self.stop_deg * degree),
         )
-
-
-@dataclass(frozen=True, repr=False)
-class ScaleErrorTerm(Term):
-    """A wrong ratio, over the travel on which it was measured.
-
-    ::
-
-        ε = s [min(max(φ, a), b) - (a + b)/2]
-
-    with ``φ`` over the turns, not modulo one. Beyond the travel it keeps the value of
-    its end: where the ratio is wrong there too, put it right where counts are turned into angles.
-
-    Parameters
-    ----------
-    relative_error : float
-        s, below 1 in size.
-    start, stop : float
-        a < b.
-    """
-
-    relative_error: float
-    start: float
-    stop: float
-
-    kind: ClassVar[str] = "scale_error"
-
-    @property
-    def is_periodic(self) -> bool:
-        return False
-
-    @property
-    def travel(self) -> tuple[float, float]:
-        return self.start, self.stop
-
-    def check(self) -> None:
-        if not -1.0 < self.relative_error < 1.0:
-            raise self._out_of_range("relative_error", "between -1 and 1")
-        if self.stop <= self.start:
-            raise self._out_of_range("stop", f"beyond start ({self.start!r})")
-
-    def forms(self) -> tuple[Form, ...]:
-        return (forms.Ramp(self.relative_error, self.start, self.stop),)

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ..estimation.estimate import Parameters
 from ..estimation.regression import Regression
 from ..support.distributions import chi_squared_tail
 from .search import Array
-
-if TYPE_CHECKING:
-    from .effect import Effect
 
 #: Squared residuals are taken at most this many of their own variances large.
 SQUARE_CLIP = 9.0
@@ -31,30 +24,6 @@ CLIPPED_VARIANCE = (_CLIPPED_POWER - _CLIPPED_MEAN**2) / _BELOW_SQUARE**2
 #: Evidence that uneven noise must bring beyond its penalty. Half of what other causes must:
 #: nothing in the mean of the readings imitates it.
 NEW_SCATTER = 3.0
-
-
-@dataclass(frozen=True)
-class ScatterFinding:
-    """A cause of the scatter with its evidence.
-
-    Attributes
-    ----------
-    cause : str
-    bic_gain : float
-    parameters : dict
-    effects : list of Effect
-    weights : ndarray, shape (n,)
-        Inverse variances, of mean 1 (uneven noise), or 0 for outliers.
-    size : float
-        Of the scatter, in standard deviations of one reading.
-    """
-
-    cause: str
-    bic_gain: float
-    parameters: Parameters
-    effects: list[Effect]
-    weights: Array
-    size: float = 1.0
 
 
 def standardised_residuals(regression: Regression) -> Array:

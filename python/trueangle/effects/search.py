@@ -1,21 +1,17 @@
-"""What searches have in common: the best of many shapes, lines from pairs, one peak."""
+"""What searches have in common: lines from pairs, one peak, doubts, joint covariances."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..estimation.batch import Blocks
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from .blindness import Blindness
-
-if TYPE_CHECKING:
-    from .effect import Effect
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -23,36 +19,6 @@ Array: TypeAlias = NDArray[np.float64]
 Fitted: TypeAlias = tuple[Extension, Array, Array]
 
 _GOLDEN = (5.0**0.5 - 1.0) / 2.0
-
-
-def best_shape(
-    effect: type[Effect],
-    regression: Regression,
-    shapes: Sequence[dict[str, Any]],
-    log_grids: Sequence[float],
-    extra: Sequence[int] | None = None,
-) -> Extension | None:
-    """The extension of the shape with the most evidence; all are scored at once.
-
-    ``extra`` counts the parameters of a shape that are no coefficients.
-    """
-    if not shapes:
-        return None
-    signals, around = regression.signals, regression.around
-    remembered = regression.cache.of_motion if effect.of_motion else regression.of_pattern
-    blocks: Blocks = remembered(
-        effect.kind,
-        repr(shapes),
-        lambda: Blocks([effect.columns(signals, around, shape) for shape in shapes]),
-    )
-    more = np.zeros(len(shapes)) if extra is None else np.asarray(extra)
-    penalty = more * regression.log_n + 2.0 * np.asarray(log_grids)
-    for where, products in blocks.groups:
-        penalty[where] += products.width * regression.log_n
-    k = int(np.argmax(regression.block_gains(blocks) - penalty))
-    columns = effect.columns(signals, around, shapes[k])
-    parameters = columns.shape[1] + int(more[k])
-    return regression.propose(effect.kind, shapes[k], columns, parameters, float(log_grids[k]))
 
 
 def line_parameters(coefficients: Array, covariance: Array) -> tuple[float, float, float, float]:

@@ -18,13 +18,8 @@ from .blindness import Blindness
 from .drawing import carrier_order, phase
 from .effect import Effect
 from .missing_order import FREE_ANGLES, MissingOrder
-from .search import (
-    Array,
-    Fitted,
-    best_shape,
-    known_orders,
-    line_parameters,
-)
+from .search import Array, Fitted, known_orders, line_parameters
+from .shapes import best_shape
 
 #: Periods of the modulation that a run must cover for sidebands to be looked for.
 RESOLVED = 0.75

@@ -13,18 +13,14 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term, from_arcsec
+from ..model.terms.load import StiffeningComplianceTerm
 from .bends import columns_beyond
-from .blindness import (
-    OWN_POWER,
-    Blindness,
-    share_left,
-)
+from .blindness import OWN_POWER, Blindness, share_left
 from .drawing import largest_signal
 from .effect import Effect
-from .search import Array, Fitted, best_shape, golden_maximum, tangent_covariance
+from .search import Array, Fitted, golden_maximum, tangent_covariance
+from .shapes import best_shape
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
 #: Knees searched, in shares of the largest torque.
@@ -59,7 +55,7 @@ class StiffeningCompliance(Effect):
     knee_Nm: float = 0.0
     gravity_deg: float | None = None
 
-    kind: ClassVar[str] = "stiffening_compliance"
+    kind: ClassVar[str] = StiffeningComplianceTerm.kind
     size_name: ClassVar[str] = "arcsec_per_Nm3"
     sentence: ClassVar[str] = (
         "The gear stiffens under torque, as K1 and K2 of its catalogue say: the wind-up grows "
@@ -254,51 +250,5 @@ class StiffeningCompliance(Effect):
                 from_arcsec(self.beyond_knee_arcsec_per_Nm, period),
                 self.knee_Nm,
                 None if gravity is None else gravity * (period / 360.0),
-            ),
-        )
-
-
-@dataclass(frozen=True, repr=False)
-class StiffeningComplianceTerm(Term):
-    """A spring that stiffens under the moment m.
-
-    ::
-
-        ε = c₁ m + c₃ m³ + c_k sign(m) max(|m| - m_k, 0)
-
-    where m is the torque or, with ``gravity``, ``τ sin(φ - φ_g)``.
-
-    Parameters
-    ----------
-    per_Nm, per_Nm3 : float
-        ``c₁`` and ``c₃``.
-    beyond_knee_per_Nm, knee_Nm : float
-        ``c_k`` and the knee ``m_k ≥ 0``.
-    gravity : float, optional
-        ``φ_g``, the angle at which the load has no moment.
-    """
-
-    per_Nm: float = 0.0
-    per_Nm3: float = 0.0
-    beyond_knee_per_Nm: float = 0.0
-    knee_Nm: float = 0.0
-    gravity: float | None = None
-
-    kind: ClassVar[str] = "stiffening_compliance"
-    signals: ClassVar[tuple[str, ...]] = ("torque",)
-
-    def check(self) -> None:
-        if self.knee_Nm < 0.0:
-            raise self._out_of_range("knee_Nm", "0 or more")
-
-    def forms(self) -> tuple[Form, ...]:
-        return (
-            forms.Spring(
-                "torque",
-                self.per_Nm,
-                self.per_Nm3,
-                self.beyond_knee_per_Nm,
-                self.knee_Nm,
-                self.gravity,
             ),
         )

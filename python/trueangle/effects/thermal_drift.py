@@ -12,21 +12,13 @@ from ..estimation.estimate import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_sum
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term, from_arcsec, line_values
+from ..model.terms.place import ThermalDriftTerm
 from .backlash import Backlash
-from .blindness import (
-    LEAST_KELVIN,
-    Blindness,
-)
+from .blindness import LEAST_KELVIN, Blindness
 from .effect import Effect
 from .factor import FactorEffect
-from .search import (
-    Array,
-    Fitted,
-    known_orders,
-)
+from .search import Array, Fitted, known_orders
 from .torsional_compliance import TorsionalCompliance
 
 #: Temperature at which the simulation's lines hold, degrees Celsius.
@@ -57,7 +49,7 @@ class ThermalDrift(FactorEffect):
     lines_per_K: tuple[tuple[float, float, float], ...] = ()
     reference_C: float = 20.0
 
-    kind: ClassVar[str] = "thermal_drift"
+    kind: ClassVar[str] = ThermalDriftTerm.kind
     sentence: ClassVar[str] = (
         "Mounts expand and the magnet weakens with temperature: the zero and the lines of the "
         "encoder or the gear change in proportion to the temperature."
@@ -140,54 +132,5 @@ class ThermalDrift(FactorEffect):
                 self.pattern_per_K,
                 **line_values(self.lines_per_K, period),
                 reference_C=self.reference_C,
-            ),
-        )
-
-
-@dataclass(frozen=True, repr=False)
-class ThermalDriftTerm(Term):
-    """Error in proportion to ``ΔT = T - T₀``.
-
-    ::
-
-        ε = ΔT [k₀ + k_p p(φ) + Σ_m A_m cos mφ + B_m sin mφ]
-
-    with p the harmonics of the model without their constant.
-
-    Parameters
-    ----------
-    zero_per_K : float
-        ``k₀``, angle per kelvin.
-    pattern_per_K : float
-        ``k_p``, relative growth of the harmonics per kelvin.
-    orders : sequence of float
-        Output orders m of the lines, positive.
-    cosine, sine : sequence of float
-        ``A_m, B_m``, angle per kelvin.
-    reference_C : float
-        ``T₀``, where the harmonics hold, degrees Celsius.
-    """
-
-    zero_per_K: float = 0.0
-    pattern_per_K: float = 0.0
-    orders: tuple[float, ...] = ()
-    cosine: tuple[float, ...] = ()
-    sine: tuple[float, ...] = ()
-    reference_C: float = 20.0
-
-    kind: ClassVar[str] = "thermal_drift"
-    signals: ClassVar[tuple[str, ...]] = ("temperature",)
-
-    def check(self) -> None:
-        self._check_lines()
-
-    @property
-    def is_built_on_harmonics(self) -> bool:  # type: ignore[override]
-        return self.pattern_per_K != 0.0
-
-    def forms(self) -> tuple[Form, ...]:
-        return (
-            forms.Scaled(
-                "temperature", self.zero_per_K, self.lines, self.pattern_per_K, self.reference_C
             ),
         )

@@ -13,15 +13,9 @@ from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..support.angles import ARCSEC_PER_DEG
-from .effect import Effect
+from .effect import Effect, ScatterFinding
 from .heteroscedastic_noise import HeteroscedasticNoise
-from .scatter import (
-    CLIPPED_VARIANCE,
-    NEW_SCATTER,
-    ScatterFinding,
-    clipped_squares,
-    standardised_residuals,
-)
+from .scatter import CLIPPED_VARIANCE, NEW_SCATTER, clipped_squares, standardised_residuals
 from .search import Array
 
 #: Scoring steps, and the least variance in robust ones of the whole.

@@ -12,20 +12,12 @@ from ..estimation.estimate import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term, from_arcsec, line_values
-from .blindness import (
-    OWN_POWER,
-    Blindness,
-    share_left,
-)
+from ..model.terms.load import TorsionalComplianceTerm
+from .blindness import OWN_POWER, Blindness, share_left
 from .effect import Effect
 from .factor import FactorEffect
-from .search import (
-    Array,
-    Fitted,
-)
+from .search import Array, Fitted
 
 
 @dataclass(frozen=True)
@@ -44,7 +36,7 @@ class TorsionalCompliance(FactorEffect):
     arcsec_per_Nm: float = 0.0
     lines_per_Nm: tuple[tuple[float, float, float], ...] = ()
 
-    kind: ClassVar[str] = "torsional_compliance"
+    kind: ClassVar[str] = TorsionalComplianceTerm.kind
     sentence: ClassVar[str] = (
         "The gear and its parts twist under torque: the error is proportional to the torque, "
         "and under gravity follows it once per turn."
@@ -114,38 +106,6 @@ class TorsionalCompliance(FactorEffect):
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         lines = line_values(self.lines_per_Nm, period)
         return (TorsionalComplianceTerm(from_arcsec(self.arcsec_per_Nm, period), **lines),)
-
-
-@dataclass(frozen=True, repr=False)
-class TorsionalComplianceTerm(Term):
-    """Wind-up in proportion to the torque.
-
-    ::
-
-        ε = τ [c + Σ_m A_m cos mφ + B_m sin mφ]
-
-    Parameters
-    ----------
-    per_Nm : float
-        c = 1/K, angle per newton metre.
-    orders, cosine, sine : sequence of float
-        Lines per newton metre: order 1 where the torque states the load of an arm and
-        not its moment.
-    """
-
-    per_Nm: float = 0.0
-    orders: tuple[float, ...] = ()
-    cosine: tuple[float, ...] = ()
-    sine: tuple[float, ...] = ()
-
-    kind: ClassVar[str] = "torsional_compliance"
-    signals: ClassVar[tuple[str, ...]] = ("torque",)
-
-    def check(self) -> None:
-        self._check_lines()
-
-    def forms(self) -> tuple[Form, ...]:
-        return (forms.Scaled("torque", self.per_Nm, self.lines),)
 
 
 def torque_of(signals: Signals) -> Array:

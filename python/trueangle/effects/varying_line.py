@@ -13,16 +13,16 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns, line_sum
 from ..joint.signals import Signals
-from ..model import forms
-from ..model.forms import Form
 from ..model.term import Term, line_values
+from ..model.terms.motion import VaryingLineTerm
 from .blindness import Blindness
 from .channel_skew import ChannelSkew, sensor_order
 from .drawing import carrier_order, free_line, phase
 from .effect import ALWAYS, Effect
 from .filter_lag import FilterLag
 from .load_dependent_gear_error import LoadDependentGearError
-from .search import Array, Fitted, best_shape, grid_doubt, is_gear_order, line_parameters
+from .search import Array, Fitted, grid_doubt, is_gear_order, line_parameters
+from .shapes import best_shape
 
 #: Lines at most, and the price of a broad cause: one of so many beside every narrow one.
 MOST_LINES = 2
@@ -53,7 +53,7 @@ class VaryingLine(Effect):
     amplitude_arcsec: float
     phase_deg: float = 0.0
 
-    kind: ClassVar[str] = "varying_line"
+    kind: ClassVar[str] = VaryingLineTerm.kind
     size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
         "A line of a shaft grows, shrinks or turns with speed or load, in a form that no "
@@ -146,43 +146,6 @@ class VaryingLine(Effect):
         per_unit = 1.0 if self.follows == "torque" else 360.0 / period
         lines = ((self.order, self.amplitude_arcsec * per_unit, self.phase_deg),)
         return (VaryingLineTerm(follows=self.follows, **line_values(lines, period)),)
-
-
-@dataclass(frozen=True, repr=False)
-class VaryingLineTerm(Term):
-    """A line times a signal.
-
-    ::
-
-        ε = x Σ_m A_m cos mφ + B_m sin mφ
-
-    Parameters
-    ----------
-    orders, cosine, sine : sequence of float
-        Output orders (positive) and coefficients per unit of x.
-    follows : {"speed", "velocity", "torque"}
-        x: the absolute or the signed velocity in the model's unit, or the torque in Nm.
-    """
-
-    orders: tuple[float, ...]
-    cosine: tuple[float, ...]
-    sine: tuple[float, ...]
-    follows: str = "velocity"
-
-    kind: ClassVar[str] = "varying_line"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        return ("torque",) if self.follows == "torque" else ("velocity",)
-
-    def check(self) -> None:
-        self._check_lines()
-        if self.follows not in ("speed", "velocity", "torque"):
-            raise self._out_of_range("follows", "'speed', 'velocity' or 'torque'")
-
-    def forms(self) -> tuple[Form, ...]:
-        (signal,) = self.needs
-        return (forms.Scaled(signal, lines=self.lines, absolute=self.follows == "speed"),)
 
 
 def _resolved(regression: Regression) -> Array:

@@ -13,9 +13,9 @@ import numpy as np
 from ..errors import ArgumentError, OutsideSpanWarning
 from ..model.model import HarmonicModel
 from ..model.term import Term
+from ..model.terms import LocalDefect
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.signals import coupled_with
-from ..terms import LocalDefect
 from .pattern import TurnPattern
 from .runtimeterms import RunTimeTerms
 

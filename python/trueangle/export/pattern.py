@@ -10,9 +10,9 @@ from ..errors import ArgumentError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.term import Term
+from ..model.terms import LocalDefect
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
-from ..terms import LocalDefect
 from .inversion import inverse_rising
 
 

@@ -22,8 +22,8 @@ from ..model import forms
 from ..model.forms import Form
 from ..model.model import HarmonicModel
 from ..model.term import Term
+from ..model.terms import LocalDefect
 from ..support.signals import coupled_with
-from ..terms import LocalDefect
 
 #: What tells the direction of travel.
 DIRECTIONS = ("auto", "angle", "velocity", "signal")

@@ -41,7 +41,7 @@ def travel_model(
     FileError
         A travel of no more than three entries.
     """
-    from ..terms import Backlash
+    from ..model.terms import Backlash
 
     nominal, ahead, back = table.T
     travel = float(nominal[-1] - nominal[0])

@@ -157,7 +157,7 @@ def fit(
         from .prior import fitted_with_prior
 
         asked = {"nuisance": nuisance, "covariance": covariance, "ridge": ridge, "method": method}
-        return fitted_with_prior(
+        problem, weighted, posterior = fitted_with_prior(
             runs_of(runs, reading),
             prior,
             None
@@ -165,8 +165,19 @@ def fit(
             else resolve_orders(orders, gear_ratio, fixed_member, shafts),
             argument,
             loss,
-            (gear_ratio, fixed_member),
             {**asked, "reference_orders": tuple(reference_orders) or ()},
+        )
+        return FitResult(
+            problem,
+            weighted.fitted,
+            weighted,
+            loss,
+            0.0,
+            travelled_span(problem.travel, problem.period, problem.is_periodic),
+            None,
+            (gear_ratio, fixed_member),
+            (posterior.note(),),
+            posterior=posterior,
         )
     return fitted_to(
         runs_of(runs, reading),
@@ -255,7 +266,7 @@ def fitted_to(
         problem = Problem(found, wanted, choice.argument, method, threads)
         weighted = fit_robustly(problem, loss, ROUNDING * problem.period)
     else:
-        from .summed import SummedProblem
+        from .summedproblem import SummedProblem
 
         problem = SummedProblem(summed, wanted, threads)
         weighted = fit_without_outliers(problem, len(summed.outliers))

@@ -17,15 +17,14 @@ from ..model.records import FitRecord, Provenance
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import student_quantile
-from ..support.plainresult import PlainResult
+from .fitdata import FitData
 from .rounding import COUNTED
 
 if TYPE_CHECKING:
-    from .result import FitResult
-    from .uncertainty import Uncertainty
+    from .orders.table import OrderSelection
 
 
-def build_model(fit: FitResult) -> HarmonicModel:
+def build_model(fit: FittedCoefficients) -> HarmonicModel:
     """The fitted series with its covariance, record and provenance."""
     problem, solution = fit.problem, fit.fitted.solution
     covariance, condition = fit.uncertainty.covariance, solution.condition_number
@@ -45,7 +44,7 @@ def build_model(fit: FitResult) -> HarmonicModel:
     )
 
 
-def fit_notes(fit: FitResult) -> Iterable[str]:
+def fit_notes(fit: FittedCoefficients) -> Iterable[str]:
     """What not to trust and why, one sentence each."""
     span, weighted = fit.span, fit.weighted
     if not span.full:
@@ -82,7 +81,7 @@ def _sentence(note: str) -> str:
     return f"{note[:1].upper()}{note[1:]}."
 
 
-def _record(fit: FitResult) -> FitRecord:
+def _record(fit: FittedCoefficients) -> FitRecord:
     problem, solution = fit.problem, fit.fitted.solution
     variance = solution.residual_variance
     used = fit.offsets[np.isfinite(fit.offsets)]
@@ -104,7 +103,7 @@ def _record(fit: FitResult) -> FitRecord:
     )
 
 
-def _verified(fit: FitResult) -> tuple[int, str] | None:
+def _verified(fit: FittedCoefficients) -> tuple[int, str] | None:
     """Distinct positions and where the model is verified; None for free or many angles."""
     from .orders.verdicts import verified_positions
 
@@ -115,20 +114,37 @@ def _verified(fit: FitResult) -> tuple[int, str] | None:
     return None if verified.between else (verified.count, verified.sentence)
 
 
-class FittedCoefficients(PlainResult):
-    """Coefficients with their uncertainty: what fits of runs and of logs have in common."""
+class FittedCoefficients(FitData):
+    """The model of a fit, and its coefficients with their uncertainty."""
 
-    if TYPE_CHECKING:
+    @cached_property
+    def model(self) -> HarmonicModel:
+        """The fitted model, with its covariance and the record of this fit."""
+        return build_model(self)
 
-        @property
-        def model(self) -> HarmonicModel:
-            """The fitted model."""
-            raise NotImplementedError
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What not to trust and why."""
+        return tuple(fit_notes(self))
 
-        @property
-        def uncertainty(self) -> Uncertainty:
-            """Covariance, its kind and the degrees of freedom of each coefficient's variance."""
-            raise NotImplementedError
+    @cached_property
+    def selection(self) -> OrderSelection | None:
+        """The evidence, when the orders were chosen by it; retained ones as they are fitted."""
+        return (
+            None
+            if self.evidence is None
+            else self.evidence.as_fitted(self.model, self.standard_errors)
+        )
+
+    @property
+    def offset_spread(self) -> float:
+        """Standard deviation of the runs' zeros about their circular mean."""
+        return 0.0 if self.model.fit is None else self.model.fit.offset_spread
+
+    @property
+    def standard_errors(self) -> tuple[Array, Array] | None:
+        """Of amplitudes and phases; None where no residual is left to take them from."""
+        return None if self.model.covariance is None else (self.amplitude_std, self.phase_std)
 
     @property
     def covariance(self) -> Array:

@@ -26,13 +26,11 @@ from ..model.model import Argument
 from ..model.validity import check_invertible
 from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
-from ..runs.travel import travelled_span
 from ..support.angles import circular_mean, unit_name, wrap
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument
 from .problem import Fitted, PlainSolution, Problem
-from .result import FitResult
 from .robust import WILD, Loss, Weighted
 
 #: Rounds in which what is set aside settles, and the noise: each takes off a part of what is left.
@@ -257,9 +255,8 @@ def fitted_with_prior(
     shafts: list[ShaftOrders] | None,
     argument: AnyArgument,
     loss: Loss,
-    joint: tuple[float | None, str],
     asked: Mapping[str, Any],
-) -> FitResult:
+) -> tuple[Problem, Weighted, Posterior]:
     """See `trueangle.fit` with ``prior``."""
     for name, value in asked.items():
         if not (value is None or value == _USUAL[name]):
@@ -272,16 +269,4 @@ def fitted_with_prior(
     problem = Problem(runs, list(known.shafts) if shafts is None else shafts, angle)
     weighted, taken = posterior(problem, known, loss)
     check_invertible(weighted.fitted.series.slope_bound)
-    return FitResult(
-        problem,
-        weighted.fitted,
-        weighted,
-        loss,
-        0.0,
-        travelled_span(problem.travel, problem.period, problem.is_periodic),
-        None,
-        joint,
-        (taken.note(),),
-        "auto",
-        posterior=taken,
-    )
+    return problem, weighted, taken

@@ -2,39 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-import numpy as np
-
-from ..errors import ArgumentError
-from ..model.model import HarmonicModel
-from ..runs.run import CalibrationRun
-from ..runs.travel import Span
-from ..support.arrays import Array
 from ..support.display_units import ErrorsIn
 from ..support.plainresult import result_picture
-from .model import FittedCoefficients, build_model, fit_notes
-from .problem import Fitted, Problem
-from .robust import Weighted
-from .rounding import beside_rounding
-from .uncertainty import CovarianceKind, Uncertainty, coefficient_uncertainty
+from .model import FittedCoefficients
+from .summary import fit_summary, plain_fit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..estimation.moments import Moments
-    from .nuisance import Nuisance
-    from .orders.table import OrderSelection
-    from .prior import Posterior
-    from .summed import Summed
-
 Picture: TypeAlias = Literal["errors", "spectrum", "phases", "residuals"]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class FitResult(FittedCoefficients):
     """A fitted model and everything needed to judge it.
 
@@ -70,159 +50,6 @@ class FitResult(FittedCoefficients):
         What a prior did: the share of each order that is the unit's own (`fit`, ``prior=``).
     """
 
-    problem: Problem
-    fitted: Fitted
-    weighted: Weighted
-    loss: str
-    ridge: float
-    span: Span
-    evidence: OrderSelection | None
-    joint: tuple[float | None, str]
-    remarks: tuple[str, ...] = ()
-    covariance_asked: CovarianceKind = "auto"
-    nuisance: Nuisance | None = None
-    posterior: Posterior | None = None
-
-    @cached_property
-    def model(self) -> HarmonicModel:
-        """The fitted model, with its covariance and the record of this fit."""
-        return build_model(self)
-
-    @cached_property
-    def notes(self) -> tuple[str, ...]:
-        """What not to trust and why."""
-        return tuple(fit_notes(self))
-
-    @cached_property
-    def selection(self) -> OrderSelection | None:
-        """The evidence, when the orders were chosen by it; retained ones as they are fitted."""
-        return None if self.evidence is None else self.evidence.as_fitted(self)
-
-    @property
-    def weights(self) -> list[Array] | None:
-        """Weights that a robust loss ended with; 0 marks readings set aside as wild."""
-        return self.weighted.weights
-
-    @property
-    def readings(self) -> int:
-        """Readings of all runs."""
-        return self.problem.readings
-
-    @property
-    def missing(self) -> int:
-        """Rows of the files that an empty cell kept out."""
-        if self._summed is not None:
-            return self._summed.missing
-        return sum(run.left_out for run in self.problem.runs)
-
-    @property
-    def moments(self) -> Moments | None:
-        """Sums of logs that were fitted in one pass; None where the readings are in memory."""
-        return None if self._summed is None else self._summed.moments
-
-    @property
-    def runs(self) -> tuple[CalibrationRun, ...]:
-        """The runs fitted, as given but for `nuisance`.
-
-        Raises
-        ------
-        ArgumentError
-            The readings were too many to keep.
-        """
-        if self._summed is not None:
-            raise ArgumentError(
-                f"the {self.readings} readings were summed in one pass and are not kept: fit runs "
-                "in memory (trueangle.fit) for their residuals and plots"
-            )
-        return tuple(self.problem.runs)
-
-    @property
-    def _summed(self) -> Summed | None:
-        return self.problem.summed
-
-    @property
-    def offsets(self) -> Array:
-        """Zero of every run, a nuisance of the fit; the constant is their circular mean."""
-        return self.fitted.offsets
-
-    @property
-    def offset_std(self) -> Array:
-        """Standard errors of `offsets`."""
-        std = np.full(len(self.problem.runs), np.nan)
-        std[np.isfinite(self.offsets)] = self.fitted.solution.offset_std
-        return std
-
-    @property
-    def offset_spread(self) -> float:
-        """Standard deviation of the runs' zeros about their circular mean."""
-        return 0.0 if self.model.fit is None else self.model.fit.offset_spread
-
-    @property
-    def residual_variance(self) -> float:
-        """Weighted sum of squared residuals over `degrees_of_freedom`."""
-        return self.fitted.solution.residual_variance
-
-    @property
-    def residual_std(self) -> float:
-        """Residual standard deviation, degrees of freedom allowed for."""
-        return math.sqrt(self.residual_variance)
-
-    @property
-    def degrees_of_freedom(self) -> float:
-        """Readings less unknowns; effective (not whole) with a ridge."""
-        return self.fitted.solution.degrees_of_freedom
-
-    @property
-    def rank(self) -> int:
-        """Numerical rank of the design."""
-        return self.fitted.solution.rank
-
-    @property
-    def condition_number(self) -> float:
-        """Of the design with its columns scaled to unit length."""
-        return self.fitted.solution.condition_number
-
-    @property
-    def method(self) -> str:
-        """The way taken: ``"plain"``, ``"moments"``, ``"qr"`` or ``"counts"``, see `fit`."""
-        return self.fitted.solution.method
-
-    @cached_property
-    def uncertainty(self) -> Uncertainty:
-        """Covariance, its kind and the degrees of freedom of each coefficient's variance."""
-        if self.posterior is not None:
-            covariance = np.asarray(self.fitted.solution.covariance)
-            return Uncertainty(
-                "white", covariance, np.full(len(covariance), self.posterior.freedom)
-            )
-        weights = self.weights or self.problem.base
-        found = coefficient_uncertainty(
-            self.problem, self.fitted, weights, self.ridge, self.covariance_asked
-        )
-        found = beside_rounding(found, self.problem, self.fitted)
-        if self.nuisance is None or not self.nuisance.inflation:
-            return found
-        wider = np.array([1.0, *self.nuisance.inflation])
-        return found._replace(covariance=found.covariance * np.outer(wider, wider))
-
-    @cached_property
-    def residuals(self) -> Array:
-        """Measured less fitted error of every reading, run after run, zeros removed."""
-        return np.concatenate(self.problem.residuals(self.fitted)[: len(self.runs)])
-
-    @property
-    def wild(self) -> tuple[tuple[str, int], ...]:
-        """Label and row (from 0) of every reading that was set aside."""
-        if self.weights is None:
-            return () if self._summed is None else self._summed.outliers
-        return tuple(
-            (run.label or str(i), int(row))
-            for i, (run, weights) in enumerate(zip(self.runs, self.weights, strict=True))
-            for row in np.flatnonzero(
-                (weights == 0.0) & (True if run.weights is None else run.weights > 0.0)
-            )
-        )
-
     def plot(self, kind: Picture = "errors", ax: Axes | None = None, **options: Any) -> Axes:
         """A picture of the fit (needs ``trueangle[plot]``).
 
@@ -243,8 +70,6 @@ class FitResult(FittedCoefficients):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle fit`` prints as JSON beside the model."""
-        from .summary import plain_fit
-
         return plain_fit(self)
 
     def summary(self, errors_in: ErrorsIn = "auto") -> str:
@@ -256,8 +81,6 @@ class FitResult(FittedCoefficients):
             Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         """
-        from .summary import fit_summary
-
         return fit_summary(self, errors_in)
 
     def __repr__(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +12,10 @@ from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, phase_pair,
 from ..support.distributions import student_quantile
 from ..support.layout import laid_out
 from ..support.plainresult import finite
-
-if TYPE_CHECKING:
-    from .result import FitResult
+from .model import FittedCoefficients
 
 
-def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
+def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
     """See `FitResult.summary`."""
     model = fit.model
     runs = len(fit.problem.runs)
@@ -43,7 +41,7 @@ def fit_summary(fit: FitResult, errors_in: ErrorsIn = "auto") -> str:
     return laid_out(lines)
 
 
-def fit_error_unit(fit: FitResult, errors_in: ErrorsIn = "auto") -> ErrorUnit:
+def fit_error_unit(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> ErrorUnit:
     """One unit for all that is told and drawn of a fit, by the rms of pattern and residual."""
     period = fit.model.period
     pattern = 0.5 * float(fit.model.amplitudes @ fit.model.amplitudes)
@@ -52,14 +50,14 @@ def fit_error_unit(fit: FitResult, errors_in: ErrorsIn = "auto") -> ErrorUnit:
     return error_unit(errors_in, sine_of_rms(rms), period)
 
 
-def _residual(fit: FitResult, shown: ErrorUnit) -> str:
+def _residual(fit: FittedCoefficients, shown: ErrorUnit) -> str:
     """The residual to the digits that its degrees of freedom leave, with its unit."""
     size = arcsec(fit.residual_std, fit.model.period)
     std = size / math.sqrt(2.0 * max(1.0, fit.degrees_of_freedom))
     return f"{shown.number(size, std)} {shown.name}"
 
 
-def _spread(fit: FitResult, shown: ErrorUnit) -> str:
+def _spread(fit: FittedCoefficients, shown: ErrorUnit) -> str:
     if len(fit.problem.runs) < 2:
         return ""
     return (
@@ -68,7 +66,7 @@ def _spread(fit: FitResult, shown: ErrorUnit) -> str:
     )
 
 
-def _intervals(fit: FitResult) -> str:
+def _intervals(fit: FittedCoefficients) -> str:
     """By how many standard errors 95 % intervals reach, and whose covariance it is."""
     found = fit.uncertainty
     least, most = float(found.freedom.min()), float(found.freedom.max())
@@ -85,7 +83,7 @@ _KINDS = {
 }
 
 
-def _table(fit: FitResult, shown: ErrorUnit) -> list[str]:
+def _table(fit: FittedCoefficients, shown: ErrorUnit) -> list[str]:
     model = fit.model
     with_std = model.covariance is not None
     amplitude_std = fit.amplitude_std if with_std else np.full(model.amplitudes.size, np.nan)
@@ -107,7 +105,7 @@ def _table(fit: FitResult, shown: ErrorUnit) -> list[str]:
     return lines
 
 
-def plain_fit(found: FitResult) -> dict[str, Any]:
+def plain_fit(found: FittedCoefficients) -> dict[str, Any]:
     """The fit with the same names whatever way it took; angles in arcsec."""
     period = found.model.period
     record = found.model.fit
@@ -148,7 +146,7 @@ def plain_fit(found: FitResult) -> dict[str, Any]:
     }
 
 
-def _evidence(found: FitResult) -> list[dict[str, Any]]:
+def _evidence(found: FittedCoefficients) -> list[dict[str, Any]]:
     """The evidence for every order that was looked at; empty where the orders were given."""
     scale = arcsec(1.0, found.model.period)
     return [
@@ -166,7 +164,7 @@ def _evidence(found: FitResult) -> list[dict[str, Any]]:
     ]
 
 
-def _standard_error(found: FitResult, n: int) -> dict[str, Any]:
+def _standard_error(found: FittedCoefficients, n: int) -> dict[str, Any]:
     """Standard error and 95 % interval of one amplitude; null where nothing tells them."""
     if found.model.covariance is None:
         return {"std_arcsec": None, "interval_arcsec": None}

@@ -10,13 +10,11 @@ import numpy as np
 from ..errors import ArgumentError
 from ..estimation.linear import NormalEquations
 from ..estimation.moments import Moments
-from ..joint.shafts import ShaftOrders
 from ..model.model import Argument
 from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 from .orders.harmonicsums import HarmonicSums
 from .orders.unitgroups import MOST_UNITS
-from .problem import Fitted, Problem
 
 #: Orders this close to a whole multiple of the base shaft are one.
 _WHOLE = 1e-9
@@ -71,66 +69,6 @@ class Summed:
             "in one pass; what needs readings in their order (positions, repeats, correlation, "
             f"the ridge) is estimated from {kept} of them, taken in blocks at random"
         )
-
-
-class SummedProblem(Problem):
-    """The problem of readings that are known by their sums, and by some of them.
-
-    Raises
-    ------
-    ArgumentError
-        Angles within one turn, of a shaft that comes to another place in every turn.
-    """
-
-    summed: Summed
-
-    def __init__(
-        self, summed: Summed, shafts: Sequence[ShaftOrders], threads: int | None = None
-    ) -> None:
-        super().__init__(summed.runs, shafts, summed.argument, None, threads)
-        if any(mine is not given for mine, given in zip(self.runs, summed.runs, strict=True)):
-            raise ArgumentError(
-                "the angles lie within one turn, and a shaft does not turn a whole number of times "
-                "in it: turns would have to be counted, which one pass does not; give the angles "
-                "over all turns, or fewer readings"
-            )
-        self.summed = summed
-        self.readings = summed.readings
-        self.travel = [*self.angles, summed.ends if self.is_periodic else summed.reach]
-
-    def solve(
-        self, weights: Sequence[Array | None], penalty: float = 0.0, watch: bool = False
-    ) -> Fitted:
-        """Least squares on all readings, whatever the weights of those kept."""
-        solution = self.summed.moments.solution(self.shafts)
-        fitted = Fitted(solution, solution.offsets, self.shafts, self.period)
-        return self.penalised(fitted, weights, penalty) if penalty > 0.0 else fitted
-
-    def _weight(self, weights: Sequence[Array | None]) -> float:
-        return float(self.summed.moments.count)
-
-    def products(self, weights: Sequence[Array | None], index: int, count: int) -> list[Array]:
-        """As of readings in memory; of whole runs only."""
-        if count != 1:
-            raise ArgumentError(
-                "one pass does not keep segments of runs: take covariance='cluster'"
-            )
-        moments = self.summed.moments
-        orders = [k * shaft.cycles_per_turn for shaft in self.shafts for k in shaft.orders]
-        steps = np.rint(np.asarray(orders) / moments.cycles).astype(np.int64)
-        spectrum = moments.spectrum(moments.runs[index], int(steps.max()))
-        cosine, sine = np.arange(steps.size) * 2 + 1, np.arange(steps.size) * 2 + 2
-        found = np.empty((2 * steps.size + 2, 2 * steps.size + 2))
-        weight, error = spectrum.weight, spectrum.error
-        turned = np.concatenate([cosine, sine])
-        found[np.ix_(turned, turned)] = HarmonicSums.whole(weight, *2 * [steps.astype(np.float64)])
-        found[0, 0], found[-1, -1] = weight[0].real, spectrum.squares
-        found[0, cosine], found[0, sine] = weight[steps].real, weight[steps].imag
-        found[-1, cosine], found[-1, sine] = error[steps].real, error[steps].imag
-        found[0, -1] = error[0].real
-        found[:, 0], found[:, -1] = found[0], found[-1]
-        found[-1, 0] = found[0, -1] = error[0].real
-        return [found]
 
 
 def sums_of_moments(moments: Moments, orders: Sequence[float]) -> HarmonicSums:

@@ -13,6 +13,7 @@ from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.layout import laid_out
 from ..support.plainresult import PlainResult, counted, finite, result_picture
 from .history import HistoryRow
+from .text import save_fleet
 from .tolerance import Tolerance
 from .unit import FleetUnit
 
@@ -169,9 +170,7 @@ class Fleet(PlainResult):
         FileError
             The ending names another format.
         """
-        from .text import save_fleet
-
-        save_fleet(self, path)
+        save_fleet(self.prior, self.to_dict(), path)
 
     def plot(self, kind: str = "overview", **options: Any) -> Axes:
         """A picture of the fleet (needs matplotlib).

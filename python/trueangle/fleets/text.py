@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import math
 from os import PathLike
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final
 
+from ..fitting.prior import Prior
 from ..support.files import FLEET, written_atomically
 from ..support.plainresult import pretty_json
-
-if TYPE_CHECKING:
-    from .result import Fleet
 
 FORMAT: Final = "trueangle-fleet"
 VERSION: Final = 1
 
 
-def save_fleet(fleet: Fleet, path: str | PathLike[str]) -> None:
-    """Write ``fleet``; see `Fleet.save`."""
-    prior = fleet.prior
+def save_fleet(prior: Prior, told: dict[str, Any], path: str | PathLike[str]) -> None:
+    """Write a fleet: its prior, and what it tells as plain values; see `Fleet.save`."""
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -32,7 +29,7 @@ def save_fleet(fleet: Fleet, path: str | PathLike[str]) -> None:
             "noise_freedom": None if math.isinf(prior.noise_freedom) else prior.noise_freedom,
             "units": prior.units,
         },
-        **fleet.to_dict(),
+        **told,
     }
     with written_atomically(path, kind=FLEET) as file:
         file.write(pretty_json(content) + "\n")

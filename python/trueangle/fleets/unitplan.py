@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import ArgumentError
-from ..planning.arc import check_arc, plain_arc_plan, plan_arc
-from ..planning.summary import place_table
+from ..planning.arc import check_arc, plan_arc
+from ..planning.tables import place_table, plain_arc_plan
 from ..support.kinds import told_kinds
 from ..support.layout import laid_out
 from ..support.plainresult import PlainResult, counted

@@ -11,7 +11,7 @@ import sqlite3
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
@@ -19,12 +19,9 @@ from ruamel.yaml.error import YAMLError
 from ..errors import FileError
 from .format import Addition, note
 
-if TYPE_CHECKING:
-    from .rosbag import Bag
-
 #: Of the custom data.
 KEY = "trueangle"
-_JOINT_STATE = "sensor_msgs/msg/JointState"
+JOINT_STATE = "sensor_msgs/msg/JointState"
 #: MCAP: magic at both ends, kind and length of a record, and the kinds looked for.
 _MAGIC = b"\x89MCAP0\r\n"
 _RECORD = struct.Struct("<BQ")
@@ -33,10 +30,9 @@ _FOOTER, _METADATA, _METADATA_INDEX = 0x02, 0x0C, 0x0D
 _FOOTER_BYTES, _MOST = 20, 1 << 24
 
 
-def made_note(bag: Bag, additions: Sequence[Addition], topic: str) -> str:
+def made_note(before: list[dict[str, Any]], additions: Sequence[Addition], topic: str) -> str:
     """The note of a bag whose ``topic`` takes the corrected positions, with what it said before."""
     told = json.loads(note(additions))
-    before = [e for e in _entries(bag) if not bag.is_ros1 or e["topic"] == topic]
     told["corrected"] = [*before, *({**entry, "topic": topic} for entry in told["corrected"])]
     return json.dumps(told)
 
@@ -48,7 +44,9 @@ def caller_note(note: str, caller: str | None) -> str:
     return json.dumps(told if caller is None else {**told, "callerid": caller})
 
 
-def refuse_again(path: Path, bag: Bag, topic: str, additions: Sequence[Addition]) -> None:
+def refuse_again(
+    path: Path, before: list[dict[str, Any]], topic: str, additions: Sequence[Addition]
+) -> None:
     """Refuse joints of a topic whose positions are corrected ones.
 
     Raises
@@ -57,7 +55,7 @@ def refuse_again(path: Path, bag: Bag, topic: str, additions: Sequence[Addition]
         Names the model that they were corrected with.
     """
     columns = {addition.column for addition in additions}
-    for entry in _entries(bag):
+    for entry in before:
         if entry.get("topic") == topic and entry.get("from") in columns:
             sha256 = str(entry.get("model_sha256", ""))[:12]
             raise FileError(
@@ -69,25 +67,22 @@ def refuse_again(path: Path, bag: Bag, topic: str, additions: Sequence[Addition]
             )
 
 
-def corrected_topics(bag: Bag) -> set[str]:
-    """Topics whose positions, or some of them, are corrected ones."""
-    return {str(entry.get("topic")) for entry in _entries(bag)}
-
-
-def _entries(bag: Bag) -> list[dict[str, Any]]:
+def corrected_entries(
+    connections: Sequence[Any], custom: Mapping[str, str], is_ros1: bool
+) -> list[dict[str, Any]]:
     """What was corrected in a bag: entries of its notes, with their topics."""
     found: list[dict[str, Any]] = []
-    if bag.is_ros1:
-        for connection in bag.reader.connections:
+    if is_ros1:
+        for connection in connections:
             for entry in _corrected(connection.ext.callerid):
                 # The header goes with its connection, whatever that is called by now.
                 named = {**entry, "topic": connection.topic}
                 found += [] if named in found else [named]
         return found
-    topics = {c.topic for c in bag.reader.connections if c.msgtype == _JOINT_STATE}
+    topics = {c.topic for c in connections if c.msgtype == JOINT_STATE}
     # Notes of earlier versions name no topic: where there is one only, it is that.
     only = {"topic": min(topics)} if len(topics) == 1 else {}
-    return [{**only, **entry} for entry in _corrected(bag.custom.get(KEY))]
+    return [{**only, **entry} for entry in _corrected(custom.get(KEY))]
 
 
 def _corrected(text: Any) -> list[dict[str, Any]]:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag1 import Writer as Writer1
@@ -16,10 +16,8 @@ from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 from ..errors import FileError
 from .mcapchunks import ChunkedBagWriter as Writer
 from .mcapchunks import ChunkReader
+from .openbag import Bag
 from .rosbagmarks import KEY, caller_note
-
-if TYPE_CHECKING:
-    from .rosbag import Bag
 
 
 class BagWriter:

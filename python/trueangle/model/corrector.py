@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +12,8 @@ from ..errors import ArgumentError
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.signals import GivenSignals, check_names
-
-if TYPE_CHECKING:
-    from .model import HarmonicModel, Step
+from .errormodel import ErrorModel
+from .step import Step
 
 
 class Velocity:
@@ -109,7 +108,7 @@ class Corrector:
     >>> corrector.reset()
     """
 
-    def __init__(self, model: HarmonicModel) -> None:
+    def __init__(self, model: ErrorModel) -> None:
         self._model = model
         self._core = model._core_corrector()
         self._velocity = Velocity(model.period)
@@ -198,7 +197,7 @@ class Corrector:
         return self._core.correct(indicated, out, threads=threads, **signals)[0]
 
 
-def _rebuild(model: HarmonicModel, state: tuple[float, ...]) -> Corrector:
-    corrector = model.corrector()
+def _rebuild(model: ErrorModel, state: tuple[float, ...]) -> Corrector:
+    corrector = Corrector(model)
     corrector.state = state
     return corrector

@@ -18,7 +18,7 @@ from ..support.files import MODEL_BYTES
 from ..support.kinds import told_kinds
 from .model import HarmonicModel
 from .records import MAX_TERMS, MOST_TURNS, RecordReader
-from .term import Term, known_terms
+from .term import Term
 from .text import FORMAT, ROBOT_FORMAT, VERSION, save_model
 
 __all__ = [
@@ -283,23 +283,24 @@ class _ModelReader(RecordReader):
     def terms(self, value: Any) -> tuple[Term, ...]:
         if value is None:
             return ()
+        from .terms import TERMS  # most models have none
+
         terms = []
-        kinds = known_terms()
         for i, entry in enumerate(self.items(value, "terms", "terms", MAX_TERMS)):
             where = f"terms[{i}]"
             if not isinstance(entry, dict):
                 raise self.error(f"an object is needed, got {shown(entry)}", where)
             kind = entry.get("kind")
-            if not isinstance(kind, str) or kind not in kinds:
+            if not isinstance(kind, str) or kind not in TERMS:
                 raise self.error(
-                    f"{shown(kind)} is unknown; the kinds are {', '.join(kinds)}; "
+                    f"{shown(kind)} is unknown; the kinds are {', '.join(TERMS)}; "
                     "a later trueangle may know it",
                     f"{where}.kind",
                 )
             table = {key: self.parameter(v, f"{where}.{key}") for key, v in entry.items()}
             table.pop("kind")
             try:
-                terms.append(kinds[kind].from_table(table))
+                terms.append(TERMS[kind].from_table(table))
             except ArgumentError as cause:
                 raise self.error(str(cause), where) from None
         return tuple(terms)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from os import PathLike
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
+from typing import Any, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,10 +20,8 @@ from ..support.plainresult import Shown, counted
 from ..support.roles import wanted_columns
 from ..support.signals import GivenSignals, check_names, coupled_with
 from .model import HarmonicModel
-from .step import exchangeable
-
-if TYPE_CHECKING:
-    from .step import AllJoints
+from .step import AllJoints, exchangeable
+from .text import save_robot
 
 #: Columns of a log by role, each with its unit where its name does not tell it.
 Columns: TypeAlias = Mapping[str, tuple[str, str | None]]
@@ -177,7 +175,7 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
                 raise type(error)(f"joint {joint}: {error}") from None
         return corrected.T
 
-    def compensator(self) -> AllJoints:
+    def compensator(self) -> AllJoints[Robot]:
         """``step(positions) -> corrected`` for one sample of all joints at a time.
 
         One call of the compiled core for all joints: of an array of float64 it allocates
@@ -205,7 +203,7 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         array([90.,  0.])
         """
         core = self._prepared()
-        step: AllJoints = exchangeable(core.step, partial(_swap, core, self))
+        step: AllJoints[Robot] = exchangeable(core.step, partial(_swap, core, self))
         return step
 
     def _prepared(self) -> _core.RobotStep:
@@ -221,9 +219,7 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         FileError
             An ending of another format, a file that the models were fitted to.
         """
-        from .text import save_robot
-
-        save_robot(self, path)
+        save_robot(self, self.name, self.signals, path)
 
     def _brief(self) -> str:
         return f"{self.name or 'unnamed'}, {counted(len(self), 'joint')}: {', '.join(self)}"

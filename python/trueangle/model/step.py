@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol, Unpack
+from typing import Any, Protocol, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..support.signals import GivenSignals
 
-if TYPE_CHECKING:
-    from .model import HarmonicModel
-    from .robot import Robot
+Model_contra = TypeVar("Model_contra", contravariant=True)
+Robot_contra = TypeVar("Robot_contra", contravariant=True)
 
 
 class Step(Protocol):
@@ -33,14 +32,14 @@ class Step(Protocol):
         """The true angle of an indicated one."""
 
 
-class ExchangeableStep(Step, Protocol):
+class ExchangeableStep(Step, Protocol[Model_contra]):
     """A step that goes on with another model."""
 
-    def swap(self, model: HarmonicModel) -> None:
+    def swap(self, model: Model_contra) -> None:
         """Correct by another model from the next step on (`HarmonicModel.compensator`)."""
 
 
-class AllJoints(Protocol):
+class AllJoints(Protocol[Robot_contra]):
     """The corrected angles of all joints of a robot for their indicated ones."""
 
     def __call__(
@@ -52,7 +51,7 @@ class AllJoints(Protocol):
     ) -> NDArray[np.float64]:
         """The true angles, in the order of the joints; in ``out`` where it is given."""
 
-    def swap(self, robot: Robot) -> None:
+    def swap(self, robot: Robot_contra) -> None:
         """Correct by another robot's models from the next step on (`Robot.compensator`)."""
 
 

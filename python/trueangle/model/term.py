@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
@@ -164,12 +163,6 @@ class Term:
             )
         if any(order <= 0.0 for order in orders):
             raise self._out_of_range("orders", "positive")
-
-
-def known_terms() -> Mapping[str, type[Term]]:
-    """Every kind of term; a class stands with its effect, which enters it in `TERMS`."""
-    importlib.import_module("trueangle.effects")
-    return TERMS
 
 
 def from_arcsec(value: float, period: float) -> float:

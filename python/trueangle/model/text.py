@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import ArgumentError
 from ..support.angles import arcsec, unit_name
@@ -13,11 +14,8 @@ from ..support.display_units import error_unit, sine_of_rms
 from ..support.files import MODEL, MODEL_BYTES, written_atomically
 from ..support.layout import laid_out, wrapped
 from ..support.plainresult import pretty_json
-
-if TYPE_CHECKING:
-    from .model import HarmonicModel
-    from .records import FitRecord
-    from .robot import Robot
+from .errormodel import ErrorModel
+from .records import FitRecord
 
 FORMAT = "trueangle-model"
 ROBOT_FORMAT = "trueangle-robot"
@@ -30,12 +28,12 @@ _LISTED = 40
 _NAMED, _LETTERS = 4, 24
 
 
-def model_text(model: HarmonicModel) -> str:
+def model_text(model: ErrorModel) -> str:
     """What the file of a model holds."""
     return pretty_json(model_content(model)) + "\n"
 
 
-def model_content(model: HarmonicModel) -> dict[str, Any]:
+def model_content(model: ErrorModel) -> dict[str, Any]:
     """The object that the file of a model is."""
     return {
         "format": FORMAT,
@@ -55,7 +53,7 @@ def model_content(model: HarmonicModel) -> dict[str, Any]:
     }
 
 
-def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
+def save_model(model: ErrorModel, path: str | PathLike[str]) -> None:
     """Write ``model``; see `HarmonicModel.save`."""
     text = model_text(model)
     if len(text) > MODEL_BYTES:
@@ -68,24 +66,29 @@ def save_model(model: HarmonicModel, path: str | PathLike[str]) -> None:
         file.write(text)
 
 
-def save_robot(robot: Robot, path: str | PathLike[str]) -> None:
-    """Write ``robot``; see `Robot.save`."""
+def save_robot(
+    models: Mapping[str, ErrorModel],
+    name: str,
+    signals: Mapping[str, Mapping[str, Any]],
+    path: str | PathLike[str],
+) -> None:
+    """Write the models of a robot; see `Robot.save`."""
     content: dict[str, Any] = {"format": ROBOT_FORMAT, "version": VERSION}
-    if robot.name:
-        content["name"] = robot.name
-    if robot.signals:
+    if name:
+        content["name"] = name
+    if signals:
         content["signals"] = {
             joint: {role: [*column] for role, column in columns.items()}
-            for joint, columns in robot.signals.items()
+            for joint, columns in signals.items()
         }
-    content["joints"] = {joint: model_content(model) for joint, model in robot.items()}
+    content["joints"] = {joint: model_content(model) for joint, model in models.items()}
     text = pretty_json(content) + "\n"
     if len(text) > MODEL_BYTES:
         raise ArgumentError(
             f"{path}: the models take {len(text)} bytes, and at most {MODEL_BYTES} are read back; "
             "save them without their covariances"
         )
-    hashes = [source.sha256 for model in robot.values() for source in model.provenance.inputs]
+    hashes = [source.sha256 for model in models.values() for source in model.provenance.inputs]
     with written_atomically(path, kind=MODEL, hashes=hashes) as file:
         file.write(text)
 
@@ -101,7 +104,7 @@ def _record(record: FitRecord) -> dict[str, Any]:
     return table
 
 
-def one_line(model: HarmonicModel) -> str:
+def one_line(model: ErrorModel) -> str:
     """What the model is, in one line of a screen."""
     lines = len(model.orders)
     parts = [
@@ -115,7 +118,7 @@ def one_line(model: HarmonicModel) -> str:
     return f"<HarmonicModel: {', '.join(parts)}>"
 
 
-def model_summary(model: HarmonicModel) -> str:
+def model_summary(model: ErrorModel) -> str:
     """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
     period, unit = model.period, unit_name(model.period)
     rms = math.sqrt(0.5 * float(model.amplitudes @ model.amplitudes))

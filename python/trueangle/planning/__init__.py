@@ -1,18 +1,20 @@
 """Where to measure so that the wanted orders can be told apart."""
 
-from .arc import ArcPlan, plan_arc
+from .arc import plan_arc
+from .arcplan import ArcPlan
 from .limits import Limits, load_limits
+from .mountplan import CalibrationPlan
 from .nextruns import NextRuns
 from .plan import (
     HIGHEST_LOW_ORDER,
-    CalibrationPlan,
     plan_encoder,
     plan_mounts,
     plan_tilts,
     readings_needed,
     wanted_orders,
 )
-from .selfplan import SelfPlan, plan_self
+from .referencefree import SelfPlan
+from .selfplan import plan_self
 
 __all__ = [
     "HIGHEST_LOW_ORDER",

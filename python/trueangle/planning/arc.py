@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +11,8 @@ from ..errors import ArgumentError
 from ..joint.shafts import counted_orders
 from ..support.arrays import Array
 from ..support.kinds import told_kinds
-from ..support.plainresult import PlainResult, counted, finite
+from ..support.plainresult import counted
+from .arcplan import ArcPlan
 from .counts import exchanged, rounded
 from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
 from .noisefactors import noise_factors
@@ -38,92 +37,6 @@ _GROWS = 0.01
 #: Share of an uncertainty that rounding may miss it by: as many readings as the optimum needs
 #: reach it exactly.
 _ROUNDING = 1e-9
-
-
-@dataclass(frozen=True)
-class ArcPlan(PlainResult):
-    """Places on an arc and readings at each of them.
-
-    Attributes
-    ----------
-    start_deg, stop_deg : float
-    orders : tuple of float
-        Output orders, fitted together with a zero of each run.
-    places_deg : tuple of float
-        Increasing; the same in every run.
-    counts : tuple of int
-        Readings at each place in one run; half of them from either side with
-        ``both_directions``.
-    runs : int
-    both_directions : bool
-    d_efficiency : float
-        ``(det M / det M^*)^(1/p)``, M the information of these readings, M* the most that
-        as many can have.
-    efficiency_of_even_spacing : float
-        The same for as many places spread evenly, both ends among them.
-    noise_factors : dict of order to float
-        How many times a coefficient scatters more than one of as many readings over whole turns.
-    even_noise_factors : dict of order to float
-        The same for even spacing.
-    uncertainty_arcsec : float or None
-        Expanded uncertainty (k = 2) of the curve, with its zero, at the worst place of the arc;
-        None without the noise of a reading.
-    notes : tuple of str
-    """
-
-    start_deg: float
-    stop_deg: float
-    orders: tuple[float, ...]
-    places_deg: tuple[float, ...]
-    counts: tuple[int, ...]
-    runs: int
-    both_directions: bool
-    d_efficiency: float
-    efficiency_of_even_spacing: float
-    noise_factors: dict[float, float]
-    even_noise_factors: dict[float, float]
-    uncertainty_arcsec: float | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def readings(self) -> int:
-        """All readings of all runs."""
-        return self.runs * sum(self.counts)
-
-    @property
-    def worst_noise_factor(self) -> float:
-        """The largest factor."""
-        return max(self.noise_factors.values())
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object that ``trueangle plan`` prints as JSON for an arc."""
-        return plain_arc_plan(self, "arc")
-
-    def summary(self) -> str:
-        """The plan as text: a table to follow at the rig."""
-        from .summary import arc_summary
-
-        return arc_summary(self)
-
-    def _brief(self) -> str:
-        return (
-            f"{self.readings} readings at {counted(self.places_deg, 'place')}, "
-            f"worst factor {self.worst_noise_factor:.3g}"
-        )
-
-
-def plain_arc_plan(plan: Any, kind: str) -> dict[str, Any]:
-    """The JSON object of a plan of readings at places: lists, and orders as the keys of objects."""
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {f"{order:g}": plain(one) for order, one in value.items()}
-        if isinstance(value, float):
-            return finite(value)
-        return list(value) if isinstance(value, tuple) else value
-
-    fields = {name: plain(value) for name, value in vars(plan).items()}
-    return {"kind": kind, **fields, "readings": plan.readings}
 
 
 @told_kinds

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
+from ..support.layout import laid_out
 from ..support.plainresult import PlainResult, counted
 from .evidence import Hypothesis
+from .further import run_steps
 
 
 @dataclass(frozen=True)
@@ -106,9 +109,45 @@ class NextRuns(PlainResult):
 
     def summary(self) -> str:
         """What to do at the rig, and what it would tell."""
-        from .summary import next_summary
-
-        return next_summary(self)
+        lines = []
+        if self.runs:
+            lines.append(
+                f"Next: {counted(self.runs, 'run')} of {self.readings} readings in all, "
+                f"{_spoken_time(self.seconds)} of motion"
+                + ("; diagnose by themselves" if self.alone else "; diagnose with those there are")
+            )
+            for steps, same in groupby(self.runs, lambda design: [*run_steps(design)]):
+                labels = [str(design.label) for design in same]
+                times = f" to {labels[-1]}, {len(labels)} times the same" if len(labels) > 1 else ""
+                lines.append(f"  {labels[0]}{times}")
+                lines += [f"    - {step}" for step in steps]
+        shown = {
+            entry.causes[0]: None
+            for entry in self.between
+            if entry.told and len(entry.causes) == 1 and not entry.seen
+        }
+        for entry in self.between:
+            if entry.told and entry.causes[0] in shown and len(entry.causes) == 1:
+                continue
+            names = " or ".join(entry.causes)
+            if not entry.told:
+                text = f"  not distinguished: {names}"
+            elif len(entry.causes) > 1:
+                text = f"  distinguishes {names}"
+            else:
+                text = f"  shows {names}"
+            if entry.seen and entry.expected_bic is not None and entry.chance_named is not None:
+                text += f": BIC better by {entry.expected_bic:.0f} expected for the true one"
+                by = f" ({entry.trials} simulated)" if entry.trials else ""
+                text += f", named in {100.0 * entry.chance_named:.0f} %{by}"
+            if text not in lines:  # of two lines of the pattern the same may be asked
+                lines.append(text)
+        if shown:
+            lines.append(f"  shows {', '.join(shown)}")
+        if self.beyond:
+            lines.append(f"  beyond what was seen so far: {', '.join(self.beyond)}")
+        lines += [f"  note: {note}" for note in self.notes]
+        return laid_out(lines)
 
     def _brief(self) -> str:
         told = [cause for entry in self.between if entry.told for cause in entry.causes]
@@ -126,3 +165,8 @@ def plain_run(design: RunDesign) -> dict[str, Any]:
         if always or f.default is MISSING or value != f.default:
             table[f.name] = list(value) if isinstance(value, tuple) else value
     return table
+
+
+def _spoken_time(seconds: float) -> str:
+    """Seconds or minutes."""
+    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"

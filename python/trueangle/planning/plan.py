@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +16,7 @@ from ..joint.shafts import counted_orders
 from ..runs.aliasing import fold
 from ..support.distributions import random_numbers
 from ..support.kinds import told_kinds
-from ..support.plainresult import PlainResult, counted
+from .mountplan import CalibrationPlan
 from .mountsearch import offset_tolerance, search_offsets, search_shifts
 from .noisefactors import mount_noise_factors, noise_factors
 
@@ -31,72 +29,6 @@ __all__ = [
     "readings_needed",
     "wanted_orders",
 ]
-
-
-@dataclass(frozen=True)
-class CalibrationPlan(PlainResult):
-    """Where to read, and how well each order will be known.
-
-    Attributes
-    ----------
-    kind : str
-        ``"mounts"``, ``"encoder"`` or ``"tilts"``.
-    positions : int
-        Positions per mount (or in all, for a free reference encoder).
-    mount_offsets_deg : tuple of float
-        How far the joint stands from the first mount's positions, per mount or tilt.
-    facet_shifts : tuple of int
-        By how many facets to turn the artefact at each mount, so that its own errors
-        separate from the joint's.
-    facet_noise_factor : float
-        Worst factor of an order of the joint when the artefact's errors are fitted too,
-        relative to one mount with a perfect artefact; infinite where they stay mixed.
-    noise_factors : dict of order to float
-        Factor of each wanted order; infinite for an order that no zero-free reading at
-        these positions shows.
-    tolerance_deg : float
-        Every offset may be off by this much with all factors below 2; it must be known
-        to about 0.01 degree (2 degrees of phase at order 202).
-    readings : int or None
-        Readings that reach the wanted standard error, in whole rounds.
-    notes : tuple of str
-    """
-
-    kind: str
-    positions: int
-    mount_offsets_deg: tuple[float, ...]
-    facet_shifts: tuple[int, ...]
-    facet_noise_factor: float
-    noise_factors: dict[float, float]
-    tolerance_deg: float
-    readings: int | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def worst_noise_factor(self) -> float:
-        """The largest factor of the orders that can be seen at all."""
-        return max((f for f in self.noise_factors.values() if math.isfinite(f)), default=math.inf)
-
-    @property
-    def invisible_orders(self) -> tuple[float, ...]:
-        """Wanted orders that fold onto the constant: every zero absorbs them."""
-        return tuple(m for m, f in self.noise_factors.items() if not math.isfinite(f))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object that ``trueangle plan`` prints as JSON."""
-        from .summary import plain_plan
-
-        return plain_plan(self)
-
-    def summary(self) -> str:
-        """The plan as text."""
-        from .summary import plan_summary
-
-        return plan_summary(self)
-
-    def _brief(self) -> str:
-        mounts = counted(self.mount_offsets_deg, "mount")
-        return f"{self.positions} positions, {mounts}, worst factor {self.worst_noise_factor:.3g}"
 
 
 @told_kinds

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,9 +13,9 @@ from ..errors import ArgumentError
 from ..joint.shafts import counted_orders
 from ..support.arrays import Array
 from ..support.kinds import told_kinds
-from ..support.plainresult import PlainResult, counted
 from ..support.suggestions import check_choice
 from .plan import readings_needed
+from .referencefree import SelfPlan
 
 SELF_METHODS: Final = ("spin-down", "heads", "shifts", "dual")
 
@@ -32,72 +31,6 @@ _BLIND: Final = 1e-3
 
 _STARTS: Final = 400
 _SWEEPS: Final = 6
-
-
-@dataclass(frozen=True)
-class SelfPlan(PlainResult):
-    """What to record, and how well each order will be known.
-
-    Attributes
-    ----------
-    method : str
-    orders : tuple of float
-    noise_factors : dict of order to float
-        Standard error over that of all readings with the true angle known; infinite where
-        blind.
-    angles_deg : tuple of float
-        Best angles of heads or shifts; empty for the others.
-    given : dict
-        Angles that were given, their ``worst_noise_factor``, ``worse_by`` and
-        ``blind_orders``.
-    speed_ratio : float or None
-        Start over end speed.
-    speed_ratio_factors : dict of ratio to float
-    turns, readings, seconds : float or int or None
-    knots_per_turn : float or None
-        At most so many, in the slowest part.
-    notes : tuple of str
-    """
-
-    method: str
-    orders: tuple[float, ...]
-    noise_factors: dict[float, float]
-    angles_deg: tuple[float, ...] = ()
-    given: dict[str, object] = field(default_factory=dict)
-    speed_ratio: float | None = None
-    speed_ratio_factors: dict[float, float] = field(default_factory=dict)
-    turns: float | None = None
-    readings: int | None = None
-    seconds: float | None = None
-    knots_per_turn: float | None = None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def worst_noise_factor(self) -> float:
-        """The largest factor of the orders that are seen."""
-        seen = [f for f in self.noise_factors.values() if math.isfinite(f)]
-        return max(seen, default=math.inf)
-
-    @property
-    def blind_orders(self) -> tuple[float, ...]:
-        """Wanted orders that are not seen."""
-        return tuple(k for k, f in self.noise_factors.items() if not math.isfinite(f))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object that ``trueangle plan`` prints as JSON."""
-        from .summary import plain_self_plan
-
-        return plain_self_plan(self)
-
-    def summary(self) -> str:
-        """The plan as text."""
-        from .summary import self_plan_summary
-
-        return self_plan_summary(self)
-
-    def _brief(self) -> str:
-        orders = counted(self.orders, "order")
-        return f"{self.method}, {orders}, worst factor {self.worst_noise_factor:.3g}"
 
 
 def angle_factors(angles_deg: ArrayLike, orders: Sequence[float]) -> Array:

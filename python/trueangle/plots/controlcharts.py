@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..fleets.result import Fleet
-    from ..monitoring.alarm import WatchedWindow
+    from ..model.alarm import WatchedWindow
 
 #: Limits beyond which a chart has a scale of logarithms.
 _FAR: Final = 10.0

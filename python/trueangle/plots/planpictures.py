@@ -13,7 +13,7 @@ from .canvas import described, grid, new_axes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..planning.plan import CalibrationPlan
+    from ..planning.mountplan import CalibrationPlan
 
 
 def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from .after import plan_after
+from .cause import RehearsedCause
 from .rehearse import rehearse
-from .result import Rehearsal, RehearsedCause
+from .result import Rehearsal
 
 __all__ = ["Rehearsal", "RehearsedCause", "plan_after", "rehearse"]

@@ -17,7 +17,8 @@ from ..simulation.simulation import SIMULATION, Simulation
 from ..support.deadline import Pace, with_pace
 from ..support.kinds import of_type, told_kinds
 from ..support.suggestions import check_choice
-from .result import Rehearsal, RehearsedCause
+from .cause import RehearsedCause
+from .result import Rehearsal
 from .search import SizeSearch
 from .trial import FAILED, measured_signals
 from .visibility import blind_causes, size_range

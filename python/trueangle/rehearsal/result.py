@@ -1,145 +1,23 @@
-"""What a rehearsal found."""
+"""What a rehearsal found, and its words."""
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..planning.nextruns import NextRuns
-from ..support.plainresult import PlainResult, Shown, counted, result_picture
-from .detection import Chance, binomial_interval
-from .visibility import Range
+from ..support.layout import laid_out, wrapped
+from ..support.plainresult import PlainResult, counted, result_picture
+from .cause import RehearsedCause
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .trial import TrialOutcome
+#: Names of causes listed of those it is confused with.
+MOST = 3
 
-#: Shares of the trials that are told.
-SHARES = (0.5, 0.95)
-
-
-@dataclass(frozen=True)
-class RehearsedCause(Shown):
-    """From which size on one cause would be named.
-
-    Attributes
-    ----------
-    cause, size_name : str
-    tried : dict of float to (int, int)
-        Named and all trials by size, from the least visible on.
-    named_50, named_95 : float or None
-        Size from which on it is named in that share of the trials; None where the sizes tried
-        do not bracket it.
-    intervals : dict of float to (float or None, float or None)
-        95 % interval of each, the less visible end first; None where it is open to that side.
-    told : dict of str to int
-        Trials by what the diagnosis said: ``named``, ``not_confirmed``, ``not_told_apart``,
-        ``taken_for_another``, ``unexplained``, ``nothing``.
-    confused_with : dict of str to int
-        Causes it was taken for or not told from, with the number of trials, most often first.
-    beside : dict of str to int
-        Causes that were confirmed beside it and were not there.
-    blind_because, measure : str or None
-        Why the design cannot tell it, and what would; None where it can.
-    grows : bool
-        It shows the more the larger its size.
-    """
-
-    cause: str
-    size_name: str
-    tried: dict[float, tuple[int, int]]
-    named_50: float | None
-    named_95: float | None
-    intervals: dict[float, tuple[float | None, float | None]]
-    told: dict[str, int]
-    confused_with: dict[str, int]
-    beside: dict[str, int]
-    blind_because: str | None = None
-    measure: str | None = None
-    grows: bool = True
-    curve: tuple[tuple[float, float], ...] = field(default=(), repr=False)
-
-    @property
-    def trials(self) -> int:
-        """How often it was hidden."""
-        return sum(count for _, count in self.tried.values())
-
-    @property
-    def ever_named(self) -> bool:
-        """It was named once at least."""
-        return any(named for named, _ in self.tried.values())
-
-    def to_dict(self) -> dict[str, Any]:
-        """The entry of ``causes``."""
-        return {
-            "cause": self.cause,
-            "size_name": self.size_name,
-            "named_50": self.named_50,
-            "named_50_interval": [*self.intervals.get(SHARES[0], (None, None))],
-            "named_95": self.named_95,
-            "named_95_interval": [*self.intervals.get(SHARES[1], (None, None))],
-            "confused_with": list(self.confused_with),
-            "blind_because": self.blind_because,
-            "measure": self.measure,
-            "trials": self.trials,
-            "told": self.told,
-            "beside": self.beside,
-            "tried": [
-                {
-                    "size": size,
-                    "named": named,
-                    "trials": count,
-                    "interval": [*binomial_interval(named, count)],
-                }
-                for size, (named, count) in self.tried.items()
-            ],
-        }
-
-
-def rehearsed_cause(
-    cause: str,
-    size_name: str,
-    sizes: Range | None,
-    answers: list[tuple[int, TrialOutcome]],
-    blind_because: str | None,
-    measure: str | None,
-) -> RehearsedCause:
-    """Put the answers of the trials of one cause together."""
-    counts: dict[int, tuple[int, int]] = {}
-    for step, outcome in answers:
-        named, count = counts.get(step, (0, 0))
-        counts[step] = named + (outcome.is_named), count + 1
-    thresholds: list[float | None] = [None, None]
-    intervals: dict[float, tuple[float | None, float | None]] = {}
-    curve: list[tuple[float, float]] = []
-    if sizes is not None and counts and sizes.highest > 0:
-        chance = Chance(counts)
-        for k, share in enumerate(SHARES):
-            found = chance.threshold(share)
-            of = [None if s is None else sizes.size(s) for s in (found.step, found.low, found.high)]
-            thresholds[k], intervals[share] = of[0], (of[1], of[2])
-        curve = chance.curve(sizes.size)
-    instead = Counter(c for _, outcome in answers for c in outcome.instead)
-    beside = Counter(c for _, outcome in answers for c in outcome.beside)
-    if any(named for named, _ in counts.values()):
-        blind_because = measure = None
-    return RehearsedCause(
-        cause,
-        size_name,
-        {} if sizes is None else {sizes.size(k): counts[k] for k in sorted(counts)},
-        thresholds[0],
-        thresholds[1],
-        intervals,
-        dict(Counter(outcome.verdict for _, outcome in answers).most_common()),
-        dict(sorted(instead.items(), key=lambda item: (-item[1], item[0]))),
-        dict(sorted(beside.items(), key=lambda item: (-item[1], item[0]))),
-        blind_because,
-        measure,
-        sizes is None or sizes.grows,
-        tuple(curve),
-    )
+#: Of what is not bracketed.
+OPEN = "Sizes with their 95 % intervals; ? where the sizes tried do not bracket them."
 
 
 @dataclass(frozen=True)
@@ -202,12 +80,103 @@ class Rehearsal(PlainResult):
         return f"{named} of {counted(self.causes, 'cause')} named, {self.trials} trials{ended}"
 
     def summary(self) -> str:
-        """A readable account (`trueangle.rehearsal.summary.rehearsal_summary`)."""
-        from .summary import rehearsal_summary
+        """The table of sizes, what is not seen and why, and the runs that would help most."""
+        lines: list[str] = []
+        for note in self.notes:
+            if note.startswith("INCOMPLETE"):
+                lines += [*wrapped(f"{note}.", 2), ""]
+        lines += wrapped(
+            f"{self.runs} runs, {self.readings} readings, noise {self.noise:g} arcsec; "
+            f"{self.trials} diagnoses, at most {self.seeds} of a cause, seed "
+            f"{self.seed}.",
+            2,
+        )
+        tried = [cause for cause in self.causes if cause.ever_named]
+        if tried:
+            lines += ["", *_table(tried), "", OPEN]
+        never = [cause for cause in self.causes if not cause.ever_named]
+        if never:
+            lines += ["", "Not named in these runs:"]
+            for cause in never:
+                lines += wrapped(f"- {_never(cause)}", 2)
+        lines += ["", *self._next()]
+        for note in self.notes:
+            if not note.startswith("INCOMPLETE"):
+                lines += wrapped(f"Note: {note}.", 2)
+        return laid_out(lines)
 
-        return rehearsal_summary(self)
+    def _next(self) -> list[str]:
+        if self.next_runs is not None:
+            return [*self.next_runs.summary().splitlines(), ""]
+        if all(cause.ever_named for cause in self.causes):
+            return []
+        return ["No further run was found that tells another cause."]
 
     def plot(self) -> Figure:
         """Detection against size, a small picture for every cause (needs ``trueangle[plot]``)."""
         figure: Figure = result_picture(self)
         return figure
+
+
+def _table(causes: list[RehearsedCause]) -> list[str]:
+    """Sizes by cause, with intervals, trials, and what it is taken for below them."""
+    rows = [("cause, size", "named in 50 %", "named in 95 %", "trials", "else")]
+    for c in causes:
+        rows.append(
+            (
+                f"{c.cause}, {c.size_name}",
+                _size(c, 0.5),
+                _size(c, 0.95),
+                str(c.trials),
+                ", ".join([*c.confused_with][:MOST]) or _else(c),
+            )
+        )
+    widths = [max(len(row[k]) for row in rows) for k in range(4)]
+    lines = []
+    for row in rows:
+        cells = [text.ljust(width) for text, width in zip(row, widths, strict=False)]
+        lines.append("  ".join([*cells, row[4]]).rstrip())
+    return lines
+
+
+def _size(cause: RehearsedCause, share: float) -> str:
+    """A threshold with its interval; where it is not bracketed, what is known."""
+    value = cause.named_50 if share == 0.5 else cause.named_95
+    low, high = cause.intervals.get(share, (None, None))
+    sizes = [*cause.tried]
+    if len(sizes) == 1:
+        named, count = cause.tried[sizes[0]]
+        return f"{named} of {count}"
+    if value is not None:
+        return f"{value:.3g} ({_end(low)} to {_end(high)})"
+    named, count = cause.tried[sizes[0]]
+    if named > share * count:
+        return f"{'below' if cause.grows else 'above'} {sizes[0]:.3g}"
+    named, count = cause.tried[sizes[-1]]
+    return f"? ({named} of {count} at {sizes[-1]:.3g})"
+
+
+def _end(size: float | None) -> str:
+    return "?" if size is None else f"{size:.3g}"
+
+
+def _else(cause: RehearsedCause) -> str:
+    """What a diagnosis says where it names nothing instead."""
+    other = [verdict.replace("_", " ") for verdict in cause.told if verdict != "named"]
+    return ", ".join(other)
+
+
+def _never(cause: RehearsedCause) -> str:
+    text = cause.cause
+    if cause.blind_because:
+        text += f": {cause.blind_because}"
+    elif not cause.trials:
+        text += ": not tried"
+    if cause.trials:
+        largest = [*cause.tried][-1]
+        text += f" (hidden {cause.trials} times, up to {cause.size_name} {largest:.3g}"
+        instead = ", ".join([*cause.confused_with][:MOST])
+        text += f"; taken for {instead})" if instead else f"; reported: {_else(cause)})"
+    if cause.measure:
+        text += f". To find out: {cause.measure}"
+    return text + "."

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
+from .cause import RehearsedCause, rehearsed_cause
 from .detection import Chance
-from .result import RehearsedCause, rehearsed_cause
 from .trial import Trial, TrialOutcome
 from .visibility import Range
 

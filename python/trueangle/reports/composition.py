@@ -70,7 +70,7 @@ class Report(Page):
     _kind: ClassVar[Kind] = REPORT
 
     def _written(self) -> str:
-        return rendered_report(self)
+        return rendered_report(self.content, self.figures)
 
     @property
     def _hashes(self) -> list[str]:

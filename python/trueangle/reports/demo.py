@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from os import PathLike
 
-from ..effects import Backlash, Effect
-from ..simulation import Harmonic, Joint, RunDesign, Simulation, simulate
+from ..simulation import Backlash, Effect, Harmonic, Joint, RunDesign, Simulation, simulate
 from .composition import Report, report
 
 #: Runs of the demonstration: a turn out and a turn back, two speeds, repeated.

@@ -72,7 +72,7 @@ def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
             }
             for cause in spot["causes"]
         ]
-    content["extended"] = _toml(diagnosis)
+    content["extended"] = diagnosis.extended.text()
     plan = diagnosis.next_runs
     content["next"] = plan.summary() if plan is not None and plan.runs else ""
     return content
@@ -111,9 +111,3 @@ def _text(value: Any) -> str:
     if isinstance(value, list):
         return "; ".join(_text(item) for item in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def _toml(diagnosis: Diagnosis) -> str:
-    from ..simulation.simulationfile import simulation_text
-
-    return simulation_text(diagnosis.extended)

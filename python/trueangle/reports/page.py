@@ -23,8 +23,6 @@ from .numbers import Numbers
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-    from .composition import Report
-
 _TEMPLATES = Path(__file__).parent / "templates"
 
 #: Signs of the code that end or escape something in HTML, and those that stand for them.
@@ -45,22 +43,23 @@ _TIMEOUT_S: Final = 120
 _OPTIONS = ("headless", "disable-gpu", "no-pdf-header-footer", "virtual-time-budget=20000")
 
 
-def rendered_report(report: Report, framed: bool = False) -> str:
-    """The report as HTML: style, scripts, plotting library, content and figures inside.
+def rendered_report(
+    content: dict[str, Any], figures: dict[str, dict[str, Any]], framed: bool = False
+) -> str:
+    """A report as HTML: style, scripts, plotting library, content and figures inside.
 
     ``framed`` in a page that holds the library, it takes that one.
     """
     made = template_environment()
     from markupsafe import Markup
 
-    numbers = Numbers(report.content)
+    numbers = Numbers(content)
     made.globals |= {"show": numbers, "wording": wording, "swatch": charts.run_swatch}
-    content = report.content
     return made.get_template("report.html.j2").render(
         c=content,
-        figures=report.figures,
+        figures=figures,
         result_json=Markup(_embedded(content)),
-        figures_packed=Markup(_packed(json.dumps(_live(report.figures), separators=(",", ":")))),
+        figures_packed=Markup(_packed(json.dumps(_live(figures), separators=(",", ":")))),
         still=Markup,
         style=Markup((_TEMPLATES / "report.css").read_text("utf-8")),
         script=Markup((_TEMPLATES / "report.js").read_text("utf-8")),

@@ -176,7 +176,9 @@ class RobotReport(Page):
             title=self.title,
             ranking=self.ranking,
             pages={
-                row.joint: rendered_report(self.reports[row.joint], True) for row in self.ranking
+                row.joint: rendered_report(made.content, made.figures, True)
+                for row in self.ranking
+                for made in [self.reports[row.joint]]
             },
             library=bokeh_library(),
             unit=error_unit(self.errors_in, largest),

@@ -15,7 +15,7 @@ from ..joint.pattern import Pattern
 from ..runs.run import CalibrationRun
 from ..support.kinds import told_kinds
 from ..support.signals import COUPLED
-from .rotor import Motion, rotor_angle
+from .rotor import Drive, Motion, rotor_angle
 
 #: Readings of one run, at most: a simulation holds some 150 bytes of each.
 MAX_SAMPLES = 20_000_000
@@ -175,6 +175,23 @@ class RunDesign:
             return 0.0
         return (self.speed_deg_s - self.speed_end_deg_s) / (360.0 * self.turns)
 
+    @property
+    def _drive(self) -> Drive:
+        """What moves the shaft."""
+        return Drive(
+            math.radians(self.start_deg),
+            math.radians(self.speed_deg_s) * self.direction,
+            self.decay_per_s,
+            math.radians(self.cogging_deg_s2),
+            self.cogging_order,
+            math.radians(self.cogging_phase_deg),
+            math.radians(self.imbalance_deg_s2),
+            math.radians(self.imbalance_phase_deg),
+            2.0 * math.pi * (self.loop_bandwidth_hz or 0.0),
+            self.friction_deg_s2,
+            self.friction_memory_s,
+        )
+
     def path(self, rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Travel and unwrapped angle of every reading, degrees, in the order taken."""
         n = self.samples
@@ -215,7 +232,7 @@ class RunDesign:
             time = np.log(self.speed_deg_s / speed) / self.decay_per_s
         motion = Motion(angle, np.asarray(signs * speed), np.zeros(n))
         if self.is_moved:
-            motion = rotor_angle(self, time, pattern, rng)
+            motion = rotor_angle(self._drive, time, pattern, rng)
         temperature = np.full(n, float(self.temperature_C))
         if self.temperature_end_C is not None:
             share = travel / (360.0 * self.turns)

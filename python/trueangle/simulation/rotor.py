@@ -19,7 +19,7 @@ so that the shaft moves by ``-Tε`` and the log shows ``(1 - T)ε``.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -28,14 +28,27 @@ from ..joint.pattern import Pattern
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 
-if TYPE_CHECKING:
-    from .designs import RunDesign
-
 ARCSEC_PER_RAD: Final = ARCSEC_PER_TURN / (2.0 * math.pi)
 
 #: Radians that the fastest term turns by in one step of the integration, at most: Runge and
 #: Kutta's rule of fourth order is then right to some 1e-6 of what the term moves.
 _STEP: Final = 0.1
+
+
+class Drive(NamedTuple):
+    """What moves a shaft, in radians and seconds; the friction that wanders in deg/s^2."""
+
+    place: float
+    speed: float
+    decay: float
+    cogging: float
+    order: float
+    phase: float
+    imbalance: float
+    low: float
+    band: float
+    friction_deg_s2: float
+    memory_s: float
 
 
 class Motion(NamedTuple):
@@ -46,14 +59,12 @@ class Motion(NamedTuple):
     driven: Array
 
 
-def rotor_angle(
-    design: RunDesign, time: Array, pattern: Pattern, rng: np.random.Generator
-) -> Motion:
+def rotor_angle(drive: Drive, time: Array, pattern: Pattern, rng: np.random.Generator) -> Motion:
     """Where the shaft is at ``time``, integrated from the start of the run.
 
     Parameters
     ----------
-    design : RunDesign
+    drive : Drive
     time : ndarray
         Seconds, ascending from the start of the run.
     pattern : Pattern
@@ -66,14 +77,7 @@ def rotor_angle(
     ArgumentError
         The shaft runs away.
     """
-    start = math.radians(design.speed_deg_s) * design.direction
-    rate = design.decay_per_s
-    place = math.radians(design.start_deg)
-    cogging, order = math.radians(design.cogging_deg_s2), design.cogging_order
-    phase = math.radians(design.cogging_phase_deg)
-    imbalance = math.radians(design.imbalance_deg_s2)
-    low = math.radians(design.imbalance_phase_deg)
-    band = 2.0 * math.pi * (design.loop_bandwidth_hz or 0.0)
+    place, start, rate, cogging, order, phase, imbalance, low, band, *_ = drive
     viscous = 0.0 if band else rate  # a loop gives what friction takes
     lines = (
         [
@@ -118,7 +122,7 @@ def rotor_angle(
 
     fastest = max([order if cogging else 1.0, *(m for m, _ in lines)])
     longest = _STEP / max(fastest * abs(start) * max(1.0, math.exp(-rate * time[-1])), band, 1e-12)
-    friction = np.radians(_wander(design, time, rng)).tolist()
+    friction = np.radians(_wander(drive, time, rng)).tolist()
     n = time.size
     angle, speed, driven = np.empty(n), np.empty(n), np.zeros(n)
     x, v, before = place, start, 0.0
@@ -155,12 +159,12 @@ def rotor_angle(
     return Motion(np.degrees(angle), np.degrees(speed), np.degrees(driven))
 
 
-def _wander(design: RunDesign, time: Array, rng: np.random.Generator) -> Array:
-    """A friction's acceleration at every reading, that forgets itself in ``friction_memory_s``."""
-    size = design.friction_deg_s2
+def _wander(drive: Drive, time: Array, rng: np.random.Generator) -> Array:
+    """A friction's acceleration at every reading, that forgets itself in ``memory_s``."""
+    size = drive.friction_deg_s2
     if size == 0.0:
         return np.zeros(time.size)
-    keep = np.exp(-np.diff(time, prepend=time[0]) / design.friction_memory_s)
+    keep = np.exp(-np.diff(time, prepend=time[0]) / drive.memory_s)
     shocks = rng.standard_normal(time.size) * size
     found, state = np.empty(time.size), float(shocks[0])
     fresh = np.sqrt(1.0 - keep**2) * shocks

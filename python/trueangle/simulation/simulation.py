@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -21,6 +21,7 @@ from ..support.distributions import random_numbers
 from ..support.kinds import all_of_type, of_type, told_kinds
 from ..support.plainresult import Shown, counted
 from .designs import RunDesign
+from .simulationtext import Stated, simulation_text, write_simulation
 
 #: What must be given, for messages.
 SIMULATION = "a trueangle.Simulation (trueangle.load_simulation reads one)"
@@ -109,11 +110,9 @@ class Simulation(Shown):
 
     def summary(self) -> str:
         """What is believed as a simulation file has it, and the names of the runs."""
-        from .simulationtext import simulation_text
-
         named = ", ".join(design.label or str(i) for i, design in enumerate(self.runs, 1))
         told = f"\n# {counted(self.runs, 'run')}" + (f": {named}" if named else "")
-        return simulation_text(replace(self, source=None, runs=())) + told
+        return simulation_text(self._stated._replace(source=None, runs=())) + told
 
     def with_effects(self, effects: Iterable[Effect]) -> Simulation:
         """The simulation with further effects.
@@ -139,9 +138,15 @@ class Simulation(Shown):
 
     def save(self, path: str | Path) -> None:
         """Write the simulation as TOML (`trueangle.simulation.simulationtext.write_simulation`)."""
-        from .simulationtext import write_simulation
+        write_simulation(self._stated, path)
 
-        write_simulation(self, path)
+    def text(self) -> str:
+        """What `save` writes."""
+        return simulation_text(self._stated)
+
+    @property
+    def _stated(self) -> Stated:
+        return Stated(*(getattr(self, entry.name) for entry in fields(self)))
 
 
 @told_kinds

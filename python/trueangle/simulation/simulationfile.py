@@ -6,15 +6,7 @@ from pathlib import Path
 
 from ..support.kinds import told_kinds
 from .simulation import Simulation
-from .simulationtext import (
-    decoded_simulation,
-    guarded_build,
-    simulation_text,
-    to_table,
-    write_simulation,
-)
-
-__all__ = ["load_simulation", "simulation_text", "to_table", "write_simulation"]
+from .simulationtext import decoded_simulation, guarded_build
 
 
 @told_kinds

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from ..effects import EFFECTS, Effect
 from ..errors import ArgumentError, FileError
@@ -16,9 +16,6 @@ from ..support.decoding import finite_float, read_text, shown
 from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
 from ..support.suggestions import did_you_mean
 from .designs import MAX_SAMPLES, RunDesign
-
-if TYPE_CHECKING:
-    from .simulation import Simulation
 
 _TABLES = ("joint", "shaft", "bearing", "head", "harmonic", "effect", "noise", "run")
 _JOINT_KEYS = ("gear_ratio", "fixed_member", "encoder_side", "pole_pairs")
@@ -36,18 +33,18 @@ MAX_TABLES = 10_000
 T = TypeVar("T")
 
 
-class Decoded(NamedTuple):
-    """What a simulation file says, the arguments of `Simulation` in their order."""
+class Stated(NamedTuple):
+    """What a simulation file says, the fields of `Simulation` in their order."""
 
     joint: Joint
     harmonics: tuple[Harmonic, ...]
     effects: tuple[Effect, ...]
     sigma_arcsec: float
     runs: tuple[RunDesign, ...]
-    source: str
+    source: str | None
 
 
-def decoded_simulation(path: str | Path) -> Decoded:
+def decoded_simulation(path: str | Path) -> Stated:
     """The checked parts of a simulation file; see `load_simulation`."""
     text = read_text(path, SIMULATION_BYTES, FileError, "a simulation")
     return _decoded(path, _document(path, text))
@@ -66,7 +63,7 @@ def _document(path: str | Path, text: str) -> dict[str, Any]:
         raise FileError(path, "holds a number or date that cannot be read") from None
 
 
-def _decoded(path: str | Path, document: Mapping[str, Any]) -> Decoded:
+def _decoded(path: str | Path, document: Mapping[str, Any]) -> Stated:
     for name in document:
         if name not in _TABLES:
             raise FileError(
@@ -98,7 +95,7 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> Decoded:
     if sigma is None:
         got = shown(noise["sigma_arcsec"])
         raise FileError(path, f"[noise]: sigma_arcsec must be a finite number, got {got}")
-    return Decoded(joint, harmonics, effects, sigma, designs, str(path))
+    return Stated(joint, harmonics, effects, sigma, designs, str(path))
 
 
 def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
@@ -235,7 +232,7 @@ def guarded_build(path: str | Path, where: str, build: Callable[[], T]) -> T:
         raise FileError(path, f"{where}: {cause}") from None
 
 
-def to_table(sim: Simulation | Decoded) -> dict[str, Any]:
+def to_table(sim: Stated) -> dict[str, Any]:
     """The tables of a simulation file; keys at their defaults are left out of ``run``."""
     runs = []
     for design in sim.runs:
@@ -264,7 +261,7 @@ def _given(entry: Any) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def write_simulation(sim: Simulation, path: str | Path) -> None:
+def write_simulation(sim: Stated, path: str | Path) -> None:
     """Write a simulation file, beside and then renamed; floats round-trip exactly.
 
     Where the simulation was read from a file, that file's text is kept and only what
@@ -275,7 +272,7 @@ def write_simulation(sim: Simulation, path: str | Path) -> None:
         file.write(text)
 
 
-def simulation_text(sim: Simulation) -> str:
+def simulation_text(sim: Stated) -> str:
     """The text of a simulation file, as `write_simulation` writes it."""
     whole = to_table(sim)
     if sim.source is not None and Path(sim.source).is_file():

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+import trueangle._core as _core
+
 from ..errors import ArgumentError, MissingSignalError
 from ..export.mujoco import NOISE_NAME, TEXT_NAME
 from ..model.file import embedded_model
@@ -253,7 +255,7 @@ class _Encoder:
             )
         known = 0 if self._states is None else len(self._states)
         if not known or (known != len(angle) and not self.model.follows_travel):
-            self._states = self.model._core_corrector().alike(len(angle))
+            self._states = _core.Alike(self.model._core_corrector(), len(angle))
         elif known != len(angle):
             raise ArgumentError(
                 f"{known} environments were read before, and {len(angle)} now: "

@@ -175,7 +175,9 @@ def power(cuts, boxes, columns):
 
 LINES = (THETA, ORDERS, COSINE, SINE)
 MOMENTS = _core.Moments(360.0, [1.0], [[1]])
-ALIKE = _core.Corrector(_core.Series(360.0, 0.0, [1.0], [[1]], [[0.1]], [[0.0]]), []).alike(2)
+ALIKE = _core.Alike(
+    _core.Corrector(_core.Series(360.0, 0.0, [1.0], [[1]], [[0.1]], [[0.0]]), []), 2
+)
 
 
 @pytest.mark.parametrize(

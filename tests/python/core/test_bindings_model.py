@@ -111,7 +111,7 @@ def test_a_number_has_the_result_of_an_array_of_one():
 
 def test_joints_alike_forget_one_by_one():
     """Play of an indicated reversal: a joint that has turned back is on the other side."""
-    alike = corrector(Play(0.05)).alike(3)
+    alike = _core.Alike(corrector(Play(0.05)), 3)
     forth, back = [10.0, 20.0, 30.0], [5.0, 15.0, 25.0]
     fresh = alike.copy()
     alike.error(forth)
@@ -152,7 +152,7 @@ def test_a_robot_has_a_name_for_each_joint(names):
 
 def test_a_step_takes_an_angle_and_signals():
     step = corrector().step
-    held = series().compensator().step
+    held = _core.Compensator(series()).step
     assert held(20.0) == pytest.approx(step(20.0), abs=ROUNDING)
     assert held(20.0, None) == held(20.0)
     for given in ((), tuple([1.0] * 9)):

@@ -9,7 +9,7 @@ import threading
 import numpy as np
 import pytest
 
-from trueangle._core import Series
+from trueangle._core import Compensator, Series
 from trueangle.errors import ArgumentError, NotInvertibleError
 
 #: Default and exact paths, relative to the sum of amplitudes.
@@ -287,12 +287,12 @@ def test_what_cannot_be_inverted():
             correct()
         assert caught.value.slope == steep.slope_bound >= 1
     with pytest.raises(NotInvertibleError):
-        steep.compensator()
-    Series(2 * math.pi, 0.0, [1.0], [[1]], [[0.0]], [[1.5]], "indicated").compensator()
+        Compensator(steep)
+    Compensator(Series(2 * math.pi, 0.0, [1.0], [[1]], [[0.0]], [[1.5]], "indicated"))
 
 
 def test_compensator_equals_correct(series):
-    step = series.compensator().step
+    step = Compensator(series).step
     for value in np.linspace(-1e4, 1e4, 501):
         assert step(value) == series.correct(value)
     assert type(step(1)) is float

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle._core import Series
-from trueangle.terms import Backlash
+from trueangle._core import Compensator, Series
+from trueangle.model.terms import Backlash
 
 THREADS = 8
 ROUNDS = 40
@@ -68,7 +68,7 @@ def test_one_series_in_many_threads():
         alone.error(single),
         alone.error(counts),
     )
-    step = alone.compensator().step
+    step = Compensator(alone).step
     steps = [step(x) for x in theta[:200].tolist()]
     for _ in range(ROUNDS):
         # New every time: the threads meet while its tables are being built.
@@ -84,14 +84,14 @@ def test_one_series_in_many_threads():
             for j in range(len(ways)):
                 which = (i + j) % len(ways)
                 np.testing.assert_array_equal(ways[which](), expected[which])
-            step = shared.compensator().step
+            step = Compensator(shared).step
             assert [step(x) for x in theta[:200].tolist()] == steps
 
         at_once(work)
 
 
 def test_one_step_in_many_threads():
-    step = series().compensator().step
+    step = Compensator(series()).step
     angles = np.linspace(-720.0, 720.0, 20_000).tolist()
     expected = [step(x) for x in angles]
 

@@ -12,7 +12,8 @@ from trueangle.fitting.orders.evidence import (
     held_out_gains,
     log_tail,
 )
-from trueangle.fitting.orders.harmonicsums import ZeroGroupReadings, harmonic_sums
+from trueangle.fitting.orders.harmonicsums import harmonic_sums
+from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
 from trueangle.fitting.orders.zerogroups import zero_units
 from trueangle.runs.aliasing import distinct_positions
 

@@ -162,3 +162,24 @@ def test_a_tall_bump_is_as_wide_as_a_low_one(height: float) -> None:
     (width,) = [f.parameters["width_deg"] for f in found if f.cause == "local_defect"]
     assert abs(width.value - 1.3) < 3.0 * width.std
     assert width.std < 0.5 / height
+
+
+@pytest.mark.parametrize(
+    ("loads", "form"),
+    [((-8, -4, 0, 4, 8, 8), "arcsec_per_Nm3"), ((-8, -4, 0, 4, 8, 6), "arcsec_per_Nm3"),
+     (range(-10, 11, 2), "knee_Nm")],
+)  # fmt: skip
+def test_a_knee_is_named_where_loads_show_that_it_is_there(loads, form) -> None:
+    """Slopes on both sides of a knee, and the knee, pass through any three loads and zero."""
+    spring = EFFECTS["stiffening_compliance"](1.6, 0.0, -1.0, 5.0)
+    runs = tuple(
+        RunDesign(f"{k}", samples=200, turns=2.0, reversals=(0.5,), torque_Nm=float(load))
+        for k, load in enumerate(loads)
+    )
+    known = Simulation(sigma_arcsec=2.0, runs=runs)
+    (found,) = ta.diagnose(ta.simulate(known.with_effects([spring]), 1), known).findings
+    assert found.cause == spring.kind
+    assert form in found.parameters
+    if form == "knee_Nm":
+        for name, told in found.parameters.items():
+            assert abs(told.value - getattr(spring, name)) < 4.0 * told.std, (name, told)

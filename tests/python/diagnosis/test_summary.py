@@ -10,11 +10,10 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.beliefs import Belief
-from trueangle.diagnosis.brief import brief_finding
-from trueangle.diagnosis.finding import Finding
+from trueangle.diagnosis.finding import Finding, brief_finding
 from trueangle.diagnosis.gain import Gain
 from trueangle.diagnosis.levels import LevelGain
-from trueangle.diagnosis.summary import diagnosis_summary, finding_text
+from trueangle.diagnosis.summary import diagnosis_summary
 from trueangle.estimation.estimate import quantity
 from trueangle.simulation import Simulation
 from trueangle.support.display_units import error_unit
@@ -38,7 +37,7 @@ def flat(text: str) -> str:
 
 
 def test_a_finding_says_its_numbers_in_their_order() -> None:
-    text = flat(finding_text(FOUND))
+    text = flat(FOUND.summary())
     assert "delay_s: 0.00125 +- 0.00012" in text
     assert "amplitudes_arcsec: 4.500, 6.700 +- 0.1000, 0.2000" in text
     assert "BIC better by 41.5 than without it" in text
@@ -56,7 +55,7 @@ def test_a_finding_says_its_numbers_in_their_order() -> None:
         "reducible share 0.63 (0.64 to 0.65); far enough."
     ) in text
     doubt = replace(FOUND, status="not_confirmed", reason="it is 4.5 arcsec small")
-    assert "(NOT CONFIRMED: it is 4.5 arcsec small)" in flat(finding_text(doubt))
+    assert "(NOT CONFIRMED: it is 4.5 arcsec small)" in flat(doubt.summary())
     assert "NOT CONFIRMED" not in text
 
 

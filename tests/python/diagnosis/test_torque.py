@@ -9,8 +9,8 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.discrepancy import unfolded_error
+from trueangle.diagnosis.drive import torque_account
 from trueangle.diagnosis.finding import Finding
-from trueangle.diagnosis.torque import torque_account
 from trueangle.effects import Backlash, Latency
 from trueangle.estimation.estimate import quantity
 from trueangle.joint.signals import join_runs

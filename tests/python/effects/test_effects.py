@@ -1,6 +1,7 @@
 """The vocabulary of effects: each in one file, what it declares, what is not said twice."""
 
 import ast
+import sys
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 import trueangle
 from trueangle.effects import EFFECTS
 from trueangle.effects.effect import telling_apart
+from trueangle.model.terms import TERMS
 
 PACKAGE = Path(trueangle.__file__).parent
 
@@ -44,11 +46,13 @@ def quoted(path):
 
 
 def test_the_quoted_name_of_a_cause_stands_in_its_own_file_only():
+    """In that of its term where it has one, from which the effect takes it."""
+    own = {kind: sys.modules[TERMS.get(kind, EFFECTS[kind]).__module__] for kind in EFFECTS}
     strangers = {
         (kind, str(path.relative_to(PACKAGE)))
         for path in PACKAGE.rglob("*.py")
         for kind in quoted(path) & set(EFFECTS)
-        if path != PACKAGE / "effects" / f"{kind}.py"
+        if path != Path(own[kind].__file__)
     }
     assert strangers - WORDS == set()
 

@@ -12,8 +12,8 @@ import pytest
 
 import trueangle as ta
 from trueangle import errors
+from trueangle.model.terms import JointCoupling as Term
 from trueangle.simulation import Harmonic, Joint, JointCoupling, RunDesign, Simulation, simulate
-from trueangle.terms import JointCoupling as Term
 
 NIGHTLY = os.environ.get("TRUEANGLE_NIGHTLY") == "1"
 

@@ -5,7 +5,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.model.records import FitRecord, TableRecord
-from trueangle.terms import Backlash, LocalDefect
+from trueangle.model.terms import Backlash, LocalDefect
 
 SEED = 55_301
 

@@ -5,7 +5,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.export.pattern import TurnPattern
-from trueangle.terms import Backlash, LocalDefect
+from trueangle.model.terms import Backlash, LocalDefect
 
 SEED = 55_401
 UNITS = (360.0, 1.0, 2.0 * np.pi, 4096.0)

@@ -8,7 +8,8 @@ import pytest
 import trueangle as ta
 from trueangle.errors import OutsideSpanWarning, RankError, UnlikeRunsWarning
 from trueangle.fitting.orders import unitgroups
-from trueangle.fitting.orders.harmonicsums import ZeroGroupReadings, harmonic_sums
+from trueangle.fitting.orders.harmonicsums import harmonic_sums
+from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
 
 ARCSEC = 1.0 / 3600.0
 

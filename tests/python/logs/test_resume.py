@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.terms import Backlash, ThermalDrift
+from trueangle.model.terms import Backlash, ThermalDrift
 
 from .conftest import made_angles, made_model
 

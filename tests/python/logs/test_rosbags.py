@@ -125,7 +125,7 @@ BAGS = {
 def test_joint_states_are_corrected_and_other_topics_untouched(
     kind, replace, positions, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("trueangle.formats.rosbag._BLOCK", 71)
+    monkeypatch.setattr("trueangle.formats.openbag.BLOCK", 71)
     name, write = BAGS[kind]
     source = write(tmp_path / name, positions)
     models = {"elbow": made_model(period=2 * np.pi), "wrist": made_model(argument="indicated")}
@@ -193,7 +193,7 @@ def test_bags_in_place_and_in_folders(positions, tmp_path):
 
 
 def test_turns_are_counted_over_messages(positions, tmp_path, monkeypatch):
-    monkeypatch.setattr("trueangle.formats.rosbag._BLOCK", 50)
+    monkeypatch.setattr("trueangle.formats.openbag.BLOCK", 50)
     model = made_model(ratio=50.5, period=2 * np.pi)
     write_ros2(tmp_path / "a", positions, StoragePlugin.MCAP)
     ta.correct_logs(tmp_path / "a", {"elbow": model}, tmp_path / "b")

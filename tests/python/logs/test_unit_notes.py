@@ -152,7 +152,7 @@ def test_the_python_interface_warns(tmp_path):
 
 
 def test_the_transformer_tells_degrees_and_what_it_leaves():
-    sklearn = pytest.importorskip("trueangle.sklearn")
+    sklearn = pytest.importorskip("trueangle.fitting.sklearn")
     theta = np.linspace(0.0, 360.0, 300, endpoint=False)
     rng = np.random.default_rng(11)
     rows = rng.permutation(300)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.terms import ScaleError
+from trueangle.model.terms import ScaleError
 
 PERIODS = (360.0, 2.0 * np.pi, 1.0)
 #: Printed to four digits.

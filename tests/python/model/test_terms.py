@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import trueangle as ta
 from trueangle import errors
-from trueangle.terms import (
+from trueangle.model.terms import (
     TERMS,
     ChannelSkew,
     CurrentCoupling,

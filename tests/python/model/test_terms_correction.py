@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import trueangle as ta
 from trueangle import errors
-from trueangle.terms import ScaleError
+from trueangle.model.terms import ScaleError
 
 # The motion goes beyond the travel of the ramp, which is held there.
 pytestmark = pytest.mark.filterwarnings("ignore::trueangle.errors.OutsideSpanWarning")

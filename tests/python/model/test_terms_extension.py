@@ -14,9 +14,9 @@ from trueangle.diagnosis.correction import (
     terms_from_effects,
     without_terms,
 )
+from trueangle.model.terms import TERMS
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 from trueangle.simulation.effects import EFFECTS, Effect
-from trueangle.terms import TERMS
 
 ARCSEC = 1.0 / 3600.0
 

@@ -8,7 +8,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.terms import CurrentCoupling
+from trueangle.model.terms import CurrentCoupling
 
 SIGNALS = ("velocity_deg_s", "temperature_C", "torque_Nm", "current_A")
 

@@ -18,7 +18,7 @@ from trueangle.plots.curves import Points
 from trueangle.plots.detection import detection
 from trueangle.plots.diagnosispictures import gains
 from trueangle.plots.readingpictures import before_after_picture, residual_picture
-from trueangle.rehearsal.result import RehearsedCause
+from trueangle.rehearsal.cause import RehearsedCause
 from trueangle.support.display_units import error_unit
 
 matplotlib = pytest.importorskip("matplotlib")

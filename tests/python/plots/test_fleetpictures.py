@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 import trueangle as ta
 from fleets.made import units
-from monitoring.test_windows import PER, model, readings
+from model.test_windows import PER, model, readings
 from trueangle.plots.controlcharts import watched_windows
 
 matplotlib = pytest.importorskip("matplotlib")

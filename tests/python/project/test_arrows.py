@@ -50,8 +50,16 @@ def test_make_lint_runs_it():
     assert "$(PYTHON) .ci/arrows\n" in (ROOT / "Makefile").read_text("utf-8")
 
 
-def test_a_circle_inside_functions_is_seen(package):
-    plant(package / "runs/run.py", "\n\ndef planted():\n    from .files import read_runs\n")
+@pytest.mark.parametrize(
+    "planted",
+    [
+        "def planted():\n    from .files import read_runs",
+        "if TYPE_CHECKING:\n    from .files import read_runs",
+        'planted = importlib.import_module("trueangle.runs.files")',
+    ],
+)
+def test_a_circle_is_seen_whatever_its_import_is_for(planted, package):
+    plant(package / "runs/run.py", f"\n\n{planted}\n")
     (said,) = (line for line in check(package) if "circle" in line)
     assert "runs.run:" in said
     assert "runs.files:" in said

@@ -13,10 +13,10 @@ import trueangle as ta
 from trueangle.planning.evidence import ReadingNoise
 from trueangle.planning.nextruns import NextRuns, RivalEvidence
 from trueangle.rehearsal.after import _FurtherTrials
+from trueangle.rehearsal.cause import RehearsedCause
 from trueangle.rehearsal.rehearse import _notes, _still
-from trueangle.rehearsal.result import Rehearsal, RehearsedCause
+from trueangle.rehearsal.result import Rehearsal, _never, _size
 from trueangle.rehearsal.search import SizeSearch
-from trueangle.rehearsal.summary import _never, _size, rehearsal_summary
 from trueangle.rehearsal.trial import FAILED, NAMED, TrialOutcome, trial_outcome
 
 
@@ -79,7 +79,7 @@ def test_every_figure_of_a_rehearsal_has_its_own_place() -> None:
     assert [(t["size"], t["named"], t["trials"]) for t in of["tried"]] == [
         (1.0, 0, 4), (2.0, 3, 4), (4.0, 2, 2),
     ]  # fmt: skip
-    text = " ".join(rehearsal_summary(found).split())
+    text = " ".join(found.summary().split())
     assert "8 runs, 701 readings, noise 1.25 arcsec; 10 diagnoses, at most 20 of a cause" in text
     assert "seed 41" in text
 

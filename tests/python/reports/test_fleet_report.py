@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 import trueangle as ta
 from fleets.made import units
-from monitoring.test_windows import PER, model, readings
+from model.test_windows import PER, model, readings
 from trueangle.cli import main
 from trueangle.reports.fleet import FleetReport
 from trueangle.reports.watched import WatchReport

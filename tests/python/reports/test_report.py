@@ -227,7 +227,7 @@ def test_missing_extras_are_named(made, monkeypatch, missing: str) -> None:
     monkeypatch.setitem(sys.modules, missing, None)
     page.bokeh_library.cache_clear()
     with pytest.raises(MissingExtraError, match=r"trueangle\[report\]"):
-        page.rendered_report(made)
+        page.rendered_report(made.content, made.figures)
 
 
 def test_pdf_without_a_browser_says_what_to_do(made, tmp_path) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.monitoring.alarm import WatchedOrder, WatchedWindow
+from trueangle.model.alarm import WatchedOrder, WatchedWindow
 from trueangle.reports.numbers import Numbers
 from trueangle.reports.robot import JointRank, ranking_text
 from trueangle.reports.scale import error_scale

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 from ...fitting.orders.select import select_orders
 from ...fitting.orders.table import OrderSelection
-from ...planning.plan import CalibrationPlan, plan_mounts, wanted_orders
+from ...planning.mountplan import CalibrationPlan
+from ...planning.plan import plan_mounts, wanted_orders
 from ...runs.aliasing import fold
 from ...runs.run import CalibrationRun
 from ...support.arrays import Array

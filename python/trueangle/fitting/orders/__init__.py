@@ -1,6 +1,7 @@
 """Which orders of the angle error are real: selection with evidence, aliases, the paper."""
 
+from .rows import OrderRow
 from .select import FALSE_ALARM, select_orders
-from .table import OrderRow, OrderSelection
+from .table import OrderSelection
 
 __all__ = ["FALSE_ALARM", "OrderRow", "OrderSelection", "select_orders"]

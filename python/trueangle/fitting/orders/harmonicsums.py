@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ import trueangle._core as _core
 from ...estimation.linear import NormalEquations
 from ...support.arrays import Array
 from ...support.powersums import power_sums
-from .unitgroups import GROUPS, MOST_UNITS, columns_summed, units_in_groups
+from .unitgroups import GROUPS, MOST_UNITS, ZeroGroupReadings, columns_summed, units_in_groups
 
 #: From so many readings on the core's piecewise moments are faster than this file's powers.
 _LARGE: Final = 1024
@@ -30,30 +30,6 @@ _KEPT: Final = 64
 
 #: Readings handled at once: the working set stays in the cache.
 _CHUNK: Final = 1 << 15
-
-
-class ZeroGroupReadings(NamedTuple):
-    """Readings of one unit: a run, or a run on one mount, that has its own zero.
-
-    Attributes
-    ----------
-    turns : ndarray, shape (n,)
-        Reference angle in turns; unwrapped where the orders are not whole.
-    error : ndarray, shape (n,)
-        Error around its zero, in any unit.
-    weights : ndarray, shape (n,)
-        Positive.
-    label : str
-    """
-
-    turns: Array
-    error: Array
-    weights: Array
-    label: str
-
-    def part(self, mask: NDArray[np.bool_], label: str) -> ZeroGroupReadings:
-        """The readings where ``mask`` is true."""
-        return ZeroGroupReadings(self.turns[mask], self.error[mask], self.weights[mask], label)
 
 
 class HarmonicSums:

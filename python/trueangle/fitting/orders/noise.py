@@ -13,7 +13,8 @@ from ...runs.aliasing import Positions
 from ...support.arrays import Array
 from ...support.quantiles import median
 from .evidence import COLLINEAR, OVERDISPERSED, fit_subset, log_chi2_tail
-from .harmonicsums import HarmonicSums, ZeroGroupReadings
+from .harmonicsums import HarmonicSums
+from .unitgroups import ZeroGroupReadings
 
 #: Sweeps of alternating means (positions, zeros); whole grids need one.
 _SWEEPS: Final = 20

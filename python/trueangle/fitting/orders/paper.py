@@ -21,11 +21,12 @@ from ...support.arrays import Array
 from ...support.quantiles import median
 from .candidates import Candidates
 from .evidence import log_tail
-from .harmonicsums import ZeroGroupReadings
 from .lookalikes import find_lookalikes
 from .noise import ReadingVariance
 from .phases import circular_range_deg
-from .table import OrderRow, OrderSelection
+from .rows import OrderRow
+from .table import OrderSelection
+from .unitgroups import ZeroGroupReadings
 from .verdicts import explained_row, selection_notes
 from .zerogroups import zero_units
 

@@ -11,7 +11,7 @@ from ...estimation.readings import LEAST_SHARE, MOST_SHARE
 from ...estimation.rounded import fit_rounded
 from ...joint.pattern import lines_columns
 from ...support.arrays import Array
-from .harmonicsums import ZeroGroupReadings
+from .unitgroups import ZeroGroupReadings
 
 
 def beyond_rounding(

@@ -16,8 +16,9 @@ from ..argument import AnyArgument
 from ..fit import fitted_to
 from ..uncertainty import CovarianceKind
 from .choice import Method, selected_of
+from .rows import OrderRow
 from .selection import FALSE_ALARM
-from .table import OrderRow, OrderSelection
+from .table import OrderSelection
 
 __all__ = ["FALSE_ALARM", "OrderRow", "OrderSelection", "select_orders"]
 
@@ -141,4 +142,4 @@ def _as_fitted(
             )
     except TrueAngleError:
         return selection
-    return selection.as_fitted(fit)
+    return selection.as_fitted(fit.model, fit.standard_errors)

@@ -19,8 +19,9 @@ from .lookalikes import find_lookalikes
 from .noise import pure_error
 from .phases import circular_range_deg, unit_phases
 from .rounding import beyond_rounding
+from .rows import OrderRow
 from .search import FALSE_ALARM, EvidenceSearch
-from .table import OrderRow, OrderSelection
+from .table import OrderSelection
 from .verdicts import explained_row, selection_notes, verdict_reason
 from .zerogroups import angle_blocks, zero_units
 

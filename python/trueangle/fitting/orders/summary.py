@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from ...support.angles import arcsec
 from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, phase_pair, sine_of_rms
 from ...support.layout import laid_out, wrapped
 from ...support.plainresult import finite
-
-if TYPE_CHECKING:
-    from .table import OrderRow, OrderSelection
+from .rows import OrderRow, OrderTable
 
 #: Rejected orders listed beside the retained ones, the strongest first.
 _REJECTED = 8
 
 
-def selection_summary(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> str:
+def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> str:
     """Table of the orders, the reasons and the notes; see `OrderSelection.summary`."""
     period = selection.period
     noise = arcsec(selection.noise.standard_deviation, period)
@@ -56,7 +54,7 @@ def selection_summary(selection: OrderSelection, errors_in: ErrorsIn = "auto") -
     return laid_out(lines).rstrip()
 
 
-def selection_error_unit(selection: OrderSelection, errors_in: ErrorsIn = "auto") -> ErrorUnit:
+def selection_error_unit(selection: OrderTable, errors_in: ErrorsIn = "auto") -> ErrorUnit:
     """One unit for all that is told and drawn of a selection, by the rms before it."""
     before = arcsec(selection.holdout_rms[0], selection.period)
     return error_unit(errors_in, sine_of_rms(before), selection.period)
@@ -97,7 +95,7 @@ def _explanations(rows: Sequence[OrderRow]) -> list[str]:
     return ["What they may be:", *lines, ""] if lines else []
 
 
-def _source(selection: OrderSelection) -> str:
+def _source(selection: OrderTable) -> str:
     noise = selection.noise
     what = {
         "repeats": "repeats at the same positions",
@@ -107,7 +105,7 @@ def _source(selection: OrderSelection) -> str:
     return f"{what} ({noise.degrees_of_freedom} degrees of freedom)"
 
 
-def plain_selection(selection: OrderSelection) -> dict[str, Any]:
+def plain_selection(selection: OrderTable) -> dict[str, Any]:
     """The selection with angles in arcsec; what is not a number becomes None."""
     scale = arcsec(1.0, selection.period)
     before, after = selection.holdout_rms

@@ -26,7 +26,8 @@ from ...runs.aliasing import (
 from ...runs.run import CalibrationRun, as_runs
 from ...support.angles import arcsec
 from .candidates import Candidates, choose_candidates
-from .table import OrderRow, OrderSelection
+from .rows import OrderRow
+from .table import OrderSelection
 
 #: Share of the energy in the upper half of the orders from which under-sampling is said.
 _UNDER_SAMPLED: Final = 0.25

@@ -13,7 +13,7 @@ from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
 from ...runs.travel import over_turns
 from ...support.angles import wrap
-from .harmonicsums import ZeroGroupReadings
+from .unitgroups import ZeroGroupReadings
 
 #: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
 _FOLDS: Final = 6

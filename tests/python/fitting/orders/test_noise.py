@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from trueangle.fitting.orders.harmonicsums import ZeroGroupReadings
 from trueangle.fitting.orders.noise import pure_error
+from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
 from trueangle.runs.aliasing import Positions
 
 SEED = 46_700

@@ -14,8 +14,9 @@ from trueangle.fitting.orders.evidence import (
     fit_subset,
     log_tail,
 )
-from trueangle.fitting.orders.harmonicsums import ZeroGroupReadings, harmonic_sums
+from trueangle.fitting.orders.harmonicsums import harmonic_sums
 from trueangle.fitting.orders.noise import neighbour_scatter, pooled_scatter, run_scatter
+from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
 
 SIGMA = 0.3
 

@@ -9,8 +9,8 @@ import pytest
 
 import trueangle as ta
 from coarse import Sensor, any_sensor
-from trueangle.fitting.orders.harmonicsums import ZeroGroupReadings
 from trueangle.fitting.orders.rounding import beyond_rounding
+from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
 
 
 @pytest.mark.parametrize("seed", range(40, 70))

@@ -13,12 +13,12 @@ import trueangle._core as _core
 
 from ..errors import ArgumentError
 from ..joint.joint import Joint
-from ..model.model import HarmonicModel
 from ..support.angles import arcsec
 from ..support.kinds import of_type, told_kinds
 from ..support.plainresult import Shown, counted
 from ..support.runlength import chart_limit, rare
 from .alarm import WatchedOrder, WatchedWindow
+from .model import HarmonicModel
 
 #: By which the run length of all charts is raised: what standardizing by a few windows, and
 #: correlation that is found late, take from it.

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm, t
 
 import trueangle as ta
-from trueangle.monitoring.monitor import _lines, _variances
+from trueangle.model.monitor import _lines, _variances
 from trueangle.support.runlength import chart_limit
 
 SEED = 53_500

@@ -12,14 +12,14 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ..errors import MissingExtraError
-from ..estimation.moments import Moments
-from ..fitting.fit import fit
-from ..fleets.fleet import fleet
-from ..model.model import HarmonicModel
-from ..monitoring.monitor import Monitor
-from ..runs.run import CalibrationRun
-from ..support.arrays import Array
+from ...errors import MissingExtraError
+from ...estimation.moments import Moments
+from ...fitting.fit import fit
+from ...fleets.fleet import fleet
+from ...model.model import HarmonicModel
+from ...model.monitor import Monitor
+from ...runs.run import CalibrationRun
+from ...support.arrays import Array
 from .evaluation import harmonics
 from .fit import Case, readings
 from .interleaved import Timing, interleave
@@ -120,7 +120,7 @@ def by_workers(workers: Sequence[int], size: int, files: int = 8) -> list[Measur
         raise MissingExtraError(
             "workers need Dask and Parquet: pip install 'trueangle[dask,parquet]'"
         ) from None
-    from ..logs.fitting import fit_logs
+    from ...logs.fitting import fit_logs
 
     found = []
     with tempfile.TemporaryDirectory() as folder:

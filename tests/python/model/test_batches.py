@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import FileError
-from trueangle.monitoring.readings import read_batches, read_lines
+from trueangle.model.batches import read_batches, read_lines
 from trueangle.runs.source import Reading
 
 TURN = np.array([0.05, 0.3, 0.55, 0.8, 1.05])

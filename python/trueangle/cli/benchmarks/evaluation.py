@@ -9,8 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..joint.shafts import Shaft
-from ..model.model import HarmonicModel
+import trueangle._core as _core
+
+from ...joint.shafts import Shaft
+from ...model.model import HarmonicModel
 from .evaluationpeers import peers
 from .interleaved import Timing, interleave
 
@@ -121,7 +123,7 @@ def small(samples: int = 37, rounds: int = 200) -> list[EvaluationRow]:
 
 def single(rounds: int = 200) -> list[EvaluationRow]:
     """One float in, one float out; the loop around it is in every figure."""
-    compensator = harmonics(ORDERS["17 orders"])._series.compensator()
+    compensator = _core.Compensator(harmonics(ORDERS["17 orders"])._series)
     calls = range(_CALLS)
     functions: dict[str, Callable[[float], float]] = {
         "step": compensator.step,

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import MissingExtraError, NoModelError, NotCorrectedWarning
-from .fitting.fit import fit
-from .model.model import HarmonicModel
-from .runs.follows import check_follows
-from .runs.run import CalibrationRun
-from .support.angles import circular_mean, wrap
+from ..errors import MissingExtraError, NoModelError, NotCorrectedWarning
+from ..model.model import HarmonicModel
+from ..runs.follows import check_follows
+from ..runs.run import CalibrationRun
+from ..support.angles import circular_mean, wrap
+from .fit import fit
 
 try:
     from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin

@@ -13,7 +13,7 @@ from sklearn.model_selection import cross_val_score  # noqa: E402
 from sklearn.pipeline import make_pipeline  # noqa: E402
 from sklearn.utils.estimator_checks import check_estimator  # noqa: E402
 
-from trueangle.sklearn import AngleCorrector  # noqa: E402
+from trueangle.fitting.sklearn import AngleCorrector  # noqa: E402
 
 SEED = 5
 #: Checks whose targets are classes or noise: no column follows them, and the fit says so.

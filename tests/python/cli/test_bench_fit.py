@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from trueangle.bench.fit import Case, measure, peers
+from trueangle.cli.benchmarks.fit import Case, measure, peers
 
 # Ours relative to the largest coefficient; the error is a difference of angles of a turn.
 AGREES = 1e-11

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..estimation import reference
-from ..model.model import HarmonicModel
+from ...estimation import reference
+from ...model.model import HarmonicModel
 from .compiled import compiled, is_available
 
 _Array = NDArray[np.float64]

@@ -13,12 +13,12 @@ from ..errors import FileError
 from ..formats.columns import find_columns
 from ..formats.format import Labels, Selection
 from ..formats.formats import find_format
-from ..model.model import HarmonicModel
 from ..runs.angles import Angles, find_angles
 from ..runs.files import Conversion
 from ..runs.source import Reading, checked_reading
 from ..support.arrays import Array
 from ..support.roles import Column, wanted_columns
+from .model import HarmonicModel
 
 
 class ReadingBatch(NamedTuple):

@@ -13,10 +13,10 @@ from conftest import ROOT
 sys.path.insert(0, str(ROOT / "benches"))
 
 import latency
-from trueangle.bench import compiled, evaluation, scaling
-from trueangle.bench.evaluationpeers import peers
-from trueangle.bench.interleaved import Timing
 from trueangle.cli import main
+from trueangle.cli.benchmarks import compiled, evaluation, scaling
+from trueangle.cli.benchmarks.evaluationpeers import peers
+from trueangle.cli.benchmarks.interleaved import Timing
 
 #: The least accurate peer draws chords over 65536 places: h^2/8 times the curvature of
 #: order 17, of its amplitude.

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..fitting.fit import fit
-from ..runs.run import CalibrationRun
+from ...fitting.fit import fit
+from ...runs.run import CalibrationRun
 from .interleaved import Timing, interleave
 
 _Array = NDArray[np.float64]

@@ -1,0 +1,211 @@
+"""What a diagnosis holds, what follows from it, and the runs that would tell what is open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from ..effects.blindness import Blindness
+from ..estimation.regression import ROUNDING
+from ..joint.signals import join_runs
+from ..runs.checks import DataFault
+from ..simulation.measured import design_of
+from ..simulation.simulation import Simulation
+from ..support.plainresult import counted, json_text
+from .beliefs import Belief
+from .correctable import Correctable
+from .discrepancy import Discrepancy
+from .finding import Finding
+from .goodness import Unexplained
+from .torque import TorqueAccount
+
+if TYPE_CHECKING:
+    from ..planning.limits import Limits
+    from ..planning.nextruns import NextRuns
+    from ..runs.joining import MeasuredMinusSimulated
+    from ..runs.run import CalibrationRun
+
+
+@dataclass(frozen=True)
+class DiagnosisData(Correctable):
+    """What a `Diagnosis` holds."""
+
+    discrepancy: Discrepancy
+    structure: dict[str, float]
+    noise: float
+    findings: list[Finding]
+    not_identifiable: list[Blindness]
+    extended: Simulation
+    gain: dict[str, float]
+    readings: int
+    readings_used: int
+    correlation: float
+    unexplained: Unexplained | None = None
+    unexplained_before: Unexplained | None = None
+    beliefs: list[Belief] = field(default_factory=list)
+    data_faults: list[DataFault] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    complete: bool = True
+    simulated: MeasuredMinusSimulated | None = None
+    runs: list[CalibrationRun] = field(repr=False, compare=False, default_factory=list)
+    torque: TorqueAccount | None = None
+
+    @property
+    def is_enough(self) -> bool:
+        """The simulation is enough: no finding, nothing unexplained, every belief confirmed.
+
+        An account that was ended early does not tell.
+        """
+        return (
+            self.complete
+            and not self.findings
+            and not (self.unexplained is not None and self.unexplained.found)
+            and all(belief.verdict == "confirmed" for belief in self.beliefs)
+        )
+
+    def simulation(self) -> Simulation:
+        """`extended`, with the noise of the readings and designs of their runs.
+
+        Both stand where the simulation states none: `trueangle.simulate` repeats the
+        measurement then. What an extended simulation is written as.
+
+        Examples
+        --------
+        >>> import trueangle as ta
+        >>> from trueangle.simulation import RunDesign, Simulation
+        >>> measured = ta.simulate(Simulation(sigma_arcsec=2.0), runs=[RunDesign(samples=900)])
+        >>> found = ta.diagnose(measured, Simulation()).simulation()
+        >>> round(found.sigma_arcsec), len(ta.simulate(found)[0])
+        (2, 900)
+        """
+        extended = self.extended
+        return replace(
+            extended,
+            sigma_arcsec=extended.sigma_arcsec or self.noise,
+            runs=extended.runs or tuple(design_of(run) for run in self.runs),
+        )
+
+    def plan(
+        self, limits: Limits | None = None, *, between: Sequence[str] | None = None
+    ) -> NextRuns:
+        """The runs that would tell what is open (`trueangle.planning.planner.next_runs`).
+
+        Parameters
+        ----------
+        limits : Limits, optional
+            What a run may be; by default much as those there are.
+        between : sequence of str, optional
+            Causes to be told apart in place of what is open.
+
+        Returns
+        -------
+        NextRuns
+            Not rehearsed: `trueangle.plan_after` does that.
+
+        Examples
+        --------
+        >>> from trueangle import diagnose, simulate
+        >>> from trueangle.simulation import Backlash, RunDesign, Simulation
+        >>> sim = Simulation(sigma_arcsec=1.0, runs=(RunDesign(reversals=(0.5,)),))
+        >>> plan = diagnose(simulate(sim.with_effects([Backlash(3.0)])), sim).plan()
+        >>> plan.runs[0].speed_deg_s, plan.between[0].causes
+        (60.0, ('backlash', 'latency'))
+        """
+        # Most accounts leave nothing open, and need no plan.
+        from ..planning.evidence import ReadingNoise
+        from ..planning.planner import next_runs
+
+        noise = ReadingNoise(max(self.noise, ROUNDING), self.correlation)
+        signals = join_runs(self.runs if self.simulated is None else self.simulated.runs)
+        believed, spots = self._without_open(), self.not_identifiable
+        if between is not None:
+            believed, spots = self._between(tuple(between))
+        return next_runs(signals, believed, spots, noise, limits)
+
+    @cached_property
+    def next_runs(self) -> NextRuns | None:
+        """The runs that would tell what is seen and not told, as `plan` has them by default.
+
+        None where nothing is, or the account was ended early.
+        """
+        is_open = any(spot.supported and spot.hypotheses for spot in self.not_identifiable)
+        return self.plan() if is_open and self.complete and self.runs else None
+
+    def _without_open(self) -> Simulation:
+        """The extended simulation without what may be due to another cause."""
+        asked = [
+            (effect.kind, getattr(effect, "order", None))
+            for spot in self.not_identifiable
+            for effects in spot.hypotheses.values()
+            for effect in effects
+        ]
+        kept = (
+            effect
+            for effect in self.extended.effects
+            if (effect.kind, getattr(effect, "order", None)) not in asked
+        )
+        return replace(self.extended, effects=tuple(kept))
+
+    def _between(self, causes: tuple[str, ...]) -> tuple[Simulation, list[Blindness]]:
+        """What is believed without these causes, and the question which of them it is."""
+        for spot in self.not_identifiable:
+            if spot.supported and set(causes) <= set(spot.causes):
+                return self._without_open(), [replace(spot, causes=causes)]
+        known = {f.cause: tuple(f.effects) for f in self.findings if f.cause in causes}
+        known = {cause: effects for cause, effects in known.items() if effects}
+        taken = [effect for effects in known.values() for effect in effects]
+        kept = tuple(effect for effect in self.extended.effects if effect not in taken)
+        asked = Blindness(causes, "", "", bool(known), hypotheses=known)
+        return replace(self.extended, effects=kept), [asked]
+
+    def to_dict(self, extended_simulation: str | None = None) -> dict[str, Any]:
+        """The object that ``trueangle diagnose`` prints as JSON."""
+        return {
+            "simulation": {
+                "rms_arcsec": self.discrepancy.rms,
+                "peak_to_peak_arcsec": self.discrepancy.peak_to_peak,
+                "max_abs_arcsec": self.discrepancy.max_abs,
+                "closure_arcsec": self.discrepancy.closure,
+                "zero_spread_arcsec": self.discrepancy.zero_spread,
+            },
+            "structure": self.structure,
+            "noise_arcsec": self.noise,
+            "noise_correlation": self.correlation,
+            "readings": self.readings,
+            "readings_used": self.readings_used,
+            "unexplained": self._unexplained(),
+            "findings": [finding.to_dict() for finding in self.findings],
+            "beliefs": [belief.to_dict() for belief in self.beliefs],
+            "data_faults": [fault.to_dict() for fault in self.data_faults],
+            "gain": self.gain,
+            "complete": self.complete,
+            "notes": self.notes,
+            "not_identifiable": [spot.to_dict() for spot in self.not_identifiable],
+            "extended_simulation": extended_simulation,
+            **({} if self.simulated is None else {"simulated": self.simulated.to_dict()}),
+            **({} if self.torque is None else {"torque": self.torque.to_dict()}),
+        }
+
+    def _unexplained(self) -> dict[str, Any]:
+        if self.unexplained is None:
+            return {"found": False, "rms_arcsec": 0.0, "share": 0.0, "evidence": [], "before": None}
+        before = self.unexplained_before
+        return {
+            **self.unexplained.to_dict(),
+            "before": None if before is None else before.to_dict(),
+        }
+
+    def to_json(self, extended_simulation: str | None = None) -> str:
+        """`to_dict` as JSON text."""
+        return json_text(self.to_dict(extended_simulation), indent=2)
+
+    def _brief(self) -> str:
+        sure = [finding.cause for finding in self.findings if finding.confirmed]
+        parts = [] if self.complete else ["incomplete"]
+        parts.append(f"{len(sure)} of {counted(self.findings, 'finding')} confirmed")
+        if self.unexplained is not None and self.unexplained.found:
+            parts.append("more is unexplained")
+        parts.append(f"noise {self.noise:.3g} arcsec of {self.readings} readings")
+        return ", ".join(parts) + (f": {', '.join(sure)}" if sure else "")
