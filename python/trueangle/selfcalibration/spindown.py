@@ -280,8 +280,7 @@ def _notes(
     wild = int((~fit.valid).sum())
     if wild:
         notes.append(f"{counted(wild, 'outlier')} set aside")
-    seconds = fit.motion.knots.spacing
-    per_turn = 1.0 / (seconds * readings.mean_speed)
+    per_turn = sum(fit.motion.knots.intervals) / sum(s.turns for s in readings.stretches)
     notes.append(
         f"motion: {counted(readings.stretches, 'segment')}, "
         f"{per_turn:.2g} knots per turn, smoothing by evidence"
