@@ -118,6 +118,9 @@ def run(args: argparse.Namespace) -> int:
     if args.after is not None:
         return run_after(args)
     refuse_without_after(args)
+    if args.self_method is None:
+        of_self = ("count", "angles", "speed_ratio", "start_speed", "rate", "simulation")
+        refuse_given(args, of_self, "is of plans without a reference: add --self METHOD")
     plan = _planned(args, orders)
     print(plan.to_json() if args.json else plan.summary())
     return 0
@@ -157,6 +160,7 @@ def _planned(
 def _of_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> ArcPlan:
     from ..planning.arc import plan_arc
 
+    refuse_given(args, ("positions", "mounts"), "is of plans for whole turns: it has --readings")
     start, stop = WHOLE_TURN if args.arc is None else args.arc
     return plan_arc(
         start,
@@ -175,7 +179,7 @@ def _of_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> ArcPl
 def _of_unit(args: argparse.Namespace, orders: tuple[float, ...] | None) -> UnitPlan:
     from ..fleets import load_fleet, plan_unit
 
-    others = ("runs", "both_directions", "apart", "std_arcsec")
+    others = ("positions", "mounts", "runs", "both_directions", "apart", "std_arcsec")
     refuse_given(args, others, "does not go with --prior; leave one of them out")
     if (args.uncertainty is None) == (args.readings is None):
         raise ArgumentError(
@@ -197,6 +201,11 @@ def _of_unit(args: argparse.Namespace, orders: tuple[float, ...] | None) -> Unit
 def _of_self(args: argparse.Namespace, orders: tuple[float, ...] | None) -> SelfPlan:
     from ..planning.selfplan import plan_self
 
+    others = (
+        *("positions", "mounts", "arc", "readings", "runs", "both_directions", "apart"),
+        *("uncertainty", "prior"),
+    )
+    refuse_given(args, others, "is of plans with a reference: leave it or --self out")
     told = {
         "orders": orders,
         "count": args.count,

@@ -97,6 +97,7 @@ def run_levels(signals: Signals, factor: str) -> tuple[NDArray[np.int64], list[f
     """Level of every reading (that of its run) and the mean value of every level, ascending.
 
     None where the factor has no levels, was not recorded or did not change from run to run.
+    Levels are parted by gaps; runs at values without a gap by equal parts of their range.
 
     Examples
     --------
@@ -120,6 +121,9 @@ def run_levels(signals: Signals, factor: str) -> tuple[NDArray[np.int64], list[f
     count = int(group.max()) + 1
     if count > MOST_LEVELS:
         group = group * MOST_LEVELS // count
+    elif count == 1:  # in many small steps: as many equal parts of the range
+        group = ((of_run - of_run.min()) / span * MOST_LEVELS).astype(np.int64)
+        _, group = np.unique(np.minimum(group, MOST_LEVELS - 1), return_inverse=True)
     values = np.bincount(group, of_run) / np.bincount(group)
     sizes = [stop - start for start, stop in bounds]
     return np.repeat(group, sizes), [float(value) for value in values]

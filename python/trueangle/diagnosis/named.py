@@ -189,16 +189,19 @@ def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, flo
 def _equals(cause: str, rivals: Sequence[tuple[str, float]]) -> Blindness | None:
     """That other causes explain as much as one, where they do; none strongly less.
 
-    What contains it or is contained in it is the same cause in another form, and what takes up
-    anything no cause; a line and a ramp are what is seen, whatever makes them.
+    What contains it or is contained in it is the same cause in another form, and explains for it
+    where noise that follows a misfit makes the simpler form the better one; what takes up
+    anything is no cause; a line and a ramp are what is seen, whatever makes them.
     """
     effect = EFFECTS[cause]
     if cause in (MissingOrder.kind, ScaleError.kind) or is_flexible(effect):
         return None
+    forms = {other for other, _ in rivals if _is_another_form(effect, EFFECTS[other])}
+    own = min([0.0, *(gap for other, gap in rivals if other in forms)])
     equal = [
         other
         for other, gap in rivals
-        if gap < NEW_CAUSE and not _is_another_form(effect, EFFECTS[other])
+        if gap - own < NEW_CAUSE and other not in forms and not is_flexible(EFFECTS[other])
     ]
     if not equal:
         return None
@@ -212,7 +215,7 @@ def _equals(cause: str, rivals: Sequence[tuple[str, float]]) -> Blindness | None
 
 
 def _is_another_form(effect: type[Effect], other: type[Effect]) -> bool:
-    return is_flexible(other) or effect in other.contains or other in effect.contains
+    return effect in other.contains or other in effect.contains
 
 
 def scatter_finding(item: ScatterFinding, unexplained: Unexplained) -> Finding:

@@ -19,12 +19,16 @@ from .bends import columns_beyond
 from .blindness import OWN_POWER, Blindness, share_left
 from .drawing import largest_signal
 from .effect import Effect
-from .search import Array, Fitted
+from .search import Array, Fitted, golden_maximum, tangent_covariance
 from .shapes import best_shape
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
 #: Knees searched, in shares of the largest torque.
 KNEES = (0.2, 0.35, 0.5, 0.65, 0.8)
+
+#: A knee and the slopes on both sides of it pass through as many loads wherever they are: more
+#: are needed to say that it is there.
+KNEE_PARAMETERS = 3
 
 
 @dataclass(frozen=True)
@@ -101,20 +105,46 @@ class StiffeningCompliance(Effect):
         torque = regression.signals.torque
         if torque is None or not torque.any() or regression.has(cls.kind):
             return None
+        loads = np.round(torque / np.abs(torque).max(), 3)
         shapes: list[dict[str, Any]] = []
-        if np.unique(np.round(torque / np.abs(torque).max(), 3)).size >= 3:
+        if np.unique(loads).size >= 3:
             shapes += [{"power": 3, "gravity_deg": None}]
-            shapes += [{"knee_share": k, "gravity_deg": None} for k in KNEES]
+        if np.unique(np.abs(loads[loads != 0.0])).size > KNEE_PARAMETERS:
+            shapes += cls._knees(regression.signals, None)
         if cls._constant_in_runs(regression.signals):
             gravity = cls._gravity(regression)
-            shapes += [{"power": 3, "gravity_deg": gravity}]
-            shapes += [{"knee_share": k, "gravity_deg": gravity} for k in KNEES]
-        for shape in shapes:
-            if "knee_share" in shape:
-                moment = StiffeningCompliance.moment(regression.signals, shape["gravity_deg"])
-                shape["knee_Nm"] = float(shape.pop("knee_share") * np.abs(moment).max())
-        extra = [0 if shape["gravity_deg"] is None else 1 for shape in shapes]
-        return best_shape(cls, regression, shapes, [float(np.log(2.0))] * len(shapes), extra)
+            shapes += [
+                {"power": 3, "gravity_deg": gravity},
+                *cls._knees(regression.signals, gravity),
+            ]
+        extra = [("knee_Nm" in shape) + (shape["gravity_deg"] is not None) for shape in shapes]
+        log_grid = float(np.log(2.0))
+        found = best_shape(cls, regression, shapes, [log_grid] * len(shapes), extra)
+        if found is None or "knee_Nm" not in found.shape:
+            return found
+        return cls._refined(found, regression, log_grid)
+
+    @staticmethod
+    def _knees(signals: Signals, gravity: float | None) -> list[dict[str, Any]]:
+        most = float(np.abs(StiffeningCompliance.moment(signals, gravity)).max())
+        return [{"knee_Nm": share * most, "gravity_deg": gravity} for share in KNEES]
+
+    @classmethod
+    def _refined(cls, found: Extension, regression: Regression, log_grid: float) -> Extension:
+        """The same form with its knee where the readings have it, between those searched."""
+        if regression.is_dominated(found.deviance, found.parameters, log_grid):
+            return found
+        signals, shape = regression.signals, found.shape
+        moment = StiffeningCompliance.moment(signals, shape["gravity_deg"])
+        step = (KNEES[1] - KNEES[0]) * float(np.abs(moment).max())
+
+        def gain(knee: float) -> float:
+            return regression.gain(np.column_stack([moment, cls.beyond(moment, knee)]))[0]
+
+        knee, _ = golden_maximum(gain, shape["knee_Nm"] - step, shape["knee_Nm"] + step)
+        shape = {**shape, "knee_Nm": knee}
+        columns = cls.columns(signals, regression.around, shape)
+        return regression.propose(cls.kind, shape, columns, found.parameters, log_grid)
 
     @staticmethod
     def _constant_in_runs(signals: Signals) -> bool:
@@ -155,25 +185,41 @@ class StiffeningCompliance(Effect):
     def report(
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:
-        extension, coefficients, covariance = terms[0]
-        std = np.sqrt(np.diag(covariance))
+        (extension, (linear, second), covariance) = terms[0]
         shape = extension.shape
-        parameters: Parameters = {"arcsec_per_Nm": quantity(coefficients[0], std[0])}
         gravity = shape["gravity_deg"]
         if "power" in shape:
-            parameters["arcsec_per_Nm3"] = quantity(coefficients[1], std[1])
-            effect = StiffeningCompliance(
-                float(coefficients[0]), float(coefficients[1]), gravity_deg=gravity
-            )
+            effect = StiffeningCompliance(float(linear), float(second), gravity_deg=gravity)
+            names = ["arcsec_per_Nm", "arcsec_per_Nm3"]
         else:
-            parameters["beyond_knee_arcsec_per_Nm"] = quantity(coefficients[1], std[1])
-            parameters["knee_Nm"] = quantity(shape["knee_Nm"])
             effect = StiffeningCompliance(
-                float(coefficients[0]), 0.0, float(coefficients[1]), shape["knee_Nm"], gravity
+                float(linear), 0.0, float(second), shape["knee_Nm"], gravity
             )
-        if gravity is not None:
-            parameters["gravity_deg"] = quantity(gravity)
-        return parameters, [effect]
+            names = ["arcsec_per_Nm", "beyond_knee_arcsec_per_Nm", "knee_Nm"]
+        names += [] if gravity is None else ["gravity_deg"]
+        slopes = effect.slopes(regression.signals)
+        if slopes.size:
+            tangents = np.hstack([extension.columns, slopes])
+            covariance = tangent_covariance(regression, terms, tangents)
+        std = np.sqrt(np.diag(covariance))
+        return {
+            name: quantity(getattr(effect, name), error)
+            for name, error in zip(names, std, strict=True)
+        }, [effect]
+
+    def slopes(self, signals: Signals) -> Array:
+        """Derivatives of the signal by the knee and by the vertical, as far as it has them."""
+        moment = self.moment(signals, self.gravity_deg)
+        beyond = np.abs(moment) > self.knee_Nm
+        columns = []
+        if self.beyond_knee_arcsec_per_Nm:
+            columns.append(-self.beyond_knee_arcsec_per_Nm * np.sign(moment) * beyond)
+        if self.gravity_deg is not None:
+            slope = self.arcsec_per_Nm + 3.0 * self.arcsec_per_Nm3 * moment**2
+            slope += self.beyond_knee_arcsec_per_Nm * beyond
+            turned = np.cos(signals.theta - np.radians(self.gravity_deg))
+            columns.append(-np.radians(slope * torque_of(signals) * turned))
+        return np.column_stack(columns) if columns else np.zeros((len(signals), 0))
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import FileError
 from ..formats.columns import find_columns
-from ..formats.format import Selection
+from ..formats.format import Labels, Selection
 from ..formats.formats import find_format
 from ..runs.angles import Angles, find_angles
 from ..runs.files import Conversion
@@ -45,7 +45,13 @@ def read_batches(path: Path, model: HarmonicModel, reading: Reading) -> Iterator
         columns = _WatchedColumns.of(path, header, reading, given, kind.unit)
     for stretch in kind.stretches(path):
         for batch in kind.module.read(path, Selection(columns.names, topic, stretch)):
-            yield columns.batch(lambda name, b=batch: np.asarray(b[name], dtype=float), model)
+            yield columns.batch(lambda name, b=batch: _numbers(path, name, b[name]), model)
+
+
+def _numbers(path: Path, name: str, values: Array | Labels) -> Array:
+    if isinstance(values, Labels):
+        raise FileError(path, "labels, where a number is needed in every row", column=name)
+    return np.asarray(values, dtype=float)
 
 
 def read_lines(

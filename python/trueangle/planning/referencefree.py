@@ -102,13 +102,14 @@ class SelfPlan(PlainResult):
             lines.append(f"  seconds                {self.seconds:.3g}")
         if self.given:
             given: Any = self.given
+            names = ", ".join(f"{k:g}" for k in given["blind_orders"])
+            factor = f"{given['worst_noise_factor']:.2f}"
+            worse = f"{given['worse_by']:.2f} times the best"
             lines.append(
-                f"  the given angles       factor {given['worst_noise_factor']:.2f}, "
-                f"{given['worse_by']:.2f} times the best"
+                f"  the given angles       cannot see {names}; factor {factor} of the others"
+                if names
+                else f"  the given angles       factor {factor}, {worse}"
             )
-            if given["blind_orders"]:
-                names = ", ".join(f"{k:g}" for k in given["blind_orders"])
-                lines.append(f"                         cannot see {names}")
         lines += ["  noise factor per order", *factor_table(self.noise_factors)]
         lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)

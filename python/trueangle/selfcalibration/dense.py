@@ -13,7 +13,7 @@ from ..support.arrays import Array
 from .projected import NOT_SEEN, Projected, Unknown
 
 #: Variances of random terms that are tried, relative to the noise (powers of ten).
-_POWERS: Final = (-math.inf, *np.linspace(-4.0, 10.0, 57).tolist())
+_POWERS: Final[tuple[float, ...]] = (-math.inf, *np.linspace(-4.0, 10.0, 57).tolist())
 
 #: No variance at all: a prior so tight that the term is nothing.
 _NO_VARIANCE: Final = 1e-24
@@ -182,7 +182,8 @@ def _split(root: Array, right: Array) -> tuple[Array, Array]:
 
 def _best_variance(triangle: Array, p: int, m: int, random: Sequence[int], count: float) -> float:
     """The variance of the random nuisances by their evidence, to a quarter of a decade."""
-    return max((10.0**power for power in _POWERS), key=_evidence(triangle, p, m, random, count))
+    tried = [math.pow(10.0, power) for power in _POWERS]
+    return max(tried, key=_evidence(triangle, p, m, random, count))
 
 
 def _evidence(
@@ -205,7 +206,7 @@ def _evidence(
     def evidence(variance: float) -> float:
         variance = max(variance, _NO_VARIANCE)
         prior = np.eye(len(last), len(last) + 1) / math.sqrt(variance)
-        r = np.linalg.qr(np.concatenate([small, prior]), mode="r")
+        r: Array = np.asarray(np.linalg.qr(np.concatenate([small, prior]), mode="r"))
         squares = float(np.sum(r[len(last) :, -1] ** 2))
         diagonal = np.abs(np.diagonal(r)[: len(last)])
         twice = freedom * math.log(max(squares, 1e-300) / freedom)

@@ -112,6 +112,19 @@ def test_the_worst_position_is_the_one_nearest_to_its_own_acceptance_limit():
     assert not wide["conforms"]
 
 
+@pytest.mark.parametrize("rule", ["simple", "guard_band"])
+def test_a_joint_conforms_where_its_worst_position_is_within_the_limit_that_is_told(rule):
+    rng, told = np.random.default_rng(72_200), set()
+    for _ in range(200):
+        pairs = zip(rng.uniform(-11.0, 11.0, 3), rng.uniform(0.5, 4.0, 3), strict=True)
+        found = conformity(Specification(10.0, rule), rows(*pairs))
+        worst = found["worst"]
+        within = bool(abs(worst["error_arcsec"]) <= worst["acceptance_limit_arcsec"])
+        assert found["conforms"] is within, found
+        told.add(within)
+    assert told == {True, False}
+
+
 def test_a_guard_band_of_u_accepts_few_that_do_not_conform():
     """True errors anywhere, measured with U: of those accepted hardly any lies outside."""
     seed = 7

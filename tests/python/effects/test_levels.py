@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+import trueangle as ta
+from trueangle.diagnosis.levels import run_levels
+from trueangle.effects import TorsionalCompliance
 from trueangle.effects.blindspots import blind_spots
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
@@ -28,3 +31,26 @@ def test_runs_alike_in_temperature_are_one_level(middle):
 
 def test_runs_a_kelvin_apart_are_levels_of_their_own():
     assert hides_drift([20.0, 21.1, 22.2])
+
+
+@pytest.mark.parametrize("count", [4, 7, 11, 12, 21])
+def test_even_steps_of_a_load_are_levels_however_many_they_are(count):
+    """A stiffness test in equal steps: no gap parts one load from the next."""
+    loads = np.linspace(-10.0, 10.0, count)
+    runs = tuple(RunDesign(f"{k}", samples=60, torque_Nm=t) for k, t in enumerate(loads))
+    known = Simulation(sigma_arcsec=2.0, runs=runs)
+    signals = join_runs(simulate(known, 0))
+    level, values = run_levels(signals, "torque")
+    assert len(values) == min(count, 5)
+    assert np.all(np.diff(level) >= 0)
+    of_level = [signals.torque[level == k] for k in range(len(values))]
+    np.testing.assert_allclose(values, [np.mean(torque) for torque in of_level], atol=1e-12)
+    assert np.all(np.diff(values) > 0.0)
+    # No part of the range holds more than twice the loads of another.
+    sizes = [np.unique(torque).size for torque in of_level]
+    assert max(sizes) <= 2 * min(sizes)
+    (found,) = ta.diagnose(
+        simulate(known.with_effects([TorsionalCompliance(1.0)]), 1), known
+    ).findings
+    assert found.cause == "torsional_compliance"
+    assert found.gain.by_level.held_out

@@ -70,6 +70,10 @@ HIDDEN = {
         {"arcsec_per_Nm": 1.5, "arcsec_per_Nm3": 0.1},
         ("arcsec_per_Nm", "arcsec_per_Nm3"),
     ),
+    "stiffening_compliance, knee": (
+        {"arcsec_per_Nm": 3.0, "beyond_knee_arcsec_per_Nm": -2.0, "knee_Nm": 2.2},
+        ("arcsec_per_Nm", "beyond_knee_arcsec_per_Nm", "knee_Nm"),
+    ),
     "torque_hysteresis": (
         {"half_width_arcsec": 4.0, "span_Nm": 3.0},
         ("half_width_arcsec", "span_Nm"),

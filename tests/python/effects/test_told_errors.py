@@ -57,7 +57,6 @@ TERMS = {
         {"what": "line", "order": 102.0, "kind": "signed"},
     ],
     "stiffening_compliance": [{"power": 3, "gravity_deg": None}],
-    "stiffening_compliance, knee": [{"knee_Nm": 2.0, "gravity_deg": 40.0}],
     "reference_error": [
         {"order": 3.0, "mount_sign": 1.0},
         {"order": 2.0, "mount_sign": -1.0},
@@ -198,7 +197,7 @@ def test_a_load_hangs_where_it_is_said_to(gravity):
     parameters, _ = effect.report(full, [(*full.fitted()[0], full.covariance(0))])
     away = (parameters["gravity_deg"].value - gravity + 180.0) % 360.0 - 180.0
     # 20 arcsec and more at 1.4 of noise, 1920 readings: a tenth of a degree.
-    assert abs(away) < 0.6
+    assert abs(away) < min(0.6, 4.0 * parameters["gravity_deg"].std)
     for name, size in (("arcsec_per_Nm", 4.0), ("arcsec_per_Nm3", 0.05)):
         assert abs(parameters[name].value - size) < 4.5 * parameters[name].std
 

@@ -161,6 +161,21 @@ def test_a_drawn_amplitude_is_without_what_noise_adds_and_as_well_known_as_noise
             assert std == pytest.approx(np.sqrt(spread[0] / 2.0), rel=0.03)
 
 
+def test_a_drawn_amplitude_of_unlike_runs_is_known_as_a_mean_of_their_squares(signals):
+    """Half of the standard error of the mean square, over the amplitude: no noise says as much."""
+    frequency, rng = 1.7, np.random.default_rng(47)
+    waves = EFFECTS["time_periodic"].waves(signals, [frequency] * signals.runs)
+    sizes = np.linspace(4.0, 40.0, signals.runs)
+    error = sizes[signals.run] * waves[:, 1] + NOISE * rng.standard_normal(len(signals))
+    start = Regression.of(signals, error, SIM.surroundings, rho=0.0)
+    shape = {"frequency_hz": [frequency] * signals.runs}
+    full = start.with_terms([start.propose_run_effect("time_periodic", shape, waves)])
+    amplitude, std = DrawnLine(full, "time_periodic", waves).amplitude()
+    assert amplitude**2 == pytest.approx(np.mean(sizes**2), rel=0.02)
+    wanted = np.std(sizes**2, ddof=1) / np.sqrt(signals.runs) / (2.0 * amplitude)
+    assert std == pytest.approx(wanted, rel=0.02)
+
+
 # -- figures of places ------------------------------------------------------------------
 
 

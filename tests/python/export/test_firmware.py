@@ -65,6 +65,17 @@ def test_whole_ticks_leave_what_their_rounding_and_their_shift_do(bits: int, ent
     assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, rel=0.08)
 
 
+def test_knots_and_results_in_whole_counts_leave_what_both_roundings_do(tmp_path) -> None:
+    """Klipper: knots differ by tens of counts, and what is between them adds little."""
+    ratios = []
+    for k in range(12):
+        one = model(o1=3000.0 + 7.0 * k, o2=1000.0 + k)
+        made = ta.export_model(one, "klipper", existing=existing(tmp_path, one))
+        ratios.append(made.rms_difference_arcsec / made.floor_arcsec)
+    print(np.mean(ratios), np.std(ratios))
+    assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, rel=0.04)
+
+
 def test_a_list_that_is_there_is_told_by_its_distance(tmp_path) -> None:
     """Klipper's of 500 arcsec of order 2, and a model of 800: 300 of a sine, rms."""
     path = existing(tmp_path, model(o2=500.0))

@@ -12,6 +12,8 @@ import trueangle as ta
 from trueangle import terms as T
 from trueangle.cli import main
 from trueangle.errors import FileError
+from trueangle.export.fmufiles import variables_of
+from trueangle.simulation import RunDesign
 
 fmpy = pytest.importorskip("fmpy")
 from fmpy.validation import validate_fmu  # noqa: E402
@@ -119,6 +121,19 @@ def test_a_sensor_says_what_the_model_does(name, fmi, tmp_path):
     worst = np.max(np.abs(found - want[: len(found)]))
     print(worst)
     assert worst <= WITHIN
+
+
+@pytest.mark.parametrize("sensor", [False, True])
+def test_what_is_not_told_is_at_rest_at_the_temperature_that_terms_count_from(sensor):
+    """Starts in SI units, as the model takes them: all terms but the pattern are nothing then."""
+    model = ta.HarmonicModel((OUTPUT, MOTOR), 0.01, terms=TERMS["all"])
+    starts = {v.name: (v.start, v.unit) for v in variables_of(model, sensor)}
+    rest = {"velocity": "rad/s", "torque": "N.m", "current": "A"}
+    assert {name: starts[name] for name in rest} == {name: (0.0, u) for name, u in rest.items()}
+    kelvin, unit = starts["temperature"]
+    assert unit == "K"
+    assert kelvin - 273.15 == pytest.approx(T.ThermalDrift().reference_C)
+    assert kelvin - 273.15 == pytest.approx(RunDesign().temperature_C)
 
 
 @pytest.mark.parametrize("variant", ["correction", "sensor"])

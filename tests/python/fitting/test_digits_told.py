@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import trueangle as ta
 from trueangle.fitting.orders.select import select_orders
@@ -47,6 +48,19 @@ def test_a_residual_has_the_digits_that_its_degrees_of_freedom_leave(count, nois
     fit = ta.fit(run_of(unit, 50.0, noise, count), orders=[1], loss="linear", covariance="white")
     assert fit.degrees_of_freedom == count - 3.0
     assert re.search(r"residual +(\S+) arcsec", fit.summary())[1] == text
+
+
+@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("count", [8, 13, 43, 400])
+def test_the_factor_that_is_told_is_that_of_the_intervals(count, unit):
+    """Two-sided, of the degrees of freedom: in words, in JSON and by scipy."""
+    fit = ta.fit(run_of(unit, 50.0, 1.0, count), orders=[1], loss="linear", covariance="white")
+    said = re.search(r"95 % within (\S+) standard errors", fit.summary())[1]
+    (row,) = fit.to_dict()["orders"]
+    low, high = row["interval_arcsec"]
+    times = stats.t.ppf(0.975, count - 3.0)
+    assert (high - low) / 2.0 / row["std_arcsec"] == pytest.approx(times, rel=1e-9)
+    assert float(said) == pytest.approx(times, rel=5e-3)
 
 
 @pytest.mark.parametrize("unit", UNITS)

@@ -119,6 +119,12 @@ def test_guiding_dithers_and_lost_stars_are_taken_out(log):
         assert np.std(off) < 1.3 * 0.02 * SCALE / np.cos(np.radians(DECLINATION))
 
 
+def test_the_sky_turns_once_more_a_year_than_there_are_days():
+    """Tropical year of 365.2422 days; precession takes 1.4e-7 of it."""
+    year = 365.2422
+    assert SIDEREAL * 86_400.0 * year == pytest.approx(360.0 * (year + 1.0), rel=3e-7)
+
+
 @pytest.mark.filterwarnings("ignore::trueangle.errors.MessageLinesWarning")
 def test_what_stands_beside_the_error_is_told_with_its_line(log):
     """The other axis in seconds of arc, the star's signal to noise, and the frame's own line."""

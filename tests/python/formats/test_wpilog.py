@@ -126,6 +126,21 @@ def test_a_copy_gets_an_entry_and_keeps_its_bytes(tmp_path):
     assert "corrected before" in str(again.logs[0].error)
 
 
+def test_a_velocity_is_that_of_the_times_of_the_log_in_seconds(tmp_path):
+    """A delay of 2 ms of a joint that turns: as of a table with the same numbers."""
+    model = MODEL.replace(terms=[ta.Latency(0.002)])
+    path, output = written(tmp_path / "a.wpilog", apart=5000), tmp_path / "out.wpilog"
+    report = ta.correct_logs(path, model, output, signals={"indicated": SIGNALS["indicated"]})
+    assert report.is_done, report.logs[0].error
+    (batch,) = wpilog.read(output, Selection(["time_s", "/arm/corrected_rad"]))
+    time = 1.005 + 0.02 * np.arange(ROWS)
+    wanted = model.corrector()(READ.astype(np.float32).astype(float), time=time)
+    np.testing.assert_allclose(batch["/arm/corrected_rad"], wanted, rtol=0.0, atol=1e-12)
+    # 0.031 rad every 20 ms, 2 ms late.
+    moved = np.abs(wanted - MODEL.correct(READ))[1:]
+    np.testing.assert_allclose(moved, 0.1 * 2.0 * np.pi / (ROWS - 1), rtol=0.03)
+
+
 @pytest.mark.parametrize(
     ("data", "told"),
     [

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -122,6 +123,17 @@ def test_off_null_readings(tilt, tilts, factor):
     plan = plan_tilts(100, tilts=tilts, tilt_arcsec=tilt)
     # One digit behind the point where the table has one.
     assert plan.worst_noise_factor == pytest.approx(factor, abs=0.05)
+
+
+@pytest.mark.parametrize("tilt", [450.0, 1200.0, 3700.0])
+def test_what_an_error_of_the_autocollimators_scale_makes_of_a_tilt_is_told(tilt):
+    """The share that is said times the largest tilt of the plan itself."""
+    plan = plan_tilts(None, orders=[1, 2], tilt_arcsec=tilt)
+    (note,) = [note for note in plan.notes if "scale" in note]
+    percent, left = re.search(r"an error of (\S+) % is (\S+) arcsec here", note).groups()
+    largest = 3600.0 * max(map(abs, plan.mount_offsets_deg))
+    # Printed to two digits.
+    assert float(left) == pytest.approx(float(percent) / 100.0 * largest, rel=0.06)
 
 
 def test_a_free_encoder():

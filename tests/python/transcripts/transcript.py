@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from decimal import Decimal
+from difflib import SequenceMatcher
 from itertools import zip_longest
 from pathlib import Path
 from typing import NamedTuple
@@ -61,20 +62,25 @@ def text_of(steps: list[Step]) -> str:
 
 def differences(approved: tuple[str, ...], shown: list[str]) -> list[str]:
     """Lines that differ, as "was" and "is"; numbers by `is_same_number`, words to the letter."""
-    shown = list(_trimmed(tuple(shown)))
+    before, after = [*approved], [*_trimmed(tuple(shown))]
+    matcher = SequenceMatcher(None, [*map(_words, before)], [*map(_words, after)], autojunk=False)
     found = []
-    for was, now in zip_longest(approved, shown, fillvalue=None):
-        if was != now and (was is None or now is None or not _is_same_line(was, now)):
-            found += [f"  was: {was}", f"  is:  {now}"]
+    for _, a, b, c, d in matcher.get_opcodes():
+        for was, now in zip_longest(before[a:b], after[c:d]):
+            if was is None or now is None or not _is_same_line(was, now):
+                found += [f"  was: {was}", f"  is:  {now}"]
     return found
 
 
+def _words(line: str) -> str:
+    """A line without its numbers, whatever its columns are wide."""
+    return " ".join(_NUMBER.sub("#", line).split())
+
+
 def _is_same_line(was: str, now: str) -> bool:
-    """Whether lines differ in the last digits of numbers alone, whatever the columns are wide."""
-    if " ".join(_NUMBER.sub("#", was).split()) != " ".join(_NUMBER.sub("#", now).split()):
-        return False
-    pairs = zip(_NUMBER.findall(was), _NUMBER.findall(now), strict=True)
-    return all(is_same_number(a, b) for a, b in pairs)
+    """Whether lines differ in the last digits of numbers alone."""
+    pairs = [*zip(_NUMBER.findall(was), _NUMBER.findall(now), strict=False)]
+    return _words(was) == _words(now) and all(is_same_number(a, b) for a, b in pairs)
 
 
 def is_same_number(was: str, now: str) -> bool:
