@@ -12,7 +12,7 @@ import pytest
 
 import trueangle as ta
 from fleets.made import units
-from trueangle.diagnosis.summary import _named
+from trueangle.diagnosis.finding import named_quantity
 from trueangle.estimation.estimate import quantity
 from trueangle.export.export import _source
 from trueangle.export.pattern import TurnPattern
@@ -97,7 +97,8 @@ LISTS: dict[str, tuple[Callable[[int], str], str]] = {
     "names in a message": (lambda n: listed_names(names(n)), r"\bname\d+"),
     "lines of a page's cell": (lambda n: "\n".join(shortened_list(names(n))), r"\bname\d+"),
     "numbers of a finding": (
-        lambda n: _named("orders", quantity([k + 0.25 for k in range(n)]), PLAIN)[1], r"\d+\.25"
+        lambda n: named_quantity("orders", quantity([k + 0.25 for k in range(n)]), PLAIN)[1],
+        r"\d+\.25",
     ),
 }  # fmt: skip
 
