@@ -63,6 +63,7 @@ class HarmonicModel(ErrorModel):
 
     Examples
     --------
+    >>> from trueangle import Shaft
     >>> model = HarmonicModel([Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
     >>> round(model.error(90.0), 12)
     0.5
@@ -99,6 +100,7 @@ class HarmonicModel(ErrorModel):
 
         Examples
         --------
+        >>> from trueangle import Shaft
         >>> model = HarmonicModel([Shaft("output", 1, [1], [0.0], [0.5])], period=360.0)
         >>> step = model.compensator()
         >>> round(step(90.5), 9)
