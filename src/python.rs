@@ -10,6 +10,7 @@ mod beside;
 mod circle;
 mod corrector;
 mod door;
+mod factor;
 mod failure;
 mod fit;
 mod linear;
@@ -60,6 +61,11 @@ mod _core {
     use super::corrector::PyCorrector;
 
     #[pymodule_export]
+    use super::factor::{
+        PyFactor, PyLagCorrelation, PyRunEffect, PyWhitener, settled, short_stretches,
+    };
+
+    #[pymodule_export]
     use super::fit::{
         Solution, band, fit, folds, median_magnitude, sample_residuals, scan_residuals, triangle,
     };
@@ -80,9 +86,7 @@ mod _core {
     use super::motion::{PyBanded, harmonic_rows, harmonic_sum};
 
     #[pymodule_export]
-    use super::noise::{
-        block_products, clipped, median, rounded, rounded_drawn, two_normals, whitened,
-    };
+    use super::noise::{block_products, clipped, median, rounded, rounded_drawn, two_normals};
 
     #[pymodule_export]
     use super::robot::PyRobotStep;

@@ -91,12 +91,12 @@ impl Kernel for Products<'_> {
                 }
                 let mapped = if is_white { &plain } else { &white };
                 // Columns of one place or of a part of the time tell little of most readings.
-                let (from, to) = if k < FEW {
-                    told(&plain, k, size, some)
-                } else {
-                    (0, some)
+                let (from, to) = match width {
+                    0 => (0, 0),
+                    _ if k < FEW => told(&plain, k, size, some),
+                    _ => (0, some),
                 };
-                let others = (&seen[start + from..], n);
+                let others = (seen.get(start + from..).unwrap_or(&[]), n);
                 for j in (0..if from < to { k } else { 0 }).step_by(2) {
                     let moments = &mut self.moments[(place * k + j) * width..];
                     let own = &plain[j * size + from..];

@@ -275,7 +275,7 @@ def _left(regression: Regression) -> Array:
 def _noise(chosen: Regression, rest: Unexplained) -> float:
     """Standard deviation of one reading: what is left, where all that is left is noise."""
     clean = ~chosen.outlying
-    freedom = int(np.count_nonzero(clean)) - chosen.q.shape[1]
+    freedom = int(np.count_nonzero(clean)) - chosen.rank
     if rest.found or freedom <= 0:
         return float(np.hypot(rest.noise.sigma, rounding_of(chosen)))
     return float(np.sqrt(np.sum(_left(chosen)[clean] ** 2) / freedom))

@@ -84,7 +84,7 @@ def _law_without(full: Regression, group: Sequence[int]) -> Law:
     kept = [k for k in range(len(full.terms)) if k not in group]
     effects = sum(term.run_effect is not None for term in full.terms)
     settles = effects > 1 or any(full.terms[k].run_effect is not None for k in group)
-    if settles or full.q.shape[1] < full.design.shape[1]:
+    if settles or full.rank < full.design.shape[1]:
         # Run effects that are left find another size, columns that are alike another share.
         return Law.of(full.with_terms(full.terms[k] for k in kept))
     coefficients = full.coefficients_without(group)

@@ -49,6 +49,9 @@ BEARINGS = 12.0
 #: Share of its level by which the speed must change to tell a line in time from an order.
 ONE_SPEED = 0.1
 
+#: Golden sections of a search about a trial frequency.
+SECTIONS = 14
+
 #: Share of a resolution cell within which an order and a frequency are hardly told apart.
 UNRESOLVED = 0.5
 
@@ -278,12 +281,8 @@ def _refined(regression: Regression, frequencies: list[float], step: float) -> l
     That of all runs by what it saves jointly with what is fitted, which has taken up a part of it.
     """
     if len({*frequencies}) == 1:
-        f, runs = frequencies[0], len(frequencies)
-
-        def saved(f: float) -> float:
-            return regression.ratio_of(TimePeriodic.waves(regression.signals, [f] * runs))[1]
-
-        return [float(golden_maximum(saved, f - step, f + step)[0])] * runs
+        f, turn = frequencies[0], 2.0 * np.pi * regression.signals.clock
+        return [regression.drawn_line(turn, f - step, f + step, SECTIONS)[0]] * len(frequencies)
     e = regression.left - regression.whiten.run_part(regression.left)
     e = np.where(regression.outlying, 0.0, e)
     turn = 2.0 * np.pi * regression.signals.clock
