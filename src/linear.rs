@@ -29,12 +29,12 @@ pub use clusters::{Robust, cluster_covariance};
 pub use factor::{Factor, Fitted, left};
 pub use groups::{Sums, left_out, others};
 pub use model::LinearModel;
-pub use neighbours::{Neighbours, WANDER_TERMS};
+pub use neighbours::Neighbours;
 pub use noise::{Noise, RunEffect};
 pub use products::{Order, Table};
 pub use ratio::{Left, RunProducts, best_ratio};
 pub use ridge::{Fold, RidgePath, ridge_path};
-pub use settled::{CLIP, Observed, Settled, settled, short_stretches};
+pub use settled::{Observed, Settled, settled, short_stretches, without};
 pub use whitening::Correlated;
 
 /// Rounding of an element of a triangle or normal matrix of unit columns, in units of epsilon:

@@ -303,6 +303,14 @@ class Factor:
     def q(self) -> _Array: ...
     def coefficients(self, target: _Array) -> _Array: ...
     def project(self, target: _Array) -> tuple[_Array, _Array, float]: ...
+    def without(
+        self,
+        held: Sequence[int],
+        readings: _Array,
+        roots: _Array,
+        rounding: float,
+        neighbours: LagCorrelation,
+    ) -> _Array: ...
 
 def settled(
     design: _Array,

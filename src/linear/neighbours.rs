@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVectorView};
 use crate::interrupt;
 
 /// Half periods per run that count as wander and not as correlation of the noise.
-pub const WANDER_TERMS: usize = 8;
+const WANDER_TERMS: usize = 8;
 
 /// Correlation between neighbours below which the noise counts as white, and the most it can be.
 const WHITE_BELOW: f64 = 0.05;

@@ -2,7 +2,9 @@
 
 use std::sync::OnceLock;
 
-use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut};
+use nalgebra::{
+    Cholesky, DMatrix, DMatrixView, DMatrixViewMut, DVector, DVectorView, DVectorViewMut,
+};
 
 use super::ratio::eigensystem;
 use super::{Beside, Correlated};
@@ -238,22 +240,24 @@ impl Noise {
     }
 
     fn shrink(&self, columns: &mut [f64]) {
-        for column in columns.chunks_exact_mut(self.readings().max(1)) {
-            for (drawn, &(start, stop)) in self.drawn.iter().zip(&self.bounds) {
-                interrupt::point();
-                let mut part = view_mut(&mut column[start..stop]);
-                let mut inner = drawn.axes.tr_mul(&part);
-                inner.component_mul_assign(&view(&drawn.shrink));
-                part.gemv(-1.0, &drawn.axes, &inner, 1.0);
+        let n = self.readings();
+        let count = columns.len() / n.max(1);
+        let mut columns = DMatrixViewMut::from_slice(columns, n, count);
+        for (drawn, &(start, stop)) in self.drawn.iter().zip(&self.bounds) {
+            interrupt::point();
+            let mut part = columns.rows_mut(start, stop - start);
+            let mut inner = drawn.axes.tr_mul(&part);
+            for (mut row, factor) in inner.row_iter_mut().zip(&drawn.shrink) {
+                row.scale_mut(*factor);
             }
+            part.gemm(-1.0, &drawn.axes, &inner, 1.0);
         }
     }
 
     fn of_run(&self, columns: &[f64], (start, stop): (usize, usize)) -> DMatrix<f64> {
         let n = self.readings();
-        DMatrix::from_fn(stop - start, columns.len() / n, |i, j| {
-            columns[j * n + start + i]
-        })
+        let columns = DMatrixView::from_slice(columns, n, columns.len() / n.max(1));
+        columns.rows(start, stop - start).into_owned()
     }
 }
 
@@ -281,10 +285,15 @@ impl Drawn {
     }
 }
 
-/// Inverse of the unit matrix plus one that is not negative: the eigenvalues are told one by one, as
-/// beside columns 1e8 times as large as others the unit is lost in rounding.
+/// Inverse of the unit matrix plus one that is not negative.
+///
+/// Well conditioned where it matters; beside columns 1e8 times as large as others the unit is lost in
+/// rounding, and the eigenvalues are told one by one.
 fn inverse_beside_one(gram: DMatrix<f64>) -> DMatrix<f64> {
     let size = gram.nrows();
+    if let Some(found) = Cholesky::new(DMatrix::identity(size, size) + &gram) {
+        return found.inverse();
+    }
     let Some(found) = eigensystem(gram) else {
         return DMatrix::from_element(size, size, f64::NAN);
     };
@@ -390,14 +399,14 @@ mod tests {
         for factors in [None, Some([1.0, 0.0, 0.0]), Some([0.0, 1.0, 1.0])] {
             let found = noise.run_part(y.as_slice(), factors.as_ref().map(|f| &f[..]));
             for &(start, stop) in &BOUNDS {
-                for i in start..stop {
+                for (i, found) in found.iter().enumerate().take(stop).skip(start) {
                     let shape = |k: usize, i: usize| noise.shapes[k * N + i];
                     let part = |k: usize| {
                         let along: f64 = (start..stop).map(|j| shape(k, j) * weighed[j]).sum();
                         factors.map_or(1.0, |f| f[k]) * shape(k, i) * along
                     };
                     let expected: f64 = (0..3).map(part).sum();
-                    assert!((found[i] - expected).abs() < 1e-10);
+                    assert!((found - expected).abs() < 1e-10);
                 }
             }
         }
@@ -411,6 +420,23 @@ mod tests {
             let found = inverse_beside_one(DMatrix::from_element(2, 2, power));
             let expected = DMatrix::identity(2, 2) - DMatrix::from_element(2, 2, share);
             assert!((found - expected).amax() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn an_effect_far_larger_than_the_noise_and_than_another_takes_all() {
+        let ramp = |i: usize| i as f64 / 11.5 - 1.0;
+        let shapes: Vec<f64> = (0..2 * N)
+            .map(|at| if at < N { 1.0 } else { 1e8 * ramp(at - N) })
+            .collect();
+        let effects = [RunEffect {
+            shapes: &shapes,
+            ratio: 1e4,
+        }];
+        let noise = Noise::new(BOUNDS.to_vec(), 0.0, None, &effects).unwrap();
+        let y: Vec<f64> = (0..N).map(|i| 3.0 + 2.0 * ramp(i)).collect();
+        for (part, y) in noise.run_part(&y, None).iter().zip(&y) {
+            assert!((part - y).abs() < 1e-3);
         }
     }
 

@@ -2,14 +2,16 @@
 
 use std::sync::Arc;
 
-use super::{Factor, Fitted, Neighbours, clipped, left};
+use nalgebra::{DMatrix, DVector};
+
+use super::{Clipped, Factor, Fitted, LinearModel, Neighbours, Noise, clipped, left};
 
 /// Residuals are taken at most this many robust standard deviations large: outliers must not make
 /// causes, and normal ones are not touched.
-pub const CLIP: f64 = 4.0;
+const CLIP: f64 = 4.0;
 
 /// Readings in a row up to which a glitch is a glitch: what lasts longer is an error of the mean.
-pub const MOST_IN_ROW: usize = 4;
+const MOST_IN_ROW: usize = 4;
 
 /// Fits after each other by which noise and outliers settle, the last one not counted.
 const PASSES: usize = 2;
@@ -25,6 +27,18 @@ pub struct Observed<'a> {
     pub rounding: f64,
     /// What tells the correlation of their noise.
     pub neighbours: &'a Neighbours,
+}
+
+impl Observed<'_> {
+    /// What coefficients leave, less what run effects take of it, outliers clipped.
+    fn clipped(&self, noise: &Noise, design: &[f64], coefficients: &[f64]) -> Clipped {
+        let mut left = left(design, coefficients, self.readings);
+        if noise.has_effects() {
+            let part = noise.run_part(&left, None);
+            left.iter_mut().zip(part).for_each(|(e, part)| *e -= part);
+        }
+        clipped(self.readings, &left, self.roots, CLIP, self.rounding)
+    }
 }
 
 /// A fit, and what it was found by.
@@ -67,14 +81,9 @@ pub fn settled(
     for _ in 0..PASSES {
         let fitted = projected(correlation, &target, &mut factors)?;
         let noise = factors[0].noise();
-        let mut left = left(design, &fitted.coefficients, readings);
-        if noise.has_effects() {
-            let part = noise.run_part(&left, None);
-            left.iter_mut().zip(part).for_each(|(e, part)| *e -= part);
-        }
-        let found = clipped(readings, &left, roots, CLIP, observed.rounding);
+        let found = observed.clipped(noise, design, &fitted.coefficients);
         (target, outlying) = (found.target, found.outlying);
-        let is_clipped = outlying.iter().any(|&is| is);
+        let is_clipped = outlying.contains(&true);
         let before = correlation;
         if rho.is_none() {
             let mut kept = found.kept;
@@ -104,6 +113,38 @@ pub fn settled(
     })
 }
 
+/// Coefficients of all columns where those at some places are held at 0, by
+///
+/// `b - C_(.g) C_gg^(-1) b_g`, `C = B B'`,
+///
+/// outliers clipped as they are in a fit of the others. None where a number is not finite.
+pub fn without(
+    observed: Observed<'_>,
+    design: &[f64],
+    factor: &Factor,
+    held: &[usize],
+) -> Option<Vec<f64>> {
+    let own = factor.back().select_rows(held);
+    let gram = &own * own.transpose();
+    let none = DMatrix::zeros(held.len(), 0);
+    let inverse = LinearModel::of_sums(&gram, &none, &[], None, None)?.inverse();
+    let moved = factor.back() * (own.transpose() * inverse);
+    let solved = |target: &[f64]| {
+        let found = factor.coefficients(design, target);
+        let held = DVector::from_iterator(held.len(), held.iter().map(|&k| found[k]));
+        found - &moved * held
+    };
+    let mut coefficients = solved(observed.readings);
+    for _ in 0..PASSES {
+        let found = observed.clipped(factor.noise(), design, coefficients.as_slice());
+        if !found.outlying.contains(&true) {
+            break;
+        }
+        coefficients = solved(&found.target);
+    }
+    Some(coefficients.as_slice().to_vec())
+}
+
 /// The flags that stand in stretches of at most [`MOST_IN_ROW`], none of which goes over two runs.
 pub fn short_stretches(flags: &[bool], bounds: &[(usize, usize)]) -> Vec<bool> {
     let mut found = vec![false; flags.len()];
@@ -123,7 +164,6 @@ pub fn short_stretches(flags: &[bool], bounds: &[(usize, usize)]) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear::Noise;
 
     #[test]
     fn a_stretch_is_short_within_its_run() {
@@ -133,6 +173,42 @@ mod tests {
         let found = short_stretches(&flags, &[(0, 8)]);
         assert_eq!(found[..6], [false; 6]);
         assert!(found[6] && !found[7]);
+    }
+
+    /// As the fit of the others alone.
+    #[test]
+    fn columns_that_are_held_at_zero_leave_the_fit_of_the_others() {
+        let n = 240;
+        let wave = |i: usize, k: usize| ((i * (k + 1)) as f64 * 0.11).sin();
+        let design: Vec<f64> = (0..4 * n).map(|at| wave(at % n, at / n)).collect();
+        let mut readings: Vec<f64> = (0..n)
+            .map(|i| 3.0 * wave(i, 0) - wave(i, 3) + ((i * i) as f64).sin())
+            .collect();
+        readings[100] += 60.0;
+        let clock: Vec<f64> = (0..n).map(|i| i as f64).collect();
+        let observed = Observed {
+            readings: &readings,
+            roots: &vec![1.0; n],
+            rounding: 0.0,
+            neighbours: &Neighbours::new(&clock, &[(0, n)]),
+        };
+        let noise = Arc::new(Noise::new(vec![(0, n)], 0.3, None, &[]).unwrap());
+        let whole = Factor::of(noise.clone(), &design).unwrap();
+        let found = without(observed, &design, &whole, &[1, 2]).unwrap();
+        let others: Vec<f64> = [&design[..n], &design[3 * n..]].concat();
+        let rest = settled(observed, &others, Some(0.3), |_| {
+            Factor::of(noise.clone(), &others).map(Arc::new)
+        });
+        let rest = rest.unwrap();
+        assert!(rest.outlying[100]);
+        assert!(found[1].abs() < 1e-12 && found[2].abs() < 1e-12);
+        for (k, expected) in [0, 3].into_iter().zip(rest.fitted.coefficients) {
+            assert!(
+                (found[k] - expected).abs() < 1e-9,
+                "{} {expected}",
+                found[k]
+            );
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! `_core.Whitener`, `_core.Factor` and the fit whose noise is that of what it leaves.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use numpy::{
@@ -12,6 +13,7 @@ use pyo3::types::PyTuple;
 
 use super::array::vector;
 use super::beside::{PyBeside, by_columns};
+use super::failure::argument_error;
 use super::linear::{NOT_FINITE, told};
 use super::noise::{Bounds, consecutive};
 use super::release::detached;
@@ -155,7 +157,8 @@ impl PyWhitener {
     ) -> PyResult<Bound<'py, PyAny>> {
         same_length("x", x.shape()[0], "readings", self.core.readings())?;
         if x.ndim() == 1 {
-            let x: Vec<f64> = x.as_array().iter().copied().collect();
+            let x: PyReadonlyArray1<'py, f64> = x.as_any().extract()?;
+            let x = values(&x);
             let mapped = detached(py, || self.core.map(&x))?;
             return Ok(vector(py, &mapped)?.into_any());
         }
@@ -180,8 +183,8 @@ impl PyWhitener {
             let width = effect.get().columns.bind(py).shape()[1];
             factors.extend(vec![if *chosen { 1.0 } else { 0.0 }; width]);
         }
-        let (residual, factors) = (residual.as_slice()?, chosen.map(|_| factors));
-        let part = detached(py, || self.core.run_part(residual, factors.as_deref()))?;
+        let (residual, factors) = (values(&residual), chosen.map(|_| factors));
+        let part = detached(py, || self.core.run_part(&residual, factors.as_deref()))?;
         vector(py, &part)
     }
 
@@ -207,8 +210,8 @@ impl PyWhitener {
     ) -> PyResult<PyBeside> {
         same_length("q", q.shape()[0], "readings", self.core.readings())?;
         same_length("r", r.len(), "readings", self.core.readings())?;
-        let (q, r) = (by_columns(&q)?, r.as_slice()?);
-        let made = detached(py, || self.core.beside(&q, r, squares, excited))?;
+        let (q, r) = (by_columns(&q)?, values(&r));
+        let made = detached(py, || self.core.beside(&q, &r, squares, excited))?;
         Ok(PyBeside(made))
     }
 }
@@ -244,16 +247,16 @@ impl PyLagCorrelation {
         };
         let readings = clock.len();
         consecutive(py, readings, &noise)?;
-        let clock = clock.as_slice()?;
-        let core = detached(py, || Neighbours::new(clock, &bounds))?;
+        let clock = values(&clock);
+        let core = detached(py, || Neighbours::new(&clock, &bounds))?;
         Ok(Self { core, readings })
     }
 
     /// Pooled over runs and at least 0; white noise stays exactly white.
     fn __call__(&self, py: Python<'_>, residual: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
         same_length("residual", residual.len(), "clock", self.readings)?;
-        let residual = residual.as_slice()?;
-        detached(py, || self.core.correlation(residual))
+        let residual = values(&residual);
+        detached(py, || self.core.correlation(&residual))
     }
 }
 
@@ -322,6 +325,38 @@ impl PyFactor {
         Ok(self.project(py, target)?.0)
     }
 
+    /// Coefficients where those at some places are held at 0, outliers clipped as in a fit of the
+    /// others.
+    fn without<'py>(
+        &self,
+        py: Python<'py>,
+        held: Vec<usize>,
+        readings: PyReadonlyArray1<'py, f64>,
+        roots: PyReadonlyArray1<'py, f64>,
+        rounding: f64,
+        neighbours: &PyLagCorrelation,
+    ) -> PyResult<Vector<'py>> {
+        let n = self.core.noise().readings();
+        same_length("readings", readings.len(), "those of the noise", n)?;
+        same_length("roots", roots.len(), "readings", n)?;
+        let columns = self.core.back().nrows();
+        if let Some(place) = held.iter().find(|&&place| place >= columns) {
+            let problem = format!("held must be places of the {columns} columns, got {place}");
+            return Err(argument_error(py, problem));
+        }
+        let design = self.design.bind(py).readonly();
+        let design = design.as_slice()?;
+        let (readings, roots) = (values(&readings), values(&roots));
+        let observed = Observed {
+            readings: &readings,
+            roots: &roots,
+            rounding,
+            neighbours: &neighbours.core,
+        };
+        let found = detached(py, || linear::without(observed, design, &self.core, &held))?;
+        vector(py, &told(py, found, NOT_FINITE)?)
+    }
+
     /// A target fitted by the columns.
     fn project<'py>(
         &self,
@@ -331,8 +366,8 @@ impl PyFactor {
         let n = self.core.noise().readings();
         same_length("target", target.len(), "readings", n)?;
         let design = self.design.bind(py).readonly();
-        let (design, target) = (design.as_slice()?, target.as_slice()?);
-        let fitted = detached(py, || self.core.fitted(design, target))?;
+        let (design, target) = (design.as_slice()?, values(&target));
+        let fitted = detached(py, || self.core.fitted(design, &target))?;
         shown(py, &fitted)
     }
 }
@@ -396,9 +431,10 @@ pub fn settled<'py>(
     let found = {
         let columns = design.readonly();
         let columns = columns.as_slice()?;
+        let (readings, roots) = (values(&readings), values(&roots));
         let observed = Observed {
-            readings: readings.as_slice()?,
-            roots: roots.as_slice()?,
+            readings: &readings,
+            roots: &roots,
             rounding,
             neighbours: &neighbours.core,
         };
@@ -454,6 +490,12 @@ pub fn short_stretches<'py>(
     };
     consecutive(py, flags.len(), &noise)?;
     vector(py, &linear::short_stretches(flags.as_slice()?, &bounds))
+}
+
+/// Numbers one after the other.
+fn values<'a>(array: &'a PyReadonlyArray1<'_, f64>) -> Cow<'a, [f64]> {
+    let copied = |_| Cow::Owned(array.as_array().iter().copied().collect());
+    array.as_slice().map_or_else(copied, Cow::Borrowed)
 }
 
 fn shown<'py>(py: Python<'py>, fitted: &Fitted) -> PyResult<Told<'py>> {

@@ -49,12 +49,6 @@ class Projection:
     coefficients: Array
     further: Array | None = None
 
-    @classmethod
-    def of(cls, factor: _core.Factor, target: Array) -> Projection:
-        """A target fitted by a factor's columns."""
-        coefficients, r, rss = factor.project(target)
-        return Projection(factor=factor, r=r, rss=rss, coefficients=coefficients)
-
     @property
     def whiten(self) -> Whitener:
         """M."""
@@ -222,3 +216,9 @@ class Projection:
         That of `ratio_of` the line's columns, by so many golden sections.
         """
         return self.beside.line(angles, low, high, steps, VANISHES)
+
+
+def project(factor: _core.Factor, target: Array) -> Projection:
+    """A target fitted by a factor's columns."""
+    coefficients, r, rss = factor.project(target)
+    return Projection(factor=factor, r=r, rss=rss, coefficients=coefficients)

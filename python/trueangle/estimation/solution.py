@@ -18,13 +18,9 @@ from ..joint.signals import Signals
 from ..support.arrays import Array
 from .extension import Extension
 from .lines import LineBasis
-from .projection import Projection
+from .projection import Projection, project
 from .readings import ENOUGH_RUNS, Readings
 from .whitening import RunEffect, Whitener
-
-#: Residuals are taken at most this many robust standard deviations large: outliers
-#: must not make causes, and normal ones are not touched.
-CLIP = 4.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -91,7 +87,7 @@ class Solution(Projection):
             for k, effect in enumerate(effects):
                 others = [other for j, other in enumerate(effects) if j != k]
                 whiten = _whitener(readings, correlation, others, known)
-                beside = Projection.of(_core.Factor(whiten, design), target)
+                beside = project(_core.Factor(whiten, design), target)
                 effects[k] = RunEffect(
                     effect.columns, max(beside.ratio_of(effect.columns)[0], 1e-9)
                 )
@@ -262,25 +258,14 @@ class Solution(Projection):
         under the noise of this fit, which may have a fixed correlation and none of the terms
         ``group`` a run effect of its own; outliers are clipped as in the fit of the others.
         """
-        held = np.concatenate([self.place(k) for k in group])
-        spread = self.unscaled_covariance[:, held]
-        moved = spread @ np.linalg.pinv(spread[held])
-
-        def solved(target: Array) -> Array:
-            found = self.factor.coefficients(target)
-            return np.asarray(found - moved @ found[held])
-
-        coefficients = solved(self.residual)
-        for _ in range(2):
-            left = self.residual - self.design @ coefficients
-            left = left - self.whiten.run_part(left)
-            _, target, outlying = _core.clipped(
-                self.residual, left, self.root_weights, CLIP, self.readings.rounding
-            )
-            if not outlying.any():
-                break
-            coefficients = solved(target)
-        return coefficients
+        readings = self.readings
+        return self.factor.without(
+            [int(column) for k in group for column in self.place(k)],
+            readings.residual,
+            readings.root_weights,
+            readings.rounding,
+            readings.correlation,
+        )
 
     def surroundings(self, fitted: Sequence[tuple[Extension, Array]]) -> Surroundings:
         """The joint, with the believed pattern and the missing orders among the terms.
