@@ -205,8 +205,9 @@ def _beside_neighbours(regression: Regression) -> tuple[Array, float]:
     rho = regression.whiten.rho
     e = _interpolated(known, rho, regression.bounds)
     spread = 1.4826 * float(np.median(np.abs(e)))
-    ends = np.isin(rows, np.array(regression.bounds) - [0, 1])
-    beside = e[rows] + away[rows] / np.where(ends, np.sqrt(1.0 + rho**2), 1.0)
+    is_end = np.zeros(left.size, dtype=np.bool_)
+    is_end[np.array(regression.bounds) - [0, 1]] = True
+    beside = e[rows] + away[rows] / np.where(is_end[rows], np.sqrt(1.0 + rho**2), 1.0)
     e[rows] = np.where(np.abs(beside) < np.abs(away[rows]), beside, away[rows])
     return np.asarray(e / max(spread, 1e-300)), spread
 

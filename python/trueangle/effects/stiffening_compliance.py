@@ -16,6 +16,7 @@ from ..joint.signals import Signals
 from ..model import forms
 from ..model.forms import Form
 from ..model.term import Term, from_arcsec
+from ..support.arrays import distinct
 from .bends import columns_beyond
 from .blindness import (
     OWN_POWER,
@@ -110,7 +111,7 @@ class StiffeningCompliance(Effect):
         if torque is None or not torque.any() or regression.has(cls.kind):
             return None
         shapes: list[dict[str, Any]] = []
-        if np.unique(np.round(torque / np.abs(torque).max(), 3)).size >= 3:
+        if distinct(np.round(torque / np.abs(torque).max(), 3)).size >= 3:
             shapes += [{"power": 3, "gravity_deg": None}]
             shapes += [{"knee_share": k, "gravity_deg": None} for k in KNEES]
         if cls._constant_in_runs(regression.signals):

@@ -17,6 +17,7 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
+from ..support.quantiles import quantile
 from .blindness import Blindness
 from .drawing import reading_rate
 from .drawnline import DrawnLine
@@ -197,7 +198,7 @@ class TimePeriodic(Effect):
         speed = np.abs(regression.signals.turns_per_s)
         moving = speed[speed > 0.0]
         level = float(np.median(moving)) if moving.size else 0.0
-        if not level or np.percentile(moving, 90) - np.percentile(moving, 10) > ONE_SPEED * level:
+        if not level or quantile(moving, 0.9) - quantile(moving, 0.1) > ONE_SPEED * level:
             return None
         order = float(np.median(extension.shape["frequency_hz"])) / level
         if order > BEARINGS * max(regression.belief.joint.shafts.values()):
