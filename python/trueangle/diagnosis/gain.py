@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.linear import NormalEquations
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array
@@ -248,8 +249,8 @@ def _control(
         # What the training half does not show (a bump that it never passes) has no size.
         seen = np.linalg.norm(columns[~test], axis=0) > 1e-6 * np.linalg.norm(columns, axis=0)
         columns = columns[:, seen]
-        coefficients = np.linalg.lstsq(columns[~test], y[~test], rcond=None)[0]
-        after = y[test] - columns[test] @ coefficients
+        seen = NormalEquations.of_rows(columns[~test], y[~test]).solved()
+        after = y[test] - columns[test] @ seen.coefficients[:, 0]
         gained = float(np.mean(y[test] ** 2 - after**2))
         shares.append(max(gained / max(reducible, least), -1.0))
     return float(np.mean(shares))
@@ -257,7 +258,7 @@ def _control(
 
 def _within_runs(regression: Regression, outlying: NDArray[np.bool_]) -> Array:
     """What is left of the readings beside the zeros of their runs."""
-    left = regression.left - regression.whiten.run_part(regression.left)
+    left = regression.left_within_runs
     return np.where(outlying, 0.0, left)
 
 

@@ -182,7 +182,7 @@ class NonIntegerOrder(Effect):
         if count < 3:
             return np.zeros(0), np.zeros(0)
         orders = low + step * np.arange(count, dtype=np.float64)
-        e = regression.left - regression.whiten.run_part(regression.left)
+        e = regression.left_within_runs
         e = np.where(regression.outlying, 0.0, e)
         spectrum: OrderSpectrum = regression.cache.of_motion(
             cls.kind,

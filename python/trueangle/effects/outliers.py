@@ -214,7 +214,7 @@ def _beside_neighbours(regression: Regression) -> tuple[Array, float]:
 
 def _unfiltered(regression: Regression) -> Array:
     """What is left, weighed and not whitened."""
-    left = regression.left - regression.whiten.run_part(regression.left)
+    left = regression.left_within_runs
     return np.asarray(left * regression.root_weights)
 
 
@@ -269,7 +269,7 @@ def _lengths(regression: Regression, rows: NDArray[np.int64]) -> NDArray[np.int6
 def _is_scattered(regression: Regression, rows: NDArray[np.int64]) -> bool:
     """Rows that follow each other lie on both sides at random: bursts, no manoeuvre."""
     # Not whitened: that would make neighbours change sides.
-    e = regression.left - regression.whiten.run_part(regression.left)
+    e = regression.left_within_runs
     next_to = np.flatnonzero(np.diff(rows) == 1)
     turns = e[rows[next_to]] * e[rows[next_to + 1]] < 0.0
     by_chance = rows.size**2 / regression.n

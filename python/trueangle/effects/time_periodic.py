@@ -228,7 +228,7 @@ def _periodogram(
         return None
     # Bins of a time that wraps after one over the step: exact at multiples of the step.
     bins = 1 << int(np.ceil(np.log2(BINS * count)))
-    e = regression.left - regression.whiten.run_part(regression.left)
+    e = regression.left_within_runs
     e = np.where(regression.outlying, 0.0, e)
     power = np.empty((count - low, len(bounds)))
     for j, (start, stop) in enumerate(bounds):
@@ -284,7 +284,7 @@ def _refined(regression: Regression, frequencies: list[float], step: float) -> l
     if len({*frequencies}) == 1:
         f, turn = frequencies[0], 2.0 * np.pi * regression.signals.clock
         return [regression.drawn_line(turn, f - step, f + step, SECTIONS)[0]] * len(frequencies)
-    e = regression.left - regression.whiten.run_part(regression.left)
+    e = regression.left_within_runs
     e = np.where(regression.outlying, 0.0, e)
     turn = 2.0 * np.pi * regression.signals.clock
 

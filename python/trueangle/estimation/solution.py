@@ -174,6 +174,11 @@ class Solution(Projection):
         return np.asarray(self.residual - self.design @ self.coefficients)
 
     @cached_property
+    def left_within_runs(self) -> Array:
+        """What is left less what is taken for drawn anew in every run, arcsec."""
+        return np.asarray(self.left - self.whiten.run_part(self.left))
+
+    @cached_property
     def around(self) -> Surroundings:
         """The joint, with the believed pattern and the missing orders among the terms."""
         return self.surroundings(self.fitted())
