@@ -9,8 +9,8 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
+use super::Noise;
 use super::products::{Order, Products};
-use super::{Correlated, Noise};
 use crate::lstsq::{cholesky, invert_upper, product, triangle};
 use crate::simd::{InstructionSet, Kernel, Lanes, MOST_LANES, dispatch};
 
@@ -61,13 +61,8 @@ impl Factor {
         } else {
             Cow::Borrowed(design)
         };
-        let white = Correlated {
-            rho: 0.0,
-            roots: None,
-            ..noise.correlated()
-        };
         let filter = if noise.has_effects() {
-            white
+            noise.white()
         } else {
             noise.correlated()
         };
@@ -138,7 +133,8 @@ impl Factor {
     /// With a basis that is nearly orthonormal made so.
     fn made(noise: Arc<Noise>, design: &[f64], back: DMatrix<f64>) -> Option<Self> {
         let near = spanned(&noise, design, &back);
-        let (again, _) = inverse_root(near.tr_mul(&near)).unwrap_or_default();
+        let gram = product(near.transpose().as_view(), near.as_view());
+        let (again, _) = inverse_root(gram).unwrap_or_default();
         if again.ncols() < back.ncols() {
             return None;
         }
@@ -180,11 +176,7 @@ impl Factor {
         let p = self.back.nrows();
         let (mut powers, mut moments) = (vec![0.0; p], vec![0.0; p]);
         let work = Products {
-            noise: Correlated {
-                rho: 0.0,
-                roots: None,
-                ..self.noise.correlated()
-            },
+            noise: self.noise.white(),
             x: (design, p),
             order: Order::Columns,
             seen: (&seen, 1),

@@ -1,14 +1,22 @@
 //! Noise of readings in runs, and the linear map that makes it white.
 
+// Kernels index arrays instead of chaining closures: a closure is compiled for the
+// baseline processor and would call every vector instruction as a function.
+#![allow(clippy::needless_range_loop)]
+
 use std::sync::OnceLock;
 
-use nalgebra::{
-    Cholesky, DMatrix, DMatrixView, DMatrixViewMut, DVector, DVectorView, DVectorViewMut,
-};
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, DVectorView, DVectorViewMut};
 
+use super::products::{Order, Products, Table};
 use super::ratio::eigensystem;
 use super::{Beside, Correlated};
 use crate::interrupt;
+use crate::lstsq::product;
+use crate::simd::{InstructionSet, Kernel, Lanes, MOST_LANES, dispatch};
+
+/// Readings of which axes are taken off at a time: they stay in the first cache.
+const CHUNK: usize = 256;
 
 /// Share of the power of the strongest combination of shapes below which one is rounding.
 const VANISHES: f64 = 1e-14;
@@ -35,20 +43,16 @@ pub struct Noise {
     roots: Option<Vec<f64>>,
     /// Times their standard deviations, column by column.
     shapes: Vec<f64>,
-    /// Of every run, where there are shapes.
-    drawn: Vec<Drawn>,
+    /// Directions at right angles that the filtered shapes span in every run, column by column, the
+    /// last ones zeros where there are fewer; then as many zeros as a vector may read beyond.
+    axes: Vec<f64>,
+    /// What the map takes off along each, run by run.
+    shrink: Vec<f64>,
+    /// Of every run, without the weights; and of all, with them.
+    log_determinants: Vec<f64>,
+    log_determinant: f64,
     /// `(I + Z' Z)^(-1)` of every run's shapes `Z`, made when they are asked for.
     shares: OnceLock<Vec<DMatrix<f64>>>,
-}
-
-/// What a run effect is in one run.
-#[derive(Debug)]
-struct Drawn {
-    /// Directions at right angles that the filtered shapes span.
-    axes: DMatrix<f64>,
-    /// What the map takes off along each.
-    shrink: Vec<f64>,
-    log_determinant: f64,
 }
 
 impl Noise {
@@ -78,21 +82,55 @@ impl Noise {
         roots: Option<Vec<f64>>,
         shapes: Vec<f64>,
     ) -> Option<Self> {
+        let white = -(-rho * rho).ln_1p();
         let mut made = Self {
+            log_determinants: vec![white; bounds.len()],
+            log_determinant: 0.0,
             bounds,
             rho,
             roots,
             shapes,
-            drawn: Vec::new(),
+            axes: Vec::new(),
+            shrink: Vec::new(),
             shares: OnceLock::new(),
         };
         if !made.shapes.is_empty() {
-            let filtered = made.filtered(&made.shapes);
-            let runs = made.bounds.iter();
-            let drawn = runs.map(|&run| Drawn::of(&made.of_run(&filtered, run)));
-            made.drawn = drawn.collect::<Option<_>>()?;
+            made.turn()?;
         }
+        let weights = made.roots.iter().flatten();
+        let weights = weights.map(|root| root.ln()).sum::<f64>();
+        made.log_determinant = made.log_determinants.iter().sum::<f64>() - 2.0 * weights;
         Some(made)
+    }
+
+    /// Shapes turned to right angles in every run: those of them that add something to the others.
+    fn turn(&mut self) -> Option<()> {
+        let n = self.readings();
+        let width = self.shapes.len() / n;
+        let filtered = self.filtered(&self.shapes);
+        let grams = self.grams(&filtered, width);
+        self.axes = vec![0.0; n * width + MOST_LANES];
+        self.shrink = vec![0.0; self.bounds.len() * width];
+        let shapes = DMatrixView::from_slice(&filtered, n, width);
+        for (run, (gram, &(start, stop))) in grams.into_iter().zip(&self.bounds).enumerate() {
+            interrupt::point();
+            let found = eigensystem(gram)?;
+            let power = found.eigenvalues;
+            let limit = VANISHES * power.max().max(0.0);
+            let kept: Vec<usize> = (0..width).filter(|&k| power[k] > limit).collect();
+            let turns = found.eigenvectors.select_columns(&kept);
+            let own = product(shapes.rows(start, stop - start), turns.as_view());
+            for (j, (axis, &k)) in own.column_iter().zip(&kept).enumerate() {
+                let size = 1.0 / power[k].sqrt();
+                let out = &mut self.axes[j * n + start..j * n + stop];
+                out.iter_mut()
+                    .zip(axis.iter())
+                    .for_each(|(out, x)| *out = size * x);
+                self.shrink[run * width + j] = 1.0 - 1.0 / (1.0 + power[k]).sqrt();
+                self.log_determinants[run] += power[k].ln_1p();
+            }
+        }
+        Some(())
     }
 
     /// Readings.
@@ -117,7 +155,7 @@ impl Noise {
 
     /// Something is drawn anew in every run.
     pub fn has_effects(&self) -> bool {
-        !self.drawn.is_empty()
+        !self.shrink.is_empty()
     }
 
     /// Without what runs draw anew.
@@ -131,17 +169,12 @@ impl Noise {
 
     /// `-2 ln|map|`, to be added to the likelihood's `n ln RSS`.
     pub fn log_determinant(&self) -> f64 {
-        let runs: f64 = (0..self.bounds.len())
-            .map(|run| self.log_determinant_of(run))
-            .sum();
-        let weights = self.roots.iter().flatten();
-        runs - 2.0 * weights.map(|root| root.ln()).sum::<f64>()
+        self.log_determinant
     }
 
-    /// The part of one run, without that of the weights.
-    pub fn log_determinant_of(&self, run: usize) -> f64 {
-        let drawn = self.drawn.get(run).map_or(0.0, |run| run.log_determinant);
-        drawn - (-self.rho * self.rho).ln_1p()
+    /// The part of one run, without that of the weights; None where there is no such run.
+    pub fn log_determinant_of(&self, run: usize) -> Option<f64> {
+        self.log_determinants.get(run).copied()
     }
 
     /// The map applied to columns, one after the other.
@@ -166,12 +199,8 @@ impl Noise {
             return out;
         }
         let shares = self.shares.get_or_init(|| {
-            let runs = self.bounds.iter();
-            let gram = |&run| {
-                let shapes = self.of_run(&self.shapes, run);
-                shapes.tr_mul(&shapes)
-            };
-            runs.map(|run| inverse_beside_one(gram(run))).collect()
+            let grams = self.grams(&self.shapes, self.width());
+            grams.into_iter().map(inverse_beside_one).collect()
         });
         for (&(start, stop), share) in self.bounds.iter().zip(shares) {
             let parts = self.shapes.chunks_exact(self.readings());
@@ -192,16 +221,9 @@ impl Noise {
     /// is `(F x)'F y` less, run by run, `(w'x) c (w'y)`. Columns `w`, one after the other, and `c`
     /// run by run.
     pub fn taken(&self) -> (Vec<f64>, Vec<f64>) {
-        let width = self.drawn.iter().map(|run| run.shrink.len()).max();
-        let (width, n) = (width.unwrap_or(0), self.readings());
-        let (mut axes, mut shares) = (vec![0.0; n * width], vec![0.0; self.bounds.len() * width]);
-        for (run, (drawn, &(start, stop))) in self.drawn.iter().zip(&self.bounds).enumerate() {
-            for (j, (axis, shrink)) in drawn.axes.column_iter().zip(&drawn.shrink).enumerate() {
-                view_mut(&mut axes[j * n + start..j * n + stop]).copy_from(&axis);
-                shares[run * width + j] = shrink * (2.0 - shrink);
-            }
-        }
-        (self.filtered_back(&axes), shares)
+        let axes = &self.axes[..self.readings() * self.width()];
+        let shares = self.shrink.iter().map(|shrink| shrink * (2.0 - shrink));
+        (self.filtered_back(axes), shares.collect())
     }
 
     /// A fit under this noise as columns see it that are not mapped; see [`Beside::new`].
@@ -239,49 +261,106 @@ impl Noise {
         out
     }
 
-    fn shrink(&self, columns: &mut [f64]) {
-        let n = self.readings();
-        let count = columns.len() / n.max(1);
-        let mut columns = DMatrixViewMut::from_slice(columns, n, count);
-        for (drawn, &(start, stop)) in self.drawn.iter().zip(&self.bounds) {
-            interrupt::point();
-            let mut part = columns.rows_mut(start, stop - start);
-            let mut inner = drawn.axes.tr_mul(&part);
-            for (mut row, factor) in inner.row_iter_mut().zip(&drawn.shrink) {
-                row.scale_mut(*factor);
-            }
-            part.gemm(-1.0, &drawn.axes, &inner, 1.0);
-        }
+    /// Shapes of run effects.
+    fn width(&self) -> usize {
+        self.shrink.len() / self.bounds.len().max(1)
     }
 
-    fn of_run(&self, columns: &[f64], (start, stop): (usize, usize)) -> DMatrix<f64> {
-        let n = self.readings();
-        let columns = DMatrixView::from_slice(columns, n, columns.len() / n.max(1));
-        columns.rows(start, stop - start).into_owned()
+    fn shrink(&self, columns: &mut [f64]) {
+        if !self.has_effects() {
+            return;
+        }
+        let (count, width) = (columns.len() / self.readings(), self.width());
+        let mut powers = vec![0.0; self.bounds.len() * count];
+        let mut inner = vec![0.0; self.bounds.len() * count * width];
+        let work = Products {
+            noise: self.white(),
+            x: (columns, count),
+            order: Order::Columns,
+            seen: (&self.axes, width),
+            each: true,
+            pairs: false,
+            grams: &mut powers,
+            moments: &mut inner,
+        };
+        dispatch(InstructionSet::best(), work);
+        for (inner, shrink) in inner
+            .chunks_exact_mut(count * width)
+            .zip(self.shrink.chunks_exact(width))
+        {
+            for (k, inner) in inner.iter_mut().enumerate() {
+                *inner *= shrink[k % width];
+            }
+        }
+        let work = TakenOff {
+            bounds: &self.bounds,
+            axes: (&self.axes, width),
+            sizes: &inner,
+            columns: (columns, count),
+        };
+        dispatch(InstructionSet::best(), work);
+    }
+
+    /// Products of columns with each other in every run.
+    fn grams(&self, columns: &[f64], count: usize) -> Vec<DMatrix<f64>> {
+        let size = count * count;
+        let mut grams = vec![0.0; self.bounds.len() * size];
+        let work = Products {
+            noise: self.white(),
+            x: (columns, count),
+            order: Order::Columns,
+            seen: (&[], 0),
+            each: true,
+            pairs: true,
+            grams: &mut grams,
+            moments: &mut [],
+        };
+        dispatch(InstructionSet::best(), work);
+        let whole =
+            |gram: &[f64]| DMatrix::from_fn(count, count, |i, j| gram[i.min(j) * count + i.max(j)]);
+        grams.chunks_exact(size).map(whole).collect()
+    }
+
+    /// The runs, and nothing to filter.
+    pub(super) fn white(&self) -> Correlated<'_> {
+        Correlated {
+            bounds: &self.bounds,
+            rho: 0.0,
+            roots: None,
+        }
     }
 }
 
-impl Drawn {
-    /// Columns turned to right angles, those of them that add something to the others.
-    fn of(filtered: &DMatrix<f64>) -> Option<Self> {
-        interrupt::point();
-        let found = eigensystem(filtered.tr_mul(filtered))?;
-        let power = found.eigenvalues;
-        let limit = VANISHES * power.max().max(0.0);
-        let kept: Vec<usize> = (0..power.len()).filter(|&k| power[k] > limit).collect();
-        let mut axes = filtered * found.eigenvectors.select_columns(&kept);
-        for (mut axis, &k) in axes.column_iter_mut().zip(&kept) {
-            axis.unscale_mut(power[k].sqrt());
+/// Columns less axes of such sizes: in every run for every column of every axis.
+struct TakenOff<'a> {
+    bounds: &'a [(usize, usize)],
+    axes: Table<'a>,
+    sizes: &'a [f64],
+    columns: (&'a mut [f64], usize),
+}
+
+impl Kernel for TakenOff<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let ((axes, width), (columns, count)) = (self.axes, self.columns);
+        let n = self.bounds.last().map_or(0, |&(_, stop)| stop);
+        for run in 0..self.bounds.len() {
+            interrupt::point();
+            let (first, last) = self.bounds[run];
+            for start in (first..last).step_by(CHUNK) {
+                let some = CHUNK.min(last - start);
+                for k in 0..count {
+                    let out = &mut columns[k * n + start..][..some];
+                    for j in 0..width {
+                        let size = self.sizes[(run * count + k) * width + j];
+                        let axis = &axes[j * n + start..][..some];
+                        for i in 0..some {
+                            out[i] -= size * axis[i];
+                        }
+                    }
+                }
+            }
         }
-        let of_kept = kept.iter().map(|&k| power[k]);
-        Some(Self {
-            axes,
-            shrink: of_kept
-                .clone()
-                .map(|p| 1.0 - 1.0 / (1.0 + p).sqrt())
-                .collect(),
-            log_determinant: of_kept.map(f64::ln_1p).sum(),
-        })
     }
 }
 

@@ -121,8 +121,9 @@ impl PyWhitener {
     }
 
     /// The part of `log_determinant` of one run, without that of the weights.
-    fn log_determinant_of(&self, run: usize) -> f64 {
-        self.core.log_determinant_of(run)
+    fn log_determinant_of(&self, py: Python<'_>, run: usize) -> PyResult<f64> {
+        let found = self.core.log_determinant_of(run);
+        found.ok_or_else(|| argument_error(py, format!("there is no run {run}")))
     }
 
     /// Nothing to do: white noise, no run effects.

@@ -268,11 +268,9 @@ def _structure(start: Regression) -> dict[str, float]:
 
 def _noise(chosen: Regression, rest: Unexplained) -> float:
     """Standard deviation of one reading: what is left, where all that is left is noise."""
-    clean = ~chosen.outlying
-    freedom = int(np.count_nonzero(clean)) - chosen.rank
-    if rest.found or freedom <= 0:
+    if rest.found or int(np.count_nonzero(~chosen.outlying)) <= chosen.rank:
         return float(np.hypot(rest.noise.sigma, rounding_of(chosen)))
-    return float(np.sqrt(np.sum(chosen.left_within_runs[clean] ** 2) / freedom))
+    return float(np.sqrt(chosen.variance_within_runs))
 
 
 def _overall(before: Regression, after: Regression) -> dict[str, float]:

@@ -178,6 +178,13 @@ class Solution(Projection):
         """What is left less what is taken for drawn anew in every run, arcsec."""
         return np.asarray(self.left - self.whiten.run_part(self.left))
 
+    @property
+    def variance_within_runs(self) -> float:
+        """Variance of `left_within_runs`, outliers left out: readings as they are, not whitened."""
+        clean = ~self.outlying
+        freedom = max(int(np.count_nonzero(clean)) - self.rank, 1)
+        return float(np.sum(self.left_within_runs[clean] ** 2)) / freedom
+
     @cached_property
     def around(self) -> Surroundings:
         """The joint, with the believed pattern and the missing orders among the terms."""
