@@ -267,7 +267,7 @@ impl Noise {
     }
 
     fn shrink(&self, columns: &mut [f64]) {
-        if !self.has_effects() {
+        if !self.has_effects() || columns.is_empty() {
             return;
         }
         let (count, width) = (columns.len() / self.readings(), self.width());
@@ -441,6 +441,7 @@ mod tests {
             let map = DMatrix::from_vec(N, N, noise.map(unit.as_slice()));
             let white = &map * &covariance * map.transpose();
             assert!((white - &unit).amax() < 1e-10);
+            assert!(noise.map(&[]).is_empty());
             let back = DMatrix::from_vec(N, N, noise.map_back(unit.as_slice()));
             assert!((back - map.transpose()).amax() < 1e-13);
             let expected = covariance.determinant().ln();

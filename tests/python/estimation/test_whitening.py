@@ -32,8 +32,8 @@ def test_the_map_makes_the_covariance_the_unit_matrix(kind: tuple) -> None:
     # As columns see it that are not mapped: the transpose of the map, applied.
     seen = whiten.beside(np.eye(N), column, 1.0, 0.0).seen
     np.testing.assert_allclose(seen, np.vstack([m, m.T @ column]), atol=1e-12)
-    for order in (x, np.asfortranarray(x)):
-        np.testing.assert_allclose(whiten(order), m @ x, atol=1e-12)
+    for order in (x, np.asfortranarray(x), x[:, :0]):
+        np.testing.assert_allclose(whiten(order), m @ order, atol=1e-12)
     whiten.beside(x, column, 1.0, 0.0)
     np.testing.assert_array_equal(np.column_stack([x, column]), keep[:, [0, 1, 2, 1]])
     assert whiten.is_identity == (kind == (0.0, (), False))
