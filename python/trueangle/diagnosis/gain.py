@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..estimation.linear import NormalEquations
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array
@@ -249,8 +248,8 @@ def _control(
         # What the training half does not show (a bump that it never passes) has no size.
         seen = np.linalg.norm(columns[~test], axis=0) > 1e-6 * np.linalg.norm(columns, axis=0)
         columns = columns[:, seen]
-        seen = NormalEquations.of_rows(columns[~test], y[~test]).solved()
-        after = y[test] - columns[test] @ seen.coefficients[:, 0]
+        coefficients = np.linalg.lstsq(columns[~test], y[~test], rcond=None)[0]
+        after = y[test] - columns[test] @ coefficients
         gained = float(np.mean(y[test] ** 2 - after**2))
         shares.append(max(gained / max(reducible, least), -1.0))
     return float(np.mean(shares))

@@ -25,7 +25,7 @@ from .unnamed import effect_of, is_named
 
 def rounding_of(regression: Regression) -> float:
     """Standard deviation of the rounding where it is a good part of what is left, else 0."""
-    readings, left = regression.readings, regression.variance_within_runs
+    readings, left = regression.readings, regression.variance
     is_part = is_good_part(readings.rounding**2, left, readings.scatter**2)
     return readings.rounding if is_part and not regression.is_explained else 0.0
 

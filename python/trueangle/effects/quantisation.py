@@ -57,7 +57,7 @@ class Quantisation(Effect):
     @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
         step = regression.signals.count
-        variance, rounding = regression.variance_within_runs, step**2 / 12.0
+        variance, rounding = regression.variance, step**2 / 12.0
         if regression.is_explained or not is_good_part(rounding, variance, variance):
             return None
         # Of n readings each falls on the lattice by a chance of its tolerance.
