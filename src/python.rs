@@ -30,6 +30,7 @@ mod step;
 mod table;
 mod terms;
 mod threads;
+mod whitening;
 
 use pyo3::prelude::*;
 
@@ -61,9 +62,7 @@ mod _core {
     use super::corrector::PyCorrector;
 
     #[pymodule_export]
-    use super::factor::{
-        PyFactor, PyLagCorrelation, PyRunEffect, PyWhitener, settled, short_stretches,
-    };
+    use super::factor::{PyFactor, settled, short_stretches};
 
     #[pymodule_export]
     use super::fit::{
@@ -99,6 +98,9 @@ mod _core {
 
     #[pymodule_export]
     use super::threads::thread_count;
+
+    #[pymodule_export]
+    use super::whitening::{PyLagCorrelation, PyRunEffect, PyWhitener};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
