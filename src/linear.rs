@@ -9,11 +9,16 @@ mod blocks;
 mod bump;
 mod clipped;
 mod clusters;
+mod factor;
+mod golden;
 mod groups;
 mod model;
+mod neighbours;
+mod noise;
 mod products;
 mod ratio;
 mod ridge;
+mod settled;
 mod whitening;
 
 pub use beside::{Beside, Powers};
@@ -21,11 +26,15 @@ pub use blocks::{BlockProducts, block_products};
 pub use bump::Bumps;
 pub use clipped::{Clipped, clipped};
 pub use clusters::{Robust, cluster_covariance};
+pub use factor::{Factor, Fitted, left};
 pub use groups::{Sums, left_out, others};
 pub use model::LinearModel;
+pub use neighbours::Neighbours;
+pub use noise::{Noise, RunEffect};
 pub use products::{Order, Table};
 pub use ratio::{Left, RunProducts, best_ratio};
 pub use ridge::{Fold, RidgePath, ridge_path};
+pub use settled::{Observed, Settled, settled, short_stretches, without};
 pub use whitening::Correlated;
 
 /// Rounding of an element of a triangle or normal matrix of unit columns, in units of epsilon:

@@ -13,8 +13,7 @@ use std::borrow::Cow;
 
 use nalgebra::DMatrix;
 
-use blocked::triangle;
-pub(crate) use blocked::{cholesky, invert_upper, product};
+pub(crate) use blocked::{cholesky, invert_upper, product, triangle};
 pub use system::{Estimate, Pivot, System};
 
 /// The upper triangle `R` of rows; the last column is the right-hand side.

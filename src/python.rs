@@ -10,6 +10,7 @@ mod beside;
 mod circle;
 mod corrector;
 mod door;
+mod factor;
 mod failure;
 mod fit;
 mod linear;
@@ -29,6 +30,7 @@ mod step;
 mod table;
 mod terms;
 mod threads;
+mod whitening;
 
 use pyo3::prelude::*;
 
@@ -60,6 +62,9 @@ mod _core {
     use super::corrector::PyCorrector;
 
     #[pymodule_export]
+    use super::factor::{PyFactor, settled, short_stretches};
+
+    #[pymodule_export]
     use super::fit::{
         Solution, band, fit, folds, median_magnitude, sample_residuals, scan_residuals, triangle,
     };
@@ -80,9 +85,7 @@ mod _core {
     use super::motion::{PyBanded, harmonic_rows, harmonic_sum};
 
     #[pymodule_export]
-    use super::noise::{
-        block_products, clipped, median, rounded, rounded_drawn, two_normals, whitened,
-    };
+    use super::noise::{block_products, clipped, median, rounded, rounded_drawn, two_normals};
 
     #[pymodule_export]
     use super::robot::PyRobotStep;
@@ -95,6 +98,9 @@ mod _core {
 
     #[pymodule_export]
     use super::threads::thread_count;
+
+    #[pymodule_export]
+    use super::whitening::{PyLagCorrelation, PyRunEffect, PyWhitener};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

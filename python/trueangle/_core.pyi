@@ -223,29 +223,113 @@ class LinearModel:
     @property
     def inverse(self) -> _Array: ...
 
-def whitened(
-    rows: NDArray[Any],
-    bounds: Sequence[tuple[int, int]],
-    rho: float,
-    roots: NDArray[np.float64] | None = None,
-    transposed: bool = False,
-) -> NDArray[Any]: ...
+@final
+class RunEffect:
+    """An error whose size is drawn anew in every run (random effect).
+
+    Coefficients of its columns, shape (n, k), are independent from run to run, of variance
+    ``ratio`` times that of one reading.
+    """
+
+    def __new__(cls, columns: _Array, ratio: float = 1.0) -> RunEffect: ...
+    @property
+    def columns(self) -> _Array: ...
+    @property
+    def ratio(self) -> float: ...
+
+@final
+class Whitener:
+    """Linear map that makes the noise of every reading independent and equal.
+
+    Within a run the noise is ``n + Σ_k Z_k u_k`` with n of first-order correlation rho and run
+    effects u: the map is ``(I + A Aᵀ)^(-1/2) F``, F the filter ``x_t - ρ x_{t-1}`` and
+    ``A = F Z √(ratio)``. `log_determinant` is -2 ln|map|, to be added to the log-likelihood's
+    ``n ln RSS``.
+    """
+
+    def __new__(
+        cls,
+        bounds: Sequence[tuple[int, int]],
+        rho: float = 0.0,
+        effects: Sequence[RunEffect] | None = None,
+        weights: _Array | None = None,
+    ) -> Whitener: ...
+    @property
+    def bounds(self) -> list[tuple[int, int]]: ...
+    @property
+    def effects(self) -> tuple[RunEffect, ...]: ...
+    @property
+    def weights(self) -> _Array | None: ...
+    @property
+    def root_weights(self) -> _Array | None: ...
+    @property
+    def rho(self) -> float: ...
+    @property
+    def log_determinant(self) -> float: ...
+    @property
+    def is_identity(self) -> bool: ...
+    def log_determinant_of(self, run: int) -> float: ...
+    def has(self, rho: float, effects: Sequence[RunEffect], weights: _Array | None) -> bool: ...
+    def __call__(self, x: _Array) -> _Array: ...
+    def run_part(self, residual: _Array, chosen: Sequence[bool] | None = None) -> _Array: ...
+    def taken(self) -> tuple[_Array, _Array]: ...
+    def beside(self, q: _Array, r: _Array, squares: float, excited: float) -> Beside: ...
+
+@final
+class LagCorrelation:
+    """Correlation between neighbours within runs, after wander is taken out.
+
+    At least 0, and 0 below 0.05 or within four standard errors of it, so that white noise stays
+    exactly white.
+    """
+
+    def __new__(cls, clock: _Array, bounds: Sequence[tuple[int, int]]) -> LagCorrelation: ...
+    def __call__(self, residual: _Array) -> float: ...
+
+@final
+class Factor:
+    """Columns X under a noise: ``Q = M X B`` with orthonormal columns; nobody changes them."""
+
+    def __new__(cls, whiten: Whitener, design: _Array) -> Factor: ...
+    @property
+    def whiten(self) -> Whitener: ...
+    @property
+    def design(self) -> _Array: ...
+    @property
+    def rank(self) -> int: ...
+    @property
+    def back(self) -> _Array: ...
+    @property
+    def q(self) -> _Array: ...
+    def coefficients(self, target: _Array) -> _Array: ...
+    def project(self, target: _Array) -> tuple[_Array, _Array, float]: ...
+    def without(
+        self,
+        held: Sequence[int],
+        readings: _Array,
+        roots: _Array,
+        rounding: float,
+        neighbours: LagCorrelation,
+    ) -> _Array: ...
+
+def settled(
+    design: _Array,
+    readings: _Array,
+    roots: _Array,
+    rounding: float,
+    neighbours: LagCorrelation,
+    whiten: Whitener,
+    rho: float | None,
+    before: Sequence[Factor],
+) -> tuple[list[Factor], tuple[_Array, _Array, float], _Array, NDArray[np.bool_]]: ...
+def short_stretches(
+    flags: NDArray[np.bool_], bounds: Sequence[tuple[int, int]]
+) -> NDArray[np.bool_]: ...
 
 @final
 class Beside:
     """A fit as columns see it that are not whitened."""
 
-    def __new__(
-        cls,
-        fitted: NDArray[np.float64],
-        residual: NDArray[np.float64],
-        squares: float,
-        excited: float,
-        bounds: Sequence[tuple[int, int]],
-        rho: float,
-        roots: NDArray[np.float64] | None = None,
-        taken: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
-    ) -> Beside: ...
     @property
     def seen(self) -> _Array: ...
     def gain(self, columns: NDArray[np.float64]) -> tuple[float, _Array]: ...
@@ -254,6 +338,9 @@ class Beside:
         self, phase: NDArray[np.float64], place: float, width: float, widest: float
     ) -> tuple[float, float]: ...
     def ratio(self, columns: NDArray[np.float64]) -> tuple[float, float]: ...
+    def line(
+        self, angles: _Array, low: float, high: float, steps: int, vanishing: float
+    ) -> tuple[float, float]: ...
 
 def clipped(
     readings: NDArray[np.float64],

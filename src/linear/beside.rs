@@ -2,9 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::golden::golden;
 use super::products::{Order, Products, Table};
 use super::ratio::eigensystem;
 use super::{Correlated, Left, RunProducts, best_ratio};
+use crate::kernel::lines;
 use crate::simd::{InstructionSet, MOST_LANES, dispatch};
 
 /// A fit under a noise that M makes white, as columns that are not mapped by it see it.
@@ -148,6 +150,31 @@ impl Beside {
             .map(|run| self.of_run(run, k, &grams, &moments))
             .collect();
         best_ratio(&runs, self.left)
+    }
+
+    /// Order of a line with a phase of its own in every run, between two, that saves most, and the
+    /// deviance: of angles in radians, by so many golden sections. Cosines and sines that
+    /// [`vanished`](lines::vanished) are none. None where a number is not finite.
+    pub fn line(
+        &self,
+        angles: &[f64],
+        span: (f64, f64),
+        steps: usize,
+        vanishing: f64,
+    ) -> Option<(f64, f64)> {
+        let (mut rows, mut is_finite) = (vec![0.0; 2 * angles.len()], true);
+        let saved = |order: f64| {
+            let orders = [order];
+            let made = lines::columns(angles, &orders, &mut rows);
+            lines::vanished(&orders, vanishing, &mut rows);
+            let found = made
+                .ok()
+                .and_then(|()| self.ratio((&rows, 2), Order::Readings));
+            is_finite &= found.is_some();
+            found.map_or(f64::NAN, |(_, deviance)| deviance)
+        };
+        let found = golden(saved, span, steps);
+        is_finite.then_some(found)
     }
 
     /// Deviance that a column saves alone: none where the fit has nearly all of it.

@@ -1,6 +1,7 @@
 //! A bump beside a fit: the place and the width with which it saves most.
 
 use super::Beside;
+use super::golden::golden;
 
 /// Degrees of a turn.
 const TURN: f64 = 360.0;
@@ -51,10 +52,12 @@ impl<'a> Bumps<'a> {
             self.beside.gain_of_one(&column)
         };
         for _ in 0..ROUNDS {
-            place = golden(|c| gain(c, width), place - width, place + width);
+            let span = (place - width, place + width);
+            place = golden(|c| gain(c, width), span, GOLDEN_STEPS).0;
             let log = width.ln();
             let top = (log + LOG_WIDTH).min(self.widest.ln());
-            width = golden(|x| gain(place, x.exp()), log - LOG_WIDTH, top).exp();
+            let span = (log - LOG_WIDTH, top);
+            width = golden(|x| gain(place, x.exp()), span, GOLDEN_STEPS).0.exp();
         }
         let mut value = gain(place, width);
         for _ in 0..NEWTON_STEPS {
@@ -110,26 +113,6 @@ impl<'a> Bumps<'a> {
         }
         rows
     }
-}
-
-/// Where a function with one peak in a span is greatest.
-fn golden(mut function: impl FnMut(f64) -> f64, low: f64, high: f64) -> f64 {
-    let share = (5.0_f64.sqrt() - 1.0) / 2.0;
-    let (mut a, mut b) = (low, high);
-    let (mut c, mut d) = (b - share * (b - a), a + share * (b - a));
-    let (mut at_c, mut at_d) = (function(c), function(d));
-    for _ in 0..GOLDEN_STEPS {
-        if at_c > at_d {
-            (b, d, at_d) = (d, c, at_c);
-            c = b - share * (b - a);
-            at_c = function(c);
-        } else {
-            (a, c, at_c) = (c, d, at_d);
-            d = a + share * (b - a);
-            at_d = function(d);
-        }
-    }
-    if at_c > at_d { c } else { d }
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ pub struct Products<'a> {
     pub seen: Table<'a>,
     /// Of each run.
     pub each: bool,
-    /// All of the upper triangle of products with each other; else their powers.
+    /// All products with each other, at least those of the upper triangle; else their powers.
     pub pairs: bool,
     /// Those of mapped columns with each other.
     pub grams: &'a mut [f64],
@@ -91,32 +91,47 @@ impl Kernel for Products<'_> {
                 }
                 let mapped = if is_white { &plain } else { &white };
                 // Columns of one place or of a part of the time tell little of most readings.
-                let (from, to) = if k < FEW {
-                    told(&plain, k, size, some)
-                } else {
-                    (0, some)
+                let (from, to) = match width {
+                    0 => (0, 0),
+                    _ if k < FEW => told(&plain, k, size, some),
+                    _ => (0, some),
                 };
-                let others = (&seen[start + from..], n);
-                for j in (0..if from < to { k } else { 0 }).step_by(2) {
-                    let moments = &mut self.moments[(place * k + j) * width..];
-                    let own = &plain[j * size + from..];
-                    if j + 1 < k {
-                        let rows = (to - from, size);
-                        add::<L, true>(own, rows, others, width, (moments, width));
-                    } else {
-                        let rows = (to - from, 0);
-                        add::<L, false>(own, rows, others, width, (moments, 0));
+                let others = (seen.get(start + from..).unwrap_or(&[]), n);
+                // A few of the others at a time: they and all of the columns stay in the first cache.
+                for first in (0..if from < to { width } else { 0 }).step_by(TOGETHER) {
+                    let count = TOGETHER.min(width - first);
+                    let some = (&others.0[first * n..], n);
+                    for j in (0..k).step_by(2) {
+                        let moments = &mut self.moments[(place * k + j) * width + first..];
+                        let own = &plain[j * size + from..];
+                        if j + 1 < k {
+                            let rows = (to - from, size);
+                            add::<L, true>(own, rows, some, count, (moments, width));
+                        } else {
+                            let rows = (to - from, 0);
+                            add::<L, false>(own, rows, some, count, (moments, 0));
+                        }
                     }
                 }
-                for j in 0..k {
-                    let own = (&mapped[j * size..], size);
-                    let (at, count) = if self.pairs {
-                        ((place * k + j) * k + j, k - j)
-                    } else {
-                        (place * k + j, 1)
-                    };
-                    let sums = (&mut self.grams[at..], 0);
-                    add::<L, false>(&mapped[j * size..], (some, 0), own, count, sums);
+                if self.pairs {
+                    for first in (0..k).step_by(TOGETHER) {
+                        let count = TOGETHER.min(k - first);
+                        let some_columns = (&mapped[first * size..], size);
+                        for j in (0..first + count).step_by(2) {
+                            let grams = &mut self.grams[(place * k + j) * k + first..];
+                            let own = &mapped[j * size..];
+                            if j + 1 < k {
+                                add::<L, true>(own, (some, size), some_columns, count, (grams, k));
+                            } else {
+                                add::<L, false>(own, (some, 0), some_columns, count, (grams, 0));
+                            }
+                        }
+                    }
+                } else {
+                    for j in 0..k {
+                        let (own, powers) = (&mapped[j * size..], &mut self.grams[place * k + j..]);
+                        add::<L, false>(own, (some, 0), (own, size), 1, (powers, 0));
+                    }
                 }
             }
         }

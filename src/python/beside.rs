@@ -7,10 +7,9 @@ use pyo3::prelude::*;
 
 use super::array::vector;
 use super::linear::{NOT_FINITE, told};
-use super::noise::{Bounds, consecutive};
 use super::release::detached;
 use crate::check::same_length;
-use crate::linear::{Beside, Bumps, Correlated, Order};
+use crate::linear::{Beside, Bumps, Order};
 
 type Vector<'py> = Bound<'py, numpy::PyArray1<f64>>;
 
@@ -19,57 +18,10 @@ const TURNED: usize = 64;
 
 /// A fit as columns see it that are not whitened.
 #[pyclass(name = "Beside", module = "trueangle._core", frozen)]
-pub struct PyBeside(Beside);
+pub struct PyBeside(pub(super) Beside);
 
 #[pymethods]
 impl PyBeside {
-    /// Of the orthonormal columns and the residual of a fit, both whitened, and its sum of squares;
-    /// `taken` are the shapes of run effects and what every run takes off products with them.
-    #[new]
-    #[pyo3(signature = (fitted, residual, squares, excited, bounds, rho, roots=None, taken=None))]
-    #[allow(clippy::too_many_arguments)]
-    fn new(
-        py: Python<'_>,
-        fitted: PyReadonlyArray2<'_, f64>,
-        residual: PyReadonlyArray1<'_, f64>,
-        squares: f64,
-        excited: f64,
-        bounds: Bounds,
-        rho: f64,
-        roots: Option<PyReadonlyArray1<'_, f64>>,
-        taken: Option<(PyReadonlyArray2<'_, f64>, PyReadonlyArray2<'_, f64>)>,
-    ) -> PyResult<Self> {
-        let noise = Correlated {
-            bounds: &bounds,
-            rho,
-            roots: roots.as_ref().map(PyReadonlyArray1::as_slice).transpose()?,
-        };
-        let n = residual.len();
-        consecutive(py, n, &noise)?;
-        same_length("fitted", fitted.shape()[0], "residual", n)?;
-        let (mut shapes, mut shares) = (Cow::Borrowed(&[][..]), Vec::new());
-        if let Some((columns, runs)) = &taken {
-            same_length("shapes", columns.shape()[0], "residual", n)?;
-            same_length("shares", runs.shape()[0], "bounds", noise.bounds.len())?;
-            same_length("shares", runs.shape()[1], "shapes", columns.shape()[1])?;
-            shapes = by_columns(columns)?;
-            shares = by_rows(runs);
-        }
-        let fitted = by_columns(&fitted)?;
-        let residual = residual.as_slice()?;
-        let made = detached(py, || {
-            Beside::new(
-                noise,
-                &fitted,
-                residual,
-                (&shapes, &shares),
-                squares,
-                excited,
-            )
-        })?;
-        Ok(Self(made))
-    }
-
     /// The fitted columns and what they leave, as rows.
     #[getter]
     fn seen<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -123,6 +75,23 @@ impl PyBeside {
         })
     }
 
+    /// Order between two, and deviance, of the line with a phase of its own in every run that saves
+    /// most; see `golden_maximum` and `line_columns`.
+    fn line(
+        &self,
+        py: Python<'_>,
+        angles: PyReadonlyArray1<'_, f64>,
+        low: f64,
+        high: f64,
+        steps: usize,
+        vanishing: f64,
+    ) -> PyResult<(f64, f64)> {
+        same_length("angles", angles.len(), "readings", self.0.readings())?;
+        let angles = angles.as_slice()?;
+        let found = detached(py, || self.0.line(angles, (low, high), steps, vanishing))?;
+        told(py, found, NOT_FINITE)
+    }
+
     /// Best ratio of variances of a run effect and the deviance that it saves.
     fn ratio(&self, py: Python<'_>, columns: PyReadonlyArray2<'_, f64>) -> PyResult<(f64, f64)> {
         let k = columns.shape()[1];
@@ -170,7 +139,7 @@ fn by_rows(table: &PyReadonlyArray2<'_, f64>) -> Vec<f64> {
 }
 
 /// Columns one after the other: as they stand, or of so many rows at a time.
-fn by_columns<'a>(table: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Cow<'a, [f64]>> {
+pub(super) fn by_columns<'a>(table: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Cow<'a, [f64]>> {
     if table.is_fortran_contiguous() {
         return Ok(Cow::Borrowed(table.as_slice()?));
     }

@@ -29,61 +29,6 @@ type Three<'py> = (
 type Values<'py, T> = Bound<'py, PyArray1<T>>;
 pub(super) type Bounds = Vec<(usize, usize)>;
 
-/// Rows under the filter that makes noise of first-order correlation white, or its transpose.
-#[pyfunction]
-#[pyo3(signature = (rows, bounds, rho, roots=None, transposed=false))]
-pub fn whitened<'py>(
-    py: Python<'py>,
-    rows: Rows<'py>,
-    bounds: Bounds,
-    rho: f64,
-    roots: Option<PyReadonlyArray1<'py, f64>>,
-    transposed: bool,
-) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let noise = Correlated {
-        bounds: &bounds,
-        rho,
-        roots: roots.as_ref().map(PyReadonlyArray1::as_slice).transpose()?,
-    };
-    match rows {
-        Rows::Double(rows) => filtered(py, &rows, noise, transposed),
-        Rows::Single(rows) => filtered(py, &rows, noise, transposed),
-    }
-}
-
-fn filtered<'py, T: Element + RealField + Copy>(
-    py: Python<'py>,
-    rows: &PyReadonlyArray2<'py, T>,
-    noise: Correlated<'_>,
-    transposed: bool,
-) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let &[n, columns] = rows.shape() else {
-        unreachable!("two dimensions")
-    };
-    consecutive(py, n, &noise)?;
-    // What stands column by column stays so.
-    let by_columns = columns > 1 && rows.is_fortran_contiguous();
-    let rows = rows.as_slice()?;
-    let array = empty::<T>(py, &[n, columns], by_columns)?;
-    // SAFETY: a fresh contiguous array of this type and size.
-    let out = unsafe { std::slice::from_raw_parts_mut(data::<T>(&array), rows.len()) };
-    let (size, columns) = if by_columns {
-        (n.max(1), 1)
-    } else {
-        (rows.len().max(1), columns)
-    };
-    detached(py, || {
-        for (rows, out) in rows.chunks_exact(size).zip(out.chunks_exact_mut(size)) {
-            if transposed {
-                noise.filtered_back(rows, columns, out);
-            } else {
-                noise.filtered(rows, columns, out);
-            }
-        }
-    })?;
-    Ok(array)
-}
-
 /// Products of columns within blocks of so many: at one reading, at those that neither begin nor
 /// end a run, and with the reading before, each of shape (blocks, width, width).
 #[pyfunction]

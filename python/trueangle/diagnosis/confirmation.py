@@ -14,6 +14,7 @@ from ..estimation.regression import Regression
 from ..joint.pattern import line_columns
 from ..support.arrays import Array
 from ..support.display_units import brief
+from ..support.quantiles import quantile
 from .forms import FORM
 from .gain import Gain
 from .goodness import FREE_PATH, Unexplained
@@ -202,7 +203,7 @@ def _explains_runs(regression: Regression, group: Sequence[int]) -> bool:
         return True
     rng = np.random.default_rng(0)
     weights = rng.multinomial(gains.size, np.full(gains.size, 1.0 / gains.size), RESAMPLES)
-    return float(np.quantile(weights @ gains, LOWER)) > 0.0
+    return float(quantile(weights @ gains, LOWER)) > 0.0
 
 
 def _by_run(regression: Regression) -> Array:

@@ -28,7 +28,7 @@ from ..joint.pattern import ARCSEC_PER_RAD, Pattern, lines_columns
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.arrays import Array
+from ..support.arrays import Array, distinct
 from .confirmation import status_of
 from .finding import Finding
 from .gain import measure_delay_gain
@@ -125,7 +125,7 @@ def _newton(
     then: Signals, y: Array, orders: Array, sim: Simulation
 ) -> tuple[float, float, float, float, Pattern]:
     """Change of the delay with its standard error; sums of squares with it and without; pattern."""
-    runs = (then.run[:, None] == np.unique(then.run)).astype(np.float64)
+    runs = (then.run[:, None] == distinct(then.run)).astype(np.float64)
     lines = lines_columns(then.theta, orders)
     known = orthonormal_basis(np.hstack([runs, then.direction[:, None], lines]))
     rest = y - known @ (known.T @ y)

@@ -19,7 +19,6 @@ from ..runs.files import runs_of
 from ..runs.run import CalibrationRun
 from ..runs.source import Reading
 from ..simulation.simulation import SIMULATION, Simulation
-from ..support.arrays import Array
 from ..support.blas import one_blas_thread
 from ..support.deadline import Pace, pace, with_pace
 from ..support.kinds import of_type, told_kinds
@@ -257,35 +256,28 @@ def _ratio_finding(ratio: Ratio) -> Finding:
 
 def _structure(start: Regression) -> dict[str, float]:
     """Share of the readings' variance that each cause takes up alone, largest first."""
-    before = _left(start)
+    before = start.left_within_runs
     alone = {}
     for cause in EFFECTS:
         extension = proposed_above(start, cause)
         if extension is not None and extension.bic_gain > 0.0:
-            after = _left(start.with_terms([extension], 0.0))
+            after = start.with_terms([extension], 0.0).left_within_runs
             alone[cause] = 1.0 - float(np.sum(after**2) / max(float(np.sum(before**2)), 1e-300))
     return dict(sorted(alone.items(), key=lambda item: -item[1]))
 
 
-def _left(regression: Regression) -> Array:
-    """What a regression leaves of its readings, less what it takes for drawn in every run."""
-    return np.asarray(regression.left - regression.whiten.run_part(regression.left))
-
-
 def _noise(chosen: Regression, rest: Unexplained) -> float:
     """Standard deviation of one reading: what is left, where all that is left is noise."""
-    clean = ~chosen.outlying
-    freedom = int(np.count_nonzero(clean)) - chosen.q.shape[1]
-    if rest.found or freedom <= 0:
+    if rest.found or int(np.count_nonzero(~chosen.outlying)) <= chosen.rank:
         return float(np.hypot(rest.noise.sigma, rounding_of(chosen)))
-    return float(np.sqrt(np.sum(_left(chosen)[clean] ** 2) / freedom))
+    return float(np.sqrt(chosen.variance_within_runs))
 
 
 def _overall(before: Regression, after: Regression) -> dict[str, float]:
     """rms, peak-to-peak and max abs without and with all findings, fitted alike."""
     numbers = {}
     for name, regression in (("before", before), ("after", after)):
-        left = _left(regression)
+        left = regression.left_within_runs
         numbers[f"rms_{name}_arcsec"] = float(np.sqrt(np.mean(left**2)))
         numbers[f"peak_to_peak_{name}_arcsec"] = float(np.ptp(left))
         numbers[f"max_abs_{name}_arcsec"] = float(np.abs(left).max())

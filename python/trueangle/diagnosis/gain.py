@@ -257,7 +257,7 @@ def _control(
 
 def _within_runs(regression: Regression, outlying: NDArray[np.bool_]) -> Array:
     """What is left of the readings beside the zeros of their runs."""
-    left = regression.left - regression.whiten.run_part(regression.left)
+    left = regression.left_within_runs
     return np.where(outlying, 0.0, left)
 
 

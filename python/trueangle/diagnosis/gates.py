@@ -16,6 +16,7 @@ from ..effects.blindness import Blindness
 from ..effects.presliding_hysteresis import PreslidingHysteresis
 from ..effects.scale_error import ScaleError
 from ..estimation.regression import Regression
+from ..support.quantiles import quantile
 from .confirmation import NOT_CONFIRMED
 from .finding import Finding
 from .levels import UNITS
@@ -110,7 +111,7 @@ def not_in_every_part(regression: Regression, finding: Finding) -> str:
         return ""
     (k,) = finding.group
     column = regression.terms[k].columns[:, 0]
-    edges = np.quantile(column, np.linspace(0.0, 1.0, PARTS + 1))
+    edges = [quantile(column, k / PARTS) for k in range(PARTS + 1)]
     parts = np.column_stack([np.clip(column, *pair) for pair in itertools.pairwise(edges)])
     rest = cause_terms(regression, [k], settled=True)
     own, excited = rest.projected(parts)

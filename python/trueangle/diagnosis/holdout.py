@@ -14,6 +14,7 @@ from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from ..support.deadline import pace
+from ..support.quantiles import quantile
 from .unnamed import effect_of
 
 Rows = NDArray[np.bool_]
@@ -84,7 +85,7 @@ def _law_without(full: Regression, group: Sequence[int]) -> Law:
     kept = [k for k in range(len(full.terms)) if k not in group]
     effects = sum(term.run_effect is not None for term in full.terms)
     settles = effects > 1 or any(full.terms[k].run_effect is not None for k in group)
-    if settles or full.q.shape[1] < full.design.shape[1]:
+    if settles or full.rank < full.design.shape[1]:
         # Run effects that are left find another size, columns that are alike another share.
         return Law.of(full.with_terms(full.terms[k] for k in kept))
     coefficients = full.coefficients_without(group)
@@ -171,8 +172,9 @@ def reducible_share(
     acts = power0 - count * variance > ABOVE_NOISE * variance * np.sqrt(2.0 * count)
     if acts.any():
         draws = draws[(draws[:, acts] > 0).any(axis=1)]
-    low, high = np.quantile(of(draws.astype(np.float64)), [0.025, 0.975])
-    return float(of(np.ones((1, count.size)))[0]), (float(low), float(high))
+    drawn = of(draws.astype(np.float64))
+    low, high = float(quantile(drawn, 0.025)), float(quantile(drawn, 0.975))
+    return float(of(np.ones((1, count.size)))[0]), (low, high)
 
 
 def numbers(e: Array) -> tuple[float, float, float]:

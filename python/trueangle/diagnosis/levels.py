@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
-from ..support.arrays import Array
+from ..support.arrays import Array, distinct
 from ..support.deadline import pace
 from .holdout import held_out, numbers, rebuilt, reducible_share
 from .unnamed import effect_of
@@ -185,7 +185,7 @@ def gains_by_level(
                 left[concerned.index(k)][:, test] = values_before, after
         for k, (before_k, after_k) in zip(concerned, left, strict=True):
             used = ~regression.outlying & ~np.isnan(before_k)
-            held = [values[j] for j in np.unique(level[used])]
+            held = [values[j] for j in distinct(level[used])]
             if not held:
                 found[k] = LevelGain(factor, UNITS[factor], values, note=NONE_TO_SPARE)
                 continue

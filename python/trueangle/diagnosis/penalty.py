@@ -54,7 +54,7 @@ def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
     """
     exact = exact_terms(chosen)
     before, after = (
-        float(np.var(one.left - one.whiten.run_part(one.left)))
+        float(np.var(one.left_within_runs))
         for one in (start.with_terms(exact) if exact else start, chosen)
     )
     ratio = before / max(after, 1e-300)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..estimation.factor import orthonormal_basis
-from ..estimation.readings import LEAST_SHARE
+from ..estimation.readings import is_good_part
 from ..estimation.regression import Extension, Regression
 from ..estimation.rounded import Rounded, fit_rounded
 from ..estimation.whitening import RunEffect
@@ -25,9 +25,9 @@ from .unnamed import effect_of, is_named
 
 def rounding_of(regression: Regression) -> float:
     """Standard deviation of the rounding where it is a good part of what is left, else 0."""
-    rounding = regression.readings.rounding
-    is_part = rounding**2 > LEAST_SHARE * regression.variance and not regression.is_explained
-    return rounding if is_part else 0.0
+    readings, left = regression.readings, regression.variance
+    is_part = is_good_part(readings.rounding**2, left, readings.scatter**2)
+    return readings.rounding if is_part and not regression.is_explained else 0.0
 
 
 def beyond_rounding(start: Regression, chosen: Regression) -> Regression:

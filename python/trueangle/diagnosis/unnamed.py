@@ -95,7 +95,7 @@ class UnnamedPattern(Effect):
         orders = regression.lines.orders
         wave = regression.lines.values
         trials: list[tuple[float, dict[str, Any]]] = []
-        r = (regression.left - regression.whiten.run_part(regression.left)) * (~regression.outlying)
+        r = regression.left_within_runs * (~regression.outlying)
         for name, (mean, spread) in known.items():
             g = modulator(signals, name, mean, spread)
             assert g is not None
@@ -165,7 +165,7 @@ class UnnamedLine(Effect):
     def _line_in_time(regression: Regression) -> Extension | None:
         """The line that stands out, unless one with a name is hardly told from it."""
         signals = regression.signals
-        left = regression.left - regression.whiten.run_part(regression.left)
+        left = regression.left_within_runs
         left = left * ~regression.outlying
         rho = regression.whiten.rho
         found = periodogram(left, signals.clock, regression.bounds, correlation=rho)

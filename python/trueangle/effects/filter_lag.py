@@ -20,6 +20,7 @@ from ..joint.pattern import Pattern, Surroundings
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import FilterLagTerm
+from ..support.quantiles import quantile
 from .blindness import Blindness
 from .effect import Effect
 from .latency import UNTIMED, Latency
@@ -217,7 +218,7 @@ class FilterLag(Effect):
         elif np.ptp(signals.direction) == 0.0:
             speed = np.abs(signals.velocity)
             # One direction at one speed filters every line by one factor: another line.
-            if np.percentile(speed, 90) < 1.5 * max(float(np.percentile(speed, 10)), 1e-12):
+            if quantile(speed, 0.9) < 1.5 * max(float(quantile(speed, 0.1)), 1e-12):
                 yield cls.blind(
                     "one speed in one direction (or at rest): a filtered pattern is only another "
                     "pattern"

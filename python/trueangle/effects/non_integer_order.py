@@ -25,7 +25,6 @@ from .orderspectrum import OrderSpectrum
 from .search import (
     Array,
     Fitted,
-    golden_maximum,
     grid_doubt,
 )
 
@@ -48,6 +47,9 @@ UNRESOLVED = 1.0
 #: Orders per turn of a shaft at which the cage of its bearing goes round: half of 1 less
 #: the ratio of ball to pitch diameter. Expected there, they pay less for the search.
 CAGE = (0.35, 0.48)
+
+#: Golden sections of a search about the best of them.
+SECTIONS = 10
 
 #: Peaks of the quick search that are scored exactly.
 PEAKS = 4
@@ -120,10 +122,9 @@ class NonIntegerOrder(Effect):
         if regression.is_dominated(best.deviance, 1, best.log_grid):
             return best
         middle, log_grid = best.shape["order"], best.log_grid
-        order, _ = golden_maximum(
-            lambda f: cls._at(regression, f, log_grid).deviance, middle - step, middle + step, 10
-        )
-        best = max(best, cls._at(regression, float(order), log_grid), key=lambda p: p.deviance)
+        theta, low, high = regression.signals.theta, middle - step, middle + step
+        order, _ = regression.drawn_line(theta, low, high, SECTIONS)
+        best = max(best, cls._at(regression, order, log_grid), key=lambda p: p.deviance)
         near = np.abs(regression.around.pattern.orders - best.shape["order"])
         if near.min(initial=1.0) < OWN_LINE or cls._keeps_phase(regression, best):
             return None
@@ -181,7 +182,7 @@ class NonIntegerOrder(Effect):
         if count < 3:
             return np.zeros(0), np.zeros(0)
         orders = low + step * np.arange(count, dtype=np.float64)
-        e = regression.left - regression.whiten.run_part(regression.left)
+        e = regression.left_within_runs
         e = np.where(regression.outlying, 0.0, e)
         spectrum: OrderSpectrum = regression.cache.of_motion(
             cls.kind,

@@ -202,15 +202,16 @@ def _beside_neighbours(regression: Regression) -> tuple[Array, float]:
     rho = regression.whiten.rho
     e = _interpolated(known, rho, regression.bounds)
     spread = 1.4826 * float(np.median(np.abs(e)))
-    ends = np.isin(rows, np.array(regression.bounds) - [0, 1])
-    beside = e[rows] + away[rows] / np.where(ends, np.sqrt(1.0 + rho**2), 1.0)
+    is_end = np.zeros(left.size, dtype=np.bool_)
+    is_end[np.array(regression.bounds) - [0, 1]] = True
+    beside = e[rows] + away[rows] / np.where(is_end[rows], np.sqrt(1.0 + rho**2), 1.0)
     e[rows] = np.where(np.abs(beside) < np.abs(away[rows]), beside, away[rows])
     return np.asarray(e / max(spread, 1e-300)), spread
 
 
 def _unfiltered(regression: Regression) -> Array:
     """What is left, weighed and not whitened."""
-    left = regression.left - regression.whiten.run_part(regression.left)
+    left = regression.left_within_runs
     return np.asarray(left * regression.root_weights)
 
 
@@ -265,7 +266,7 @@ def _lengths(regression: Regression, rows: NDArray[np.int64]) -> NDArray[np.int6
 def _is_scattered(regression: Regression, rows: NDArray[np.int64]) -> bool:
     """Rows that follow each other lie on both sides at random: bursts, no manoeuvre."""
     # Not whitened: that would make neighbours change sides.
-    e = regression.left - regression.whiten.run_part(regression.left)
+    e = regression.left_within_runs
     next_to = np.flatnonzero(np.diff(rows) == 1)
     turns = e[rows[next_to]] * e[rows[next_to + 1]] < 0.0
     by_chance = rows.size**2 / regression.n

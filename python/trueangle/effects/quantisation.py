@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..estimation.estimate import quantity
-from ..estimation.readings import LEAST_SHARE, MOST_SHARE
+from ..estimation.readings import is_good_part
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
@@ -56,14 +56,14 @@ class Quantisation(Effect):
     @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
         step = regression.signals.count
-        share = step**2 / 12.0 / max(regression.variance, 1e-300)
-        if regression.is_explained or not LEAST_SHARE < share < MOST_SHARE:
+        variance, rounding = regression.variance, step**2 / 12.0
+        if regression.is_explained or not is_good_part(rounding, variance, variance):
             return None
         # Of n readings each falls on the lattice by a chance of its tolerance.
         gain = 2.0 * regression.n * float(np.log(10.0)) - regression.log_n
         parameters = {
             "step_arcsec": quantity(step, 0.0),
-            "share_of_noise": quantity(min(share, 1.0)),
+            "share_of_noise": quantity(min(rounding / variance, 1.0)),
         }
         weights = np.ones(regression.n)
         return ScatterFinding(cls.kind, gain, parameters, [Quantisation(step)], weights)

@@ -15,6 +15,7 @@ from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec
 from ..model.terms.load import StiffeningComplianceTerm
+from ..support.arrays import distinct
 from .bends import columns_beyond
 from .blindness import OWN_POWER, Blindness, share_left
 from .drawing import largest_signal
@@ -107,9 +108,9 @@ class StiffeningCompliance(Effect):
             return None
         loads = np.round(torque / np.abs(torque).max(), 3)
         shapes: list[dict[str, Any]] = []
-        if np.unique(loads).size >= 3:
+        if distinct(loads).size >= 3:
             shapes += [{"power": 3, "gravity_deg": None}]
-        if np.unique(np.abs(loads[loads != 0.0])).size > KNEE_PARAMETERS:
+        if distinct(np.abs(loads[loads != 0.0])).size > KNEE_PARAMETERS:
             shapes += cls._knees(regression.signals, None)
         if cls._constant_in_runs(regression.signals):
             gravity = cls._gravity(regression)

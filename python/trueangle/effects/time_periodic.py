@@ -17,6 +17,7 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings, line_columns
 from ..joint.signals import Signals
+from ..support.quantiles import quantile
 from .blindness import Blindness
 from .drawing import reading_rate
 from .drawnline import DrawnLine
@@ -48,6 +49,9 @@ BEARINGS = 12.0
 
 #: Share of its level by which the speed must change to tell a line in time from an order.
 ONE_SPEED = 0.1
+
+#: Golden sections of a search about a trial frequency.
+SECTIONS = 14
 
 #: Share of a resolution cell within which an order and a frequency are hardly told apart.
 UNRESOLVED = 0.5
@@ -194,7 +198,7 @@ class TimePeriodic(Effect):
         speed = np.abs(regression.signals.turns_per_s)
         moving = speed[speed > 0.0]
         level = float(np.median(moving)) if moving.size else 0.0
-        if not level or np.percentile(moving, 90) - np.percentile(moving, 10) > ONE_SPEED * level:
+        if not level or quantile(moving, 0.9) - quantile(moving, 0.1) > ONE_SPEED * level:
             return None
         order = float(np.median(extension.shape["frequency_hz"])) / level
         if order > BEARINGS * max(regression.belief.joint.shafts.values()):
@@ -224,7 +228,7 @@ def _periodogram(
         return None
     # Bins of a time that wraps after one over the step: exact at multiples of the step.
     bins = 1 << int(np.ceil(np.log2(BINS * count)))
-    e = regression.left - regression.whiten.run_part(regression.left)
+    e = regression.left_within_runs
     e = np.where(regression.outlying, 0.0, e)
     power = np.empty((count - low, len(bounds)))
     for j, (start, stop) in enumerate(bounds):
@@ -278,13 +282,9 @@ def _refined(regression: Regression, frequencies: list[float], step: float) -> l
     That of all runs by what it saves jointly with what is fitted, which has taken up a part of it.
     """
     if len({*frequencies}) == 1:
-        f, runs = frequencies[0], len(frequencies)
-
-        def saved(f: float) -> float:
-            return regression.ratio_of(TimePeriodic.waves(regression.signals, [f] * runs))[1]
-
-        return [float(golden_maximum(saved, f - step, f + step)[0])] * runs
-    e = regression.left - regression.whiten.run_part(regression.left)
+        f, turn = frequencies[0], 2.0 * np.pi * regression.signals.clock
+        return [regression.drawn_line(turn, f - step, f + step, SECTIONS)[0]] * len(frequencies)
+    e = regression.left_within_runs
     e = np.where(regression.outlying, 0.0, e)
     turn = 2.0 * np.pi * regression.signals.clock
 

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..estimation.estimate import quantity
+from ..estimation.linear import NormalEquations
 from ..estimation.regression import Regression
 from ..joint.pattern import Surroundings
 from ..joint.signals import Signals
@@ -106,7 +107,8 @@ def _likelihood(e: Array, design: Array, logarithm: bool) -> tuple[float, Array]
         linear = design @ g
         variance = np.exp(np.clip(linear, -20.0, 20.0)) if logarithm else np.maximum(linear, FLOOR)
         slope = design if logarithm else design / variance[:, None]
-        g = g + np.linalg.lstsq(slope, clipped_squares(square, variance) - 1.0, rcond=None)[0]
+        away = clipped_squares(square, variance) - 1.0
+        g = g + NormalEquations.of_rows(slope, away).solved().coefficients[:, 0]
     linear = design @ g
     variance = np.exp(np.clip(linear, -20.0, 20.0)) if logarithm else np.maximum(linear, FLOOR)
     return -0.5 * float(np.sum(np.log(variance) + clipped_squares(square, variance))), g

@@ -223,10 +223,12 @@ class _History:
         begins[1:] = np.diff(since) != 0.0
         starts = np.array([start for start, _ in bounds])
         begins[starts] = True
+        is_start = np.zeros(torque.size, dtype=bool)
+        is_start[starts] = True
         first = np.flatnonzero(begins)
         return cls(
             sign[first],
-            np.isin(first, starts),
+            is_start[first],
             np.append(first[1:], torque.size) - 1,
             np.cumsum(begins) - 1,
             np.abs(torque - since),

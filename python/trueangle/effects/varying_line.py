@@ -162,7 +162,7 @@ def _resolved(regression: Regression) -> Array:
     names = [joint.name_order(float(m)) for m in orders]
     own = np.array([m for m, n in zip(orders, names, strict=True) if n and n[0] != "output"])
     near = np.abs(orders[:, None] - own[None, :]) * travel < UNRESOLVED
-    kept = (orders * travel > RESOLVED) & (np.isin(orders, own) | ~near.any(axis=1))
+    kept = (orders * travel > RESOLVED) & ((orders[:, None] == own).any(axis=1) | ~near.any(axis=1))
     return np.asarray(orders[kept])
 
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ..joint.pattern import VANISHES
 from ..support.arrays import Array
 from .batch import Blocks, Products
-from .factor import Factor
 from .whitening import Whitener
 
 #: Arcsec below which what is left is the rounding of angles (1e-12 of a turn).
@@ -32,25 +32,43 @@ class Projection:
 
     Attributes
     ----------
-    whiten : Whitener
-        M.
-    q : ndarray, shape (n, r)
-        Orthonormal columns that span M X.
-    back : ndarray, shape (p, r)
-        Coefficients of X are ``back @ (q.T @ M y)``.
+    factor : Factor
+        X under M, made orthonormal; see `whiten`, `q` and `back`.
     r : ndarray, shape (n,)
         The residual of M y.
     rss : float
         Its sum of squares.
     coefficients : ndarray, shape (p,)
+    further : ndarray or None
+        Columns that are taken out beside those of the factor, at right angles to them.
     """
 
-    whiten: Whitener
-    q: Array
-    back: Array
+    factor: _core.Factor
     r: Array
     rss: float
     coefficients: Array
+    further: Array | None = None
+
+    @property
+    def whiten(self) -> Whitener:
+        """M."""
+        return self.factor.whiten
+
+    @cached_property
+    def q(self) -> Array:
+        """Orthonormal columns that span M X, and those taken out beside them."""
+        q = self.factor.q
+        return q if self.further is None else np.hstack([q, self.further])
+
+    @cached_property
+    def back(self) -> Array:
+        """B: coefficients of X are ``back @ (q.T @ M y)``."""
+        return self.factor.back
+
+    @property
+    def rank(self) -> int:
+        """Columns that are taken out and told apart."""
+        return self.factor.rank + (0 if self.further is None else self.further.shape[1])
 
     # -- what is left ------------------------------------------------------------
 
@@ -62,7 +80,7 @@ class Projection:
     @property
     def variance(self) -> float:
         """Variance of one reading's noise, arcsec squared."""
-        return float(self.rss / max(self.n - self.q.shape[1], 1))
+        return float(self.rss / max(self.n - self.rank, 1))
 
     @property
     def unscaled_covariance(self) -> Array:
@@ -126,15 +144,14 @@ class Projection:
             power = (s * spread) ** 2 / self.variance
             share = power / (1.0 + power)
         r = self.r - u @ (share * (u.T @ self.r))
-        q = np.hstack([self.q, u * np.sqrt(share)])
-        return replace(self, q=q, r=r, rss=max(float(self.r @ r), 1e-300))
+        own = u * np.sqrt(share)
+        further = own if self.further is None else np.hstack([self.further, own])
+        return replace(self, further=further, r=r, rss=max(float(self.r @ r), 1e-300))
 
     def of_target(self, target: Array) -> Self:
         """Another target fitted by the same columns."""
-        y = self.whiten(target)
-        inner = self.q.T @ y
-        r = y - self.q @ inner
-        return replace(self, r=r, rss=max(float(r @ r), 1e-300), coefficients=self.back @ inner)
+        coefficients, r, rss = self.factor.project(target)
+        return replace(self, r=r, rss=rss, coefficients=coefficients, further=None)
 
     def gain(self, columns: Array) -> tuple[float, Array]:
         """Deviance that ``columns`` save together, and their coefficients."""
@@ -193,17 +210,15 @@ class Projection:
         """Best ratio of variances of a run effect beside what is fitted, and what it saves."""
         return self.beside.ratio(columns)
 
+    def drawn_line(self, angles: Array, low: float, high: float, steps: int) -> tuple[float, float]:
+        """Order in a span of the line with a new phase in every run that saves most, and what.
 
-def project(factor: Factor, target: Array) -> Projection:
+        That of `ratio_of` the line's columns, by so many golden sections.
+        """
+        return self.beside.line(angles, low, high, steps, VANISHES)
+
+
+def project(factor: _core.Factor, target: Array) -> Projection:
     """A target fitted by a factor's columns."""
-    y = factor.whiten(target)
-    inner = factor.q.T @ y
-    r = y - factor.q @ inner
-    return Projection(
-        whiten=factor.whiten,
-        q=factor.q,
-        back=factor.back,
-        r=r,
-        rss=max(float(r @ r), 1e-300),
-        coefficients=factor.back @ inner,
-    )
+    coefficients, r, rss = factor.project(target)
+    return Projection(factor=factor, r=r, rss=rss, coefficients=coefficients)

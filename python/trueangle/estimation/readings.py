@@ -29,6 +29,11 @@ LEAST_SHARE = 0.2
 MOST_SHARE = 2.0
 
 
+def is_good_part(rounding: float, left: float, scatter: float) -> bool:
+    """A variance of rounding is a good part of that left, and no more than the readings' may be."""
+    return LEAST_SHARE * left < rounding < MOST_SHARE * scatter
+
+
 @dataclass(frozen=True, eq=False)
 class Readings:
     """Readings and what the simulation expects of them.

@@ -89,8 +89,7 @@ class Regression(Solution):
             found = Solution.solve(self.readings, terms, fixed, self)
             return found, found.size + self.size
 
-        # Another fit before it leaves other roundings.
-        solution = self.cache.fit((fixed, self.factors, terms), build)
+        solution = self.cache.fit((fixed, terms), build)
         return self.with_solution(solution, least=0.0, cache=self.cache.for_other_terms())
 
     def with_evidence(self, terms: Iterable[Extension]) -> Self:

@@ -17,16 +17,10 @@ from ..joint.pattern import Pattern, Surroundings
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from .extension import Extension
-from .factor import Factor, in_common
 from .lines import LineBasis
 from .projection import Projection, project
 from .readings import ENOUGH_RUNS, Readings
-from .stretches import short_stretches
-from .whitening import RunEffect
-
-#: Residuals are taken at most this many robust standard deviations large: outliers
-#: must not make causes, and normal ones are not touched.
-CLIP = 4.0
+from .whitening import RunEffect, Whitener
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,7 +36,7 @@ class Solution(Projection):
     blocks : tuple of ndarray
         What the design is made of: the readings' own columns, those of every term.
     design : ndarray, shape (n, p)
-    factors : tuple of Factor
+    factors : list of Factor
         Of the noises that the fit passed through, its own first: the next fit begins there.
     target : ndarray
         The readings, outliers clipped.
@@ -56,7 +50,7 @@ class Solution(Projection):
     fixed_rho: float | None
     blocks: tuple[Array, ...]
     design: Array
-    factors: tuple[Factor, ...]
+    factors: list[_core.Factor]
     target: Array
     outlying: NDArray[np.bool_]
     form_errors: Array | None = None
@@ -76,47 +70,39 @@ class Solution(Projection):
         terms = tuple(terms)
         blocks = (readings.base, *(term.columns for term in terms))
         design = _grown(blocks, before)
-        factors = () if before is None else before.factors
         effects = [term.run_effect for term in terms if term.run_effect is not None]
-
-        def projected(target: Array, rho: float, effects: list[RunEffect]) -> Projection:
-            nonlocal factors
-            weights = readings.weights
-            factor = Factor.of(blocks, readings.bounds, rho, effects, weights, factors, design)
-            # A fit passes through white noise and two correlations: all three are kept.
-            others = (f for f in factors if f.whiten is not factor.whiten)
-            factors = (factor, *others)[:3]
-            return project(factor, target)
-
-        target, correlation, settled = readings.residual, rho or 0.0, False
-        for _ in range(2):
-            found = projected(target, correlation, effects)
-            left = _left(readings, design, found)
-            kept, target, outlying = _core.clipped(
-                readings.residual, left, readings.root_weights, CLIP, readings.rounding
-            )
-            if rho is None:
-                # What lasts over two readings or three is not noise that neighbours share.
-                if outlying.any():
-                    kept[short_stretches(outlying, readings.bounds)] = 0.0
-                correlation = readings.correlation(kept * readings.root_weights)
-            settled = not outlying.any() and correlation == found.whiten.rho
-            if settled:
-                break
+        known = [] if before is None else before.factors
+        factors, found, target, outlying = _core.settled(
+            design,
+            readings.residual,
+            readings.root_weights,
+            readings.rounding,
+            readings.correlation,
+            _whitener(readings, rho or 0.0, effects, known),
+            rho,
+            known,
+        )
         if len(effects) > 1:
+            correlation = factors[0].whiten.rho
             for k, effect in enumerate(effects):
                 others = [other for j, other in enumerate(effects) if j != k]
-                ratio, _ = projected(target, correlation, others).ratio_of(effect.columns)
-                effects[k] = RunEffect(effect.columns, max(ratio, 1e-9))
-        if len(effects) > 1 or not settled:
-            found = projected(target, correlation, effects)
+                whiten = _whitener(readings, correlation, others, known)
+                beside = project(_core.Factor(whiten, design), target)
+                effects[k] = RunEffect(
+                    effect.columns, max(beside.ratio_of(effect.columns)[0], 1e-9)
+                )
+            factor = _core.Factor(_whitener(readings, correlation, effects, ()), design)
+            factors, found = [factor], factor.project(target)
         sizes = iter(effects)
         terms = tuple(
             term if term.run_effect is None else replace(term, run_effect=next(sizes))
             for term in terms
         )
         return Solution(
-            **values_of(found, Projection),
+            factor=factors[0],
+            coefficients=found[0],
+            r=found[1],
+            rss=found[2],
             readings=readings,
             terms=terms,
             fixed_rho=rho,
@@ -127,13 +113,12 @@ class Solution(Projection):
             outlying=outlying,
         )
 
-    def factor_with(self, extension: Extension) -> Factor:
+    def factor_with(self, extension: Extension) -> _core.Factor:
         """All columns and those of an extension, under the noise of this fit and of its effect."""
-        blocks = (*self.blocks, extension.columns)
         own = [] if extension.run_effect is None else [extension.run_effect]
         effects = [*self.whiten.effects, *own]
-        bounds, weights = self.bounds, self.readings.weights
-        return Factor.of(blocks, bounds, self.whiten.rho, effects, weights, self.factors)
+        whiten = _whitener(self.readings, self.whiten.rho, effects, self.factors)
+        return _core.Factor(whiten, np.hstack([self.design, extension.columns]))
 
     def with_solution(self, solution: Solution, **changes: Any) -> Self:
         """Another solution with what else this one holds."""
@@ -189,6 +174,18 @@ class Solution(Projection):
         return np.asarray(self.residual - self.design @ self.coefficients)
 
     @cached_property
+    def left_within_runs(self) -> Array:
+        """What is left less what is taken for drawn anew in every run, arcsec."""
+        return np.asarray(self.left - self.whiten.run_part(self.left))
+
+    @property
+    def variance_within_runs(self) -> float:
+        """Variance of `left_within_runs`, outliers left out: readings as they are, not whitened."""
+        clean = ~self.outlying
+        freedom = max(int(np.count_nonzero(clean)) - self.rank, 1)
+        return float(np.sum(self.left_within_runs[clean] ** 2)) / freedom
+
+    @cached_property
     def around(self) -> Surroundings:
         """The joint, with the believed pattern and the missing orders among the terms."""
         return self.surroundings(self.fitted())
@@ -202,7 +199,7 @@ class Solution(Projection):
     @property
     def size(self) -> int:
         """Numbers that it holds beside the readings, about."""
-        return self.design.size + sum(factor.q.size for factor in self.factors)
+        return self.design.size + self.n * sum(factor.rank for factor in self.factors)
 
     def has(self, cause: str) -> bool:
         """A term of this cause is among the terms."""
@@ -273,25 +270,14 @@ class Solution(Projection):
         under the noise of this fit, which may have a fixed correlation and none of the terms
         ``group`` a run effect of its own; outliers are clipped as in the fit of the others.
         """
-        held = np.concatenate([self.place(k) for k in group])
-        spread = self.unscaled_covariance[:, held]
-        moved = spread @ np.linalg.pinv(spread[held])
-
-        def solved(target: Array) -> Array:
-            found = self.back @ (self.q.T @ self.whiten(target))
-            return np.asarray(found - moved @ found[held])
-
-        coefficients = solved(self.residual)
-        for _ in range(2):
-            left = self.residual - self.design @ coefficients
-            left = left - self.whiten.run_part(left)
-            _, target, outlying = _core.clipped(
-                self.residual, left, self.root_weights, CLIP, self.readings.rounding
-            )
-            if not outlying.any():
-                break
-            coefficients = solved(target)
-        return coefficients
+        readings = self.readings
+        return self.factor.without(
+            [int(column) for k in group for column in self.place(k)],
+            readings.residual,
+            readings.root_weights,
+            readings.rounding,
+            readings.correlation,
+        )
 
     def surroundings(self, fitted: Sequence[tuple[Extension, Array]]) -> Surroundings:
         """The joint, with the believed pattern and the missing orders among the terms.
@@ -332,8 +318,18 @@ def _grown(blocks: tuple[Array, ...], before: Solution | None) -> Array:
     return design
 
 
-def _left(readings: Readings, design: Array, fit: Projection) -> Array:
-    """What coefficients leave, less what the run effects take of it."""
-    left = readings.residual - design @ fit.coefficients
-    left -= fit.whiten.run_part(left)
-    return np.asarray(left)
+def in_common(one: Sequence[Array], other: Sequence[Array]) -> int:
+    """How many blocks, the same arrays, two sequences begin with."""
+    same = 0
+    while same < min(len(one), len(other)) and one[same] is other[same]:
+        same += 1
+    return same
+
+
+def _whitener(
+    readings: Readings, rho: float, effects: Sequence[RunEffect], known: Sequence[_core.Factor]
+) -> Whitener:
+    """The map of a noise of readings, that of a factor where it is known."""
+    weights = readings.weights
+    made = (factor.whiten for factor in known if factor.whiten.has(rho, effects, weights))
+    return next(made, None) or Whitener(readings.bounds, rho, effects, weights)

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+import trueangle._core as _core
+
 from ..support.arrays import Array
 
 #: Readings in a row up to which a glitch is a glitch: what lasts longer is an error of the mean.
@@ -41,9 +43,7 @@ def short_stretches(flags: NDArray[np.bool_], bounds: list[tuple[int, int]]) -> 
     >>> short_stretches(np.array([True, False, *[True] * 5]), [(0, 7)]).astype(int).tolist()
     [1, 0, 0, 0, 0, 0, 0]
     """
-    starts, stops = stretches(flags, bounds)
-    short = stops - starts <= MOST_IN_ROW
-    return within(starts[short], stops[short], flags.size)
+    return _core.short_stretches(flags, bounds)
 
 
 def within(starts: NDArray[np.int64], stops: NDArray[np.int64], n: int) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from .problem import Fitted, Problem
 from .uncertainty import Uncertainty
+
+if TYPE_CHECKING:
+    from .orders.noise import ReadingVariance
 
 #: Terms of the sum, and passes of the search for the noise.
 _TERMS: Final = 200
@@ -67,6 +70,13 @@ def repeated_variance(step: float, scatter: float) -> float:
     return repeated(low)
 
 
+def repeated_over(step: float, repeats: ReadingVariance | None, readings: float) -> float:
+    """``R v(σ)`` of so many readings at each position; 0 without a step or repeated readings."""
+    if not step or repeats is None:
+        return 0.0
+    return readings * repeated_variance(step, repeats.variance)
+
+
 def beside_rounding(found: Uncertainty, problem: Problem, fitted: Fitted) -> Uncertainty:
     """The covariance with that of the rounding that repeats at each position.
 
@@ -92,5 +102,5 @@ def beside_rounding(found: Uncertainty, problem: Problem, fitted: Fitted) -> Unc
     if scatter is None:
         return found
     missing = problem.readings / len(positions) - (1.0 if found.kind == "white" else 0.0)
-    share = missing * repeated_variance(step, scatter.variance) / variance
-    return found.beside(share * np.asarray(fitted.solution.covariance))
+    added = repeated_over(step, scatter, missing)
+    return found.beside(added / variance * np.asarray(fitted.solution.covariance))

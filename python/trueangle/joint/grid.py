@@ -91,7 +91,7 @@ def lattice_step(values: NDArray[np.float64]) -> float:
     >>> lattice_step(np.array([0.5, 1.25, 3.0, 2.6]))
     0.0
     """
-    steps = np.diff(np.sort(values))
+    steps = np.diff(distinct(values))
     rounding = LEAST_STEP * float(np.abs(values).max(initial=1.0))
     steps = steps[steps > rounding]
     if steps.size < 3:

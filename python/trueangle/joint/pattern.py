@@ -169,7 +169,7 @@ STEEP = 0.9
 SOLVED = 1e-9
 
 #: Rounding of angles of some hundred turns, per order.
-_VANISHES = 1e-11
+VANISHES = 1e-11
 
 
 def line_columns(theta: Array, order: float) -> Array:
@@ -183,7 +183,7 @@ def line_columns(theta: Array, order: float) -> Array:
 
 def lines_columns(theta: Array, orders: Array) -> Array:
     """`line_columns` of many orders side by side, shape (n, 2 k)."""
-    return _core.line_columns(np.ascontiguousarray(theta), orders, vanishing=_VANISHES)
+    return _core.line_columns(np.ascontiguousarray(theta), orders, vanishing=VANISHES)
 
 
 def line_sum(theta: Array, lines: tuple[tuple[float, float, float], ...]) -> Array:

@@ -246,7 +246,7 @@ def sensor_lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float,
     A table shows in the moves of the indicated angles, or in the true ones (radians), in any order.
     """
     turns = [run.indicated / run.period for run in runs]
-    values = np.concatenate(turns)
+    values = distinct(np.concatenate(turns))
     step = lattice_step(values)
     move = table_move(turns, step)
     if move and abs(1.0 / move - round(1.0 / move)) < CLOSES:
@@ -254,7 +254,7 @@ def sensor_lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float,
     grid = uniform_grid(theta)
     table = 0 if grid is None else grid.positions
     # At even places, values that all lie one step apart lie on any lattice of that step.
-    even = grid is not None and np.diff(distinct(values)).max(initial=0.0) < 1.5 * step
+    even = grid is not None and np.diff(values).max(initial=0.0) < 1.5 * step
     if move or even or abs(step * table - 1.0) < CLOSES * step:
         step = finer_step(values, step)
     step = step or finer_step(values)

@@ -202,10 +202,10 @@ def deviance_left(
 ) -> float:
     """Deviance of an error beside all that a regression fits, and an imitation."""
     if imitation is None:
-        x, _ = regression.projected(error[:, None])
+        squares = float(np.sum(regression.projected(error[:, None])[0] ** 2))
     else:
-        x = regression.factor_with(imitation).left_of(error[:, None])
-    return float(np.sum(x**2)) / (noise.sigma**2 * (1.0 - noise.correlation**2))
+        squares = regression.factor_with(imitation).project(error)[2]
+    return squares / (noise.sigma**2 * (1.0 - noise.correlation**2))
 
 
 def _price(extension: Extension | None) -> float:

@@ -17,7 +17,10 @@ def distinct(values: NDArray[_Kind]) -> NDArray[_Kind]:
     """Values in ascending order, each once.
 
     As `numpy.unique`, which would import `numpy.ma` and take longer to start than a small command.
+    Values that are that already are not copied.
     """
+    if np.greater(values[1:], values[:-1]).all():
+        return values
     ascending = np.sort(values)
     first = np.ones(ascending.size, dtype=np.bool_)
     first[1:] = ascending[1:] != ascending[:-1]

@@ -81,18 +81,55 @@ def test_a_lag_is_the_gain_of_its_equation(damping):
     np.testing.assert_allclose(found, expected, rtol=0, atol=10 * ROUNDING)
 
 
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize("roots", [None, ROOTS])
-@pytest.mark.parametrize("transposed", [False, True])
-def test_whitening_is_its_matrix(dtype, roots, transposed):
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_whitening_is_its_matrix(roots, order):
     matrix = filtering() * (1.0 if roots is None else roots)
-    rows = ROWS.astype(dtype)
-    found = _core.whitened(rows, BOUNDS, 0.6, roots, transposed)
-    assert found.dtype == dtype
-    expected = (matrix.T if transposed else matrix) @ rows
-    np.testing.assert_allclose(found, expected, rtol=0, atol=10 * SINGLE)
-    if not transposed:
-        np.testing.assert_array_equal(found, _core.whitened(rows, BOUNDS, 0.6, roots))
+    whiten = _core.Whitener(BOUNDS, 0.6, None, None if roots is None else roots**2)
+    found = whiten(np.array(ROWS, order=order))
+    np.testing.assert_allclose(found, matrix @ ROWS, rtol=0, atol=10 * SINGLE)
+    np.testing.assert_array_equal(found[:, 0], whiten(ROWS[:, 0]))
+    assert whiten.bounds is BOUNDS
+    if roots is not None:
+        np.testing.assert_allclose(whiten.root_weights, roots, rtol=ROUNDING)
+
+
+def test_readings_settle_under_the_noise_of_what_they_leave():
+    """One pass after the other in numpy: a fit, what it leaves clipped, its correlation."""
+    rng, n = np.random.default_rng(3), 500
+    bounds, clock = [(0, 200), (200, n)], np.arange(float(n))
+    noise = rng.normal(size=n)
+    for k in range(1, n):
+        noise[k] += 0.6 * noise[k - 1]
+    design = np.column_stack([np.ones(n), np.cos(0.3 * clock), np.sin(0.3 * clock)])
+    readings = design @ [10.0, 3.0, -2.0] + noise
+    readings[[50, 51, 300]] += 80.0
+    lag, ones = _core.LagCorrelation(clock, bounds), np.ones(n)
+    white = _core.Whitener(bounds)
+    target, rho = readings, 0.0
+    for _ in range(2):
+        whiten = _core.Whitener(bounds, rho)
+        x, y = whiten(design), whiten(target)
+        left = readings - design @ np.linalg.lstsq(x, y)[0]
+        kept, target, outlying = _core.clipped(readings, left, ones, 4.0)
+        rho = lag(np.where(_core.short_stretches(outlying, bounds), 0.0, kept))
+    whiten = _core.Whitener(bounds, rho)
+    expected = np.linalg.lstsq(whiten(design), whiten(target))[0]
+    factors, fit, clipped, flags = _core.settled(design, readings, ones, 0.0, lag, white, None, [])
+    np.testing.assert_array_equal(flags, outlying)
+    assert flags[[50, 51, 300]].all()
+    np.testing.assert_allclose(fit[0], expected, rtol=0, atol=100 * ROUNDING)
+    np.testing.assert_allclose(clipped, target, rtol=0, atol=1000 * ROUNDING)
+    assert factors[0].whiten.rho == pytest.approx(rho, abs=100 * ROUNDING)
+    assert 0.4 < rho < 0.8
+    assert factors[-1].whiten is white
+    # Another one that begins there makes nothing anew.
+    again = _core.settled(factors[0].design, readings, ones, 0.0, lag, white, None, factors)
+    assert again[0][0].whiten is factors[0].whiten
+    np.testing.assert_array_equal(again[1][0], fit[0])
+    # A correlation that is given stays.
+    given = _core.settled(design, readings, ones, 0.0, lag, _core.Whitener(bounds, 0.3), 0.3, [])
+    assert [factor.whiten.rho for factor in given[0]] == [0.3]
 
 
 def test_medians_and_what_is_clipped():
@@ -148,7 +185,8 @@ def test_rows_of_harmonics_are_those_of_numpy():
 
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_a_fit_is_seen_however_its_columns_lie(order):
-    found = _core.Beside(np.array(ROWS, order=order), THETA, 1.0, 0.0, BOUNDS, 0.6).seen
+    whiten = _core.Whitener(BOUNDS, 0.6)
+    found = whiten.beside(np.array(ROWS, order=order), THETA, 1.0, 0.0).seen
     expected = filtering().T @ np.column_stack([ROWS, THETA])
     np.testing.assert_allclose(found, expected.T, rtol=0, atol=10 * ROUNDING)
 
@@ -174,6 +212,8 @@ def power(cuts, boxes, columns):
 
 
 LINES = (THETA, ORDERS, COSINE, SINE)
+NOISE = _core.Whitener(BOUNDS, 0.5)
+LAG = _core.LagCorrelation(THETA, BOUNDS)
 MOMENTS = _core.Moments(360.0, [1.0], [[1]])
 ALIKE = _core.Alike(
     _core.Corrector(_core.Series(360.0, 0.0, [1.0], [[1]], [[0.1]], [[0.0]]), []), 2
@@ -188,10 +228,19 @@ ALIKE = _core.Alike(
         (_core.line_sum_and_slope, (*LINES[:2], COSINE[:2], SINE), "cosine"),
         (_core.unit_sums, (THETA, np.ones((2, N - 1)), [0], 1.0, 1.0, 2), "row, got 39"),
         (_core.lagged, (np.ones((N, 5)), np.ones((N, 3)), 1.0), "waves"),
-        (_core.whitened, (ROWS, BOUNDS[:2], 0.5), "of 40 readings in all"),
-        (_core.whitened, (ROWS, [(0, 10), (11, N)], 0.5), "one after the other"),
-        (_core.whitened, (ROWS, [(0, 30), (30, 20), (20, N)], 0.5), "one after the other"),
-        (_core.whitened, (ROWS, BOUNDS, 0.5, SHORT), "roots"),
+        (_core.Whitener, ([(0, 10), (11, N)], 0.5), "one after the other"),
+        (_core.Whitener, ([(0, 30), (30, 20), (20, N)], 0.5), "one after the other"),
+        (_core.Whitener, (BOUNDS, 0.5, None, SHORT), "roots"),
+        (_core.Whitener, (BOUNDS, 0.5, [_core.RunEffect(ROWS[1:])]), "columns"),
+        (NOISE, (ROWS[1:],), "x"),
+        (NOISE.run_part, (SHORT,), "residual"),
+        (_core.LagCorrelation, (SHORT, BOUNDS), "readings in all"),
+        (_core.LagCorrelation(THETA, BOUNDS), (SHORT,), "residual"),
+        (_core.Factor, (NOISE, ROWS[1:]), "design"),
+        (_core.Factor(NOISE, ROWS).project, (SHORT,), "target"),
+        (_core.Factor(NOISE, ROWS).without, ([9], THETA, ROOTS, 0.0, LAG), "places of the"),
+        (_core.Factor(NOISE, ROWS).without, ([0], SHORT, ROOTS, 0.0, LAG), "readings"),
+        (_core.short_stretches, (np.ones(3, dtype=bool), BOUNDS), "of 3 readings in all"),
         (_core.clipped, (THETA, SHORT, ROOTS, 3.0), "left"),
         (_core.clipped, (THETA, THETA, SHORT, 3.0), "roots"),
         (_core.Banded.factor, (np.ones((N, 3)),), "bands"),
@@ -204,9 +253,10 @@ ALIKE = _core.Alike(
         (power, ([-1, 9], [(1, 1.0)], 9), "grow"),
         (power, ([4], [(1, 1.0)], 9), "two edges"),
         (power, ([0, 9], [(1, 1.0)], 10), "9 columns"),
-        (_core.Beside, (ROWS, THETA[1:], 1.0, 0.0, BOUNDS, 0.5), "39 readings in all"),
-        (_core.Beside, (ROWS[1:], THETA, 1.0, 0.0, BOUNDS, 0.5), "fitted"),
-        (_core.Beside(ROWS, THETA, 1.0, 0.0, BOUNDS, 0.5).gain, (ROWS[1:],), "columns"),
+        (NOISE.beside, (ROWS, THETA[1:], 1.0, 0.0), "r has 39"),
+        (NOISE.beside, (ROWS[1:], THETA, 1.0, 0.0), "q"),
+        (NOISE.beside(ROWS, THETA, 1.0, 0.0).gain, (ROWS[1:],), "columns"),
+        (NOISE.beside(ROWS, THETA, 1.0, 0.0).line, (SHORT, 1.0, 2.0, 4, 0.0), "angles"),
         (MOMENTS.update, (THETA, SHORT), "error"),
         (MOMENTS.update, (THETA, THETA, SHORT), "weights"),
         (MOMENTS.update_known, (THETA, SHORT, False), "indicated"),

@@ -286,6 +286,7 @@ def test_columns_beside_a_fit_of_any_length_are_those_of_numpy(n, order):
     """What the readings of a fit see, however its table lies in memory and ends."""
     rng = np.random.default_rng(SEED)
     table, residual = rng.normal(size=(n, 3)), rng.normal(size=n)
-    found = _core.Beside(np.array(table, order=order), residual, 1.0, 0.0, [(0, n)], 0.0).seen
+    whiten = _core.Whitener([(0, n)])
+    found = whiten.beside(np.array(table, order=order), residual, 1.0, 0.0).seen
     expected = np.column_stack([table, residual]).T
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import trueangle._core as _core
+from trueangle._core import Factor
 from trueangle.effects.bends import LAG, _late
 from trueangle.estimation.batch import Blocks
-from trueangle.estimation.factor import Factor
 from trueangle.estimation.projection import project
 from trueangle.estimation.regression import Regression
 from trueangle.estimation.whitening import LagCorrelation, RunEffect, Whitener
@@ -109,54 +108,32 @@ def test_products_under_a_noise_need_no_mapped_columns(space, noise):
 def test_gains_of_blocks_are_those_of_each(space, noise):
     rng = np.random.default_rng(4)
     columns = [rng.standard_normal((space.n, 1 + k % 2)) for k in range(7)]
-    known = project(Factor.of((space.base,), space.bounds, **noise), space.target)
+    known = project(Factor(Whitener(space.bounds, **noise), space.base), space.target)
     singly = [known.gain(block)[0] for block in columns]
     assert known.block_gains(Blocks(columns)) == pytest.approx(singly, rel=1e-7)
 
 
-def test_a_factor_that_grows_is_the_one_made_at_once(space, noise):
+def test_a_factor_is_that_of_the_singular_values(space, noise):
     rng = np.random.default_rng(5)
     sizes = [1e-6, 1.0, 1e6, 1.0, 1.0]
     base = np.column_stack([np.ones(space.n), rng.standard_normal((space.n, 5)) * sizes])
     blocks = [base, base[:, 1:3] + 1e4 * rng.standard_normal((space.n, 2)), base[:, :0]]
     near = base[:, 3:4] + 1e-3 * rng.standard_normal((space.n, 1))  # beyond doubt alike
     y = rng.standard_normal(space.n)
-    factors: list[Factor] = []
-    for many in (1, 2, 3, 4, 2):
-        parts = [*blocks, near][:many]
-        factor = Factor.of(parts, space.bounds, **noise, before=factors[-1:])
-        factors.append(factor)
-        whole = factor.whiten(np.hstack(parts))
+    whiten = Whitener(space.bounds, **noise)
+    for many in (1, 2, 3, 4):
+        design = np.hstack([*blocks, near][:many])
+        factor = Factor(whiten, design)
+        whole = whiten(design)
         lengths = np.linalg.norm(whole, axis=0)
         u, s, vt = np.linalg.svd(whole / lengths, full_matrices=False)
         kept = s > 1e-7 * s[0]
-        slow = vt[kept].T @ ((u[:, kept].T @ y) / s[kept]) / lengths
-        assert factor.q.shape[1] == kept.sum() == whole.shape[1] - (many == 4)
+        slow = vt[kept].T @ ((u[:, kept].T @ whiten(y)) / s[kept]) / lengths
+        assert factor.rank == factor.q.shape[1] == kept.sum() == whole.shape[1] - (many == 4)
         assert factor.q.T @ factor.q == pytest.approx(np.eye(kept.sum()), abs=ROUNDING)
-        assert factor.back @ (factor.q.T @ y) == pytest.approx(slow, rel=1e-7)
-        assert factor.whiten is factors[0].whiten
-    assert np.array_equal(factors[1].q[:, :6], factors[0].q)
-
-
-@pytest.mark.parametrize("left_out", [1, 2, 3])
-@pytest.mark.parametrize("joins", [0, 2])
-def test_a_factor_without_a_block_is_the_one_made_anew(left_out, joins, space, noise):
-    """What stands before the block is taken as it is, whatever comes after it."""
-    rng = np.random.default_rng(6)
-    blocks = [rng.standard_normal((space.n, width)) for width in (9, 2, 1, 1)]
-    blocks[2] += 3.0 * blocks[1][:, :1]  # no columns are at right angles
-    y = rng.standard_normal(space.n)
-    whole = Factor.of(blocks, space.bounds, **noise)
-    parts = [block for k, block in enumerate(blocks) if k != left_out]
-    parts += [rng.standard_normal((space.n, joins))] if joins else []
-    factor = Factor.of(parts, space.bounds, **noise, before=[whole])
-    anew = Factor.of(parts, space.bounds, **noise)
-    assert factor.q.shape == anew.q.shape == (space.n, sum(part.shape[1] for part in parts))
-    assert factor.q.T @ factor.q == pytest.approx(np.eye(factor.q.shape[1]), abs=ROUNDING)
-    slow = anew.back @ (anew.q.T @ y)
-    assert factor.back @ (factor.q.T @ y) == pytest.approx(slow, rel=1e-7)
-    if left_out == 3 or not joins:
-        assert np.array_equal(factor.q[:, :9], whole.q[:, :9])
+        assert factor.back @ (factor.q.T @ whiten(y)) == pytest.approx(slow, rel=1e-7)
+        assert factor.coefficients(y) == pytest.approx(slow, rel=1e-7)
+        assert factor.whiten is whiten
 
 
 def test_gains_are_those_of_least_squares(space):
@@ -264,7 +241,7 @@ def test_squares_saved_at_every_ratio_are_those_of_a_ridge(space, width):
     left = own @ rng.standard_normal(own.shape[1])
     beside, left = (x - space.q @ (space.q.T @ x) for x in (own, left))
     squares = 2.0 * float(left @ left)
-    ratio, deviance = _core.Beside(space.q, left, squares, 0.0, space.bounds, 0.0).ratio(z)
+    ratio, deviance = Whitener(space.bounds).beside(space.q, left, squares, 0.0).ratio(z)
     assert ratio > 0.0
     moment = own.T @ left
     saved = moment @ np.linalg.solve(np.eye(own.shape[1]) / ratio + beside.T @ own, moment)

@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from trueangle._core import Factor
+from trueangle.effects.search import golden_maximum
 from trueangle.estimation.batch import Blocks, Products
-from trueangle.estimation.factor import Factor, in_common, orthonormal_basis
+from trueangle.estimation.factor import orthonormal_basis
 from trueangle.estimation.projection import Projection, project
+from trueangle.estimation.solution import in_common
 from trueangle.estimation.whitening import RunEffect, Whitener
+from trueangle.joint.pattern import line_columns
 
 from .dense import BOUNDS, CASES, N, case, covariance
 
@@ -26,9 +30,7 @@ def fitted(kind: tuple, seed: int = 20) -> tuple[Projection, np.ndarray, np.ndar
     rng = np.random.default_rng(seed)
     x = np.column_stack([np.ones(N), rng.normal(size=(N, 3))])
     y = x @ [1.0, 2.0, -1.0, 0.5] + rng.normal(size=N)
-    blocks = [x[:, :1].copy(), x[:, 1:].copy()]
-    factor = Factor.of(blocks, BOUNDS, whiten.rho, whiten.effects, whiten.weights)
-    return project(factor, y), x, y, covariance(whiten)
+    return project(Factor(whiten, x), y), x, y, covariance(whiten)
 
 
 @pytest.mark.parametrize("kind", CASES)
@@ -145,7 +147,7 @@ def test_many_columns_have_their_ratio_as_few_have() -> None:
     rng = np.random.default_rng(24)
     bounds = [(8 * k, 8 * k + 8) for k in range(50)]
     y = rng.normal(size=400) + np.repeat(rng.normal(size=50), 8) * 0.7
-    factor = Factor.of([np.ones((400, 1))], bounds, 0.0, [], None)
+    factor = Factor(Whitener(bounds, 0.0, []), np.ones((400, 1)))
     ratio, _ = project(factor, y).ratio_of(np.ones((400, 1)))
     # Of equal runs the likelihood has a closed form: variance between over that within.
     means = y.reshape(50, 8).mean(axis=1)
@@ -156,7 +158,7 @@ def test_many_columns_have_their_ratio_as_few_have() -> None:
 
 def test_a_long_run_is_one_however_many_of_its_readings_are_held_at_once() -> None:
     rng = np.random.default_rng(26)
-    factor = Factor.of([np.ones((900, 1))], [(0, 900)], 0.9, [], None)
+    factor = Factor(Whitener([(0, 900)], 0.9, []), np.ones((900, 1)))
     found = project(factor, rng.normal(size=900))
     columns = np.cumsum(rng.normal(size=(900, 3)), axis=0)
     x, _ = found.projected(columns)
@@ -164,38 +166,67 @@ def test_a_long_run_is_one_however_many_of_its_readings_are_held_at_once() -> No
     np.testing.assert_allclose(found.gain(columns)[1], expected, rtol=1e-9)
 
 
-def test_a_factor_grown_is_one_made_anew() -> None:
+@pytest.mark.parametrize("kind", CASES)
+def test_a_factor_is_the_mapped_columns_by_their_singular_values(kind: tuple) -> None:
     rng = np.random.default_rng(25)
-    whiten = case(0.5, (2.0,), False)
-    noise = (BOUNDS, whiten.rho, whiten.effects, whiten.weights)
+    whiten = case(*kind)
     blocks = [rng.normal(size=(N, 6)), rng.normal(size=(N, 2)) * 1e3, rng.normal(size=(N, 1))]
     blocks.append(blocks[0][:, :1] + 1e-7 * rng.normal(size=(N, 1)))  # all but fitted already
+    blocks.append(blocks[0][:, 1:2] + 1e-2 * rng.normal(size=(N, 1)))
     blocks.append(np.zeros((N, 1)))
     y = rng.normal(size=N)
-    for first, then in (((0,), (0, 1)), ((0, 1, 2), (0, 1)), ((0, 1, 2), (0, 2)), ((0, 1), (0, 3)),
-                        ((0, 1), (0, 1)), ((0, 1), (0, 1, 4)), ((0, 1), (1, 0))):  # fmt: skip
-        before = Factor.of([blocks[k] for k in first], *noise)
-        chosen = [blocks[k] for k in then]
-        grown = Factor.of(chosen, *noise, before=(before,))
-        anew = Factor.of(chosen, *noise)
-        assert grown.whiten is before.whiten
-        np.testing.assert_allclose(grown.q.T @ grown.q, np.eye(grown.q.shape[1]), atol=1e-10)
-        a, b = project(grown, y), project(anew, y)
-        scale = np.maximum(np.abs(b.coefficients), 1e-3)
-        np.testing.assert_allclose(a.coefficients / scale, b.coefficients / scale, atol=1e-6)
-        np.testing.assert_allclose(a.r, b.r, atol=1e-8)
+    for chosen in ((0, 1), (0, 2), (0, 3), (0, 1, 4), (1, 0, 5), (2, 3, 0, 4, 5)):
+        design = np.hstack([blocks[k] for k in chosen])
+        x = whiten(design)
+        lengths = np.linalg.norm(x, axis=0).clip(1e-300)
+        u, s, vt = np.linalg.svd(x / lengths, full_matrices=False)
+        kept = s > 1e-7 * s[0]
+        factor = Factor(whiten, design)
+        assert factor.rank == factor.q.shape[1] == kept.sum()
+        np.testing.assert_allclose(factor.q.T @ factor.q, np.eye(factor.rank), atol=1e-10)
+        found = factor.coefficients(y)
+        slow = vt[kept].T @ ((u[:, kept].T @ whiten(y)) / s[kept]) / lengths
+        scale = np.maximum(np.abs(slow), 1e-3)
+        np.testing.assert_allclose(found / scale, slow / scale, atol=1e-6)
+        again, r, squares = factor.project(y)
+        np.testing.assert_array_equal(again, found)
+        np.testing.assert_allclose(r, whiten(y - design @ slow), atol=1e-8)
+        assert squares == pytest.approx(r @ r)
         # X B is Q.
-        x = whiten(np.hstack(chosen))
-        np.testing.assert_allclose(x @ grown.back, grown.q, atol=1e-6)
+        np.testing.assert_allclose(x @ factor.back, factor.q, atol=1e-6)
+    assert Factor(whiten, blocks[0][:, ::2]).design.flags.f_contiguous
+
+
+def test_blocks_in_common() -> None:
+    blocks = [np.zeros((3, k)) for k in range(4)]
     assert in_common(blocks, [*blocks[:2], blocks[0]]) == 2
     assert in_common(blocks, blocks[:3]) == 3
     assert in_common(blocks[1:], blocks) == 0
 
 
+@pytest.mark.parametrize("rho", [0.0, 0.5])
+def test_a_line_that_every_run_draws_anew_is_the_best_of_golden_sections(rho: float) -> None:
+    rng = np.random.default_rng(28)
+    bounds = [(0, 200), (200, 380)]
+    angles = np.cumsum(rng.uniform(0.0, 0.1, 380))
+    phase = np.repeat([0.3, 2.0], [200, 180])
+    y = np.sin(3.3 * angles + phase) + 0.2 * rng.normal(size=380)
+    found = project(Factor(Whitener(bounds, rho), np.ones((380, 1))), y)
+
+    def saved(order: float) -> float:
+        return found.ratio_of(line_columns(angles, order))[1]
+
+    place, value = golden_maximum(saved, 3.1, 3.5, 10)
+    order, deviance = found.drawn_line(angles, 3.1, 3.5, 10)
+    assert order == place
+    assert deviance == value == saved(order)
+    assert order == pytest.approx(3.3, abs=0.02)
+
+
 def test_columns_that_are_alike_share_what_they_explain() -> None:
     x = np.column_stack([np.ones(N), np.arange(N), np.arange(N), np.zeros(N)])
     y = 2.0 + 3.0 * np.arange(N)
-    found = project(Factor.of([x], BOUNDS, 0.0, [], None), y)
+    found = project(Factor(Whitener(BOUNDS, 0.0, []), x), y)
     np.testing.assert_allclose(found.coefficients, [2.0, 1.5, 1.5, 0.0], atol=1e-9)
     assert found.q.shape == (N, 2)
     for columns in (x[:, :3], x[:, :2]):
@@ -210,7 +241,7 @@ def test_columns_that_are_nearly_alike(apart: float, rank: int) -> None:
     rng = np.random.default_rng(26)
     one, other = np.linalg.qr(rng.normal(size=(N, 2)))[0].T
     x = np.column_stack([one, one + apart * other])
-    found = project(Factor.of([x], BOUNDS, 0.0, [], None), 2.0 * one + 3.0 * other)
+    found = project(Factor(Whitener(BOUNDS, 0.0, []), x), 2.0 * one + 3.0 * other)
     assert found.q.shape[1] == rank
     np.testing.assert_allclose(found.q.T @ found.q, np.eye(rank), atol=1e-12)
     if rank == 2:
@@ -219,7 +250,7 @@ def test_columns_that_are_nearly_alike(apart: float, rank: int) -> None:
 
 def test_scores_allow_for_a_run_effect_that_is_fitted() -> None:
     effect = RunEffect(np.ones((N, 1)), 1e12)
-    factor = Factor.of([np.ones((N, 1))], BOUNDS, 0.0, [effect], None)
+    factor = Factor(Whitener(BOUNDS, 0.0, [effect]), np.ones((N, 1)))
     column = np.repeat([1.0, 2.0, 5.0], [20, 2, 18])[:, None]
     # A step between runs is what the effect draws: it saves nothing.
     assert project(factor, np.random.default_rng(1).normal(size=N)).gain(column)[0] < 1e-3

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ...support.arrays import Array
+from ...support.arrays import Array, distinct
 from ...support.display_units import brief
 from ...support.distributions import f_tail
 from .evidence import Evidence, largest_of
@@ -315,7 +315,7 @@ def _blocks(size: int, over: float) -> tuple[NDArray[np.int64], Array]:
     edges = [1.0]
     while edges[-1] < size:
         edges.append(edges[-1] + min(width, max(edges[-1] * 0.5, 4.0 * over)))
-    cuts = np.unique(np.minimum(np.array(edges), size).astype(np.int64))
+    cuts = distinct(np.minimum(np.array(edges), size).astype(np.int64))
     # Short blocks at the low end are uncertain: neighbours share what they know.
     cells = np.repeat(SHARED * np.diff(cuts) / over, np.diff(cuts))
     return cuts, np.concatenate([cells[:1], cells])

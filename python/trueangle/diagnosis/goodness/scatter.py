@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...support.arrays import Array
+from ...support.arrays import Array, distinct
 from ...support.distributions import chi_squared_tail, f_tail, normal_tail
 from .evidence import Evidence
 from .leftover import Leftover
@@ -87,9 +87,9 @@ def scatter_of_repeats(left: Leftover) -> tuple[float, float] | None:
     if places.size * 2 > len(left):
         return None
     shares, dense = [], []
-    for k in np.unique(passed):
+    for k in distinct(passed):
         inside = index[passed == k]
-        own = np.unique(inside)
+        own = distinct(inside)
         span = places[(places >= places[own.min()]) & (places <= places[own.max()])].size
         shares.append(own.size / max(span, 1))
         dense.append(inside.size / own.size)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...estimation.factor import orthonormal_basis
-from ...estimation.readings import LEAST_SHARE, MOST_SHARE
+from ...estimation.readings import is_good_part
 from ...estimation.rounded import fit_rounded
 from ...joint.pattern import lines_columns
 from ...support.arrays import Array
@@ -44,8 +44,7 @@ def beyond_rounding(
 
     left = error - _fitted(columns(range(len(orders))), error)
     about = error - _fitted(zeros, error)
-    rounding = step**2 / 12.0
-    if rounding < LEAST_SHARE * np.var(left) or rounding > MOST_SHARE * np.var(about):
+    if not is_good_part(step**2 / 12.0, float(np.var(left)), float(np.var(about))):
         return list(range(forced, len(orders)))
     told = list(range(forced))
     fit = fit_rounded(orthonormal_basis(columns(told)), error, step)

@@ -11,7 +11,7 @@ import numpy as np
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
 from ...support.display_units import brief
-from ..rounding import repeated_variance, rounding_step
+from ..rounding import repeated_over, rounding_step
 from ..uncertainty import CovarianceKind
 from .candidates import Candidates
 from .harmonicsums import HarmonicSums, harmonic_sums
@@ -64,10 +64,6 @@ class EvidenceSelection(EvidenceSearch):
         repeats = pure_error(self.units, self.positions)
         self.samples = int(sums.count.sum())
         self.step = rounding_step(runs, self.positions)
-        rounding = 0.0
-        if self.step and repeats is not None:
-            rounding = repeated_variance(self.step, repeats.variance)
-            rounding *= self.samples / len(self.positions)
         super().__init__(
             sums,
             candidates.log_limits(FALSE_ALARM),
@@ -77,7 +73,7 @@ class EvidenceSelection(EvidenceSearch):
             repeats,
             [i for i, k in enumerate(candidates.orders) if k in reference],
             covariance,
-            rounding,
+            repeated_over(self.step, repeats, self.samples / len(self.positions)),
         )
 
     def result(self) -> OrderSelection:
