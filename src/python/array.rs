@@ -1,10 +1,13 @@
 //! Arrays of numpy: made, read, and known by the kind of their elements.
 
+use std::borrow::Cow;
+
 use numpy::npyffi::{NpyTypes, PY_ARRAY_API, get_type_object, npy_intp};
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods,
-    PyUntypedArray, dtype,
+    PyReadonlyArray1, PyUntypedArray, dtype,
 };
+
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -132,6 +135,23 @@ pub fn vector<'py, T: Element + Copy>(
         std::ptr::copy_nonoverlapping(values.as_ptr(), data::<T>(&array), values.len());
         Ok(array.into_any().cast_into_unchecked())
     }
+}
+
+/// Numbers one after the other.
+pub fn values<'a>(array: &'a PyReadonlyArray1<'_, f64>) -> Cow<'a, [f64]> {
+    let copied = |_| Cow::Owned(array.as_array().iter().copied().collect());
+    array.as_slice().map_or_else(copied, Cow::Borrowed)
+}
+
+/// Columns as numpy has them that stand one after the other.
+pub fn columns<'py>(
+    py: Python<'py>,
+    values: &[f64],
+    shape: &[usize],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    vector(py, values)?
+        .reshape([shape[1], shape[0]])?
+        .transpose()
 }
 
 /// The elements of a contiguous array.

@@ -1,13 +1,12 @@
 //! `_core.Factor` and the fit whose noise is that of what it leaves.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 
-use super::array::vector;
+use super::array::{columns, values, vector};
 use super::beside::by_columns;
 use super::failure::argument_error;
 use super::linear::{NOT_FINITE, told};
@@ -252,26 +251,9 @@ pub fn short_stretches<'py>(
     vector(py, &linear::short_stretches(flags.as_slice()?, &bounds))
 }
 
-/// Numbers one after the other.
-pub(super) fn values<'a>(array: &'a PyReadonlyArray1<'_, f64>) -> Cow<'a, [f64]> {
-    let copied = |_| Cow::Owned(array.as_array().iter().copied().collect());
-    array.as_slice().map_or_else(copied, Cow::Borrowed)
-}
-
 fn shown<'py>(py: Python<'py>, fitted: &Fitted) -> PyResult<Told<'py>> {
     let coefficients = vector(py, &fitted.coefficients)?;
     Ok((coefficients, vector(py, &fitted.residual)?, fitted.squares))
-}
-
-/// Columns as numpy has them that stand one after the other.
-pub(super) fn columns<'py>(
-    py: Python<'py>,
-    values: &[f64],
-    shape: &[usize],
-) -> PyResult<Matrix<'py>> {
-    vector(py, values)?
-        .reshape([shape[1], shape[0]])?
-        .transpose()
 }
 
 /// The same columns, one after the other.

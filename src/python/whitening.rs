@@ -9,9 +9,8 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-use super::array::vector;
+use super::array::{columns, values, vector};
 use super::beside::{PyBeside, by_columns};
-use super::factor::{columns, values};
 use super::failure::argument_error;
 use super::linear::{NOT_FINITE, told};
 use super::noise::{Bounds, consecutive};
