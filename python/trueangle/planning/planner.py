@@ -128,10 +128,10 @@ def _entries(
 
 
 def _notes(designs: Sequence[RunDesign], over: bool) -> Iterator[str]:
-    if over:
-        yield "the search was ended early"
     if not designs:
         yield f"no run {'found so far' if over else 'within the limits'} tells any of these causes"
+    if over:
+        yield "the search was ended early"
 
 
 def _beyond(designs: Sequence[RunDesign], seen: Limits) -> Iterator[str]:
