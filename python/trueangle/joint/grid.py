@@ -133,12 +133,13 @@ def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
     some = distinct(moves[:: max(1, moves.size // STEPS_TRIED)])
     tried = distinct(np.concatenate([some, np.diff(some)]))
     tried = tried[(tried > rounding) & (tried < 0.5 * below)][::-1]
-    for step in tried.tolist():
-        counts = np.round(some / step)
-        away = float(np.abs(some / step - counts).max())
-        told = distinct(counts).size - 1
+    counts = some / tried[:, None]
+    aways = np.abs(counts - np.round(counts)).max(axis=1, initial=0.0)
+    for k in np.flatnonzero(aways < ON_LATTICE).tolist():
+        step, away = float(tried[k]), float(aways[k])
+        told = distinct(np.round(counts[k])).size - 1
         # That each further move is a whole number of counts, as near as they all are.
-        if away < ON_LATTICE and tried.size * (2.0 * away) ** told < BY_CHANCE:
+        if tried.size * (2.0 * away) ** told < BY_CHANCE:
             off = np.abs(moves / step - np.round(moves / step)).max()
             return step if off < ON_LATTICE else 0.0
     return 0.0
