@@ -21,6 +21,11 @@ FREE_PATH = "a free path in time"
 #: Chance with which noise alone may be called unexplained, all deciding tests together.
 LEVEL = 0.01
 
+#: Chances below this are sure alike, and those that differ by less than this share are one: sums
+#: that are put together another way give the same order of tests.
+SURE = 1e-9
+ROUNDING = 1e-7
+
 #: Arcsec that something is at least.
 SMALLEST = 1e-9
 
@@ -130,9 +135,9 @@ def goodness_of_fit(
     # in angle or in time the one that stands out more.
     rank = {id(item): float(k) for k, item in enumerate(deciding)}
     lines = [item for item in deciding if item.test in ("place within runs", "time periodogram")]
-    if len(lines) == 2 and lines[1].statistic > lines[0].statistic:
+    if len(lines) == 2 and lines[1].statistic > lines[0].statistic * (1.0 + ROUNDING):
         rank[id(lines[1])] = rank[id(lines[0])] - 0.5
-    deciding.sort(key=lambda item: (max(item.p, 1e-9), rank[id(item)]))
+    deciding.sort(key=lambda item: (round(np.log(max(item.p, SURE)) / ROUNDING), rank[id(item)]))
     # A free path has no name either: what it follows is a part of what is left.
     variance = float(np.var((left if loose is None else loose).residual))
     power = min(max((item.rms**2 for item in firing), default=0.0), variance)
