@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 
 import numpy as np
@@ -87,6 +88,11 @@ def test_scaling(arguments, tmp_path, capsys):
         }
     else:
         assert "model of cost" in out
+        told = re.findall(r": (\S+) us \+ (\S+) ns a reading .*; 1e12 readings: (\S+) h", out)
+        assert len(told) == 4
+        for call, reading, hours in (map(float, line) for line in told):
+            taken = 1e-6 * call + 1e-9 * reading * 1e12
+            assert 3600.0 * hours == pytest.approx(taken, rel=0.012)  # both of three digits
         assert picture.stat().st_size > 1000
 
 

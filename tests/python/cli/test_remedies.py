@@ -257,6 +257,12 @@ REFUSALS: dict[str, tuple[Callable[[], list[ta.CalibrationRun]], list[str], str,
         "two heads",
         "plan",
     ),
+    "no motion to calibrate by, a gear": (
+        noise,
+        ["selfcal", "R", "-o", "m.json", "--method", "heads", "--gear-ratio", "50.5"],
+        "two heads",
+        "plan",
+    ),
 }
 
 
@@ -271,6 +277,9 @@ def test_the_command_that_is_named_works(
     assert told in said
     program, *again = shlex.split(said.split("; run: ")[1])
     assert (program, again[0]) == ("trueangle", command)
+    if "--gear-ratio" in words:  # of the same joint
+        before, after = (float(line[line.index("--gear-ratio") + 1]) for line in (words, again))
+        assert after == before
     assert main(again) == 0
     assert capsys.readouterr().out
 

@@ -66,6 +66,7 @@ def test_outliers_are_told_by_share_size_and_row():
         told.append(parameters["size_arcsec"].value)
         # A deviation of a few numbers is skewed, and its logarithm is not.
         relative = parameters["size_arcsec"].std / told[-1]
+        assert relative == pytest.approx(1.0 / np.sqrt(2.0 * len(rows)))
         pulls_of_size.append(np.log(told[-1] / size) / relative)
     print(np.mean(pulls), np.std(pulls), np.sqrt(np.mean(np.square(told))), missed, wrong)
     assert WIDE[0] < np.std(pulls) < WIDE[1]

@@ -27,6 +27,18 @@ def test_slope_and_bend_are_those_of_a_parabola(steeper: str) -> None:
     assert bend == pytest.approx(2.0 * c)
 
 
+def test_slope_and_bend_are_told_in_their_own_places(tmp_path) -> None:
+    """Of ``c sin k x`` a slope of ``c k`` and a bend of ``c k²``, lines of 2 deg being short."""
+    shaft = ta.Shaft("output", 1, [4], [0.0], [0.02])
+    model = ta.HarmonicModel([shaft], period=360.0)
+    found = ta.export_model(model, "linuxcnc", tmp_path / "axis.comp")
+    note = next(note for note in found.notes if "v deg/s" in note)
+    slope, bend = map(float, re.findall(r"up to (\S+) v", note))
+    k = np.radians(4.0)
+    assert slope == pytest.approx(0.02 * k, rel=5e-3)
+    assert bend == pytest.approx(0.02 * k**2, rel=5e-3)
+
+
 def read(tmp_path, half: np.ndarray):
     """A turn of 120 entries whose columns differ by twice ``half``, degrees."""
     nominal = np.arange(121) * 3.0

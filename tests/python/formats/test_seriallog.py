@@ -52,16 +52,18 @@ def test_rows_are_read_and_corrected_with_words_among_them(style, ending, tmp_pa
     np.testing.assert_array_equal(found[0].indicated, MODEL.correct(run.indicated))
 
 
+@pytest.mark.parametrize("step", [1.0, 10_000.0])
 @pytest.mark.parametrize("block", [7, 1 << 14])
-def test_the_clock_of_a_terminal_is_the_time(block, monkeypatch, tmp_path):
+def test_the_clock_of_a_terminal_is_the_time(block, step, monkeypatch, tmp_path):
+    """Over one midnight, or over five."""
     monkeypatch.setattr(seriallog, "_BLOCK", block)
-    seconds = 86390.0 + np.arange(ROWS)  # over midnight
+    seconds = 86390.0 + step * np.arange(ROWS)
     clocks = [f"{t // 3600 % 24:02.0f}:{t // 60 % 60:02.0f}:{t % 60:06.3f} -> " for t in seconds]
     lines = [a + b for a, b in zip(clocks, rows(STYLES["plotter"]), strict=True)]
     path = tmp_path / "serial.txt"
     path.write_text("\n".join(lines) + "\n")
     (run,) = ta.read_runs(path, signals=SIGNALS)
-    np.testing.assert_allclose(run.time - run.time[0], np.arange(ROWS))
+    np.testing.assert_allclose(run.time - run.time[0], step * np.arange(ROWS))
 
 
 def test_damage_is_told_by_line_and_an_end_within_a_row_is_not(tmp_path):

@@ -75,6 +75,8 @@ def test_of_heads_and_of_a_coast():
     for name, value in (("turns", coast.turns), ("seconds", coast.seconds)):
         assert told(text, f"  {name}") == pytest.approx(value, rel=THREE)
     assert told(text, "readings needed") == coast.readings
+    table = coast.to_dict()["speed_ratio_factors"]
+    assert table == {f"{ratio:g}": factor for ratio, factor in coast.speed_ratio_factors.items()}
     for ratio, factor in coast.speed_ratio_factors.items():
         assert float(re.search(rf"(?<![\d.]){ratio:g}: ([\d.]+)", text)[1]) == pytest.approx(
             factor, rel=0.06

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,9 @@ import trueangle as ta
 from trueangle import plots
 from trueangle.certificate.typesetting import certified_errors
 from trueangle.planning import wanted_orders
+from trueangle.rehearsal.result import rehearsed_cause
+from trueangle.rehearsal.trial import TrialOutcome
+from trueangle.rehearsal.visibility import Range
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
@@ -83,8 +87,27 @@ def test_positions_of_a_plan() -> None:
     # The second of the five marks of a mount is its first position.
     drawn = [float(part.lines[0].get_xdata()[1]) for part in ax.containers]
     assert [float(x) for x in offsets.split(", ")] == pytest.approx(drawn, abs=6e-4)
+    counted = [f"mount {i}: {offset}°" for i, offset in enumerate(offsets.split(", "), 1)]
+    assert [mark.get_text() for mark in ax.get_yticklabels()] == counted
     steps = [np.diff(part.lines[0].get_xdata()) for part in ax.containers]
     np.testing.assert_allclose(steps, 360.0 / int(positions))
+
+
+@pytest.mark.parametrize("grows", [True, False])
+def test_sizes_named_in_a_rehearsal(grows: bool) -> None:
+    """The dashed lines: the one of half of the trials stands at the less visible size."""
+    tried = {-4: (0, 8), 0: (2, 8), 3: (6, 8), 6: (8, 8), 10: (8, 8), 14: (8, 8)}
+    answers = [
+        (step, TrialOutcome("named" if k < named else "nothing"))
+        for step, (named, count) in tried.items()
+        for k in range(count)
+    ]
+    cause = rehearsed_cause("x", "size", Range(3.0, -16, 20, grows), answers, "", "")
+    (ax,) = plots.detection(SimpleNamespace(causes=[cause])).axes
+    dashed = sorted(float(line.get_xdata()[0]) for line in ax.lines if line.get_linestyle() == "--")
+    assert len(dashed) == 2
+    said = words(ax, r"by size: 50 % at (\S+), 95 % at (\S+)\.$")
+    assert [float(x) for x in said] == pytest.approx(dashed if grows else dashed[::-1], rel=THREE)
 
 
 @pytest.mark.parametrize(("errors_in", "per"), UNITS)

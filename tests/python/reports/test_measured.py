@@ -54,9 +54,11 @@ def test_a_run_is_told_with_its_conditions_and_its_error_about_its_own_zero(peri
 
 def test_sizes_are_of_all_parts_together_and_about_nought():
     """Not about their mean: a zero that is left is an error."""
-    assert error_size([np.array([3.0]), np.array([4.0, -1.0])]) == pytest.approx(
-        {"rms_arcsec": np.sqrt(26.0 / 3.0), "peak_to_peak_arcsec": 5.0, "max_abs_arcsec": 4.0}
-    )
+    for sign in (1.0, -1.0):
+        parts = [sign * np.array([3.0]), sign * np.array([4.0, -1.0])]
+        assert error_size(parts) == pytest.approx(
+            {"rms_arcsec": np.sqrt(26.0 / 3.0), "peak_to_peak_arcsec": 5.0, "max_abs_arcsec": 4.0}
+        )
 
 
 @pytest.mark.parametrize("period", PERIODS)

@@ -108,10 +108,13 @@ def test_closure_is_the_difference_at_the_repeated_position():
 
 
 def test_mounts_are_a_union_of_grids():
-    positions = distinct_positions([run_at(np.arange(36) * 10.0 + d) for d in (0.0, 2.14)])
-    assert (len(positions), positions.divisions) == (72, 36)
-    assert np.allclose(np.diff(positions.offsets), 2.14 / 360.0)
-    assert "2 grids of 10 deg, shifted by 0, 2.14 deg" in positions.describe()
+    for first in (0.0, 3.5):  # wherever the reference has its zero
+        positions = distinct_positions(
+            [run_at(np.arange(36) * 10.0 + first + d) for d in (0.0, 2.14)]
+        )
+        assert (len(positions), positions.divisions) == (72, 36)
+        assert np.allclose(np.diff(positions.offsets), 2.14 / 360.0)
+        assert "2 grids of 10 deg, shifted by 0, 2.14 deg" in positions.describe()
 
 
 def test_half_way_positions_are_one_finer_grid():
