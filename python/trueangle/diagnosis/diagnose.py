@@ -186,9 +186,11 @@ def _diagnosis(
             findings = reconsidered_findings(chosen, findings, rest)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
     in_doubt = any(spot.supported and not spot.common for spot in spots)
+    faults = data_faults(records_of(measured))
+    spoilt = next((fault for fault in faults if fault.spoils_readings), None)
     for item in account.choice.scatter:
-        if in_doubt and item.size < OUTLYING_ANYWAY:
-            spots.append(scatter_doubt(item))
+        if spoilt is not None or (in_doubt and item.size < OUTLYING_ANYWAY):
+            spots.append(scatter_doubt(item, spoilt))
         else:
             findings.append(scatter_finding(item, rest))
     if seen.ratio is not None:
@@ -222,7 +224,7 @@ def _diagnosis(
         rest,
         before,
         beliefs,
-        data_faults(records_of(measured)),
+        faults,
         notes,
         not at.cut,
         log,

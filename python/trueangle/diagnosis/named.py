@@ -12,6 +12,7 @@ from ..effects.missing_order import MissingOrder
 from ..effects.scale_error import ScaleError
 from ..estimation.estimate import Parameters, Quantity, quantity
 from ..estimation.regression import Regression
+from ..runs.checks.fault import DataFault
 from ..support.deadline import pace
 from .candidates import Candidate, extensions, propose
 from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
@@ -225,13 +226,14 @@ def scatter_finding(item: ScatterFinding, unexplained: Unexplained) -> Finding:
     return Finding(item.cause, item.parameters, evidence, None, [], item.effects, status, reason)
 
 
-def scatter_doubt(item: ScatterFinding) -> Blindness:
-    """Scatter about a mean that is itself in doubt."""
-    return Blindness(
-        (item.cause,),
+def scatter_doubt(item: ScatterFinding, fault: DataFault | None = None) -> Blindness:
+    """Scatter about a mean that is itself in doubt, or of readings that a fault has spoilt."""
+    because, measure = (
         "the error that the readings show has no certain cause yet, so what scatters about it "
         "has none either",
         "the measurements named above, then diagnose again",
-        True,
-        item.bic_gain,
     )
+    if fault is not None:
+        because = f"{fault.fault}: the readings that it names scatter whatever the sensor does"
+        measure = f"{fault.mend}; then diagnose again"
+    return Blindness((item.cause,), because, measure, True, item.bic_gain)

@@ -32,6 +32,9 @@ FREE_ANGLES = (
     "off the grid (`ta.plan_mounts(...)` proposes them; about 2.14 deg for 36 positions)"
 )
 
+#: Orders up to which an alias is told at least, whatever lines the joint is known for.
+HIGHEST = 100.0
+
 #: Periods over the travel below which there is no line.
 HALF = 0.5
 
@@ -146,6 +149,11 @@ class MissingOrder(Effect):
             "phase_deg": quantity(phase, phase_std),
             "explanations": quantity(joint.explanations(output_order)),
         }
+        grid = regression.signals.grid
+        if grid is not None:
+            most = max(HIGHEST, float(regression.lines.orders.max()))
+            aliases = [m for m in grid.aliases(output_order, 3) if m <= most]
+            parameters |= {"aliases": quantity(aliases)} if aliases else {}
         if extension.shape["alike"]:
             parameters["hardly_told_from_output_orders"] = quantity(extension.shape["alike"])
         return parameters, [MissingOrder(shaft, order, amplitude, phase)]

@@ -35,6 +35,9 @@ ALIKE = 0.004
 #: Positions beyond which a grid is not looked for.
 MOST_POSITIONS = 10_000
 
+#: Positions that part of a grid has at least, and share of those between its ends.
+LEAST_OF_ARC, FILLED = 6, 0.5
+
 #: Share of the moves from reading to reading that stay where they are, as at turning points,
 #: up to which readings are a table: a sensor that rounds lingers at its counts.
 LINGERS = 0.05
@@ -67,18 +70,40 @@ class UniformGrid:
 
 
 def uniform_grid(theta: NDArray[np.float64]) -> UniformGrid | None:
-    """The uniform grid that all angles (radians) lie on, or None."""
+    """The uniform grid that all angles (radians) lie on, or None.
+
+    Equal steps that close after a turn, or an arc of them, some left out: at a polygon's places
+    the same orders look alike wherever the joint stops.
+
+    Examples
+    --------
+    >>> uniform_grid(np.radians(np.arange(40.0, 240.0, 10.0)))
+    UniformGrid(positions=36)
+    >>> uniform_grid(np.radians([3.0, 41.0, 77.0, 122.0])) is None
+    True
+    """
     turns = np.sort(np.mod(theta / (2.0 * np.pi), 1.0))
     # Positions are groups of angles closer than the finest grid looked for.
     gaps = np.diff(np.append(turns, turns[0] + 1.0))
-    near = 0.2 / MOST_POSITIONS
-    positions = int(np.count_nonzero(gaps > near))
-    if not 3 <= positions <= MOST_POSITIONS:
+    steps = gaps[gaps > 0.2 / MOST_POSITIONS]
+    if not 3 <= steps.size <= MOST_POSITIONS:
         return None
+    if _lies_on(turns, steps.size):
+        return UniformGrid(steps.size)
+    # Readings cut to a last digit lie on a lattice too: what is filled by half is a design.
+    positions = round(1.0 / float(steps.min()))
+    on_arc = positions * (1.0 - float(steps.max())) + 1.0
+    filled = LEAST_OF_ARC <= steps.size >= FILLED * on_arc
+    if filled and positions <= MOST_POSITIONS and _lies_on(turns, positions):
+        return UniformGrid(positions)
+    return None
+
+
+def _lies_on(turns: NDArray[np.float64], positions: int) -> bool:
+    """Whether all places, in turns, lie on so many of equal steps."""
     shift = np.angle(np.mean(np.exp(2j * np.pi * positions * turns))) / (2.0 * np.pi)
     away = turns * positions - shift
-    away -= np.round(away)
-    return UniformGrid(positions) if float(np.abs(away).max()) < ON_GRID else None
+    return float(np.abs(away - np.round(away)).max()) < ON_GRID
 
 
 def lattice_step(values: NDArray[np.float64]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import trueangle as ta
@@ -54,3 +55,25 @@ def test_play_of_one_sweep_there_and_back_is_no_drift_of_clocks() -> None:
     assert spot.causes == ("clock_drift", "backlash", "latency")
     size = spot.estimates["backlash"]["half_width_arcsec"]
     assert abs(size.value - 4.0) < 3.0 * size.std
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_a_fault_of_the_data_scatters_is_no_property_of_the_sensor(seed: int) -> None:
+    """Old samples logged again are as far off as the joint has moved since."""
+    print("seed", [47, seed])
+    rng = np.random.default_rng([47, seed])
+    theta = np.arange(0.0, 360.0, 5.0)
+    indicated = theta + (30.0 * np.sin(np.radians(theta)) + rng.normal(0.0, 1.0, 72)) / 3600.0
+    first = int(rng.integers(5, 50))
+    indicated[first : first + 12] = indicated[first]
+    run = ta.CalibrationRun(theta, indicated, period=360.0)
+    found = ta.diagnose([run], Simulation(sigma_arcsec=1.0))
+    assert [fault.fault for fault in found.data_faults] == ["stale_samples"]
+    scatter = {"outliers", "heteroscedastic_noise"}
+    assert not scatter & {finding.cause for finding in found.findings if finding.confirmed}
+    told = [
+        spot for spot in found.not_identifiable if scatter & set(spot.causes) and spot.supported
+    ]
+    for spot in told:
+        assert spot.because.startswith("stale_samples")
+        assert "drop these rows" in spot.measure

@@ -18,6 +18,7 @@ from trueangle.joint.signals import join_runs
 from trueangle.simulation import Simulation
 
 LINES = ((1, 60.0, 40.0), (2, 25.0, 100.0))
+SEED = 55_900
 
 
 def table(n: int, runs: int, rng: np.random.Generator, back: bool = False) -> list:
@@ -103,8 +104,8 @@ def test_how_far_readings_may_stand_from_a_grid():
         again = np.append(turns, turns[7] + apart)
         grid = uniform_grid(2.0 * np.pi * again)
         assert (grid and grid.positions) == positions
-    one_left_out = np.delete(turns, 3)
-    assert uniform_grid(2.0 * np.pi * one_left_out) is None
+    # At the places that are left the same orders look alike.
+    assert uniform_grid(2.0 * np.pi * np.delete(turns, 3)) == UniformGrid(36)
 
 
 @pytest.mark.parametrize("step", [1.0, 1.0 / 4096.0, 1e-6])
@@ -224,3 +225,35 @@ def test_counts_that_are_all_read_are_counts(readings):
     indicated = np.round((places + 0.1 * np.sin(np.radians(places))) * 1024 / 360.0) * 360.0 / 1024
     told = join_runs([ta.CalibrationRun(places, indicated, period=360.0)]).count
     assert told == pytest.approx(1296000.0 / 1024)
+
+
+@pytest.mark.parametrize("positions", [12, 36, 360])
+@pytest.mark.parametrize("share", [0.4, 0.9])
+def test_an_arc_of_equal_steps_is_the_grid_of_its_turn(positions, share):
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    count = max(round(share * positions), 6)
+    start = rng.uniform(0.0, 2.0 * np.pi)
+    theta = start + np.arange(count) * 2.0 * np.pi / positions
+    assert uniform_grid(theta) == UniformGrid(positions)
+    # A third of the places left out, the ends kept, and readings there and back.
+    kept = np.sort(rng.permutation(np.arange(1, count - 1))[count // 3 :])
+    kept = np.concatenate([[0], kept, [count - 1]])
+    if kept.size >= 6 and np.diff(kept).min() == 1:
+        assert uniform_grid(np.concatenate([theta[kept], theta[kept][::-1]])) == UniformGrid(
+            positions
+        )
+    # Orders that look alike there do so at each place.
+    grid = uniform_grid(theta)
+    for alias in grid.aliases(5.0, 3):
+        line, other = (np.exp(1j * m * (theta - start)) for m in (5.0, alias))
+        np.testing.assert_allclose(
+            np.minimum(abs(line - other), abs(line - other.conj())), 0.0, atol=1e-9
+        )
+
+
+@pytest.mark.parametrize("digits", [1, 2, 3])
+def test_free_angles_are_no_grid_however_they_are_printed(digits):
+    rng = np.random.default_rng(SEED)
+    theta = np.radians(np.round(rng.uniform(40.0, 230.0, 200), digits))
+    assert uniform_grid(theta) is None

@@ -18,6 +18,10 @@ UNUSABLE = (
 LISTED = 100
 
 
+#: Faults whose rows are right, but there twice or out of order.
+REPEATS = ("duplicate_runs", "duplicate_rows", "unsorted_time")
+
+
 class DataFault(NamedTuple):
     """What is wrong with rows or runs, before any model.
 
@@ -49,6 +53,11 @@ class DataFault(NamedTuple):
     ) -> DataFault:
         """A fault of plain values."""
         return cls(fault, tuple(dict.fromkeys(runs)), tuple(int(k) for k in rows), says, mend)
+
+    @property
+    def spoils_readings(self) -> bool:
+        """Whether its rows hold other angles than were there: they scatter for that reason."""
+        return bool(self.rows) and self.fault not in REPEATS
 
     @property
     def unusable(self) -> bool:
