@@ -14,7 +14,7 @@ from rosbags.rosbag2 import Reader as PlainReader
 from rosbags.rosbag2 import Writer as PlainWriter
 from rosbags.typesys import Stores, get_typestore
 
-from trueangle.formats import rosbag
+from trueangle.formats import openbag
 from trueangle.formats.mcaprows import RecordRows, interleaved_rows
 
 SEED = 33
@@ -71,7 +71,7 @@ def test_rows_give_the_file_that_single_messages_give(case, output, tmp_path, mo
     made = []
     for name, by_rows in (("a", True), ("b", False)):
         if not by_rows:
-            monkeypatch.setattr(rosbag, "_chunked", lambda reader: iter(()))
+            monkeypatch.setattr(openbag, "_chunked", lambda reader: iter(()))
         target = tmp_path / name
         models = {"elbow": MODEL, "wrist": MODEL}
         columns = {joint: joint for joint in models}
