@@ -145,7 +145,7 @@ pub fn without(
     Some(coefficients.as_slice().to_vec())
 }
 
-/// The flags that stand in stretches of at most [`MOST_IN_ROW`], none of which goes over two runs.
+/// The flags that stand in stretches of at most `MOST_IN_ROW`, none of which goes over two runs.
 pub fn short_stretches(flags: &[bool], bounds: &[(usize, usize)]) -> Vec<bool> {
     let mut found = vec![false; flags.len()];
     for &(start, stop) in bounds {
