@@ -121,13 +121,10 @@ class NextRuns(PlainResult):
                 times = f" to {labels[-1]}, {len(labels)} times the same" if len(labels) > 1 else ""
                 lines.append(f"  {labels[0]}{times}")
                 lines += [f"    - {step}" for step in steps]
-        shown = {
-            entry.causes[0]: None
-            for entry in self.between
-            if entry.told and len(entry.causes) == 1 and not entry.seen
-        }
+        shown: list[str] = []
         for entry in self.between:
-            if entry.told and entry.causes[0] in shown and len(entry.causes) == 1:
+            if entry.told and not entry.seen and len(entry.causes) == 1:
+                shown += entry.causes
                 continue
             names = " or ".join(entry.causes)
             if not entry.told:
@@ -143,7 +140,7 @@ class NextRuns(PlainResult):
             if text not in lines:  # of two lines of the pattern the same may be asked
                 lines.append(text)
         if shown:
-            lines.append(f"  shows {', '.join(shown)}")
+            lines.append(f"  shows {', '.join(dict.fromkeys(shown))}")
         if self.beyond:
             lines.append(f"  beyond what was seen so far: {', '.join(self.beyond)}")
         lines += [f"  note: {note}" for note in self.notes]
