@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
+
+from ..support.plainresult import finite
 
 
 def place_table(places_deg: Sequence[float], counts: Sequence[int]) -> list[str]:
@@ -32,4 +33,4 @@ def plain(value: Any) -> Any:
         }
     if isinstance(value, list | tuple):
         return [plain(entry) for entry in value]
-    return value if not isinstance(value, float) or math.isfinite(value) else None
+    return finite(value) if isinstance(value, float) else value
