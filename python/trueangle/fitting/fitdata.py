@@ -15,8 +15,8 @@ from ..runs.travel import Span
 from ..support.arrays import Array
 from ..support.plainresult import PlainResult
 from .problem import Fitted, Problem
+from .repeated import beside_repeated
 from .robust import Weighted
-from .rounding import beside_rounding
 from .uncertainty import CovarianceKind, Uncertainty, coefficient_uncertainty
 
 if TYPE_CHECKING:
@@ -140,7 +140,9 @@ class FitData(PlainResult):
         found = coefficient_uncertainty(
             self.problem, self.fitted, weights, self.ridge, self.covariance_asked
         )
-        found = beside_rounding(found, self.problem, self.fitted)
+        found = beside_repeated(
+            found, self.problem, self.fitted, weights, self.ridge, self.covariance_asked
+        )
         if self.nuisance is None or not self.nuisance.inflation:
             return found
         wider = np.array([1.0, *self.nuisance.inflation])

@@ -21,11 +21,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ..joint.signals import sensor_lattice
-from ..runs.aliasing import Positions, distinct_positions
+from ..runs.aliasing import Positions
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
-from .problem import Fitted, Problem
-from .uncertainty import Uncertainty
 
 if TYPE_CHECKING:
     from .orders.noise import ReadingVariance
@@ -77,30 +75,13 @@ def repeated_over(step: float, repeats: ReadingVariance | None, readings: float)
     return readings * repeated_variance(step, repeats.variance)
 
 
-def beside_rounding(found: Uncertainty, problem: Problem, fitted: Fitted) -> Uncertainty:
-    """The covariance with that of the rounding that repeats at each position.
-
-    ::
-
-        C + (R - 1) v (Xᵀ X)⁻¹,    R readings at each position
-
-    One share of v is among the residuals; where runs are clusters none is, for it is the same in
-    all of them. Of more than `COUNTED` readings positions are not counted.
-    """
+def rounding_variance(runs: Sequence[CalibrationRun], positions: Positions) -> float:
+    """Variance of the rounding that repeats at each of these positions; 0 where none does."""
     from .orders.noise import pure_error
     from .orders.zerogroups import zero_units
 
-    variance = fitted.solution.residual_variance
-    if problem.readings > COUNTED or not 0.0 < variance < math.inf:
-        return found
-    positions = distinct_positions(problem.runs)
-    step = rounding_step(problem.runs, positions)
+    step = rounding_step(runs, positions)
     if step == 0.0:
-        return found
-    units, places = zero_units(problem.runs, True)
-    scatter = pure_error(units, positions.of_rows(places))
-    if scatter is None:
-        return found
-    missing = problem.readings / len(positions) - (1.0 if found.kind == "white" else 0.0)
-    added = repeated_over(step, scatter, missing)
-    return found.beside(added / variance * np.asarray(fitted.solution.covariance))
+        return 0.0
+    units, places = zero_units(runs, True)
+    return repeated_over(step, pure_error(units, positions.of_rows(places)), 1.0)

@@ -53,13 +53,21 @@ class Uncertainty(NamedTuple):
         """Fewest degrees of freedom of a variance in which noise is all there is."""
         return float(self.freedom.min()) if self.noise_freedom is None else self.noise_freedom
 
-    def beside(self, bias: Array) -> Uncertainty:
-        """The same with the covariance of a bias, taken as known (Welch and Satterthwaite)."""
-        noise = np.diag(self.covariance)
-        wider = 1.0 + np.divide(np.diag(bias), noise, out=np.zeros(len(noise)), where=noise > 0.0)
+    def beside(self, bias: Array, known: float = math.inf) -> Uncertainty:
+        """The same with the covariance of a bias of so many degrees of freedom.
+
+        ::
+
+            ν = (u + b)² / (u²/ν_u + b²/ν_b)
+
+        (Welch and Satterthwaite) for the variances u of noise and b of the bias.
+        """
+        noise, more = np.diag(self.covariance), np.diag(bias)
+        share = np.divide(more, noise, out=np.zeros(len(noise)), where=noise > 0.0)
+        told = 1.0 / self.freedom + share**2 / known
         return self._replace(
             covariance=self.covariance + bias,
-            freedom=self.freedom * wider**2,
+            freedom=(1.0 + share) ** 2 / told,
             noise_freedom=self.fewest,
         )
 

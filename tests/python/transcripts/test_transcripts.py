@@ -58,7 +58,8 @@ def test_a_transcript_reads_back():
      ("0.5", "0.6", False), ("-1.234", "1.234", False), ("1.23457e-05", "1.23456e-05", True),
      ("6.0495689082979975", "6.0495689082971", True), ("6.0495689082979975", "6.04957", False),
      ("6.0495689082979975", "6.0496", False), ("12.3", "12.4", True),
-     ("123456", "123457", False), ("1.2e+02", "1.3e+02", False), ("0.5", "0.50", True)],
+     ("123456", "123457", False), ("1.2e+02", "1.3e+02", False), ("0.5", "0.50", True),
+     ("0.899286", "0.899275", True), ("0.899286", "0.8993", True), ("0.899286", "0.899386", False)],
 )  # fmt: skip
 def test_numbers_may_differ_in_their_last_digit_and_counts_may_not(was, now, same):
     assert is_same_number(was, now) == same

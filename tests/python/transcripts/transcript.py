@@ -16,6 +16,9 @@ HERE = Path(__file__).parent
 #: What starts a command, and what a reader is told between them.
 COMMAND, REMARK = "$ ", "# "
 
+#: Share of a number of six digits that processors may differ by.
+SEARCHED = Decimal("5e-5")
+
 _NUMBER = re.compile(r"(?<![A-Za-z_\d.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![A-Za-z_\d])")
 
 
@@ -88,16 +91,20 @@ def is_same_number(was: str, now: str) -> bool:
 
     Sums are rounded another way on another processor, so a last digit may be another; where
     two digits are all there are it is not, for a unit of them is no rounding. Of numbers that
-    are written to all their digits six count.
+    are written to all their digits six count; of those of a view, whose six digits may stand at
+    the end of a search, `SEARCHED` of the number.
     """
     if was == now:
         return True
     a, b = Decimal(was), Decimal(now)
-    digits = min(len(a.as_tuple().digits), len(b.as_tuple().digits))
-    if digits > DIGITS + 2:
+    least, digits = sorted((len(a.as_tuple().digits), len(b.as_tuple().digits)))
+    if least > DIGITS + 2:
         return abs(a - b) * 10**DIGITS <= abs(a)
     exponents = {int(a.as_tuple().exponent), int(b.as_tuple().exponent)}
     is_count = "." not in was and "e" not in was.lower()
+    if digits == DIGITS and not is_count:
+        return abs(a - b) <= SEARCHED * abs(a)
+    digits = least
     if digits < 3 or len(exponents) > 1 or is_count:
         return a == b
     return abs(a - b) <= Decimal(1).scaleb(exponents.pop())
