@@ -192,11 +192,20 @@ def _equals(cause: str, rivals: Sequence[tuple[str, float]]) -> Blindness | None
 
     What contains it or is contained in it is the same cause in another form, and explains for it
     where noise that follows a misfit makes the simpler form the better one; what takes up
-    anything is no cause; a line and a ramp are what is seen, whatever makes them.
+    anything is no cause; a line and a ramp are what is seen, whatever makes them. A step so near
+    an end of its run that the run's own zero explains as much is no step.
     """
     effect = EFFECTS[cause]
-    if cause in (MissingOrder.kind, ScaleError.kind) or is_flexible(effect):
+    if cause in (MissingOrder.kind, ScaleError.kind):
         return None
+    if is_flexible(effect):
+        steps = effect.draws_zeros
+        equal = [
+            other
+            for other, gap in rivals
+            if steps and gap < NEW_CAUSE and effect in EFFECTS[other].confused_with
+        ]
+        return _alike(effect, equal) if equal else None
     forms = {other for other, _ in rivals if _is_another_form(effect, EFFECTS[other])}
     own = min([0.0, *(gap for other, gap in rivals if other in forms)])
     equal = [
@@ -204,10 +213,13 @@ def _equals(cause: str, rivals: Sequence[tuple[str, float]]) -> Blindness | None
         for other, gap in rivals
         if gap - own < NEW_CAUSE and other not in forms and not is_flexible(EFFECTS[other])
     ]
-    if not equal:
-        return None
+    return _alike(effect, equal) if equal else None
+
+
+def _alike(effect: type[Effect], equal: Sequence[str]) -> Blindness:
+    """That these explain as much as this."""
     return Blindness(
-        (cause, *equal),
+        (effect.kind, *equal),
         "they explain what these readings show alike",
         telling_apart(effect, EFFECTS[equal[0]]) or effect.measure,
         supported=True,

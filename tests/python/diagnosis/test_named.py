@@ -8,7 +8,16 @@ import pytest
 import trueangle as ta
 from trueangle.diagnosis.named import _equals
 from trueangle.diagnosis.penalty import NEW_CAUSE
-from trueangle.simulation import Backlash, Harmonic, Joint, RunDesign, Simulation, simulate
+from trueangle.simulation import (
+    Backlash,
+    Harmonic,
+    Joint,
+    MissedCounts,
+    RunDesign,
+    Simulation,
+    ZeroSlip,
+    simulate,
+)
 
 ALMOST, ENOUGH = NEW_CAUSE - 0.1, NEW_CAUSE + 0.1
 
@@ -24,6 +33,7 @@ ALMOST, ENOUGH = NEW_CAUSE - 0.1, NEW_CAUSE + 0.1
         ("backlash", [("presliding_hysteresis", 1.0)], None),
         ("presliding_hysteresis", [("backlash", 1.0)], None),
         ("zero_slip", [("latency", 1.0)], None),
+        ("zero_slip", [("missed_counts", 1.0)], None),
         # A line and a ramp are what is seen, whatever makes them.
         ("missing_order", [("local_defect", 1.0)], None),
         ("scale_error", [("clock_drift", -4.0)], None),
@@ -77,3 +87,27 @@ def test_what_a_fault_of_the_data_scatters_is_no_property_of_the_sensor(seed: in
     for spot in told:
         assert spot.because.startswith("stale_samples")
         assert "drop these rows" in spot.measure
+
+
+@pytest.mark.parametrize(("runs", "seed"), [(2, 4), (2, 6), (2, 8), (3, 1), (3, 3), (3, 8)])
+def test_a_zero_of_a_run_is_no_step_at_its_end(runs, seed):
+    """A step of which five readings of 300 lie before it: confirmed in 8 of 20 joints that slip."""
+    out_and_back = RunDesign(samples=300, turns=2.0, reversals=(0.5,))
+    base = Simulation(
+        sigma_arcsec=2.0, harmonics=(Harmonic("output", 1, 40.0),), runs=(out_and_back,) * runs
+    )
+    found = ta.diagnose(simulate(base.with_effects([ZeroSlip(1.5)]), seed=seed), base)
+    assert not any(finding.confirmed for finding in found.findings)
+    said = [spot for spot in found.not_identifiable if spot.causes[0] == "missed_counts"]
+    assert [spot.causes for spot in said] == [("missed_counts", "zero_slip")]
+    assert said[0].measure == "longer runs: the step has to fall inside one"
+
+
+@pytest.mark.parametrize("row", [20, 150, 280])
+def test_a_step_inside_a_run_is_one(row):
+    out_and_back = RunDesign(samples=300, turns=2.0, reversals=(0.5,))
+    base = Simulation(
+        sigma_arcsec=2.0, harmonics=(Harmonic("output", 1, 40.0),), runs=(out_and_back,) * 2
+    )
+    found = ta.diagnose(simulate(base.with_effects([MissedCounts(20.0, 1, row)]), seed=1), base)
+    assert [finding.cause for finding in found.findings if finding.confirmed] == ["missed_counts"]
