@@ -190,9 +190,17 @@ def certify(
 
 
 def _fitted(runs: list[CalibrationRun], orders: Any, gear: dict[str, Any]) -> FitResult:
+    """The fit; beside a reversal error where one is seen, which has a line of its own.
+
+    In the residuals it would be noise that remembers, and count twice.
+    """
     from ..fitting.fit import fit
 
-    return fit(runs, orders, **gear)
+    found = fit(runs, orders, **gear)
+    half = reversal_halfwidth(found)
+    if half is None or half.standard == 0.0:
+        return found
+    return fit(runs, orders, nuisance="direction", **gear)
 
 
 def _valued(fit: FitResult, angles: NDArray[np.float64], who: Identity) -> dict[str, Any]:

@@ -154,13 +154,15 @@ def reversal_halfwidth(fit: FitResult) -> Contribution | None:
 
     ::
 
-        h = Σ d r / Σ d²
+        h = Σ d r / Σ d²,    ν = (h / u(h))² / 2
 
-    per run, its standard error from the scatter over the runs (over the readings for one
-    run). The values then hold for the mean of both directions, and a reading is off by
-    ``+h`` or ``-h``. None where one direction only was read.
+    per run, its standard error u from the scatter over the runs (over the readings for one
+    run or two), and the degrees of freedom of what is known so well (JCGM 100, G.4.2). The values
+    then hold for the mean of both directions, and a reading is off by ``+h`` or ``-h``. None
+    where one direction only was read.
     """
     scale = ARCSEC_PER_TURN / fit.model.period
+    taken = 0.0 if fit.nuisance is None else fit.nuisance.half_width
     parts = np.split(fit.residuals, np.cumsum([len(run) for run in fit.runs])[:-1])
     halves, errors = [], []
     for run, rest in zip(fit.runs, parts, strict=True):
@@ -168,7 +170,7 @@ def reversal_halfwidth(fit: FitResult) -> Contribution | None:
         energy = float(way @ way)
         if len(run) > 2 and energy > 0.05 * len(run):
             half = float(way @ rest) / energy
-            halves.append(scale * half)
+            halves.append(scale * (half + taken))
             spread = rest - half * way
             errors.append(scale * float(np.sqrt(spread @ spread / (len(run) - 2) / energy)))
     if not halves:
@@ -176,8 +178,11 @@ def reversal_halfwidth(fit: FitResult) -> Contribution | None:
     half = float(np.mean(halves))
     count = len(halves)
     error = float(np.std(halves, ddof=1) / np.sqrt(count)) if count > 2 else float(np.max(errors))
-    standard = abs(half) if abs(half) > _SEEN * error else 0.0
-    return Contribution("reversal error, half of it", standard, "A", "two-point", max(count - 1, 1))
+    name = "reversal error, half of it"
+    if abs(half) <= _SEEN * error:
+        return Contribution(name, 0.0, "A", "two-point")
+    freedom = 0.5 * (half / error) ** 2 if error > 0.0 else np.inf
+    return Contribution(name, abs(half), "A", "two-point", freedom)
 
 
 def _by_place(

@@ -170,6 +170,36 @@ def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
     return 0.0
 
 
+def is_of_design(values: NDArray[np.float64], true: NDArray[np.float64], step: float) -> bool:
+    """Whether readings lie on a lattice because the places do: no error is as large as a step.
+
+    Parameters
+    ----------
+    values, true : ndarray
+        Readings and true angles, turns.
+    step : float
+        Of the lattice that the readings lie near, turns.
+
+    Examples
+    --------
+    >>> places = np.sort(np.append(np.arange(36) / 36.0, np.arange(36) / 36.0 + 1.0 / 180.0))
+    >>> is_of_design(places + 1e-5 * np.sin(np.arange(72)), places, 1.0 / 180.0)
+    True
+    >>> is_of_design(np.round(places * 180.0 + np.sin(np.arange(72))) / 180.0, places, 1.0 / 180.0)
+    False
+    """
+    if step <= 0.0:
+        return False
+    phase = np.angle(np.mean(np.exp(2j * np.pi * true / step))) / (2.0 * np.pi)
+    counts = true / step - phase
+    error = values - true
+    error = error - np.angle(np.mean(np.exp(2j * np.pi * error))) / (2.0 * np.pi)
+    wrapped = (error - np.round(error)) / step
+    return bool(
+        np.abs(counts - np.round(counts)).max() < ON_LATTICE and np.abs(wrapped).max() < 0.5
+    )
+
+
 def step_behind(values: NDArray[np.float64], true: NDArray[np.float64], digit: float) -> float:
     """Step of the sensor whose readings were cut to a last digit; 0 where none shows.
 

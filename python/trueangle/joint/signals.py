@@ -17,7 +17,15 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array, distinct
 from ..support.quantiles import median
 from ..support.signals import coupled_with
-from .grid import UniformGrid, finer_step, lattice_step, step_behind, table_move, uniform_grid
+from .grid import (
+    UniformGrid,
+    finer_step,
+    is_of_design,
+    lattice_step,
+    step_behind,
+    table_move,
+    uniform_grid,
+)
 from .turning import direction_at_turns, velocity_at_turns
 
 Index = NDArray[np.int64]
@@ -258,7 +266,10 @@ def sensor_lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float,
     if move or even or abs(step * table - 1.0) < CLOSES * step:
         step = finer_step(values, step)
     step = step or finer_step(values)
-    return (step_behind(values, theta / (2.0 * np.pi), step) or step) * ARCSEC_PER_TURN, table
+    true = theta / (2.0 * np.pi)
+    if is_of_design(np.concatenate(turns), true, step):
+        step = finer_step(values, step)
+    return (step_behind(values, true, step) or step) * ARCSEC_PER_TURN, table
 
 
 def _common_table(first: Signals, later: Signals) -> int:

@@ -40,7 +40,9 @@ def fit_of(parts, ways, period=360.0, places=None, weights=None):
         runs.append(ta.CalibrationRun(x, x, period, velocity=np.asarray(way, float)))
     residuals = np.concatenate(parts) * (period / ARCSEC)
     model = SimpleNamespace(period=period)
-    return SimpleNamespace(model=model, runs=runs, residuals=residuals, weights=weights)
+    return SimpleNamespace(
+        model=model, runs=runs, residuals=residuals, weights=weights, nuisance=None
+    )
 
 
 @pytest.mark.parametrize("period", UNITS)
