@@ -183,7 +183,7 @@ def tolerance_of(sizes: Array, left: Array, share: float, confidence: float) -> 
     """
     n = len(sizes)
     if n >= wilks_units(share, confidence, 1):
-        # The highest rank r whose bound holds: P(Binomial(n, share) <= r - 1) >= confidence.
+        # The lowest rank r whose bound holds: P(Binomial(n, share) <= r - 1) >= confidence.
         rank = _rank(n, share, confidence)
         bounds = [float(np.sort(values)[rank - 1]) for values in (sizes, left)]
         return Tolerance(share, confidence, None, "wilks", *bounds)

@@ -180,7 +180,7 @@ def plan_self(
             "angles_deg": list(angles),
             "noise_factors": mine,
             "worst_noise_factor": max(seen, default=math.inf),
-            "worse_by": max(mine.values()) / worst,
+            "worse_by": max(mine.values()) / worst if math.isfinite(worst) else 1.0,
             "blind_orders": [k for k, f in mine.items() if not math.isfinite(f)],
         }
     what = "heads" if method == "heads" else "shifts"
