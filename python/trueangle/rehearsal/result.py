@@ -174,7 +174,8 @@ def _never(cause: RehearsedCause) -> str:
         text += ": not tried"
     if cause.trials:
         largest = [*cause.tried][-1]
-        text += f" (hidden {counted(cause.trials, "time")}, up to {cause.size_name} {largest:.3g}"
+        times = counted(cause.trials, "time")
+        text += f" (hidden {times}, up to {cause.size_name} {largest:.3g}"
         instead = ", ".join([*cause.confused_with][:MOST])
         text += f"; taken for {instead})" if instead else f"; reported: {_else(cause)})"
     if cause.measure:
