@@ -12,10 +12,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import trueangle
+from trueangle import planning, plots
 from trueangle.cli import main
 
-from .views import figure_lines, file_lines
+from .arguments import argument_lines
+from .asked import Asked
+from .figures import figure_lines
+from .views import file_lines
 
 COLUMNS = 100
 
@@ -37,19 +43,27 @@ class Terminal:
 
     ``trueangle ...`` is the command itself, in this process. ``show FILE`` shows what a file
     holds (`views`), ``figures`` what the pictures drawn since show, and ``hide KEY=VALUE ...``
-    writes ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it.
+    writes ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it. ``write FILE
+    LINE ...`` writes a small file, ``options`` tells every argument of every command,
+    ``asked ...`` what each further option of a command line changes (`asked`), and ``python ...`` is a line of Python: what it gives, draws, warns of or raises.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._figures: list[str] = []
+        self._known: set[str] = set()
+        self._names: dict[str, Any] = {"np": np, "planning": planning, "plots": plots}
+        self._names["ta"] = trueangle
 
     def lines(self, command: str) -> list[str]:
         """What the terminal shows of a command; a status other than 0 at the end, as ``[1]``."""
-        program, *arguments = shlex.split(command)
+        program, _, rest = command.partition(" ")
+        if program == "python":
+            return self._settled(self._python(rest))
         run = {"trueangle": self._trueangle, "show": self._show, "figures": self._drawn,
-               "hide": self._hide}[program]  # fmt: skip
-        return self._settled(run(arguments))
+               "hide": self._hide, "write": self._write, "options": self._options,
+               "asked": self._asked}[program]  # fmt: skip
+        return self._settled(run(shlex.split(rest)))
 
     def _settled(self, text: str) -> list[str]:
         text = text.replace(f"{self.folder}{os.sep}", "").replace(str(self.folder), ".")
@@ -86,6 +100,45 @@ class Terminal:
         effect = "\n".join(["", "[[effect]]", *arguments, ""])
         (self.folder / "hidden.toml").write_text(believed + effect, encoding="utf-8")
         return ""
+
+    def _write(self, arguments: list[str]) -> str:
+        name, *lines = arguments
+        (self.folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return ""
+
+    def _options(self, _: list[str]) -> str:
+        return "\n".join(argument_lines())
+
+    def _asked(self, arguments: list[str]) -> str:
+        return "\n".join(Asked(self._trueangle, self.folder, self._known).lines(arguments))
+
+    def _python(self, code: str) -> str:
+        """A statement, or an expression with what it gives: a text, a picture, a value."""
+        from matplotlib import pyplot
+        from matplotlib.axes import Axes
+
+        with self._inside(), warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            try:
+                found = self._value(code)
+            except (trueangle.TrueAngleError, TypeError, ValueError) as error:
+                lines = [f"{type(error).__name__}: {error}"]
+            else:
+                figure = found.get_figure(root=True) if isinstance(found, Axes) else found
+                if hasattr(figure, "savefig"):
+                    lines = [*figure_lines(figure)]
+                else:
+                    lines = [] if found is None else [f"{found}"]
+        pyplot.close("all")
+        return "\n".join([*(f"{w.category.__name__}: {w.message}" for w in warned), *lines])
+
+    def _value(self, code: str) -> Any:
+        try:
+            expression = compile(code, "transcript", "eval")
+        except SyntaxError:
+            exec(compile(code, "transcript", "exec"), self._names)
+            return None
+        return eval(expression, self._names)
 
     @contextlib.contextmanager
     def _inside(self) -> Iterator[None]:

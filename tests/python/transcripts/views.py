@@ -1,4 +1,4 @@
-"""What files and figures hold, as lines to be compared: every name, and numbers to six digits."""
+"""What files hold, as lines to be compared: every name, and numbers to six digits."""
 
 from __future__ import annotations
 
@@ -137,24 +137,3 @@ def _page_lines(text: str) -> list[str]:
     page.feed(text)
     lines = (re.sub(r" +", " ", line).strip() for line in page.words.splitlines())
     return [line for line in lines if line]
-
-
-def figure_lines(figure: Any) -> Iterator[str]:
-    """Titles, names of axes and legends, and the numbers of every line and heap of points."""
-    for axes in figure.axes:
-        yield " | ".join([axes.get_title(), axes.get_xlabel(), axes.get_ylabel()])
-        legend = axes.get_legend()
-        if legend is not None:
-            yield "  legend: " + "; ".join(text.get_text() for text in legend.get_texts())
-        for text in axes.texts:
-            yield f"  text: {text.get_text()!r}"
-        for kind, drawn in (("line", axes.lines), ("points", axes.collections)):
-            for artist in drawn:
-                data = artist.get_xydata() if kind == "line" else artist.get_offsets()
-                xy = np.asarray(data, dtype=float)
-                if xy.size > 2:
-                    yield f"  {kind} {artist.get_label()!r} x: {numbers_line(xy[:, 0])}"
-                    yield f"  {kind} {artist.get_label()!r} y: {numbers_line(xy[:, 1])}"
-        heights = [patch.get_height() for patch in axes.patches if hasattr(patch, "get_height")]
-        if heights:
-            yield f"  bars: {numbers_line(heights)}"
