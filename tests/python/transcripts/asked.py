@@ -12,14 +12,13 @@ import contextlib
 import importlib
 import inspect
 import re
+import shlex
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from trueangle.cli import build_parser
 from trueangle.runs.run import CalibrationRun
-
-from .views import file_lines
 
 #: The doors of the package through which commands go.
 DOORS = (
@@ -31,7 +30,7 @@ DOORS = (
     "fleets.plan_unit", "rehearsal.after.plan_after", "simulation.simulate", "diagnosis.diagnose",
     "rehearsal.rehearse", "reports.report", "fleets.fleet.fleet", "export.export_model",
     "export.import_model", "selfcalibration.selfcal", "model.monitor.Monitor",
-    "model.batches.read_batches", "cli.robotmodel.joint_asked", "plots.kinds.fit_plot",
+    "model.batches.read_batches", "plots.kinds.fit_plot",
     "plots.modelerror.model_error",
 )  # fmt: skip
 
@@ -46,7 +45,7 @@ LONG = 150
 
 #: What is given to an option, by the end of its name; numbers and choices need none.
 VALUES = {
-    "angles": "0,120", "arc": "0:90", "between": "backlash,latency", "causes": "backlash",
+    "angles": "0,120", "by": "run", "reference": "off-null", "arc": "0:90", "between": "backlash,latency", "causes": "backlash",
     "count": "4", "errors_in": "mrad", "certificate": "identity.toml", "column": "indicated_deg", "every": "2turns",
     "existing": "printer.cfg", "facets": "facets.csv", "head_angles": "0,119.2", "joint": "elbow",
     "into_joint": "knee", "limits": "limits.toml", "model": "other.json", "nuisance": "ramp",
@@ -70,7 +69,7 @@ class Asked:
     ``known`` holds what was told of other lines of the command, which is not told again.
     """
 
-    def __init__(self, run: Callable[[list[str]], str], folder: Path, known: set[str]) -> None:
+    def __init__(self, run: Callable[[str], list[str]], folder: Path, known: set[str]) -> None:
         self._run, self._folder, self._known = run, folder, known
         self._calls: list[tuple[str, dict[str, str], Any]] = []
         self._told = ""
@@ -114,14 +113,14 @@ class Asked:
         """What is printed and written; and nothing stays."""
         known = {path: path.read_bytes() for path in self._folder.iterdir() if path.is_file()}
         self._at, self._told = 0, ""
-        text = self._run(words)
+        text = "\n".join(self._run(shlex.join(["trueangle", *words])))
         files = {}
         for path in [path for path in self._folder.iterdir() if path.is_file()]:
             content = path.read_bytes()
             if known.get(path) != content:
                 files[path.name] = b"" if path.suffix in TIMED else content
                 if path.suffix == ".html":
-                    files[path.name] = "\n".join(file_lines(content.decode(), ".html")).encode()
+                    files[path.name] = "\n".join(self._run(f"show {path.name}")).encode()
                 path.unlink()
                 if path in known:
                     path.write_bytes(known[path])
@@ -196,7 +195,9 @@ def _spread(signature: inspect.Signature, args: Any, kwargs: Any) -> dict[str, s
 
 def _text(value: Any) -> str:
     if isinstance(value, list) and value and isinstance(value[0], CalibrationRun):
-        return f"{len(value)} runs"
+        return f"{len(value)} runs ({sum(float(run.indicated.sum()) for run in value):.6g})"
+    if hasattr(value, "text") and callable(value.text):
+        return f"{value} {value.text()}"
     return re.sub(r" at 0x[0-9a-f]+", "", repr(value))
 
 

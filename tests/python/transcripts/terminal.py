@@ -29,6 +29,7 @@ COLUMNS = 100
 ALTERS = (
     (re.compile(r"\b[0-9a-f]{64}\b"), "SHA256"),
     (re.compile(r"\b20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|\+00:00)"), "NOW"),
+    (re.compile(r"\bwritten 20\d\d-\d\d-\d\d\b"), "written TODAY"),
     (re.compile(r"[\d,]+ rows/s"), "SPEED rows/s"),
     (re.compile(r"seconds [\d.e+-]+(?=, (?:complete|rows_per_second))"), "seconds TIME"),
     (re.compile(r"rows_per_second [\d.e+-]+"), "SPEED"),
@@ -110,7 +111,7 @@ class Terminal:
         return "\n".join(argument_lines())
 
     def _asked(self, arguments: list[str]) -> str:
-        return "\n".join(Asked(self._trueangle, self.folder, self._known).lines(arguments))
+        return "\n".join(Asked(self.lines, self.folder, self._known).lines(arguments))
 
     def _python(self, code: str) -> str:
         """A statement, or an expression with what it gives: a text, a picture, a value."""
