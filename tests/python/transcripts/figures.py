@@ -7,10 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .views import numbers_line, shown
-
-#: So many numbers of a mark are shown one by one.
-FEW = 6
+from .views import few_numbers, shown
 
 
 def figure_lines(figure: Any) -> Iterator[str]:
@@ -29,13 +26,13 @@ def figure_lines(figure: Any) -> Iterator[str]:
         if legend is not None:
             yield "  legend: " + "; ".join(text.get_text() for text in legend.get_texts())
         for text in axes.texts:
-            place = _few(getattr(text, "xy", text.get_position()))
+            place = few_numbers(getattr(text, "xy", text.get_position()))
             yield f"  text: {text.get_text()!r} at {place} {_colour(text.get_color())}"
         for kind, artist, points in _marks(axes):
             label = artist.get_label()
             yield f"  {kind} {'' if label.startswith('_') else label!r} {_style(artist)}"
             for name, values in zip("xy", points.T, strict=True):
-                yield f"    {name}: {_few(values)}"
+                yield f"    {name}: {few_numbers(values)}"
 
 
 def _axis_lines(axes: Any) -> Iterator[str]:
@@ -74,12 +71,6 @@ def _marks(axes: Any) -> Iterator[tuple[str, Any, np.ndarray[Any, Any]]]:
     for patch in axes.patches:
         corners = patch.get_path().transformed(patch.get_patch_transform()).get_extents()
         yield "bar", patch, np.asarray(corners.get_points())
-
-
-def _few(values: Any) -> str:
-    if len(values) > FEW:
-        return numbers_line(values)
-    return ", ".join(shown(float(value)) for value in values)
 
 
 def _style(artist: Any) -> str:

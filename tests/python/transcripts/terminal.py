@@ -20,6 +20,7 @@ from trueangle.cli import main
 
 from .arguments import argument_lines
 from .asked import Asked
+from .charts import chart_lines
 from .figures import figure_lines
 from .views import file_lines
 
@@ -43,7 +44,7 @@ class Terminal:
     """Runs the commands of one transcript, one after the other, in one folder.
 
     ``trueangle ...`` is the command itself, in this process. ``show FILE`` shows what a file
-    holds (`views`), ``figures`` what the pictures drawn since show, and ``hide KEY=VALUE ...``
+    holds (`views`), ``charts FILE`` what a page draws (`charts`), ``figures`` what the pictures drawn since show, and ``hide KEY=VALUE ...``
     writes ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it. ``write FILE
     LINE ...`` writes a small file, ``options`` tells every argument of every command,
     ``asked ...`` what each further option of a command line changes (`asked`), and ``python ...`` is a line of Python: what it gives, draws, warns of or raises.
@@ -53,15 +54,15 @@ class Terminal:
         self.folder = folder
         self._figures: list[str] = []
         self._known: set[str] = set()
-        self._names: dict[str, Any] = {"np": np, "planning": planning, "plots": plots}
-        self._names["ta"] = trueangle
+        self._names: dict[str, Any] = {"__name__": "transcript", "np": np, "plots": plots}
+        self._names |= {"planning": planning, "ta": trueangle}
 
     def lines(self, command: str) -> list[str]:
         """What the terminal shows of a command; a status other than 0 at the end, as ``[1]``."""
         program, _, rest = command.partition(" ")
         if program == "python":
             return self._settled(self._python(rest))
-        run = {"trueangle": self._trueangle, "show": self._show, "figures": self._drawn,
+        run = {"charts": self._charts, "trueangle": self._trueangle, "show": self._show, "figures": self._drawn,
                "hide": self._hide, "write": self._write, "options": self._options,
                "asked": self._asked}[program]  # fmt: skip
         return self._settled(run(shlex.split(rest)))
@@ -91,6 +92,9 @@ class Terminal:
     def _show(self, arguments: list[str]) -> str:
         path = self.folder / arguments[0]
         return "\n".join(file_lines(path.read_text(encoding="utf-8"), path.suffix))
+
+    def _charts(self, arguments: list[str]) -> str:
+        return "\n".join(chart_lines((self.folder / arguments[0]).read_text(encoding="utf-8")))
 
     def _drawn(self, arguments: list[str]) -> str:
         text, self._figures = "\n".join(self._figures), []
@@ -122,7 +126,7 @@ class Terminal:
             warnings.simplefilter("always")
             try:
                 found = self._value(code)
-            except (trueangle.TrueAngleError, TypeError, ValueError) as error:
+            except (trueangle.TrueAngleError, OSError, TypeError, ValueError) as error:
                 lines = [f"{type(error).__name__}: {error}"]
             else:
                 figure = found.get_figure(root=True) if isinstance(found, Axes) else found
