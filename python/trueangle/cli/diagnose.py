@@ -289,7 +289,11 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
             "fmu" if fmu else "mujoco",
             args.extend_into,
             noise_std=result.sensor_noise(),
-            **({"variant": "sensor"} if fmu else {"joint": args.into_joint or "joint", "ripple": ripple}),
+            **(
+                {"variant": "sensor"}
+                if fmu
+                else {"joint": args.into_joint or "joint", "ripple": ripple}
+            ),
         )
         left = "; the torque ripple is not in it: a file of MuJoCo (.xml) has a place for it"
         return f"\nSensor of what is confirmed: {made.output}{left if fmu and ripple else ''}"

@@ -77,7 +77,8 @@ def fleet_history(fleet: Fleet, unit: str, errors_in: ErrorsIn = "auto") -> Axes
     legend(upper)
     figure.autofmt_xdate()
     return described(
-        upper, f"Control charts of {unit} on {counted(rows, 'date')}: {rows[-1].verdict} at the last."
+        upper,
+        f"Control charts of {unit} on {counted(rows, 'date')}: {rows[-1].verdict} at the last.",
     )
 
 

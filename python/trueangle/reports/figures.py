@@ -164,8 +164,8 @@ def phase_figure(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None
         for order in sorted(found, key=lambda p: p.order)
     ]
     alt = (
-        f"Phases of {counted(charts, 'order')}, a chart for each, one dot per run. Dots of one order "
-        "on a level line are a systematic error."
+        f"Phases of {counted(charts, 'order')}, a chart for each, one dot per run. Dots of one "
+        "order on a level line are a systematic error."
     )
     return chart_figure(alt, charts, "multiples")
 

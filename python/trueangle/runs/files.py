@@ -307,8 +307,8 @@ def _warn_of_empty(
         line = table.format.line_of(table.path, row)
         warnings.warn(
             f"{table.path}: {count} of {counted(missing.size, 'row')} "
-            f"{'has an empty cell and is' if count == 1 else 'have an empty cell and are'} left out, "
-            f"the first at line {line}, column '{_column_of(table, role)}'",
+            f"{'has an empty cell and is' if count == 1 else 'have an empty cell and are'} left "
+            f"out, the first at line {line}, column '{_column_of(table, role)}'",
             EmptyCellsWarning,
             stacklevel=level_of_caller(),
         )

@@ -198,7 +198,9 @@ def signal_column(name: str, values: ArrayLike, size: int | None) -> NDArray[np.
     if size is None and array.size == 0:
         raise ArgumentError(f"{name} is empty: a run needs at least one reading")
     if size is not None and array.size != size:
-        raise ArgumentError(f"{name} has {counted(int(array.size), 'reading')}, reference has {size}")
+        raise ArgumentError(
+            f"{name} has {counted(int(array.size), 'reading')}, reference has {size}"
+        )
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         i = int(bad[0])

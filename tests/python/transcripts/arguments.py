@@ -39,7 +39,9 @@ def _told(action: argparse.Action) -> str:
     parts += [f"as often as wanted: {action.nargs}"] if action.nargs not in (None, 0) else []
     parts += ["repeated"] if isinstance(action, argparse._AppendAction) else []
     parts += ["switch"] if action.nargs == 0 else []
-    parts += [f"= {action.default!r}"] if action.default not in (None, "") and action.nargs != 0 else []
+    parts += (
+        [f"= {action.default!r}"] if action.default not in (None, "") and action.nargs != 0 else []
+    )
     parts += ["of " + ", ".join(map(str, action.choices))] if action.choices else []
     values = {"default": action.default, "prog": "trueangle"}
     return f"{' '.join(parts)}: {(action.help or '') % values}"

@@ -45,8 +45,9 @@ LONG = 150
 
 #: What is given to an option, by the end of its name; numbers and choices need none.
 VALUES = {
-    "angles": "0,120", "by": "run", "reference": "off-null", "arc": "0:90", "between": "backlash,latency", "causes": "backlash",
-    "count": "4", "errors_in": "mrad", "certificate": "identity.toml", "column": "indicated_deg", "every": "2turns",
+    "angles": "0,120", "arc": "0:90", "between": "backlash,latency", "by": "run",
+    "causes": "backlash", "certificate": "identity.toml", "column": "indicated_deg", "count": "4",
+    "errors_in": "mrad", "every": "2turns", "reference": "off-null",
     "existing": "printer.cfg", "facets": "facets.csv", "head_angles": "0,119.2", "joint": "elbow",
     "into_joint": "knee", "limits": "limits.toml", "model": "other.json", "nuisance": "ramp",
     "option_bits": "12", "option_entries": "64", "option_counts_per_turn": "65536",
@@ -94,7 +95,9 @@ class Asked:
                     self._known.add(f"{words[0]} {line}")
                     yield line
 
-    def _change(self, words: list[str], more: list[str], before: tuple[str, dict[str, bytes]]) -> str:
+    def _change(
+        self, words: list[str], more: list[str], before: tuple[str, dict[str, bytes]]
+    ) -> str:
         text, files = self._asked([*words, *more])
         if self._told:
             return self._told
@@ -203,7 +206,9 @@ def _text(value: Any) -> str:
 
 def _listed(arguments: dict[str, str]) -> str:
     """Names and values; of long ones the kind."""
-    told = {k: v if len(v) < LONG else f"({v.split('(')[0][:20]} ...)" for k, v in arguments.items()}
+    told = {
+        k: v if len(v) < LONG else f"({v.split('(')[0][:20]} ...)" for k, v in arguments.items()
+    }
     return ", ".join(f"{name} {text}" for name, text in told.items()) or "as by default"
 
 

@@ -38,7 +38,8 @@ def chart_lines(page: str) -> Iterator[str]:
     for name, figure in figures.items():
         yield f"figure {name}, {figure['arrangement']}: {figure['alt']}"
         for chart in figure["charts"]:
-            yield f"  chart {chart['title']!r} wide {shown(chart['grow'])} high {chart['height_rem']}"
+            size = f"{shown(chart['grow'])} wide, {chart['height_rem']} high"
+            yield f"  chart {chart['title']!r}, {size}"
             for entry in chart["legend"]:
                 yield f"    legend: {entry['sign']} {entry['label']} {entry['colour']}"
             yield from _figure_lines(chart["document"]["doc"]["roots"][0]["attributes"])

@@ -1,4 +1,4 @@
-"""What figures of matplotlib show, as lines to be compared: words, axes, marks and their colours."""
+"""What figures of matplotlib show, as lines to be compared: words, axes, marks, colours."""
 
 from __future__ import annotations
 

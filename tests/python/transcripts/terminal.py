@@ -43,11 +43,12 @@ ALTERS = (
 class Terminal:
     """Runs the commands of one transcript, one after the other, in one folder.
 
-    ``trueangle ...`` is the command itself, in this process. ``show FILE`` shows what a file
-    holds (`views`), ``charts FILE`` what a page draws (`charts`), ``figures`` what the pictures drawn since show, and ``hide KEY=VALUE ...``
-    writes ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it. ``write FILE
-    LINE ...`` writes a small file, ``options`` tells every argument of every command,
-    ``asked ...`` what each further option of a command line changes (`asked`), and ``python ...`` is a line of Python: what it gives, draws, warns of or raises.
+    ``trueangle ...`` is the command itself, in this process, and ``python ...`` a line of Python:
+    what it gives, draws, warns of or raises. ``show FILE [PATTERN]`` shows what a file holds
+    (`views`), ``charts FILE`` what a page draws (`charts`), ``figures`` what the pictures drawn
+    since show (`figures`). ``write FILE LINE ...`` writes a small file, and ``hide KEY=VALUE ...``
+    ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it. ``options`` tells
+    every argument of every command, ``asked ...`` what each further option changes (`asked`).
     """
 
     def __init__(self, folder: Path) -> None:
@@ -62,9 +63,11 @@ class Terminal:
         program, _, rest = command.partition(" ")
         if program == "python":
             return self._settled(self._python(rest))
-        run = {"charts": self._charts, "trueangle": self._trueangle, "show": self._show, "figures": self._drawn,
-               "hide": self._hide, "write": self._write, "options": self._options,
-               "asked": self._asked}[program]  # fmt: skip
+        run = {
+            "asked": self._asked, "charts": self._charts, "figures": self._drawn,
+            "hide": self._hide, "options": self._options, "show": self._show,
+            "trueangle": self._trueangle, "write": self._write,
+        }[program]  # fmt: skip
         return self._settled(run(shlex.split(rest)))
 
     def _settled(self, text: str) -> list[str]:
@@ -90,8 +93,9 @@ class Terminal:
         return text + warned.getvalue() + (f"[{status}]" if status else "")
 
     def _show(self, arguments: list[str]) -> str:
-        path = self.folder / arguments[0]
-        return "\n".join(file_lines(path.read_text(encoding="utf-8"), path.suffix))
+        path, wanted = self.folder / arguments[0], " ".join(arguments[1:])
+        lines = file_lines(path.read_text(encoding="utf-8"), path.suffix)
+        return "\n".join(line for line in lines if re.search(wanted, line))
 
     def _charts(self, arguments: list[str]) -> str:
         return "\n".join(chart_lines((self.folder / arguments[0]).read_text(encoding="utf-8")))
