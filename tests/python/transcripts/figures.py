@@ -28,7 +28,7 @@ def figure_lines(figure: Any) -> Iterator[str]:
         for text in axes.texts:
             place = few_numbers(getattr(text, "xy", text.get_position()))
             yield f"  text: {text.get_text()!r} at {place} {_colour(text.get_color())}"
-        for kind, artist, points in _marks(axes):
+        for kind, artist, points in figure_marks(axes):
             label = artist.get_label()
             yield f"  {kind} {'' if label.startswith('_') else label!r} {_style(artist)}"
             for name, values in zip("xy", points.T, strict=True):
@@ -54,7 +54,7 @@ def _axis_lines(axes: Any) -> Iterator[str]:
         yield line
 
 
-def _marks(axes: Any) -> Iterator[tuple[str, Any, np.ndarray[Any, Any]]]:
+def figure_marks(axes: Any) -> Iterator[tuple[str, Any, np.ndarray[Any, Any]]]:
     """Kind, artist and points of everything that is drawn."""
     for line in axes.lines:
         if line.get_marker() in ("|", "_"):
