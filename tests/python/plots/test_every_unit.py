@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from transcripts.figures import figure_marks
 from trueangle import plots
 from trueangle.reports.robot import fitted_rank
 from trueangle.reports.watched import WatchReport
-
-from transcripts.figures import figure_marks
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
