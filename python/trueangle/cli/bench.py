@@ -7,11 +7,15 @@ from typing import Any
 
 from ..support.files import PICTURE
 from ..support.plainresult import json_text
+from .options import refuse_given
 from .paths import Output
 from .pictures import save_picture
 
 HELP = "measure evaluation, correction and fits here, and those of other libraries"
 EXAMPLE = "trueangle bench --json"
+
+#: Readings of a batch, and at most of what grows.
+_SAMPLES, _LARGEST = 1_000_000, 1e7
 
 #: A unit of a fleet takes as long as so many readings of a fit.
 _READINGS_TO_A_UNIT = 10_000
@@ -19,7 +23,9 @@ _READINGS_TO_A_UNIT = 10_000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("--samples", type=int, default=1_000_000, help="size of the large batches")
+    parser.add_argument(
+        "--samples", type=int, metavar="N", help="size of the large batches (default: 1000000)"
+    )
     parser.add_argument("--rounds", type=int, default=5, help="rounds of each measurement")
     parser.add_argument(
         "--scaling",
@@ -29,7 +35,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--largest",
         type=float,
-        default=1e7,
         metavar="N",
         help="with --scaling: most readings (24 bytes of memory each), 1e7 by default; fleets have "
         "up to N / 10000 units",
@@ -51,10 +56,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Measure and print."""
     if args.scaling:
+        refuse_given(args, ("samples",), "does not go with --scaling: it has --largest")
+        args.largest = _LARGEST if args.largest is None else args.largest
         return _scaling(args)
     from ..errors import ArgumentError
     from .benchmarks import evaluation, fit
 
+    refuse_given(args, ("largest", "workers", "plot"), "goes with --scaling")
+    args.samples = _SAMPLES if args.samples is None else args.samples
     if args.samples < 1 or args.rounds < 1:
         raise ArgumentError(
             f"--samples and --rounds must be 1 or more, got {args.samples} and {args.rounds}"

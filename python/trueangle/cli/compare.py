@@ -7,7 +7,7 @@ import argparse
 from ..support.plainresult import json_text
 from .options import add_errors_in, errors_in
 from .paths import Input
-from .robotmodel import model_asked
+from .robotmodel import model_asked, refuse_joint
 
 HELP = "difference of two models per order and over the turn"
 EXAMPLE = "trueangle compare present.json joint_a.json"
@@ -37,6 +37,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the difference."""
     from ..export import compare
 
+    refuse_joint(args.joint, (args.first, args.second))
     first, second = (model_asked(path, args.joint) for path in (args.first, args.second))
     result = compare(first, second)
     if args.json:

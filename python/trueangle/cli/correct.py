@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of the angle (default: the ending of its name, else the model's)",
     )
     add("--counts-per-turn", type=float, metavar="N", help="of an angle in counts")
-    add_signals(parser, counts=False, runs=False)
+    add_signals(parser, counts=False, runs=False, reference=False)
     add(
         "--output-topic",
         metavar="NAME",
@@ -152,6 +152,8 @@ def _columns_of_joints(
                 f"--joint {joint}: it has no model{did_you_mean(joint, known)}; the joints are "
                 f"{listed_names(known)}"
             )
+    if args.robot is None:
+        signals_by_joint(args.signal, single=False)  # that of a joint has its name before it
     if args.joint and whole:
         models.update(load_robot(models.pop(None)))
     for joint in known if args.joint else ():

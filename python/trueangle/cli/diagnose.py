@@ -11,7 +11,14 @@ from ..errors import ArgumentError, NoModelError, TrueAngleError
 from ..support.deadline import ending_early
 from ..support.files import MODEL, SENSOR, SIMULATION
 from ..support.plainresult import json_text
-from .options import add_argument_choice, add_errors_in, add_joint, add_progress, errors_in
+from .options import (
+    add_argument_choice,
+    add_errors_in,
+    add_joint,
+    add_progress,
+    errors_in,
+    refuse_given,
+)
 from .paths import Input, Output
 from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
 from .signal_options import reading, signals_by_joint
@@ -63,7 +70,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--into-joint",
-        default="joint",
         metavar="NAME",
         help="name of the joint in MuJoCo (default: joint)",
     )
@@ -121,6 +127,7 @@ def run(args: argparse.Namespace) -> int:
             "--corrected-model with --simulated: no correction model can hold what is known as a "
             "log only; leave it out, or write what is found with --extend FILE"
         )
+    _refuse_idle(args)
     asked = joints_asked(args)
     if asked is not None:
         return _robot(*asked, args)
@@ -154,16 +161,31 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _refuse_idle(args: argparse.Namespace) -> None:
+    """Refuse options that need another one beside them."""
+    if args.simulated is None:
+        refuse_given(args, ("simulated_by",), "joins the log of a simulator: add --simulated LOG")
+    if args.extend_into is None or _is_fmu(args.extend_into):
+        refuse_given(args, ("into_joint",), "is of MuJoCo: add --extend-into FILE.xml")
+    if args.corrected_model is None and args.argument != "auto":
+        raise ArgumentError("--argument is of a correction model: add --corrected-model FILE")
+
+
+def _is_fmu(path: str) -> bool:
+    return str(path).lower().endswith(".fmu")
+
+
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
     """Diagnose every joint against its simulation, or an empty one of its gear."""
     from ..diagnosis import diagnose
     from ..reports.robot import diagnosed_rank, plain_ranking, ranked
     from .run_lists import read_checked
 
-    if any(given is not None for given in (args.simulated, args.extend, args.model, args.plan)):
+    single = (args.simulated, args.extend, args.extend_into, args.model, args.plan)
+    if any(given is not None for given in single):
         raise ArgumentError(
-            "--simulated, --extend, --plan and --model are of one joint: leave --robot out and "
-            "name its columns with --signal ROLE=NAME"
+            "--simulated, --extend, --extend-into, --plan and --model are of one joint: leave "
+            "--robot out and name its columns with --signal ROLE=NAME"
         )
 
     def work(joint: JointAsked) -> Diagnosis:
@@ -177,7 +199,10 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
         plain = {joint: result.to_dict() for joint, result in found.items()}
         print(json_text({"joints": plain, "ranking": plain_ranking(ranking)}))
     else:
-        texts = {row.joint: found[row.joint].summary(errors_in(args)) for row in ranking}
+        texts = {
+            row.joint: found[row.joint].summary(errors_in(args), verbose=args.verbose)
+            for row in ranking
+        }
         title = f"Diagnosis of {name or 'the robot'}, the worst joint first:"
         print(robot_messages(title, ranking, texts, errors_in(args)), flush=True)
     if args.corrected_model is not None:
@@ -210,10 +235,10 @@ def _believed(args: argparse.Namespace, empty: bool = False) -> Simulation | Non
 
     stated = args.gear_ratio is not None or args.shaft
     if args.simulation is not None:
-        if stated:
+        if stated or args.fixed_member != "circular_spline":
             raise ArgumentError(
-                "--gear-ratio and --shaft with --simulation: the simulation states the joint; "
-                "leave them out"
+                "--gear-ratio, --fixed-member and --shaft with --simulation: the simulation "
+                "states the joint; leave them out"
             )
         return load_simulation(args.simulation)
     if not stated and not empty:
@@ -250,7 +275,7 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
     def sense() -> str:
         from ..export import export_model
 
-        fmu = str(args.extend_into).lower().endswith(".fmu")
+        fmu = _is_fmu(args.extend_into)
         try:
             sensor = result.sensor(without_any=not fmu and bool(ripple))
         except NoModelError as error:
@@ -264,7 +289,11 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
             "fmu" if fmu else "mujoco",
             args.extend_into,
             noise_std=result.sensor_noise(),
-            **({"variant": "sensor"} if fmu else {"joint": args.into_joint, "ripple": ripple}),
+            **(
+                {"variant": "sensor"}
+                if fmu
+                else {"joint": args.into_joint or "joint", "ripple": ripple}
+            ),
         )
         left = "; the torque ripple is not in it: a file of MuJoCo (.xml) has a place for it"
         return f"\nSensor of what is confirmed: {made.output}{left if fmu and ripple else ''}"

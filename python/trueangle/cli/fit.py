@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from ..support.plainresult import json_text
-from .onepass import add_one_pass, log_options, wants_one_pass
+from .onepass import add_one_pass, log_options, refuse_robot, wants_one_pass
 from .options import (
     add_argument_choice,
     add_covariance,
@@ -96,8 +96,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     """Fit every joint; one file of all models."""
     from ..reports.robot import fitted_rank, plain_ranking, ranked
 
-    if args.one_pass or args.scheduler:
-        raise ArgumentError("--one-pass and --scheduler go with one joint: leave --robot out")
+    refuse_robot(args)
     runs: dict[str, Any] = {}
 
     def work(joint: JointAsked) -> Any:

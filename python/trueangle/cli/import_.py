@@ -6,7 +6,7 @@ import argparse
 
 from ..support.angles import zero_text
 from ..support.display_units import error_unit
-from ..support.plainresult import json_text
+from ..support.plainresult import counted, json_text
 from .export import add_target_options, target_options
 from .options import add_errors_in, add_model_output, errors_in
 from .paths import Input
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         print(json_text(content))
         return 0
     print(
-        f"{args.output}: {len(rows)} orders, "
+        f"{args.output}: {counted(rows, 'order')}, "
         f"zero {zero_text(model.constant * 360.0 / model.period, 360.0)}"
     )
     largest = max((row["amplitude_arcsec"] for row in rows), default=0.0)

@@ -11,6 +11,14 @@ from .paths import Input, Output
 from .signal_options import add_signals
 from .values import names, seconds
 
+#: What is of other plans.
+OTHERS = (
+    *("gear_ratio", "positions", "mounts", "reference", "tilts", "tilt_arcsec", "orders"),
+    *("noise_arcsec", "std_arcsec", "arc", "readings", "runs", "both_directions", "apart"),
+    *("uncertainty", "prior", "self_method", "count", "angles", "speed_ratio", "start_speed"),
+    "rate",
+)
+
 
 def add_after_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of ``--after``."""
@@ -62,6 +70,7 @@ def run_after(args: argparse.Namespace) -> int:
 
     if args.simulation is None:
         raise ArgumentError("--after needs what is believed: add --simulation FILE")
+    refuse_given(args, OTHERS, "does not go with --after; leave one of them out")
     args.runs = args.after
     plan = plan_after(
         read_checked(args),

@@ -58,6 +58,18 @@ def wants_one_pass(args: argparse.Namespace) -> bool:
     return asked
 
 
+def refuse_robot(args: argparse.Namespace) -> None:
+    """Refuse one pass over the logs of several joints.
+
+    Raises
+    ------
+    ArgumentError
+        It was asked for.
+    """
+    if args.one_pass or args.scheduler:
+        raise ArgumentError("--one-pass and --scheduler go with one joint: leave --robot out")
+
+
 def _is_large(args: argparse.Namespace) -> bool:
     from ..runs.paths import find_logs, matched_paths
 

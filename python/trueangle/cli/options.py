@@ -156,4 +156,5 @@ def refuse_given(args: argparse.Namespace, options: Sequence[str], because: str)
     for name in options:
         value = getattr(args, name)
         if value is not None and value is not False:
-            raise ArgumentError(f"--{name.replace('_', '-')} {because}")
+            option = name.removesuffix("_method").replace("_", "-")  # --self is a word of Python
+            raise ArgumentError(f"--{option} {because}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from ..support.plainresult import json_text
-from .onepass import add_one_pass, log_options, wants_one_pass
+from .onepass import add_one_pass, log_options, refuse_robot, wants_one_pass
 from .options import (
     add_argument_choice,
     add_covariance,
@@ -56,6 +56,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the table of orders."""
     asked = joints_asked(args)
     if asked is not None:
+        refuse_robot(args)
         tables, _ = each_joint(asked[1], _of_joint)
         if args.json:
             print(json_text({"joints": {joint: t.to_dict() for joint, t in tables.items()}}))

@@ -22,7 +22,8 @@ GROUPS: Final = ("input", "model", "output", "other")
 
 #: Options that tell how files are read.
 _INPUT: Final = (
-    "--signal --column --unit --counts-per-turn --counts-per-turn-reference --topic --run --joint"
+    "--signal --column --unit --counts-per-turn --counts-per-turn-reference --topic --run --joint "
+    "--unit-from"
 )
 
 #: Options that tell what is printed or written, and how.

@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 HELP = "propose calibration positions that keep the wanted orders apart"
 EXAMPLE = "trueangle plan --gear-ratio 100 --positions 36 --mounts 2"
 
+#: Arcsec to which a polygon is tilted where nothing is stated.
+TILT = 1200.0
+#: What is of plans for whole turns alone.
+OF_TURNS = ("positions", "mounts", "reference", "tilts", "tilt_arcsec")
+
 #: Degrees over which an uncertainty is wanted where no arc is stated.
 WHOLE_TURN = (0.0, 360.0)
 
@@ -40,18 +45,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--reference",
         choices=("polygon", "off-null", "encoder"),
-        default="polygon",
         help="polygon: remount it; off-null: read the autocollimator at tilts instead; "
-        "encoder: a free reference encoder (default: %(default)s)",
+        "encoder: a free reference encoder (default: polygon)",
     )
     add(
         "--tilt-arcsec",
         type=float,
-        default=1200.0,
         metavar="U",
-        help="off-null: largest tilt to both sides (default: %(default)g)",
+        help=f"off-null: largest tilt to both sides (default: {TILT:g})",
     )
-    add("--tilts", type=int, default=2, metavar="T", help="off-null: tilts per facet (default: 2)")
+    add("--tilts", type=int, metavar="T", help="off-null: tilts per facet (default: 2)")
     add("--orders", metavar="1-17,202", help="orders wanted (default: 1-17 and the gear's own)")
     add("--noise-arcsec", type=float, metavar="S", help="scatter of one reading")
     add("--std-arcsec", type=float, metavar="U", help="standard error wanted: gives the readings")
@@ -146,12 +149,20 @@ def _planned(
         "noise": args.noise_arcsec,
         "standard_error": args.std_arcsec,
     }
+    if args.reference != "off-null":
+        refuse_given(args, ("tilts", "tilt_arcsec"), "goes with --reference off-null")
+    if args.reference in ("encoder", "off-null"):
+        refuse_given(args, ("mounts",), f"is of a polygon, not of --reference {args.reference}")
     if args.reference == "encoder":
         return planning.plan_encoder(args.gear_ratio, args.positions, **common)
     positions = 36 if args.positions is None else args.positions
     if args.reference == "off-null":
         return planning.plan_tilts(
-            args.gear_ratio, positions, args.tilts, tilt_arcsec=args.tilt_arcsec, **common
+            args.gear_ratio,
+            positions,
+            2 if args.tilts is None else args.tilts,
+            tilt_arcsec=TILT if args.tilt_arcsec is None else args.tilt_arcsec,
+            **common,
         )
     mounts = 2 if args.mounts is None else args.mounts
     return planning.plan_mounts(args.gear_ratio, positions, mounts, **common)
@@ -160,7 +171,8 @@ def _planned(
 def _of_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> ArcPlan:
     from ..planning.arc import plan_arc
 
-    refuse_given(args, ("positions", "mounts"), "is of plans for whole turns: it has --readings")
+    refuse_given(args, OF_TURNS, "is of plans for whole turns: it has --readings")
+    refuse_given(args, ("gear_ratio",), "is of plans for whole turns: name its orders by --orders")
     start, stop = WHOLE_TURN if args.arc is None else args.arc
     return plan_arc(
         start,
@@ -179,7 +191,7 @@ def _of_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> ArcPl
 def _of_unit(args: argparse.Namespace, orders: tuple[float, ...] | None) -> UnitPlan:
     from ..fleets import load_fleet, plan_unit
 
-    others = ("positions", "mounts", "runs", "both_directions", "apart", "std_arcsec")
+    others = (*OF_TURNS, "gear_ratio", "runs", "both_directions", "apart", "std_arcsec")
     refuse_given(args, others, "does not go with --prior; leave one of them out")
     if (args.uncertainty is None) == (args.readings is None):
         raise ArgumentError(
@@ -202,7 +214,7 @@ def _of_self(args: argparse.Namespace, orders: tuple[float, ...] | None) -> Self
     from ..planning.selfplan import plan_self
 
     others = (
-        *("positions", "mounts", "arc", "readings", "runs", "both_directions", "apart"),
+        *(*OF_TURNS, "arc", "readings", "runs", "both_directions", "apart"),
         *("uncertainty", "prior"),
     )
     refuse_given(args, others, "is of plans with a reference: leave it or --self out")

@@ -9,10 +9,10 @@ from ..errors import ArgumentError
 from ..support.files import PICTURE
 from ..support.layout import laid_out
 from ..support.plainresult import json_text
-from .options import add_errors_in, add_joint, add_orders, errors_in
+from .options import add_errors_in, add_joint, add_orders, errors_in, refuse_given
 from .paths import Input, Output
 from .pictures import save_picture
-from .robotmodel import model_asked
+from .robotmodel import model_asked, refuse_joint
 from .values import declared_shafts, orders_by_shaft
 
 if TYPE_CHECKING:
@@ -78,6 +78,11 @@ def _of_model(args: argparse.Namespace) -> Axes:
         raise ArgumentError(
             "one model has one picture: give one file and leave --kind out, or give the runs"
         )
+    of_runs = ("gear_ratio", "shaft", "signal", "counts_per_turn_reference", "topic", "facets")
+    refuse_given(args, (*of_runs, "unit_from"), "is of a picture of runs, and this is of a model")
+    if args.orders != "auto":
+        raise ArgumentError("--orders is of a picture of runs, and this is of a model")
+    refuse_joint(args.joint, args.files)
     return model_error(model_asked(args.files[0], args.joint), errors_in=errors_in(args))
 
 
@@ -86,6 +91,7 @@ def _of_runs(args: argparse.Namespace) -> Axes:
     from ..plots.kinds import fit_plot
     from .run_lists import read_checked
 
+    refuse_given(args, ("joint",), "is of the model file of a robot, and these are runs")
     args.runs = args.files
     found = fit(
         read_checked(args),

@@ -9,7 +9,14 @@ from ..errors import ArgumentError
 from ..support.deadline import with_pace
 from ..support.files import PDF, REPORT
 from ..support.plainresult import json_text
-from .options import add_errors_in, add_joint, add_orders, add_progress, errors_in
+from .options import (
+    add_errors_in,
+    add_joint,
+    add_orders,
+    add_progress,
+    errors_in,
+    refuse_given,
+)
 from .paths import Input, Output
 from .robots import add_robot, each_joint, joints_asked
 from .values import declared_shafts, orders_by_shaft
@@ -66,8 +73,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--by",
         choices=("unit", "run"),
-        default="unit",
-        help="what tells the units of --fleet apart",
+        help="what tells the units of --fleet apart (default: the column unit; without one, the "
+        "runs)",
     )
     add(
         "--permitted-arcsec",
@@ -90,8 +97,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the report."""
     if args.fleet:
         return _fleet(args)
-    if args.permitted_arcsec is not None:
-        raise ArgumentError("--permitted-arcsec is of a report on a fleet: add --fleet")
+    refuse_given(args, ("permitted_arcsec", "by"), "is of a report on a fleet: add --fleet")
     asked = joints_asked(args)
     if asked is not None:
         return _robot(*asked, args)
@@ -135,11 +141,9 @@ def _fleet(args: argparse.Namespace) -> int:
     from ..reports.fleet import FleetReport
     from .fleet import requested_fleet
 
-    if not {args.certificate, args.pdf, args.model, args.simulation, args.robot} <= {None}:
-        raise ArgumentError(
-            "--fleet is a report on many units: --certificate, --pdf, --model, --simulation and "
-            "--robot are of one"
-        )
+    single = ("certificate", "pdf", "model", "simulation", "robot", "joint", "positions")
+    refuse_given(args, single, "is of one joint, and --fleet is a report on many units")
+    args.by = args.by or "unit"
     args.orders = None if args.orders == "auto" else args.orders
     title = args.title or "Angle error of a fleet"
     found = requested_fleet(args, permitted_arcsec=args.permitted_arcsec)

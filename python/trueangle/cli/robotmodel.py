@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
@@ -14,6 +15,20 @@ if TYPE_CHECKING:
 def model_asked(path: str, joint: str | None = None) -> HarmonicModel:
     """The model of a file, or that of one joint of a robot's file; errors as `joint_asked`."""
     return joint_asked(path, joint)[0]
+
+
+def refuse_joint(joint: str | None, paths: Sequence[str]) -> None:
+    """Refuse the name of a joint where no file is that of a robot.
+
+    Raises
+    ------
+    ArgumentError
+        Every file holds the model of one joint, which has no name.
+    """
+    from ..model.robotfile import is_robot_file
+
+    if joint is not None and not any(map(is_robot_file, paths)):
+        raise ArgumentError(f"--joint {joint}: {paths[0]} is the model of one joint")
 
 
 def joint_asked(path: str, joint: str | None) -> tuple[HarmonicModel, dict[str, Any]]:

@@ -83,8 +83,8 @@ def joints_asked(args: argparse.Namespace) -> tuple[str, list[JointAsked]] | Non
         robot = RobotDescription("", tuple(JointDescription(name) for name in named))
     else:
         robot = load_description(args.robot)
-        for option in ("gear_ratio", "shaft", "simulation"):
-            if getattr(args, option, None):
+        for option in ("gear_ratio", "fixed_member", "shaft", "simulation"):
+            if getattr(args, option, None) not in (None, [], "circular_spline"):
                 raise ArgumentError(
                     f"--{option.replace('_', '-')} with --robot: the robot file states it of every "
                     "joint; leave it out"

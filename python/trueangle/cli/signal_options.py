@@ -16,7 +16,12 @@ ROLES = (
 )
 
 
-def add_signals(parser: argparse.ArgumentParser, counts: bool = True, runs: bool = True) -> None:
+def add_signals(
+    parser: argparse.ArgumentParser,
+    counts: bool = True,
+    runs: bool = True,
+    reference: bool = True,
+) -> None:
     """Declare ``--signal`` and what belongs to it; of ``runs``, what their reference is made of."""
     add = parser.add_argument
     signal = add(
@@ -34,12 +39,13 @@ def add_signals(parser: argparse.ArgumentParser, counts: bool = True, runs: bool
     )
     if counts:
         add("--counts-per-turn", type=float, metavar="N", help="of an indicated angle in counts")
-    add(
-        "--counts-per-turn-reference",
-        type=float,
-        metavar="N",
-        help="of a reference in counts",
-    )
+    if reference:
+        add(
+            "--counts-per-turn-reference",
+            type=float,
+            metavar="N",
+            help="of a reference in counts",
+        )
     add(
         "--topic",
         metavar="NAME",
@@ -106,7 +112,8 @@ def signals_by_joint(
     for joint, role, name, unit in entries or ():
         if single == (joint is not None):
             wanted = "ROLE=NAME" if single else "JOINT.ROLE=NAME"
-            raise ArgumentError(f"--signal: {wanted} is needed, got {joint or ''}.{role}={name}")
+            given = f"{joint}.{role}" if joint else role
+            raise ArgumentError(f"--signal: {wanted} is needed, got {given}={name}")
         roles = found if joint is None else found.setdefault(joint, {})
         if role == "reference_offset":
             roles.setdefault(role, []).append((name, unit))

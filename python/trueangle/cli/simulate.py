@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..support.plainresult import json_text
+from ..support.plainresult import counted, json_text
 from .options import add_runs_output
 from .paths import Input
 
@@ -40,5 +40,5 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json_text({"runs": len(runs), "samples": samples, "output": args.output}))
     else:
-        print(f"{args.output}: {samples} readings in {len(runs)} run{'s'[: len(runs) != 1]}")
+        print(f"{args.output}: {counted(samples, 'reading')} in {counted(runs, 'run')}")
     return 0

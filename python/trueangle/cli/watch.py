@@ -14,7 +14,7 @@ from ..support.plainresult import json_text
 from .options import add_errors_in, errors_in
 from .paths import Input, Output
 from .pictures import save_picture
-from .robotmodel import joint_asked
+from .robotmodel import joint_asked, refuse_joint
 from .robots import add_robot, joints_asked
 from .signal_options import add_signals, reading
 from .values import turns
@@ -121,8 +121,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _of_joint(args: argparse.Namespace) -> tuple[str | None, argparse.Namespace]:
     """The joint of a robot that is watched, if it is one, and the arguments as for it alone."""
-    from ..model.robotfile import is_robot_file
-
     if args.robot is not None or any(entry[0] is not None for entry in args.signal or ()):
         asked = joints_asked(args)
         joints = asked[1] if asked is not None else []
@@ -132,9 +130,9 @@ def _of_joint(args: argparse.Namespace) -> tuple[str | None, argparse.Namespace]
         return joints[0].name, joints[0].args
     if args.joint and len(args.joint) > 1:
         raise ArgumentError(f"one joint is watched at a time, got {', '.join(args.joint)}")
-    if args.joint and not is_robot_file(args.model):
-        raise ArgumentError(f"--joint {args.joint[0]}: {args.model} is the model of one joint")
-    return (args.joint[0] if args.joint else None), args
+    joint = args.joint[0] if args.joint else None
+    refuse_joint(joint, (args.model,))
+    return joint, args
 
 
 def _batches(

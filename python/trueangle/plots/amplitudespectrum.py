@@ -12,6 +12,7 @@ from ..fitting.orders import summary as orders_summary
 from ..fitting.orders.table import OrderSelection
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn
+from ..support.plainresult import counted
 from . import palette
 from .canvas import described, grid, legend, new_axes
 from .orderaxis import OrderAxis
@@ -129,8 +130,8 @@ def amplitude_spectrum(
     grid(ax, "y")
     legend(ax)
     named = largest_orders_text(lines, unit)
-    what = f"{len(lines)} fitted orders: {named}" if fitted else (
-        f"{len(lines)} candidate orders. Retained: {named}"
+    what = f"{counted(lines, 'fitted order')}: {named}" if fitted else (
+        f"{counted(lines, 'candidate order')}. Retained: {named}"
     )  # fmt: skip
     return described(ax, f"Amplitude of {what}.")
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import ArgumentError
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
+from ..support.plainresult import counted
 from ..support.suggestions import check_choice
 from . import palette
 from .canvas import described, grid, legend, new_figure
@@ -76,7 +77,8 @@ def fleet_history(fleet: Fleet, unit: str, errors_in: ErrorsIn = "auto") -> Axes
     legend(upper)
     figure.autofmt_xdate()
     return described(
-        upper, f"Control charts of {unit} on {len(rows)} dates: {rows[-1].verdict} at the last."
+        upper,
+        f"Control charts of {unit} on {counted(rows, 'date')}: {rows[-1].verdict} at the last.",
     )
 
 
@@ -138,9 +140,10 @@ def watched_windows(
         grid(ax)
     legend(upper)
     figure.align_ylabels()
-    first = f"; the first in window {alarms[0].window}: {alarms[0].because}" if alarms else ""
+    told = f"; the first in window {alarms[0].window}: " if alarms else ""
+    first = told + shown.spoken(alarms[0].because) if alarms else ""
     return described(
         upper,
-        f"Charts of {len(windows)} windows of a watched joint with their limit, {len(alarms)} "
-        f"alarm{'s' * (len(alarms) != 1)}{first}.",
+        f"Charts of {counted(windows, 'window')} of a watched joint with their limit, "
+        f"{counted(alarms, 'alarm')}{first}.",
     )

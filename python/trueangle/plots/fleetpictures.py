@@ -12,6 +12,7 @@ from ..errors import ArgumentError
 from ..support.angles import arcsec
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.plainresult import counted
 from ..support.suggestions import check_choice
 from . import palette
 from .canvas import described, grid, legend, new_axes, new_figure, turn_axis
@@ -155,7 +156,8 @@ def fleet_sizes(fleet: Fleet, ax: Axes | None = None, errors_in: ErrorsIn = "aut
     ax.set_ylabel(f"peak-to-peak / {shown.name}")
     grid(ax, "y")
     legend(ax)
-    return described(ax, f"Peak-to-peak of {len(ranked)} units and the band that holds the fleet.")
+    band = " and the band that holds the fleet" if math.isfinite(bound.peak_to_peak) else ""
+    return described(ax, f"Peak-to-peak of {counted(ranked, 'unit')}{band}.")
 
 
 def fleet_patterns(fleet: Fleet, errors_in: ErrorsIn = "auto", most: int = _PATTERNS) -> Axes:

@@ -117,5 +117,6 @@ def significance_amplitudes(selection: OrderSelection) -> Array:
 
 def likely_aliases(row: OrderRow) -> tuple[float, ...]:
     """Aliases of an order, those that are known lines of the joint alone where there are any."""
-    known = tuple(e.order for e in row.explanations if e.order != row.order)
-    return known or row.aliases
+    # Of several gears one line may be explained in several ways.
+    known = dict.fromkeys(e.order for e in row.explanations if e.order != row.order)
+    return tuple(known) or row.aliases

@@ -21,6 +21,7 @@ from ..plots.readingpictures import (
 from ..plots.simulatedcurves import ErrorLeft, error_left_of, simulated_points
 from ..support.arrays import Array
 from ..support.display_units import significant
+from ..support.plainresult import counted
 from .charts import Chart, Figure, chart_figure, chart_run_marker, css_run_colour
 from .linenames import LineNames
 from .panelcharts import panel_figure
@@ -163,8 +164,8 @@ def phase_figure(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None
         for order in sorted(found, key=lambda p: p.order)
     ]
     alt = (
-        f"Phases of {len(charts)} orders, a chart for each, one dot per run. Dots of one order "
-        "on a level line are a systematic error."
+        f"Phases of {counted(charts, 'order')}, a chart for each, one dot per run. Dots of one "
+        "order on a level line are a systematic error."
     )
     return chart_figure(alt, charts, "multiples")
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..errors import EmptyCellsWarning, FileError, level_of_caller
 from ..support.files import Source
 from ..support.kinds import told_kinds
+from ..support.plainresult import counted
 from ..support.roles import LABELS, Column, count_turn, signal_code, unit_in_name
 from ..support.signals import FIELDS
 from ..support.times import local_day
@@ -305,8 +306,9 @@ def _warn_of_empty(
         role = next(role for role, found in values.items() if np.isnan(found[row]))
         line = table.format.line_of(table.path, row)
         warnings.warn(
-            f"{table.path}: {count} of {missing.size} rows have an empty cell and are left out, "
-            f"the first at line {line}, column '{_column_of(table, role)}'",
+            f"{table.path}: {count} of {counted(missing.size, 'row')} "
+            f"{'has an empty cell and is' if count == 1 else 'have an empty cell and are'} left "
+            f"out, the first at line {line}, column '{_column_of(table, role)}'",
             EmptyCellsWarning,
             stacklevel=level_of_caller(),
         )

@@ -94,7 +94,7 @@ class FileReadings(NamedTuple):
             problem = f"seconds, or dates and times (ISO 8601, all with a zone or none), got {got}"
             raise self.error(f"needs {problem}", column.name, bad)
         if values.dtype == object:
-            row = next((i for i, value in enumerate(values) if value is not None), 0)
+            row = next((i for i, value in enumerate(values) if _is_no_number(value)), 0)
             got = repr(values[row])[:60]
             raise self.error(f"a number is needed, got {got}", column.name, row)
         numbers = np.asarray(values, dtype=np.float64)
@@ -308,6 +308,17 @@ def _joined(
         check_decoded(path, size, len(names))
         rows += len(parts[names[0]][-1]) if names else 0
     return {name: np.concatenate(found) if found else np.empty(0) for name, found in parts.items()}
+
+
+def _is_no_number(value: Any) -> bool:
+    """What stands in the way of a column of numbers, some of which may be texts of one."""
+    if value is None:
+        return False
+    try:
+        float(value)
+    except (TypeError, ValueError):
+        return True
+    return False
 
 
 def _undecoded(values: Any) -> int | None:

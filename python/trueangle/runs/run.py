@@ -16,6 +16,7 @@ from ..support.angles import check_period, circular_mean, wrap
 from ..support.arrays import Array
 from ..support.files import Source
 from ..support.kinds import told_kinds
+from ..support.plainresult import counted
 from ..support.signals import FIELDS, find_signal, signal_column, signal_columns
 
 
@@ -142,7 +143,8 @@ class CalibrationRun:
         return int(self.reference.size)
 
     def __repr__(self) -> str:
-        return f"CalibrationRun({self.label!r}, {len(self)} readings, period={self.period:g})"
+        held = counted(len(self), "reading")
+        return f"CalibrationRun({self.label!r}, {held}, period={self.period:g})"
 
     def __reduce__(self) -> tuple[Any, ...]:
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}

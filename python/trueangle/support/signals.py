@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
+from .plainresult import counted
 from .suggestions import did_you_mean
 
 #: Values by the name of the signal; one per reading, or one for all.
@@ -197,7 +198,9 @@ def signal_column(name: str, values: ArrayLike, size: int | None) -> NDArray[np.
     if size is None and array.size == 0:
         raise ArgumentError(f"{name} is empty: a run needs at least one reading")
     if size is not None and array.size != size:
-        raise ArgumentError(f"{name} has {array.size} readings, reference has {size}")
+        raise ArgumentError(
+            f"{name} has {counted(int(array.size), 'reading')}, reference has {size}"
+        )
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         i = int(bad[0])

@@ -12,10 +12,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import trueangle
+from trueangle import planning, plots
 from trueangle.cli import main
 
-from .views import figure_lines, file_lines
+from .arguments import argument_lines
+from .asked import Asked
+from .charts import chart_lines
+from .figures import figure_lines
+from .views import file_lines
 
 COLUMNS = 100
 
@@ -23,6 +30,7 @@ COLUMNS = 100
 ALTERS = (
     (re.compile(r"\b[0-9a-f]{64}\b"), "SHA256"),
     (re.compile(r"\b20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|\+00:00)"), "NOW"),
+    (re.compile(r"\bwritten 20\d\d-\d\d-\d\d\b"), "written TODAY"),
     (re.compile(r"[\d,]+ rows/s"), "SPEED rows/s"),
     (re.compile(r"seconds [\d.e+-]+(?=, (?:complete|rows_per_second))"), "seconds TIME"),
     (re.compile(r"rows_per_second [\d.e+-]+"), "SPEED"),
@@ -35,21 +43,32 @@ ALTERS = (
 class Terminal:
     """Runs the commands of one transcript, one after the other, in one folder.
 
-    ``trueangle ...`` is the command itself, in this process. ``show FILE`` shows what a file
-    holds (`views`), ``figures`` what the pictures drawn since show, and ``hide KEY=VALUE ...``
-    writes ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it.
+    ``trueangle ...`` is the command itself, in this process, and ``python ...`` a line of Python:
+    what it gives, draws, warns of or raises. ``show FILE [PATTERN]`` shows what a file holds
+    (`views`), ``charts FILE`` what a page draws (`charts`), ``figures`` what the pictures drawn
+    since show (`figures`). ``write FILE LINE ...`` writes a small file, and ``hide KEY=VALUE ...``
+    ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it. ``options`` tells
+    every argument of every command, ``asked ...`` what each further option changes (`asked`).
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._figures: list[str] = []
+        self._known: set[str] = set()
+        self._names: dict[str, Any] = {"__name__": "transcript", "np": np, "plots": plots}
+        self._names |= {"planning": planning, "ta": trueangle}
 
     def lines(self, command: str) -> list[str]:
         """What the terminal shows of a command; a status other than 0 at the end, as ``[1]``."""
-        program, *arguments = shlex.split(command)
-        run = {"trueangle": self._trueangle, "show": self._show, "figures": self._drawn,
-               "hide": self._hide}[program]  # fmt: skip
-        return self._settled(run(arguments))
+        program, _, rest = command.partition(" ")
+        if program == "python":
+            return self._settled(self._python(rest))
+        run = {
+            "asked": self._asked, "charts": self._charts, "figures": self._drawn,
+            "hide": self._hide, "options": self._options, "show": self._show,
+            "trueangle": self._trueangle, "write": self._write,
+        }[program]  # fmt: skip
+        return self._settled(run(shlex.split(rest)))
 
     def _settled(self, text: str) -> list[str]:
         text = text.replace(f"{self.folder}{os.sep}", "").replace(str(self.folder), ".")
@@ -74,8 +93,12 @@ class Terminal:
         return text + warned.getvalue() + (f"[{status}]" if status else "")
 
     def _show(self, arguments: list[str]) -> str:
-        path = self.folder / arguments[0]
-        return "\n".join(file_lines(path.read_text(encoding="utf-8"), path.suffix))
+        path, wanted = self.folder / arguments[0], " ".join(arguments[1:])
+        lines = file_lines(path.read_text(encoding="utf-8"), path.suffix)
+        return "\n".join(line for line in lines if re.search(wanted, line))
+
+    def _charts(self, arguments: list[str]) -> str:
+        return "\n".join(chart_lines((self.folder / arguments[0]).read_text(encoding="utf-8")))
 
     def _drawn(self, arguments: list[str]) -> str:
         text, self._figures = "\n".join(self._figures), []
@@ -86,6 +109,45 @@ class Terminal:
         effect = "\n".join(["", "[[effect]]", *arguments, ""])
         (self.folder / "hidden.toml").write_text(believed + effect, encoding="utf-8")
         return ""
+
+    def _write(self, arguments: list[str]) -> str:
+        name, *lines = arguments
+        (self.folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return ""
+
+    def _options(self, _: list[str]) -> str:
+        return "\n".join(argument_lines())
+
+    def _asked(self, arguments: list[str]) -> str:
+        return "\n".join(Asked(self.lines, self.folder, self._known).lines(arguments))
+
+    def _python(self, code: str) -> str:
+        """A statement, or an expression with what it gives: a text, a picture, a value."""
+        from matplotlib import pyplot
+        from matplotlib.axes import Axes
+
+        with self._inside(), warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            try:
+                found = self._value(code)
+            except (trueangle.TrueAngleError, OSError, TypeError, ValueError) as error:
+                lines = [f"{type(error).__name__}: {error}"]
+            else:
+                figure = found.get_figure(root=True) if isinstance(found, Axes) else found
+                if hasattr(figure, "savefig"):
+                    lines = [*figure_lines(figure)]
+                else:
+                    lines = [] if found is None else [f"{found}"]
+        pyplot.close("all")
+        return "\n".join([*(f"{w.category.__name__}: {w.message}" for w in warned), *lines])
+
+    def _value(self, code: str) -> Any:
+        try:
+            expression = compile(code, "transcript", "eval")
+        except SyntaxError:
+            exec(compile(code, "transcript", "exec"), self._names)
+            return None
+        return eval(expression, self._names)
 
     @contextlib.contextmanager
     def _inside(self) -> Iterator[None]:

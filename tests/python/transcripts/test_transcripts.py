@@ -12,6 +12,7 @@ import re
 
 import pytest
 
+from .asked import NOTHING
 from .desk import furnish
 from .terminal import Terminal
 from .transcript import HERE, Step, differences, is_same_number, steps_of, text_of
@@ -19,7 +20,16 @@ from .transcript import HERE, Step, differences, is_same_number, steps_of, text_
 pytest.importorskip("matplotlib").use("Agg")
 
 #: Half a second and more each.
-SLOW = re.compile("causes|demo|diagnose|export|plan|report")
+SLOW = re.compile("asked|causes|charts|demo|diagnose|export|pictures|plan|report")
+
+#: Why an option of a command may change nothing, of all that `asked` gives.
+IDLE = {
+    "--checksums": "a fit in memory keeps them by itself",
+    "--counts-per-turn": "of a picture of a model it is the unit of --errors-in count",
+    "--fixed-member": "says what a --gear-ratio means, and there is none",
+    "--progress": "nothing is told of work that is done at once",
+    "--robot": "the file of the models names the same columns",
+}
 
 NAMES = [
     pytest.param(path.stem, marks=[pytest.mark.slow] * bool(SLOW.match(path.stem)))
@@ -45,6 +55,12 @@ def test_what_is_shown(name, tmp_path):
     else:
         told = "\n".join(failed)
         assert not failed, f"{path.name} (meant? `make transcripts`, then read it):\n{told}"
+
+
+def test_no_option_is_given_in_vain():
+    steps = steps_of((HERE / "approved" / "asked.txt").read_text(encoding="utf-8"))
+    idle = {x.split()[0].rstrip(":") for step in steps for x in step.lines if x.endswith(NOTHING)}
+    assert idle == IDLE.keys()
 
 
 def test_a_transcript_reads_back():

@@ -1,4 +1,4 @@
-"""What files and figures hold, as lines to be compared: every name, and numbers to six digits."""
+"""What files hold, as lines to be compared: every name, and numbers to six digits."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ def file_lines(text: str, ending: str) -> list[str]:
     return text.splitlines()
 
 
-def shown(value: Any) -> str:
-    """A number to six digits, anything else as JSON has it."""
+def shown(value: Any, digits: int = DIGITS) -> str:
+    """A number to so many digits, anything else as JSON has it."""
     if isinstance(value, float):
         if abs(value) < NOTHING:
             return "0"
-        return f"{value:.{DIGITS}g}"
+        return f"{value:.{digits}g}"
     return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
 
-def numbers_line(values: Any) -> str:
+def numbers_line(values: Any, digits: int = DIGITS) -> str:
     """Many numbers as how many they are, their ends, mean, spread and what their order makes."""
     values = np.asarray(values, dtype=float)
     whole = values[np.isfinite(values)]
@@ -53,8 +53,15 @@ def numbers_line(values: Any) -> str:
     }  # fmt: skip
     missing = f" ({values.size - whole.size} missing)" if whole.size < values.size else ""
     return f"{values.size} numbers{missing}: " + ", ".join(
-        f"{name} {shown(float(value))}" for name, value in told.items()
+        f"{name} {shown(float(value), digits)}" for name, value in told.items()
     )
+
+
+def few_numbers(values: Any, digits: int = DIGITS) -> str:
+    """Numbers one by one while they are few."""
+    if len(values) > FEW // 2:
+        return numbers_line(values, digits)
+    return ", ".join(shown(float(value), digits) for value in values)
 
 
 def _plain(value: Any) -> str | None:
@@ -122,6 +129,8 @@ class _Page(HTMLParser):
     def handle_starttag(self, tag: str, attrs: Any) -> None:
         self._silent += tag in ("script", "style")
         self.words += " " if tag in self.INLINE else "\n"
+        told = [text for name, text in attrs if name in ("alt", "aria-label", "title")]
+        self.words += "".join(f"({text}) " for text in told)
 
     def handle_endtag(self, tag: str) -> None:
         self._silent -= tag in ("script", "style")
@@ -137,24 +146,3 @@ def _page_lines(text: str) -> list[str]:
     page.feed(text)
     lines = (re.sub(r" +", " ", line).strip() for line in page.words.splitlines())
     return [line for line in lines if line]
-
-
-def figure_lines(figure: Any) -> Iterator[str]:
-    """Titles, names of axes and legends, and the numbers of every line and heap of points."""
-    for axes in figure.axes:
-        yield " | ".join([axes.get_title(), axes.get_xlabel(), axes.get_ylabel()])
-        legend = axes.get_legend()
-        if legend is not None:
-            yield "  legend: " + "; ".join(text.get_text() for text in legend.get_texts())
-        for text in axes.texts:
-            yield f"  text: {text.get_text()!r}"
-        for kind, drawn in (("line", axes.lines), ("points", axes.collections)):
-            for artist in drawn:
-                data = artist.get_xydata() if kind == "line" else artist.get_offsets()
-                xy = np.asarray(data, dtype=float)
-                if xy.size > 2:
-                    yield f"  {kind} {artist.get_label()!r} x: {numbers_line(xy[:, 0])}"
-                    yield f"  {kind} {artist.get_label()!r} y: {numbers_line(xy[:, 1])}"
-        heights = [patch.get_height() for patch in axes.patches if hasattr(patch, "get_height")]
-        if heights:
-            yield f"  bars: {numbers_line(heights)}"

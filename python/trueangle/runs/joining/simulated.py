@@ -14,7 +14,7 @@ from ...errors import ArgumentError
 from ...support.angles import ARCSEC_PER_TURN
 from ...support.arrays import Array
 from ...support.layout import wrapped
-from ...support.plainresult import Shown
+from ...support.plainresult import Shown, counted
 from ...support.signals import FIELDS
 from ..files import runs_of
 from ..run import CalibrationRun
@@ -101,7 +101,9 @@ class MeasuredMinusSimulated(Shown):
             f"Simulated: {self.source}, joined by {how}; joining adds {self.std_arcsec:.2g} arcsec"
         )
         if self.left_out:
-            text += f"; {self.left_out} readings at which it says nothing are left out"
+            verb = "is" if self.left_out == 1 else "are"
+            silent = counted(self.left_out, "reading")
+            text += f"; {silent} at which it says nothing {verb} left out"
         return "\n".join(wrapped(". ".join([text, *self.notes]) + "."))
 
 
@@ -204,11 +206,13 @@ def _counterparts(
         return [logs[0]] * len(measured)
     by_label = {log.label: log for log in logs}
     missing = [run.label for run in measured if run.label not in by_label]
+    labels = [log.label for log in logs]
     if missing or len(by_label) < len(logs):
+        twice = next((label for label in labels if labels.count(label) > 1), None)
+        why = f"none of them for run {missing[0]}" if missing else f"several of them called {twice}"
         raise ArgumentError(
-            f"{source} has {len(logs)} runs ({', '.join(str(log.label) for log in logs[:6])}), "
-            f"none of them for run {missing[0] if missing else measured[0].label}: give its runs "
-            "the labels of the measured ones, or one run that holds all motion"
+            f"{source} has {len(logs)} runs ({', '.join(map(str, labels[:6]))}), {why}: give its "
+            "runs the labels of the measured ones, or one run that holds all motion"
         )
     return [by_label[run.label] for run in measured]
 

@@ -128,3 +128,16 @@ def test_a_reference_that_wraps_is_told_at_any_range(range_deg):
         theta = (theta + rng.uniform(0, 90)) % range_deg
         found = ta.check(ta.CalibrationRun(theta, indicated, period=360.0))
         assert "wrapped_reference" in {f.fault for f in found.data_faults}, seed
+
+
+@pytest.mark.parametrize("per_count", [4, 8, 15])
+def test_counts_of_unlike_sizes_are_no_fault(per_count):
+    """A disc whose lines stand up to 30 % off: each count is read as often as it is wide."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        theta = np.linspace(0.0, 340.0, 6000)
+        lines = np.cumsum(1.0 + 0.3 * rng.uniform(-1.0, 1.0, theta.size // per_count))
+        lines *= 345.0 / lines[-1]
+        read = lines[np.maximum(np.searchsorted(lines, theta, side="right") - 1, 0)]
+        found = ta.check(ta.CalibrationRun(theta, read, 360.0))
+        assert [fault.fault for fault in found.data_faults] == [], seed
