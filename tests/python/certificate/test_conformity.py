@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from pdftext import pdf_text
 from trueangle.certificate import (
     Budget,
     Contribution,
@@ -24,8 +25,6 @@ from trueangle.certificate import (
 )
 from trueangle.errors import ArgumentError, FileError
 from trueangle.support.distributions import normal_quantile
-
-from .pdftext import pdf_text
 
 #: JCGM 106:2012, examples of clause 7: value, u, lower and upper limit, probability as printed.
 PRINTED = {

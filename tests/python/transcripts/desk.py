@@ -12,6 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+import trueangle as ta
+from trueangle.model.records import FitRecord
+
 Array = NDArray[np.float64]
 
 ARCSEC = 1.0 / 3600.0
@@ -131,6 +134,30 @@ def furnish(folder: Path) -> None:
     without_reference(folder)
     two_clocks(folder)
     faulty(folder)
+    models(folder)
+
+
+def models(folder: Path) -> None:
+    """Models to be exported: of an arc with play, in radians of two shafts with terms, steep."""
+    shaft = ta.Shaft("output", 1, [1, 2], [0.3, 0.0], [0.0, 0.1])
+    found = FitRecord(900, 2, (20.0, 140.0), 0.001, signals=(("velocity", -90.0, 60.0),))
+    play = (ta.Backlash(180 * ARCSEC), ta.Latency(0.002))
+    known = np.diag([0.0, 1e-8, 1e-8, 4e-8, 4e-8])
+    ta.HarmonicModel(
+        [shaft], constant=0.25, period=360.0, terms=play, fit=found, covariance=known
+    ).save(folder / "play.json")
+    a = np.radians(ARCSEC)
+    ta.HarmonicModel(
+        [ta.Shaft("output", 1, [1, 3], [900 * a, 0.0], [0.0, 40 * a]),
+         ta.Shaft("motor", 100.5, [1], [0.0], [20 * a])],
+        constant=-0.01, period=2.0 * np.pi, argument="indicated",
+        terms=(ta.terms.ThermalDrift(2 * a, reference_C=22.0), ta.terms.TorsionalCompliance(3 * a),
+               ta.terms.CurrentCoupling(5 * a), ta.Latency(1e-4),
+               ta.terms.PreslidingHysteresis(8 * a, 0.05)),
+    ).save(folder / "loaded.json")  # fmt: skip
+    ta.HarmonicModel([ta.Shaft("output", 1, [4, 25], [7.0, 0.0], [0.0, 0.02])], period=360.0).save(
+        folder / "steep.json"
+    )
 
 
 def printer() -> str:

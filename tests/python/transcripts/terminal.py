@@ -8,14 +8,16 @@ import os
 import re
 import shlex
 import warnings
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import trueangle
 from trueangle.cli import main
+from trueangle.export import TARGETS
 
-from .views import figure_lines, file_lines
+from .views import figure_lines, file_lines, pdf_lines
 
 COLUMNS = 100
 
@@ -23,21 +25,26 @@ COLUMNS = 100
 ALTERS = (
     (re.compile(r"\b[0-9a-f]{64}\b"), "SHA256"),
     (re.compile(r"\b20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|\+00:00)"), "NOW"),
+    (re.compile(r"\{[0-9a-f-]{36}\}"), "{TOKEN}"),
     (re.compile(r"[\d,]+ rows/s"), "SPEED rows/s"),
     (re.compile(r"seconds [\d.e+-]+(?=, (?:complete|rows_per_second))"), "seconds TIME"),
     (re.compile(r"rows_per_second [\d.e+-]+"), "SPEED"),
     (re.compile(r"(readings in )[\d.]+( s| ms| min)"), r"\1TIME"),
     (re.compile(r"[\d.]+ million readings per second"), "SPEED"),
     (re.compile(rf"\b{re.escape(trueangle.__version__)}\b"), "VERSION"),
+    (re.compile(r"(numpy|[Pp]ython) \d+\.\d[\w.+]*"), r"\1 VERSION"),
+    (re.compile(r"(system |VERSION, )(Linux|Darwin|Windows) \w+"), r"\1SYSTEM"),
 )
 
 
 class Terminal:
     """Runs the commands of one transcript, one after the other, in one folder.
 
-    ``trueangle ...`` is the command itself, in this process. ``show FILE`` shows what a file
-    holds (`views`), ``figures`` what the pictures drawn since show, and ``hide KEY=VALUE ...``
-    writes ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it.
+    ``trueangle ...`` is the command itself, in this process. ``show FILE [PATTERN]`` shows what a
+    file holds (`views`), or what of it matches, ``figures`` what the pictures drawn since show,
+    ``targets`` what an export can be asked for. ``hide KEY=VALUE ...`` writes ``hidden.toml``:
+    what ``believed.toml`` believes, and one effect beside it; ``write FILE LINE ...`` writes lines
+    (``\\t`` and ``\\xff`` in them are what they are in Python).
     """
 
     def __init__(self, folder: Path) -> None:
@@ -47,8 +54,10 @@ class Terminal:
     def lines(self, command: str) -> list[str]:
         """What the terminal shows of a command; a status other than 0 at the end, as ``[1]``."""
         program, *arguments = shlex.split(command)
-        run = {"trueangle": self._trueangle, "show": self._show, "figures": self._drawn,
-               "hide": self._hide}[program]  # fmt: skip
+        run = {
+            "trueangle": self._trueangle, "show": self._show, "figures": self._drawn,
+            "hide": self._hide, "write": self._write, "targets": self._targets,
+        }[program]  # fmt: skip
         return self._settled(run(arguments))
 
     def _settled(self, text: str) -> list[str]:
@@ -74,8 +83,34 @@ class Terminal:
         return text + warned.getvalue() + (f"[{status}]" if status else "")
 
     def _show(self, arguments: list[str]) -> str:
-        path = self.folder / arguments[0]
-        return "\n".join(file_lines(path.read_text(encoding="utf-8"), path.suffix))
+        path, only = self.folder / arguments[0], "".join(arguments[1:])
+        if path.suffix == ".pdf":
+            return "\n".join(pdf_lines(path.read_bytes()))
+        if path.suffix == ".fmu":
+            with zipfile.ZipFile(path) as unit:
+                text = unit.read("modelDescription.xml").decode()
+        else:
+            text = path.read_text(encoding="utf-8")
+        lines = file_lines(text, path.suffix)
+        return "\n".join(line for line in lines if re.search(only, line))
+
+    def _write(self, arguments: list[str]) -> str:
+        name, *lines = arguments
+        text = "".join(f"{line}\n" for line in lines).encode("latin-1")
+        (self.folder / name).write_bytes(text.decode("unicode_escape").encode("latin-1"))
+        return ""
+
+    def _targets(self, arguments: list[str]) -> str:
+        lines = []
+        for target in TARGETS.values():
+            lines += [f"{target.name}: {target.what}; {target.sign}, {target.argument}"]
+            lines += [f"  {target.kind.what} ({', '.join(target.kind.endings)})"]
+            lines += [
+                f"  {name}: {option.help}; {getattr(option.values, '__name__', option.values)}, "
+                f"{option.default!r}"
+                for name, option in target.options.items()
+            ]
+        return "\n".join(lines)
 
     def _drawn(self, arguments: list[str]) -> str:
         text, self._figures = "\n".join(self._figures), []

@@ -19,7 +19,7 @@ from .transcript import HERE, Step, differences, is_same_number, steps_of, text_
 pytest.importorskip("matplotlib").use("Agg")
 
 #: Half a second and more each.
-SLOW = re.compile("causes|demo|diagnose|export|plan|report")
+SLOW = re.compile("causes|certificate|demo|diagnose|export|plan|report|targets")
 
 NAMES = [
     pytest.param(path.stem, marks=[pytest.mark.slow] * bool(SLOW.match(path.stem)))
