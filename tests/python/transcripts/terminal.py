@@ -53,12 +53,17 @@ class Terminal:
 
     def lines(self, command: str) -> list[str]:
         """What the terminal shows of a command; a status other than 0 at the end, as ``[1]``."""
-        program, *arguments = shlex.split(command)
         run = {
             "trueangle": self._trueangle, "show": self._show, "figures": self._drawn,
             "hide": self._hide, "write": self._write, "targets": self._targets,
-        }[program]  # fmt: skip
-        return self._settled(run(arguments))
+        }  # fmt: skip
+        found: list[str] = []
+        for part in command.split(" && "):
+            program, *arguments = shlex.split(part)
+            silent = arguments[-2:] == [">", "/dev/null"]
+            text = run[program](arguments[:-2] if silent else arguments)
+            found += [] if silent else self._settled(text)
+        return found
 
     def _settled(self, text: str) -> list[str]:
         text = text.replace(f"{self.folder}{os.sep}", "").replace(str(self.folder), ".")
