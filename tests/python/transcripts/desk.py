@@ -131,6 +131,7 @@ def furnish(folder: Path) -> None:
     polygon(folder)
     arm(folder)
     fleet(folder)
+    months(folder)
     without_reference(folder)
     two_clocks(folder)
     faulty(folder)
@@ -229,6 +230,42 @@ def fleet(folder: Path) -> None:
             table["reference_deg"] += angle.tolist()
             table["indicated_deg"] += (angle + error).tolist()
     write_table(folder / "fleet.csv", table)
+
+
+def months(folder: Path) -> None:
+    """Sixteen units on four dates: each of the first eight has a history of its own."""
+    rng = np.random.default_rng(21)
+    angle = np.arange(0.0, 360.0, 8.0)
+    table: dict[str, list[object]] = {
+        name: [] for name in ("unit", "when", "reference_deg", "indicated_deg")
+    }
+    size = rng.normal([40.0, 20.0, 8.0], [9.0, 5.0, 2.0], (16, 3))
+    phase = rng.normal([80.0, 30.0, 200.0], 10.0, (16, 3))
+    dates = ("2026-01-10", "2026-03-10", "2026-05-10", "2026-07-10")
+    for unit in range(16):
+        for k, when in enumerate(dates):
+            if unit in (4, 6) and k in (1, 2):
+                continue
+            new, turn, zero = size[unit].copy(), phase[unit].copy(), 0.0
+            if unit == 0:
+                new[1] += 4.0 * k  # it grows
+            elif unit == 1 and k == 3:
+                new[0] += 30.0  # a step
+            elif unit in (2, 3) and k == 3:  # their labels are exchanged
+                new, turn = size[5 - unit], phase[5 - unit]
+            elif unit == 4 and k == 3:
+                new, turn = rng.normal([40.0, 20.0, 8.0], 9.0), rng.uniform(0.0, 360.0, 3)
+            elif unit == 5 and k > 1:
+                zero = 60.0
+            elif unit == 7:
+                new[2] = 60.0  # unlike the others from the start
+            lines = zip((1.0, 2.0, 3.0), new.tolist(), turn.tolist(), strict=True)
+            error = waves(angle, *lines) + ARCSEC * (zero + rng.normal(0.0, 2.0, angle.size))
+            table["unit"] += [f"SN{unit:02}"] * angle.size
+            table["when"] += [when] * angle.size
+            table["reference_deg"] += angle.tolist()
+            table["indicated_deg"] += (angle + error).tolist()
+    write_table(folder / "months.csv", table)
 
 
 def without_reference(folder: Path) -> None:
