@@ -104,3 +104,10 @@ def test_a_summary_lists_as_many_orders_as_a_screen_holds(more):
     assert len(listed) == min(count, _LISTED)
     assert (f"... and {more} more" in lines) is (more > 0)
     assert (" more" in lines[-1]) is (more > 0)
+
+
+@pytest.mark.parametrize("condition", [0.5, 0.999, -1.0, np.nan])
+def test_a_condition_number_is_one_or_more_but_for_its_rounding(condition):
+    assert model(360.0).replace(condition_number=1.0 - 1e-9).condition_number < 1.0
+    with pytest.raises(ta.errors.ArgumentError, match="condition_number must be a finite number"):
+        model(360.0).replace(condition_number=condition)
