@@ -152,6 +152,10 @@ class Budget:
         return (item.effect / self.standard) ** 2 if self.standard > 0.0 else 0.0
 
 
+#: Whole degrees of freedom that went through a sum of one stay whole.
+_ROUNDED: Final = 1.0 + 1e-12
+
+
 def coverage_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
     """Student's quantile for a two-sided interval; degrees of freedom cut to whole ones.
 
@@ -161,6 +165,8 @@ def coverage_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
     (2.92, 2.0)
     """
     whole = (
-        max(math.floor(degrees_of_freedom), 1) if math.isfinite(degrees_of_freedom) else math.inf
+        max(math.floor(degrees_of_freedom * _ROUNDED), 1)
+        if math.isfinite(degrees_of_freedom)
+        else math.inf
     )
     return student_quantile(0.5 + 0.5 * level, whole)

@@ -356,7 +356,7 @@ def _notes(target: Target, pattern: TurnPattern, made: Made) -> list[str]:
             f"the number format leaves {made.floor_arcsec:.3g} arcsec rms, more than the model's "
             f"own uncertainty of {uncertainty:.3g}"
         )
-    if made.zero_deg:
+    if round(made.zero_deg, 9):
         notes.append(
             f"a constant of {made.zero_deg:.9f} deg is not in the table: the corrected angle is "
             "larger by it, so take it off where the target sets its zero"

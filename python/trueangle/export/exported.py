@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +13,9 @@ from .proof import rounded_up
 
 #: Size below which what the number format leaves is not written out.
 _NOTABLE_ARCSEC = 0.001
+
+#: A size in a sentence.
+_ARCSEC = re.compile(r"(\d[\d.]*(?:e[-+]\d+)?) arcsec\b")
 
 #: Digits of a bound in a file, and in a summary.
 HEADER_DIGITS = 6
@@ -110,7 +114,7 @@ class Exported(PlainResult):
                 + (
                     f"{unit.text(self.floor_arcsec)} rms"
                     if self.floor_arcsec >= _NOTABLE_ARCSEC
-                    else f"less than {_NOTABLE_ARCSEC:g} arcsec rms"
+                    else _in_unit(f"less than {_NOTABLE_ARCSEC:g} arcsec rms", unit)
                 )
             )
         worst = max(self.lost, key=lambda row: row["arcsec"], default=None)
@@ -118,7 +122,7 @@ class Exported(PlainResult):
             lines.append(
                 f"of the orders, {worst['order']:g} loses most: {unit.text(worst['arcsec'])}"
             )
-        further = laid_out([*lines, *(f"note: {note}" for note in self.notes)])
+        further = laid_out([*lines, *(f"note: {_in_unit(note, unit)}" for note in self.notes)])
         return f"{first}\n{further}" if further else first
 
     def difference(self, unit: ErrorUnit, digits: int) -> str:
@@ -129,7 +133,7 @@ class Exported(PlainResult):
 
         table = (
             f"{shown(self.max_difference_arcsec)} {unit.name}, "
-            f"{unit.number(self.rms_difference_arcsec)} rms ({self.proof})"
+            f"{unit.number(self.rms_difference_arcsec)} rms ({_in_unit(self.proof, unit)})"
         )
         if not (self.left_out or self.at_run_time):
             return f"differs from the model by at most {table}"
@@ -149,3 +153,10 @@ class Exported(PlainResult):
             f"the rest by at most {table}",
         ]
         return "; ".join(parts)
+
+
+def _in_unit(text: str, unit: ErrorUnit) -> str:
+    """A sentence whose sizes in arcsec are those of the unit that all else is shown in."""
+    if unit.name == "arcsec":
+        return text
+    return _ARCSEC.sub(lambda found: unit.text(float(found[1])), text)

@@ -84,7 +84,7 @@ class Fmu(Target):
         sensor = options["variant"] == "sensor"
         noise_std = options["noise_std"]
         if noise_std and not sensor:
-            raise ArgumentError("noise_std is of a sensor: give variant='sensor' as well")
+            raise ArgumentError('noise_std is of a sensor: give `variant="sensor"` as well')
         if not noise_std >= 0.0:
             raise ArgumentError(f"noise_std must be 0 or more radians, got {noise_std!r}")
         variables = variables_of(model, sensor, noise_std)

@@ -16,8 +16,12 @@ from .reading import failed
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
-def one_turn_knots(pattern: TurnPattern, entries: int, target: str, fixed: bool) -> Array:
+def one_turn_knots(
+    pattern: TurnPattern, entries: int, target: str, fixed: bool, binary: bool = False
+) -> Array:
     """Least-squares knots, in turns, of the correction of a reading.
+
+    A table may have a ``fixed`` number of entries, or a ``binary`` one: a power of two.
 
     Raises
     ------
@@ -26,7 +30,8 @@ def one_turn_knots(pattern: TurnPattern, entries: int, target: str, fixed: bool)
     """
     pattern.check_one_turn(target)
     top = int(max(pattern.lines, default=0.0))
-    smallest = 'use `target="c"`' if fixed else f"use `entries={2 * top + 1}` or more"
+    least = 1 << (2 * top).bit_length() if binary else 2 * top + 1
+    smallest = 'use `target="c"`' if fixed else f"use `entries={least}` or more"
     pattern.check_orders(entries, target, smallest)
     return linear_knots(pattern.correction, entries)
 

@@ -77,7 +77,9 @@ class Pmac(Target):
                 f"are {', '.join(map(str, near)) or 'none'}"
             )
         whole_turn = {"entries": entries, "start": 0.0, "stop": 360.0}
-        travel = Travel.of(pattern, self.name, whole_turn, _MOST + 1)
+        # One column for both directions: what follows the direction is left out.
+        pattern = TurnPattern(pattern.model)
+        travel = Travel.of(pattern, self.name, whole_turn, _MOST + 1, divided=counts)
         # The correction at zero is zero by definition: what it is there is left to the zero.
         first = float(travel.forward[0])
         values = np.rint((travel.forward - first) * counts * SIXTEENTHS).astype(np.int64)

@@ -75,10 +75,12 @@ class Travel:
         options: Mapping[str, Any],
         most: int,
         function: Function | None = None,
+        divided: int = 0,
     ) -> Travel:
         """Knots over the travel that is asked for, else over what the model was fitted on.
 
-        They are of the error at the true angle, for each direction, or of a ``function``.
+        They are of the error at the true angle, for each direction, or of a ``function``. Where
+        entries to a turn must be divisors of a number, that is ``divided``.
 
         Raises
         ------
@@ -94,7 +96,9 @@ class Travel:
         if not 4 <= entries <= 36_000:
             raise ArgumentError(f"entries must be from 4 to 36000 a turn, got {entries}")
         top = int(max(pattern.lines, default=0.0))
-        pattern.check_orders(entries, target, f"use `entries={2 * top + 1}` or more")
+        whole = (n for n in range(2 * top + 1, divided + 1) if divided % n == 0)
+        least = next(whole, 2 * top + 1)
+        pattern.check_orders(entries, target, f"use `entries={least}` or more")
         count = math.ceil((stop - start) * entries / 360.0 - 1e-9) + 1
         if count > most:
             fits = int((most - 1) * 360.0 / (stop - start))

@@ -46,7 +46,7 @@ class Tinymovr(Target):
         if entries & (entries - 1) or not 4 <= entries <= 1 << bits:
             raise ArgumentError(f"entries must be a power of two up to 2^bits, got {entries}")
         ticks = 1 << bits
-        knots = -one_turn_knots(pattern, entries, self.name, False) * ticks
+        knots = -one_turn_knots(pattern, entries, self.name, False, binary=True) * ticks
         # The shift between two entries cuts down: half a tick less on the mean.
         tried = [rounded_knots(knots + lift).astype(np.int64) for lift in (0.0, 0.5)]
         readings = np.arange(ticks)

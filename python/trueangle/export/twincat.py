@@ -59,7 +59,8 @@ class TwinCat(Target):
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         cnc = options["variant"] == "cnc"
-        travel = Travel.of(pattern, self.name, options, MOST if cnc else 100_000)
+        most, divided = (MOST, TENTHS) if cnc else (100_000, 0)
+        travel = Travel.of(pattern, self.name, options, most, divided=divided)
         made = self._cnc(pattern, travel) if cnc else self._nc(pattern, travel)
         return replace(made, bits=enough_bits(options["bits"], made.entries))
 

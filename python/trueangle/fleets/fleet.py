@@ -117,7 +117,7 @@ def fleet(
         kind = "file (its name without folders)" if sums.by_file else "run"
         notes.append(
             f"No column names the units: every {kind} is taken for a unit. A role 'unit', or a "
-            "pattern of the names (unit_from), says which are one."
+            "pattern of the names (`unit_from=`), says which are one."
         )
     if untold:
         notes.append(f"The readings of {_listed(untold)} do not tell the orders apart; left out.")

@@ -88,7 +88,7 @@ class Spread:
                 break
             if len(places) >= MOST:
                 raise ArgumentError(
-                    f"uncertainty={uncertainty:g} takes more than {MOST} readings of "
+                    f"`uncertainty={uncertainty:g}` takes more than {MOST} readings of "
                     f"{self.noise:g} arcsec noise: ask for more"
                 )
             # Not beyond a per cent at a time: each but shifts where the next belongs.

@@ -89,12 +89,18 @@ def copy(task: CopyTask) -> Contents:
             kept = zipfile.ZipInfo(name)
             kept.compress_type = archive.getinfo(f"{addition.column}.npy").compress_type
             with output.open(kept, "w", force_zip64=True) as put:
-                check = 0
-                for part in _corrected(task.source, archive, addition, found[addition.column]):
-                    put.write(part)
-                    check = zlib.crc32(part, check)
-                    done += len(part) // 8
-                    task.watch(len(part) // 8, min(done / total, 1.0))
+                column = found[addition.column]
+                kind = _kind_of_copy(column)
+                head = io.BytesIO()
+                write_header(head, kind, (column.size,))
+                put.write(head.getvalue())
+                check = zlib.crc32(head.getvalue())
+                for part in _corrected(task.source, archive, addition, kind):
+                    data = part.tobytes()
+                    put.write(data)
+                    check = zlib.crc32(data, check)
+                    done += part.size
+                    task.watch(part.size, done / total)
             sums[name] = f"{check:08x}"
         told = note(additions).encode()
         # Of no time of day: the same log gives the same bytes.
@@ -175,15 +181,16 @@ def _part(path: Path, name: str, given: IO[bytes], column: _ArrayHeader, count: 
     return row_labels(decoded)
 
 
+def _kind_of_copy(column: _ArrayHeader) -> np.dtype[Any]:
+    """Of a corrected array: float32 where its source is, else float64."""
+    return np.dtype(np.float32 if column.kind.newbyteorder("=") == np.float32 else np.float64)
+
+
 def _corrected(
-    path: Path, archive: zipfile.ZipFile, addition: Addition, column: _ArrayHeader
-) -> Iterator[bytes]:
-    """The bytes of a corrected array: float32 where its source is, else float64."""
-    kind = np.dtype(np.float32 if column.kind.newbyteorder("=") == np.float32 else np.float64)
-    head = io.BytesIO()
-    write_header(head, kind, (column.size,))
-    yield head.getvalue()
+    path: Path, archive: zipfile.ZipFile, addition: Addition, kind: np.dtype[Any]
+) -> Iterator[NDArray[Any]]:
+    """The values of a corrected array, part by part."""
     names = [addition.column, *addition.signals.values()]
     for batch in _batches(path, archive, list(dict.fromkeys(names))):
         signals = {signal: batch[name] for signal, name in addition.signals.items()}
-        yield addition.correct(batch[addition.column], signals).astype(kind).tobytes()
+        yield addition.correct(batch[addition.column], signals).astype(kind)

@@ -16,6 +16,7 @@ from ..support.arrays import Array
 from ..support.decoding import MAX_LINE_ORDERS, MAX_LINES, MAX_ORDER, json_text, read_text, shown
 from ..support.files import MODEL_BYTES
 from ..support.kinds import told_kinds
+from ..support.plainresult import counted
 from .model import HarmonicModel
 from .records import MAX_TERMS, MOST_TURNS, RecordReader
 from .term import Term
@@ -226,7 +227,7 @@ class _ModelReader(RecordReader):
         rows = self.items(value, "covariance", "rows")
         if len(rows) != size:
             raise self.error(
-                f"must be square, {size} x {size} for these shafts, got {len(rows)} rows",
+                f"must be square, {size} x {size} for these shafts, got {counted(rows, 'row')}",
                 "covariance",
             )
         found = np.empty((size, size))

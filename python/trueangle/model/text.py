@@ -13,7 +13,7 @@ from ..support.angles import arcsec, unit_name
 from ..support.display_units import error_unit, sine_of_rms
 from ..support.files import MODEL, MODEL_BYTES, written_atomically
 from ..support.layout import laid_out, wrapped
-from ..support.plainresult import pretty_json
+from ..support.plainresult import counted, pretty_json
 from .errormodel import ErrorModel
 from .records import FitRecord
 
@@ -140,7 +140,8 @@ def model_summary(model: ErrorModel) -> str:
     if model.fit is not None:
         start, stop = model.fit.span
         lines.append(
-            f"fitted to {model.fit.samples} readings of {model.fit.runs} runs "
+            f"fitted to {counted(model.fit.samples, 'reading')} of "
+            f"{counted(model.fit.runs, 'run')} "
             f"between {start:.6g} and {stop:.6g} {unit}"
         )
     return laid_out(lines)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from pdftext import pdf_text
 from trueangle.certificate import (
     Budget,
     Contribution,
@@ -24,8 +25,6 @@ from trueangle.certificate import (
 )
 from trueangle.errors import ArgumentError, FileError
 from trueangle.support.distributions import normal_quantile
-
-from .pdftext import pdf_text
 
 #: JCGM 106:2012, examples of clause 7: value, u, lower and upper limit, probability as printed.
 PRINTED = {
@@ -430,3 +429,18 @@ def test_all_notes_of_a_german_certificate_are_german():
         assert not ENGLISH.search(said), (note, said)
         assert said.endswith(".")
         assert language.note_in("en", note) == note
+
+
+def filled(text, values):
+    return re.sub(r"#(\w+)", lambda found: values[found[1]], text)
+
+
+def test_every_note_is_found_by_its_own_words_and_keeps_its_values():
+    """Each with other numbers in its places, which stand in the German one with a comma."""
+    english, german = (language.certificate_texts(name)["notes"] for name in ("en", "de"))
+    for name, text in english.items():
+        places = dict.fromkeys(re.findall(r"#(\w+)", text))
+        values = {place: f"{17 + 3 * k}.{k + 1}" for k, place in enumerate(places)}
+        wanted = filled(german[name], {p: v.replace(".", ",") for p, v in values.items()})
+        said = language.note_in("de", filled(text, values))
+        assert said.lower() == wanted.lower(), name

@@ -104,3 +104,67 @@ def test_a_file_of_unnamed_arrays_says_what_is_in_it(ending, tmp_path):
         ta.check(path)
     with pytest.raises(FileError, match=r"no column reference_deg .*rig/enc"):
         ta.read_runs(path)
+
+
+SHAPES = {
+    "a column": (np.arange(6.0), ["column1"]),
+    "a row": (np.arange(6.0)[None, :], ["column1"]),
+    "in the order of Fortran": (np.asfortranarray(np.arange(12.0).reshape(6, 2)), 2),
+    "of other bytes": (np.arange(12.0).reshape(6, 2).astype(">f8"), 2),
+    "single, of other bytes": (np.arange(12.0).reshape(6, 2).astype(">f4"), 2),
+    "small whole numbers": (np.arange(12, dtype=">i2").reshape(6, 2), 2),
+    "records in a column": (np.zeros((6, 1), [("a", ">f8"), ("b", "i2")]), ["a", "b"]),
+    "records of arrays": (np.zeros(6, [("a", "f8"), ("two", "f8", 2), ("t", "S3")]), ["a", "t"]),
+}
+
+
+@pytest.mark.parametrize("case", SHAPES)
+def test_an_array_of_any_shape_is_columns_and_gets_one_more(case, tmp_path):
+    from trueangle.formats import npy
+    from trueangle.formats.format import Selection
+
+    array, names = SHAPES[case]
+    names = [f"column{k + 1}" for k in range(names)] if isinstance(names, int) else names
+    array = array.copy(order="K")
+    if array.dtype.names:
+        array[array.dtype.names[0]] = np.arange(6.0).reshape(array.shape)
+    path, column = tmp_path / "a.npy", names[0]
+    np.save(path, array)
+    assert npy.columns(path) == names
+    assert npy.extent(path, [column, column]) == (6, 96)
+    (batch,) = npy.read(path, Selection([column]))
+    first = array.reshape(6, -1)[:, 0] if array.dtype.names is None else np.arange(6.0)
+    np.testing.assert_array_equal(batch[column], first)
+    assert batch[column].dtype.isnative
+    signals = {"indicated": (column, "deg")}
+    report = ta.correct_logs(path, MODEL, tmp_path / "out.npy", signals=signals)
+    assert report.is_done, report.logs[0].error
+    made = np.load(tmp_path / "out.npy")
+    wanted = MODEL.correct(first.astype(np.float64))
+    if array.dtype.names is None:
+        assert made.dtype == (np.float32 if "single" in case else np.float64)
+        width = array.size // 6
+        np.testing.assert_array_equal(made[:, :width], array.reshape(6, width))
+        np.testing.assert_allclose(made[:, width], wanted, rtol=1e-6)
+        assert made.shape == (6, width + 1)
+    else:
+        assert made.dtype.names == (*array.dtype.names, "corrected_deg")
+        np.testing.assert_array_equal(made["corrected_deg"], wanted)
+        for name in array.dtype.names:
+            assert made.dtype[name] == array.dtype[name]
+            np.testing.assert_array_equal(made[name], array.reshape(-1)[name])
+
+
+@pytest.mark.parametrize(
+    ("array", "told"),
+    [
+        (np.zeros((2, 3, 4)), "one column, or several side by side, are needed"),
+        (np.zeros(0), "one column, or several side by side, are needed"),
+        (np.array(["a", "b"]), "numbers are needed, the array holds <U1"),
+        (np.zeros((2, 2), [("a", "f8")]), r"records one after the other are needed, got \(2, 2\)"),
+    ],
+)
+def test_an_array_that_is_no_table_is_refused(array, told, tmp_path):
+    np.save(tmp_path / "a.npy", array)
+    with pytest.raises(FileError, match=rf"a\.npy: {told}"):
+        ta.read_runs(tmp_path / "a.npy")

@@ -9,7 +9,9 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
+from trueangle.errors import FileError
 from trueangle.formats import budget
+from trueangle.formats.format import Selection
 from trueangle.runs import readings
 
 #: The budget of these tests, and rows that go beyond it in two columns of numbers.
@@ -127,6 +129,34 @@ def test_a_data_set_of_which_nothing_is_stored_is_refused(tmp_path, capsys):
     assert "0 % of them are stored" in told
     assert time.process_time() - start < 20.0  # nothing of it was computed: that takes minutes
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5", "m.json"]
+
+
+@pytest.mark.parametrize(
+    ("stored", "told"), [(1.0, None), (0.6, None), (0.4, "40 %"), (0.0, "0 %")]
+)
+@pytest.mark.parametrize("chunks", [True, False])
+def test_a_large_data_set_is_read_where_half_of_it_is_stored(
+    chunks, stored, told, monkeypatch, tmp_path
+):
+    """Of one without chunks all or nothing is there."""
+    h5py = pytest.importorskip("h5py")
+    from trueangle.formats import hdf5
+
+    if not chunks and 0.0 < stored < 1.0:
+        pytest.skip("stored as a whole")
+    monkeypatch.setattr(budget, "DECODED_BYTES", 40_000)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        made = file.create_dataset("x", (10_000,), "f8", chunks=(1000,) if chunks else None)
+        if stored:
+            made[: int(10_000 * stored)] = 1.0
+    selection = Selection(["x"])
+    if told is None:
+        assert sum(part["x"].size for part in hdf5.read(tmp_path / "a.h5", selection)) == 10_000
+        return
+    with pytest.raises(
+        FileError, match=f"says to hold 10000 values, but {told} of them are stored"
+    ):
+        list(hdf5.read(tmp_path / "a.h5", selection))
 
 
 def test_a_record_batch_is_not_unpacked_to_be_corrected(small, tmp_path):

@@ -140,3 +140,18 @@ def test_a_bags_columns_are_the_fields_of_the_message():
         ("elbow/torque_Nm", ("elbow", "effort")),
     ):
         assert rosbag._values(States(), name, ["elbow"]) == wanted
+
+
+@pytest.mark.parametrize(
+    ("head", "taken"),
+    [(b"\0\1\0\0", True), (b"\0\1\0\3", True), (b"\0\1\5\0", True), (b"\0\2\0\0", False),
+     (b"\1\1\0\0", False), (b"\0\7\0\0", False)],
+)  # fmt: skip
+def test_plain_cdr_is_told_by_its_two_first_bytes(head, taken):
+    """The two behind are options: padding at the end, or anything."""
+    data = head + message(False, ["elbow"], [0.5], [1.5])[4:]
+    if taken:
+        assert Block([data], False).values("elbow", "velocity").tolist() == [1.5]
+        return
+    with pytest.raises(ValueError, match="a joint state is not in plain CDR, which alone is under"):
+        Block([data], False)

@@ -284,5 +284,5 @@ def test_words_among_readings_are_counted_and_said(tmp_path):
         (run,) = ta.read_runs(path, signals=COLUMNS)
     np.testing.assert_array_equal(run.reference, REFERENCE)
     path.write_text("\n".join([*lines, "1.5"]))
-    with pytest.raises(FileError, match=r"line 27: 1 values where the header has 3 columns"):
+    with pytest.raises(FileError, match=r"line 27: 1 value where the header has 3 columns"):
         ta.read_runs(path, signals=COLUMNS)

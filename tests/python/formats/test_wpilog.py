@@ -156,3 +156,82 @@ def test_damage_is_told_by_its_byte(data, told, tmp_path):
     path.write_bytes(data)
     with pytest.raises(FileError, match=told):
         ta.read_runs(path)
+
+
+def log_of(path, *parts):
+    path.write_bytes(EXAMPLE[:12] + b"".join(parts))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "code", "values"),
+    [("double", "<f8", [1.5, -2.25]), ("float", "<f4", [1.5, -2.25]),
+     ("int64", "<i8", [-3, 1 << 40]), ("boolean", "?", [0, 1])],
+)  # fmt: skip
+def test_numbers_of_every_kind_alone_and_in_arrays(kind, code, values, tmp_path):
+    """The second array is shorter: of its last element nothing is known then."""
+    both = np.array(values, code)
+    path = log_of(
+        tmp_path / "a.wpilog",
+        record(0, 0, started(1, "one", kind)),
+        record(0, 0, started(2, "some", f"{kind}[]")),
+        record(0, 0, started(3, "none", f"{kind}[]")),
+        *(record(1, 10 * k + 5, both[k : k + 1].tobytes()) for k in range(2)),
+        record(2, 5, both.tobytes()), record(2, 15, both[:1].tobytes()),
+    )  # fmt: skip
+    names = ["time_s", "one", "some[0]", "some[1]"]
+    assert wpilog.columns(path) == names
+    (batch,) = wpilog.read(path, Selection(names))
+    np.testing.assert_allclose(batch["time_s"], [5e-6, 15e-6])
+    assert batch["one"].tolist() == values
+    assert batch["some[0]"].tolist() == [values[0], values[0]]
+    np.testing.assert_array_equal(batch["some[1]"], [values[1], np.nan])
+    assert wpilog.extent(path, ["one", "some[1]"]) == (4, 64)
+    assert wpilog.extent(path) == (4, 0)
+    assert wpilog.contents(path).rows == 4
+
+
+def test_an_entry_that_is_finished_may_be_started_anew(tmp_path):
+    """Under another number, and its number under another name; a robot does so when it restarts."""
+    values = [struct.pack("<d", x) for x in (1.0, 2.0, 3.0, 4.0)]
+    parts = [
+        record(0, 0, started(1, "a", "double")),
+        record(1, 1, values[0]),
+        record(0, 2, bytes([1]) + struct.pack("<I", 1)),
+        record(0, 2, bytes([2]) + struct.pack("<II", 1, 2) + b"{}"),  # metadata
+        record(0, 3, started(7, "a", "double")),
+        record(0, 3, started(1, "b", "double")),
+        record(7, 4, values[1]),
+        record(1, 4, values[2]),
+    ]
+    path = log_of(tmp_path / "a.wpilog", *parts)
+    (batch,) = wpilog.read(path, Selection(["a", "b"]))
+    np.testing.assert_array_equal(batch["a"], [1.0, 2.0])
+    np.testing.assert_array_equal(batch["b"], [np.nan, 3.0])
+    added = len(log_of(tmp_path / "b.wpilog", *parts[:3]).read_bytes())
+    for more, told in (
+        (values[3], f"byte {added} is of an entry never started"),
+        (None, rf"column 'a': is started as double and as float again at byte {added}"),
+    ):
+        end = record(1, 9, more) if more else record(0, 9, started(2, "a", "float"))
+        path = log_of(tmp_path / "b.wpilog", *parts[:3], end)
+        with pytest.raises(FileError, match=told):
+            wpilog.columns(path)
+    short = log_of(tmp_path / "c.wpilog", parts[0], record(1, 1, values[0][:5]))
+    begin = len(short.read_bytes()) - 5
+    with pytest.raises(FileError, match=f"the record at byte {begin} holds 5 bytes only"):
+        list(wpilog.read(short, Selection(["a"])))
+    late = log_of(tmp_path / "d.wpilog", parts[0], record(1, -1, values[0]))
+    with pytest.raises(FileError, match=rf"is of the time {2**64 - 1} us"):
+        wpilog.columns(late)
+
+
+@pytest.mark.parametrize(
+    ("number", "time"), [(1, 0), (255, 255), (256, 1 << 16), (70_000, 1 << 40)]
+)
+def test_a_record_that_is_written_is_read(number, time, tmp_path):
+    """With fields of any length."""
+    made = wpilog._started(number, "x", '{"unit": "°"}', time)
+    made += wpilog._record(number, time, struct.pack("<d", 0.5))
+    (batch,) = wpilog.read(log_of(tmp_path / "a.wpilog", made), Selection(["time_s", "x"]))
+    assert (batch["time_s"].tolist(), batch["x"].tolist()) == ([time * 1e-6], [0.5])

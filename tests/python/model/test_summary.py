@@ -70,3 +70,44 @@ def test_terms_that_hold_over_their_own_travel_hold_together_where_all_do():
     ramps = [ScaleError(1e-5, -100.0, 500.0), ScaleError(2e-5, 20.0, 900.0)]
     for terms in (ramps, ramps[::-1]):
         assert model(360.0, terms=terms).partial_span == (20.0, 500.0)
+
+
+def test_a_summary_word_by_word():
+    from trueangle.model.records import FitRecord
+
+    a = 1.0 / 3600.0
+    shaft = ta.Shaft("output", 1, [1, 12], [0.0, 3.0 * a], [40.0 * a, 0.0])
+    record = FitRecord(1, 1, (20.0, 140.0), 0.001)
+    one = ta.HarmonicModel([shaft], 0.25, 360.0, terms=(ta.Backlash(a),), fit=record)
+    assert one.summary().splitlines() == [
+        "HarmonicModel: 2 orders of output, period 360, argument reference, with backlash",
+        "constant 0.25 deg, 900 arcsec",
+        "shaft                 order  amplitude, arcsec  phase, deg",
+        "output                    1              40.00        0.00",
+        "output                   12              3.000       90.00",
+        "fitted to 1 reading of 1 run between 20 and 140 deg",
+    ]
+    several = one.replace(fit=FitRecord(80, 2, (20.0, 140.0), 0.001), terms=())
+    assert several.summary().splitlines()[-1] == (
+        "fitted to 80 readings of 2 runs between 20 and 140 deg"
+    )
+
+
+@pytest.mark.parametrize("more", [-1, 0, 1, 30])
+def test_a_summary_lists_as_many_orders_as_a_screen_holds(more):
+    from trueangle.model.text import _LISTED
+
+    count = _LISTED + more
+    shaft = ta.Shaft("output", 1, list(range(1, count + 1)), [1e-4] * count, [0.0] * count)
+    lines = ta.HarmonicModel([shaft], 0.0, 360.0).summary().splitlines()
+    listed = [line for line in lines if line.startswith("output")]
+    assert len(listed) == min(count, _LISTED)
+    assert (f"... and {more} more" in lines) is (more > 0)
+    assert (" more" in lines[-1]) is (more > 0)
+
+
+@pytest.mark.parametrize("condition", [0.5, 0.999, -1.0, np.nan])
+def test_a_condition_number_is_one_or_more_but_for_its_rounding(condition):
+    assert model(360.0).replace(condition_number=1.0 - 1e-9).condition_number < 1.0
+    with pytest.raises(ta.errors.ArgumentError, match="condition_number must be a finite number"):
+        model(360.0).replace(condition_number=condition)

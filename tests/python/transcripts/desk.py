@@ -12,6 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+import trueangle as ta
+from trueangle.model.records import FitRecord
+
 Array = NDArray[np.float64]
 
 ARCSEC = 1.0 / 3600.0
@@ -128,9 +131,34 @@ def furnish(folder: Path) -> None:
     polygon(folder)
     arm(folder)
     fleet(folder)
+    months(folder)
     without_reference(folder)
     two_clocks(folder)
     faulty(folder)
+    models(folder)
+
+
+def models(folder: Path) -> None:
+    """Models to be exported: of an arc with play, in radians of two shafts with terms, steep."""
+    shaft = ta.Shaft("output", 1, [1, 2], [0.3, 0.0], [0.0, 0.1])
+    found = FitRecord(900, 2, (20.0, 140.0), 0.001, signals=(("velocity", -90.0, 60.0),))
+    play = (ta.Backlash(180 * ARCSEC), ta.Latency(0.002))
+    known = np.diag([0.0, 1e-8, 1e-8, 4e-8, 4e-8])
+    ta.HarmonicModel(
+        [shaft], constant=0.25, period=360.0, terms=play, fit=found, covariance=known
+    ).save(folder / "play.json")
+    a = np.radians(ARCSEC)
+    ta.HarmonicModel(
+        [ta.Shaft("output", 1, [1, 3], [900 * a, 0.0], [0.0, 40 * a]),
+         ta.Shaft("motor", 100.5, [1], [0.0], [20 * a])],
+        constant=-0.01, period=2.0 * np.pi, argument="indicated",
+        terms=(ta.terms.ThermalDrift(2 * a, reference_C=22.0), ta.terms.TorsionalCompliance(3 * a),
+               ta.terms.CurrentCoupling(5 * a), ta.Latency(1e-4),
+               ta.terms.PreslidingHysteresis(8 * a, 0.05)),
+    ).save(folder / "loaded.json")  # fmt: skip
+    ta.HarmonicModel([ta.Shaft("output", 1, [4, 25], [7.0, 0.0], [0.0, 0.02])], period=360.0).save(
+        folder / "steep.json"
+    )
 
 
 def printer() -> str:
@@ -202,6 +230,42 @@ def fleet(folder: Path) -> None:
             table["reference_deg"] += angle.tolist()
             table["indicated_deg"] += (angle + error).tolist()
     write_table(folder / "fleet.csv", table)
+
+
+def months(folder: Path) -> None:
+    """Sixteen units on four dates: each of the first eight has a history of its own."""
+    rng = np.random.default_rng(21)
+    angle = np.arange(0.0, 360.0, 8.0)
+    table: dict[str, list[object]] = {
+        name: [] for name in ("unit", "when", "reference_deg", "indicated_deg")
+    }
+    size = rng.normal([40.0, 20.0, 8.0], [9.0, 5.0, 2.0], (16, 3))
+    phase = rng.normal([80.0, 30.0, 200.0], 10.0, (16, 3))
+    dates = ("2026-01-10", "2026-03-10", "2026-05-10", "2026-07-10")
+    for unit in range(16):
+        for k, when in enumerate(dates):
+            if unit in (4, 6) and k in (1, 2):
+                continue
+            new, turn, zero = size[unit].copy(), phase[unit].copy(), 0.0
+            if unit == 0:
+                new[1] += 4.0 * k  # it grows
+            elif unit == 1 and k == 3:
+                new[0] += 30.0  # a step
+            elif unit in (2, 3) and k == 3:  # their labels are exchanged
+                new, turn = size[5 - unit], phase[5 - unit]
+            elif unit == 4 and k == 3:
+                new, turn = rng.normal([40.0, 20.0, 8.0], 9.0), rng.uniform(0.0, 360.0, 3)
+            elif unit == 5 and k > 1:
+                zero = 60.0
+            elif unit == 7:
+                new[2] = 60.0  # unlike the others from the start
+            lines = zip((1.0, 2.0, 3.0), new.tolist(), turn.tolist(), strict=True)
+            error = waves(angle, *lines) + ARCSEC * (zero + rng.normal(0.0, 2.0, angle.size))
+            table["unit"] += [f"SN{unit:02}"] * angle.size
+            table["when"] += [when] * angle.size
+            table["reference_deg"] += angle.tolist()
+            table["indicated_deg"] += (angle + error).tolist()
+    write_table(folder / "months.csv", table)
 
 
 def without_reference(folder: Path) -> None:

@@ -8,6 +8,7 @@ import os
 import re
 import shlex
 import warnings
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,13 @@ import numpy as np
 import trueangle
 from trueangle import planning, plots
 from trueangle.cli import main
+from trueangle.export import TARGETS
 
 from .arguments import argument_lines
 from .asked import Asked
 from .charts import chart_lines
 from .figures import figure_lines
-from .views import file_lines
+from .views import file_lines, pdf_lines
 
 COLUMNS = 100
 
@@ -31,12 +33,15 @@ ALTERS = (
     (re.compile(r"\b[0-9a-f]{64}\b"), "SHA256"),
     (re.compile(r"\b20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|\+00:00)"), "NOW"),
     (re.compile(r"\bwritten 20\d\d-\d\d-\d\d\b"), "written TODAY"),
+    (re.compile(r"\{[0-9a-f-]{36}\}"), "{TOKEN}"),
     (re.compile(r"[\d,]+ rows/s"), "SPEED rows/s"),
     (re.compile(r"seconds [\d.e+-]+(?=, (?:complete|rows_per_second))"), "seconds TIME"),
     (re.compile(r"rows_per_second [\d.e+-]+"), "SPEED"),
     (re.compile(r"(readings in )[\d.]+( s| ms| min)"), r"\1TIME"),
     (re.compile(r"[\d.]+ million readings per second"), "SPEED"),
     (re.compile(rf"\b{re.escape(trueangle.__version__)}\b"), "VERSION"),
+    (re.compile(r"(numpy|[Pp]ython) \d+\.\d[\w.+]*"), r"\1 VERSION"),
+    (re.compile(r"(system |VERSION, )(Linux|Darwin|Windows) \w+"), r"\1SYSTEM"),
 )
 
 
@@ -45,10 +50,12 @@ class Terminal:
 
     ``trueangle ...`` is the command itself, in this process, and ``python ...`` a line of Python:
     what it gives, draws, warns of or raises. ``show FILE [PATTERN]`` shows what a file holds
-    (`views`), ``charts FILE`` what a page draws (`charts`), ``figures`` what the pictures drawn
-    since show (`figures`). ``write FILE LINE ...`` writes a small file, and ``hide KEY=VALUE ...``
-    ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it. ``options`` tells
-    every argument of every command, ``asked ...`` what each further option changes (`asked`).
+    (`views`), or what of it matches, ``charts FILE`` what a page draws (`charts`), ``figures`` what
+    the pictures drawn since show (`figures`), ``targets`` what an export can be asked for.
+    ``write FILE LINE ...`` writes a small file (``\\t`` and ``\\xff`` are what they are in Python),
+    and ``hide KEY=VALUE ...`` ``hidden.toml``: what ``believed.toml`` believes, and one effect
+    beside it. ``options`` tells every argument of every command, ``asked ...`` what each further
+    option changes (`asked`). Further commands follow after ``&&``.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -66,9 +73,15 @@ class Terminal:
         run = {
             "asked": self._asked, "charts": self._charts, "figures": self._drawn,
             "hide": self._hide, "options": self._options, "show": self._show,
-            "trueangle": self._trueangle, "write": self._write,
-        }[program]  # fmt: skip
-        return self._settled(run(shlex.split(rest)))
+            "targets": self._targets, "trueangle": self._trueangle, "write": self._write,
+        }  # fmt: skip
+        found: list[str] = []
+        for part in command.split(" && "):
+            program, *arguments = shlex.split(part)
+            silent = arguments[-2:] == [">", "/dev/null"]
+            text = run[program](arguments[:-2] if silent else arguments)
+            found += [] if silent else self._settled(text)
+        return found
 
     def _settled(self, text: str) -> list[str]:
         text = text.replace(f"{self.folder}{os.sep}", "").replace(str(self.folder), ".")
@@ -94,11 +107,30 @@ class Terminal:
 
     def _show(self, arguments: list[str]) -> str:
         path, wanted = self.folder / arguments[0], " ".join(arguments[1:])
-        lines = file_lines(path.read_text(encoding="utf-8"), path.suffix)
+        if path.suffix == ".pdf":
+            return "\n".join(pdf_lines(path.read_bytes()))
+        if path.suffix == ".fmu":
+            with zipfile.ZipFile(path) as unit:
+                text = unit.read("modelDescription.xml").decode()
+        else:
+            text = path.read_text(encoding="utf-8")
+        lines = file_lines(text, path.suffix)
         return "\n".join(line for line in lines if re.search(wanted, line))
 
     def _charts(self, arguments: list[str]) -> str:
         return "\n".join(chart_lines((self.folder / arguments[0]).read_text(encoding="utf-8")))
+
+    def _targets(self, arguments: list[str]) -> str:
+        lines = []
+        for target in TARGETS.values():
+            lines += [f"{target.name}: {target.what}; {target.sign}, {target.argument}"]
+            lines += [f"  {target.kind.what} ({', '.join(target.kind.endings)})"]
+            lines += [
+                f"  {name}: {option.help}; {getattr(option.values, '__name__', option.values)}, "
+                f"{option.default!r}"
+                for name, option in target.options.items()
+            ]
+        return "\n".join(lines)
 
     def _drawn(self, arguments: list[str]) -> str:
         text, self._figures = "\n".join(self._figures), []
@@ -112,7 +144,11 @@ class Terminal:
 
     def _write(self, arguments: list[str]) -> str:
         name, *lines = arguments
-        (self.folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        text = "".join(f"{line}\n" for line in lines)
+        data = text.encode("utf-8")
+        if "\\" in text:
+            data = text.encode("latin-1").decode("unicode_escape").encode("latin-1")
+        (self.folder / name).write_bytes(data)
         return ""
 
     def _options(self, _: list[str]) -> str:

@@ -20,7 +20,9 @@ from .transcript import HERE, Step, differences, is_same_number, steps_of, text_
 pytest.importorskip("matplotlib").use("Agg")
 
 #: Half a second and more each.
-SLOW = re.compile("asked|causes|charts|demo|diagnose|export|pictures|plan|report")
+SLOW = re.compile(
+    "asked|causes|certificate|charts|demo|diagnose|export|pictures|plan|report|targets"
+)
 
 #: Why an option of a command may change nothing, of all that `asked` gives.
 IDLE = {

@@ -6,11 +6,15 @@ import csv
 import io
 import json
 import re
+import textwrap
 from collections.abc import Iterator
 from html.parser import HTMLParser
+from itertools import groupby
 from typing import Any
 
 import numpy as np
+
+from pdftext import pdf_text
 
 #: Digits of a number in the view of a file; and below it nothing but rounding is told.
 DIGITS = 6
@@ -28,7 +32,43 @@ def file_lines(text: str, ending: str) -> list[str]:
         return _table_lines(text)
     if ending == ".html":
         return _page_lines(text)
-    return text.splitlines()
+    return list(_squeezed(text.splitlines()))
+
+
+#: Neighbouring lines that differ in their numbers alone are shown as one from so many on.
+ALIKE = 5
+_FIGURE = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+def _squeezed(lines: list[str]) -> Iterator[str]:
+    """Lines, and of a table its form and a line for each of its columns, or for all of a row."""
+    for form, group in groupby(lines, lambda line: re.sub("#(, #)+,?", "#, #", _form(line))):
+        rows = list(group)
+        cells = [[float(x) for x in _FIGURE.findall(row)] for row in rows]
+        if len(rows) < ALIKE or not cells[0]:
+            yield from rows
+            continue
+        yield f"{len(rows)} lines: {form.strip()}"
+        is_list = "#, #" in form or len(cells[0]) > 4
+        columns = [[x for row in cells for x in row]] if is_list else zip(*cells, strict=True)
+        yield from (f"  {numbers_line(column)}" for column in columns)
+
+
+def _form(line: str) -> str:
+    return _FIGURE.sub("#", line)
+
+
+def pdf_lines(data: bytes) -> list[str]:
+    """The text of a PDF: sentences as they flow, cells of tables side by side."""
+    found = [""]
+    for piece in pdf_text(data).splitlines():
+        if found[-1].endswith(" ") or piece[:1] in (" ", ",", ".", ""):
+            found[-1] += piece
+        elif max(len(piece), len(found[-1].rpartition(" | ")[2])) < 28 and len(found[-1]) < 80:
+            found[-1] += f" | {piece}"
+        else:
+            found.append(piece)
+    return [line for text in found for line in textwrap.wrap(text.removeprefix(" | "), 96)]
 
 
 def shown(value: Any, digits: int = DIGITS) -> str:

@@ -1,0 +1,175 @@
+"""Every number of a certificate against its formula, written anew from its fit and the GUM."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+import trueangle as ta
+from trueangle.certificate import Contribution, Identity, Specification, certify
+
+SEED = 41_800
+ARCSEC = 1_296_000.0
+#: Two-sided probability of 95.45 %.
+UPPER = 0.97725
+
+#: Unit of the readings, travel in turns, runs, error in both directions, type B contributions.
+CASES = {
+    "a turn in radians": (2.0 * np.pi, 1.0, 4, 0.0, ()),
+    "an arc in turns": (1.0, 0.55, 3, 0.0, (Contribution("reference", 2.0),)),
+    "both ways": (
+        360.0, 1.0, 5, 12.0,
+        (Contribution("reference", 1.5, "B", "rectangular", 7.0), Contribution("axis", 0.7)),
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(params=CASES)
+def made(request):
+    """A certificate, the fit of its readings, and what it was asked for."""
+    period, travel, count, play, contributions = CASES[request.param]
+    rng = np.random.default_rng([SEED, count])
+    runs = []
+    for number in range(count):
+        mount = (number % 2) * 0.125
+        turn = travel * np.arange(40) / 40.0
+        turn = np.concatenate([turn, turn[::-1]]) if play else turn
+        way = np.where(np.arange(turn.size) < 40, 1.0, -1.0)
+        error = 300.0 * np.sin(2.0 * np.pi * turn + 0.3) + 90.0 * np.cos(6.0 * np.pi * turn)
+        error += play * way + 25.0 * number + rng.normal(0.0, 4.0, turn.size)
+        runs.append(
+            ta.CalibrationRun(
+                period * turn, period * (turn + error / ARCSEC), period, mount=period * mount,
+                temperature=np.full(turn.size, 20.0 + number),
+            )
+        )  # fmt: skip
+    asked = Specification(320.0, "guard_band")
+    who = Identity("1", "joint", contributions=contributions, specification=asked)
+    # Play has a line of its own, and is none of the noise.
+    fit = ta.fit(runs, orders=[1, 3], nuisance="direction" if play else "none")
+    content = certify(runs, who, orders=[1, 3], positions=30).content
+    return SimpleNamespace(fit=fit, runs=runs, content=content, period=period, asked=asked,
+                           more=contributions, play=play, travel=travel)  # fmt: skip
+
+
+def factor(freedom):
+    return student.ppf(UPPER, np.floor(freedom) if np.isfinite(freedom) else 1e12)
+
+
+def test_values_and_their_uncertainty(made):
+    """The series less its mean; the covariance through the same; Welch and Satterthwaite."""
+    content, fit = made.content, made.fit
+    rows, lines = content["positions"], content["budget"]["lines"]
+    turn = np.array([row["angle_deg"] for row in rows]) / 360.0
+    wanted = np.arange(30) / 30.0
+    np.testing.assert_allclose(turn, wanted[wanted < made.travel], atol=1e-12)
+    angle = 2.0 * np.pi * turn
+    columns = [np.ones(turn.size)]
+    for order in (1, 3):
+        columns += [np.cos(order * angle), np.sin(order * angle)]
+    design = np.column_stack(columns)
+    design -= design.mean(axis=0)
+    (shaft,) = fit.model.shafts
+    series = np.array([0.0, *np.ravel(np.column_stack([shaft.cosine, shaft.sine]))])
+    unit = ARCSEC / made.period
+    error = unit * design @ series
+    standard = unit * np.sqrt(np.einsum("ij,jk,ik->i", design, fit.covariance, design))
+    np.testing.assert_allclose([row["error_arcsec"] for row in rows], error, atol=1e-9)
+    shared = lines[1:]
+    freedom = np.array([line["degrees_of_freedom"] or np.inf for line in lines])
+    for row, own in zip(rows, standard, strict=True):
+        parts = np.array([own, *(line["standard_arcsec"] for line in shared)])
+        u = np.sqrt(np.sum(parts**2))
+        effective = u**4 / np.sum(parts**4 / freedom)
+        assert row["standard_arcsec"] == pytest.approx(u, rel=1e-9)
+        assert row["degrees_of_freedom"] == pytest.approx(effective, rel=1e-9)
+        assert row["coverage_factor"] == pytest.approx(factor(effective), rel=1e-6)
+        assert row["expanded_arcsec"] == pytest.approx(row["coverage_factor"] * u, rel=1e-9)
+    assert content["level_percent"] == 95.45
+
+
+def test_lines_of_the_budget(made):
+    content = made.content
+    lines, rows = content["budget"]["lines"], content["positions"]
+    names = ["fit of the readings", "error that the series does not hold"]
+    names += ["reversal error, half of it"] * bool(made.play)
+    assert [line["name"] for line in lines] == [*names, *(item.name for item in made.more)]
+    assert [line["type"] for line in lines] == ["A"] * len(names) + ["B"] * len(made.more)
+    kinds = ["t", "t", "two-point"][: len(names)] + [item.distribution for item in made.more]
+    assert [line["distribution"] for line in lines] == kinds
+    assert all(line["sensitivity"] == 1.0 for line in lines)
+    for line, item in zip(lines[len(names) :], made.more, strict=True):
+        assert line["standard_arcsec"] == item.standard
+        assert (line["degrees_of_freedom"] or np.inf) == item.degrees_of_freedom
+    if made.play:
+        assert lines[2]["standard_arcsec"] == pytest.approx(made.play, abs=1.5)
+        # Way and return over the same places: half of their difference, run by run.
+        errors = [(run.indicated - run.reference) * ARCSEC / made.period for run in made.runs]
+        halves = [(e[:40].mean() - e[40:].mean()) / 2.0 for e in errors]
+        # At the turning point the reading that goes back stands where the last one stood.
+        assert lines[2]["standard_arcsec"] == pytest.approx(np.mean(halves), rel=1.5 / 40.0)
+        known = np.mean(halves) / (np.std(halves, ddof=1) / np.sqrt(len(halves)))
+        assert lines[2]["degrees_of_freedom"] == pytest.approx(0.5 * known**2, rel=0.15)
+    assert lines[0]["degrees_of_freedom"] == made.fit.uncertainty.fewest
+    variance = np.array([line["standard_arcsec"] ** 2 for line in lines])
+    shares = [line["share_percent"] for line in lines]
+    np.testing.assert_allclose(shares, 100.0 * variance / variance.sum(), atol=0.1)
+    assert sum(round(10 * share) for share in shares) == 1000
+    widest = max(rows, key=lambda row: row["expanded_arcsec"])
+    assert {k: v for k, v in content["budget"].items() if k != "lines"} == {
+        k: v for k, v in widest.items() if k != "error_arcsec"
+    }
+
+
+def test_harmonics_and_readings(made):
+    content, fit, unit = made.content, made.fit, ARCSEC / made.period
+    k = factor(fit.uncertainty.fewest)
+    for n, row in enumerate(content["harmonics"]):
+        assert (row["shaft"], row["order"]) == ("output", (1, 3)[n])
+        assert row["amplitude_arcsec"] == pytest.approx(unit * fit.amplitudes[n])
+        assert row["amplitude_expanded_arcsec"] == pytest.approx(k * unit * fit.amplitude_std[n])
+        assert row["phase_deg"] == pytest.approx(np.degrees(fit.phases[n]) % 360.0)
+        assert row["phase_expanded_deg"] == pytest.approx(k * np.degrees(fit.phase_std[n]))
+    assert content["harmonics"][0]["amplitude_arcsec"] == pytest.approx(300.0, abs=10.0)
+    assert content["harmonics"][0]["phase_deg"] == pytest.approx(np.degrees(0.3), abs=2.0)
+    read = content["readings"]
+    assert read["readings"] == sum(len(run) for run in made.runs)
+    assert (read["runs"], read["mounts"], read["outliers"]) == (len(made.runs), 2, len(fit.wild))
+    zeros = 25.0 * np.arange(len(made.runs))
+    assert read["zero_deg"] * 3600.0 == pytest.approx(np.mean(zeros), abs=4.0)
+    assert read["zero_spread_arcsec"] == pytest.approx(np.std(zeros, ddof=1), abs=3.0)
+    assert read["standard_deviation_arcsec"] == pytest.approx(unit * fit.residual_std)
+    means = 20.0 + np.arange(len(made.runs))
+    assert content["temperature_recorded_C"] == pytest.approx(
+        {"mean": means.mean(), "low": means.min(), "high": means.max()}
+    )
+
+
+def test_what_is_stated_of_conformity(made):
+    """ILAC-G8, a guard band of U; JCGM 106 with Student's distribution."""
+    found, rows = made.content["conformity"], made.content["positions"]
+    limit = made.asked.limit_arcsec
+    assert (found["limit_arcsec"], found["decision_rule"]) == (limit, "guard_band")
+    counts = dict.fromkeys(("pass", "conditional_pass", "conditional_fail", "fail"), 0)
+    chances = []
+    for row in rows:
+        e, u, wide = abs(row["error_arcsec"]), row["standard_arcsec"], row["expanded_arcsec"]
+        name = ("pass" if e <= limit - wide else "conditional_pass" if e <= limit
+                else "conditional_fail" if e <= limit + wide else "fail")  # fmt: skip
+        counts[name] += 1
+        freedom = row["degrees_of_freedom"]
+        chances.append(
+            student.cdf((limit - e) / u, freedom) - student.cdf(-(limit + e) / u, freedom)
+        )
+    assert found["counts"] == counts
+    assert found["conformance_probability"] == pytest.approx(min(chances), abs=1e-9)
+    stated = [name for name, count in counts.items() if count]
+    assert found["statement"] == stated[-1]
+    assert found["conforms"] is (stated == ["pass"])
+    worst = found["worst"]
+    (row,) = [row for row in rows if row["angle_deg"] == worst["angle_deg"]]
+    assert worst["error_arcsec"] == row["error_arcsec"]
+    assert worst["acceptance_limit_arcsec"] == pytest.approx(limit - row["expanded_arcsec"])
