@@ -130,7 +130,7 @@ def load_identity(path: str | PathLike[str]) -> Identity:
     except ValueError:  # whole numbers of thousands of digits
         raise FileError(path, "holds a number or date that cannot be read") from None
     try:
-        found = identity_from(table)
+        found = _identity_from(table)
         if found.logo is None:
             return found
         logo = Path(path).parent / found.logo
@@ -144,7 +144,7 @@ def load_identity(path: str | PathLike[str]) -> Identity:
         raise FileError(path, str(reason)) from None
 
 
-def identity_from(table: Mapping[str, Any]) -> Identity:
+def _identity_from(table: Mapping[str, Any]) -> Identity:
     """Identity of a decoded file.
 
     Raises

@@ -33,7 +33,7 @@ PROPORTIONAL = 1e-3
 NOTHING = 0.05
 
 
-def scaled_effect(
+def _scaled_effect(
     effect: Effect, factor: float, signals: Signals, around: Surroundings
 ) -> Effect | None:
     """The effect ``factor`` times as strong; None where its signal is not proportional."""
@@ -80,12 +80,12 @@ def corrected_effects(
         if 2.0 * normal_tail(z) > LEVEL or (worst is not None and z <= worst[0]):
             continue
         total = 1.0 + factor
-        other = scaled_effect(effect, total, signals, around)
+        other = _scaled_effect(effect, total, signals, around)
         if other is None:
             continue
         kept = list(believed.effects)
         if abs(total) < max(NOTHING, 3.0 * std):
-            other = scaled_effect(effect, 0.0, signals, around) or other
+            other = _scaled_effect(effect, 0.0, signals, around) or other
         kept[k] = other
         worst = (z, replace(believed, effects=tuple(kept)))
     return None if worst is None else worst[1]

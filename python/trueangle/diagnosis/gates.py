@@ -51,7 +51,7 @@ FOLLOWED = {
 }
 
 
-def not_carried(finding: Finding) -> str:
+def _not_carried(finding: Finding) -> str:
     """A law that does not carry over to a level of its factor that was left out.
 
     Nothing is gained there for certain, or more is left than taken: another law.
@@ -68,7 +68,7 @@ def not_carried(finding: Finding) -> str:
     )
 
 
-def not_told_from_zero(finding: Finding) -> str:
+def _not_told_from_zero(finding: Finding) -> str:
     """A size within two standard errors of zero."""
     effect = EFFECTS[finding.cause]
     name = effect.size_name
@@ -91,7 +91,7 @@ def not_told_from_zero(finding: Finding) -> str:
     return f"its {name} is {z:.1f} standard errors from zero"
 
 
-def against_friction(finding: Finding) -> str:
+def _against_friction(finding: Finding) -> str:
     """A wind-up of friction that leads where friction holds back."""
     size = finding.parameters.get(PreslidingHysteresis.size_name)
     if finding.cause != PreslidingHysteresis.kind or size is None:
@@ -101,7 +101,7 @@ def against_friction(finding: Finding) -> str:
     return ""
 
 
-def not_in_every_part(regression: Regression, finding: Finding) -> str:
+def _not_in_every_part(regression: Regression, finding: Finding) -> str:
     """A ramp whose slope over the rest of its travel does not carry over to a part of it.
 
     A ratio is wrong at every angle alike. What rises for a while and then stays (a wide hysteresis,
@@ -135,7 +135,7 @@ def not_in_every_part(regression: Regression, finding: Finding) -> str:
 
 
 #: Every gate, in the order in which reasons are given.
-GATES: tuple[Callable[[Finding], str], ...] = (not_carried, not_told_from_zero, against_friction)
+GATES: tuple[Callable[[Finding], str], ...] = (_not_carried, _not_told_from_zero, _against_friction)
 
 #: Levels of a factor, as one of them is called.
 _NOUNS = {"velocity": "speed", "temperature": "temperature", "torque": "load", "mount": "mount"}
@@ -151,7 +151,7 @@ def gated_findings(
         reason = ""
         if finding.confirmed:
             reason = next((r for gate in GATES if (r := gate(finding))), "")
-            reason = reason or not_in_every_part(regression, finding)
+            reason = reason or _not_in_every_part(regression, finding)
         found.append(replace(finding, status=NOT_CONFIRMED, reason=reason) if reason else finding)
     spots: list[Blindness] = []
     shared: set[int] = set()

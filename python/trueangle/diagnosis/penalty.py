@@ -42,7 +42,7 @@ def before_forms(regression: Regression) -> float:
     return min(float(regression.start), found)
 
 
-def exact_terms(regression: Regression) -> list[Extension]:
+def _exact_terms(regression: Regression) -> list[Extension]:
     """Terms whose forms leave nothing of them."""
     return [term for term in regression.terms if effect_of(term.cause).has_exact_form]
 
@@ -52,7 +52,7 @@ def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
 
     Correlated noise takes up a part of what is not yet explained, and hides it from a likelihood.
     """
-    exact = exact_terms(chosen)
+    exact = _exact_terms(chosen)
     before, after = (
         float(np.var(one.left_within_runs))
         for one in (start.with_terms(exact) if exact else start, chosen)

@@ -30,7 +30,7 @@ def diagnosis_summary(
     unit = error_unit(errors_in, sine_of_rms(d.rms))
     n = unit.number
     lines = [
-        *diagnosis_headline(diagnosis, unit),
+        *_headline(diagnosis, unit),
         *_wrapped(diagnosis.simulated.summary() if diagnosis.simulated else "", 0),
         f"Measured minus simulated: rms {unit.text(d.rms)}, peak-to-peak "
         f"{n(d.peak_to_peak)}, max abs {n(d.max_abs)} ({diagnosis.readings} readings).",
@@ -83,7 +83,7 @@ def _if_it_is(spot: Blindness, unit: ErrorUnit) -> Iterator[str]:
         yield f"If {cause}: {shown}."
 
 
-def diagnosis_headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
+def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
     """What a reader must know first: faults, what is not understood, what is seen or wrong."""
     lines: list[str] = []
     for note in diagnosis.notes:

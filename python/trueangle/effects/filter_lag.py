@@ -93,7 +93,7 @@ class FilterLag(Effect):
     def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
         pattern = around.pattern
         seen = pattern.passed(
-            signals.theta, signals.turns_per_s, lambda f: low_pass(f, self.cutoff_hz, self.damping)
+            signals.theta, signals.turns_per_s, lambda f: _low_pass(f, self.cutoff_hz, self.damping)
         )
         return np.asarray(seen - pattern.value(signals.theta))
 
@@ -244,7 +244,7 @@ class FilterLag(Effect):
         return (FilterLagTerm(self.cutoff_hz, self.damping),)
 
 
-def low_pass(frequency: Array, cutoff: float, damping: float | None) -> NDArray[np.complex128]:
+def _low_pass(frequency: Array, cutoff: float, damping: float | None) -> NDArray[np.complex128]:
     """Gain of a low-pass of first or second order at a signed frequency, both in Hz."""
     if damping is None:
         return np.asarray(1.0 / (1.0 + 1j * (frequency / cutoff)))

@@ -86,7 +86,7 @@ class Travel:
             More entries than the target takes, too few for the orders, no travel.
         """
         entries = options["entries"]
-        ends = zip(("start", "stop"), calibrated_travel(pattern), strict=True)
+        ends = zip(("start", "stop"), _calibrated_travel(pattern), strict=True)
         start, stop = (end if options[key] is None else options[key] for key, end in ends)
         if not stop > start:
             raise ArgumentError(f"stop must be above `start=`, got {start:g} to {stop:g} deg")
@@ -169,7 +169,7 @@ def _moved(error: Function, first: float) -> Function:
     return lambda x: error(x + first)
 
 
-def calibrated_travel(pattern: TurnPattern) -> tuple[float, float]:
+def _calibrated_travel(pattern: TurnPattern) -> tuple[float, float]:
     """Degrees over which the model holds: its span, or one turn."""
     span = pattern.source.partial_span
     if span is None:

@@ -53,7 +53,7 @@ _SHORT: Final = 1.0 / 6.0
 _SURE_LATER: Final = 1.0
 
 
-class RunGains(NamedTuple):
+class _Gains(NamedTuple):
     """What a fit to the other runs does to each.
 
     Attributes
@@ -127,7 +127,7 @@ def gains_of_runs(
     orders: Sequence[float],
     argument: str,
     summed: Summed | None = None,
-) -> RunGains | None:
+) -> _Gains | None:
     """Decrease of every run's mean square by a fit to the others, and what noise makes of it.
 
     None where a run alone, or too few readings, cannot say.
@@ -159,7 +159,7 @@ def gains_of_runs(
     alone = np.array([max(0.0, one.squares - _explained(one)) for one in sums])
     shared = float(np.mean((squares - left_out(wholes, _RIDGE)[1]) / sizes))
     noise = float(np.mean(4.0 * alone * power / sizes**3))
-    return RunGains((squares - left) / sizes, noise, float(np.mean(shown)), shared)
+    return _Gains((squares - left) / sizes, noise, float(np.mean(shown)), shared)
 
 
 def _looked_at(

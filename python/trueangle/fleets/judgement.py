@@ -69,7 +69,7 @@ def judged_fleet(
     repeats = _repeatability(units)
     rows = zip(units.orders.tolist(), names, chosen.between, strict=True)
     ranked = sorted(
-        (unit_row(units, u, chosen.deviates, changes, joint) for u in range(n)),
+        (_unit_row(units, u, chosen.deviates, changes, joint) for u in range(n)),
         key=lambda unit: (VERDICTS.index(unit.verdict), unit.p),
     )
     return Fleet(
@@ -131,7 +131,7 @@ def _repeatability(units: Units) -> list[float | None]:
     return [math.sqrt(float(square) / freedom) for square in squares]
 
 
-def unit_row(
+def _unit_row(
     units: Units, u: int, found: Deviates, changes: Mapping[str, Change], joint: Joint
 ) -> FleetUnit:
     """One unit's row."""

@@ -160,7 +160,7 @@ class Fleet(PlainResult):
         errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
             Unit of the errors.
         """
-        return fleet_summary(self, errors_in)
+        return _fleet_summary(self, errors_in)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the fleet as JSON: a prior for further units (`trueangle.load_fleet`).
@@ -197,7 +197,7 @@ class Fleet(PlainResult):
         return f"{counted(self.units, 'unit')}, {odd} not fine, {counted(self.common, 'order')}"
 
 
-def fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
+def _fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
     """See `Fleet.summary`."""
     scale = arcsec(1.0, fleet.period)
     largest = scale * max((unit.peak_to_peak for unit in fleet.units), default=0.0)

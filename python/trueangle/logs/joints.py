@@ -130,9 +130,7 @@ class LogSettings:
             )
             taken.append(angle.corrected)
             state = (before or {}).get(joint.name or "", JointState())
-            found.append(
-                Channel(joint, angle, joint_signal_columns(path, header, joint), state, self)
-            )
+            found.append(Channel(joint, angle, _signal_columns(path, header, joint), state, self))
         return found
 
     @property
@@ -160,7 +158,7 @@ class LogSettings:
         return self.counts_turns or self.follows_travel
 
 
-def joint_signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict[str, Column]:
+def _signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict[str, Column]:
     """Columns of the signals that the joint's model uses; time stands in for velocity.
 
     Raises

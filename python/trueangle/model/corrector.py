@@ -16,7 +16,7 @@ from .errormodel import ErrorModel
 from .step import Step
 
 
-class Velocity:
+class _Velocity:
     """Backward differences of angle over time, carried over batches.
 
     Examples
@@ -111,7 +111,7 @@ class Corrector:
     def __init__(self, model: ErrorModel) -> None:
         self._model = model
         self._core = model._core_corrector()
-        self._velocity = Velocity(model.period)
+        self._velocity = _Velocity(model.period)
 
     @property
     def step(self) -> Step:

@@ -94,7 +94,7 @@ class NextRuns(PlainResult):
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON."""
         return {
-            "runs": [plain_run(design) for design in self.runs],
+            "runs": [_plain_run(design) for design in self.runs],
             "between": [entry.to_dict() for entry in self.between],
             "readings": self.readings,
             "seconds": self.seconds,
@@ -153,7 +153,7 @@ class NextRuns(PlainResult):
         return f"{runs}, {self.seconds:.3g} s: {listed or 'nothing distinguished'}"
 
 
-def plain_run(design: RunDesign) -> dict[str, Any]:
+def _plain_run(design: RunDesign) -> dict[str, Any]:
     """A ``[[run]]`` table of a simulation file; what is as usual is left out."""
     table = {}
     for f in fields(design):

@@ -50,7 +50,7 @@ def rendered_report(
 
     ``framed`` in a page that holds the library, it takes that one.
     """
-    made = template_environment()
+    made = _template_environment()
     from markupsafe import Markup
 
     numbers = Numbers(content)
@@ -76,7 +76,7 @@ def _live(figures: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def template_environment() -> Environment:
+def _template_environment() -> Environment:
     """What sets contents into the templates.
 
     Raises
@@ -102,7 +102,7 @@ def template_environment() -> Environment:
 def filled_template(template: str, **values: Any) -> str:
     """A template with its values and the report's style."""
     style = (_TEMPLATES / "report.css").read_text("utf-8")
-    text: str = template_environment().get_template(template).render(style=style, **values)
+    text: str = _template_environment().get_template(template).render(style=style, **values)
     return text
 
 

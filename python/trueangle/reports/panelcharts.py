@@ -31,7 +31,7 @@ def panel_figure(
     """All panels of a picture; the main one is twice as wide as its segment."""
     grows = [2.0 if number == 0 else 1.0 for number in range(len(picture.panels))]
     charts = [
-        panel_chart(panel, scale, grow=grow, **given)
+        _panel_chart(panel, scale, grow=grow, **given)
         for panel, grow in zip(picture.panels, grows, strict=True)
     ]
     segments = [panel.title for panel in picture.panels if panel.title]
@@ -39,7 +39,7 @@ def panel_figure(
     return chart_figure(picture.told + more, charts, arrangement)
 
 
-def panel_chart(panel: Panel, scale: Scale, **given: float) -> Chart:
+def _panel_chart(panel: Panel, scale: Scale, **given: float) -> Chart:
     """Readings, model and medians of a panel."""
     segment = bool(panel.title)
     chart = Chart(panel.x, panel.y, x_range=panel.span, title=panel.title, **given)  # type: ignore[arg-type]

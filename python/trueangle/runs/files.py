@@ -22,7 +22,7 @@ from .run import CalibrationRun, as_runs, given_runs
 from .source import Reading, checked_reading, each_table
 
 
-class RunLabels(NamedTuple):
+class _RunLabels(NamedTuple):
     """What tells a run from the others: its joint, when it was calibrated, and its label."""
 
     unit: str | None = None
@@ -31,7 +31,7 @@ class RunLabels(NamedTuple):
 
 
 #: Labels and rows of every run.
-Groups: TypeAlias = list[tuple[RunLabels, NDArray[np.intp]]]
+Groups: TypeAlias = list[tuple[_RunLabels, NDArray[np.intp]]]
 
 #: Unit of the run's angles where the reference has none that a run may be in.
 _PERIOD = 360.0
@@ -136,12 +136,12 @@ def each_runs(
         take(as_runs(runs))
         return
     given = Conversion.of(asked)
-    each_table(data, lambda table: take(runs_of_readings(table, given)), asked)
+    each_table(data, lambda table: take(_runs_of_readings(table, given)), asked)
 
 
 def _read(data: Any, reading: Reading, name: str, table: str = "table") -> list[CalibrationRun]:
     given = Conversion.of(reading)
-    found = each_table(data, lambda t: runs_of_readings(t, given), reading, name, table)
+    found = each_table(data, lambda t: _runs_of_readings(t, given), reading, name, table)
     runs = [run for part in found for run in part]
     units = {run.period: run for run in runs}
     if len(units) > 1:
@@ -173,7 +173,7 @@ class Conversion(NamedTuple):
         )
 
 
-class RunColumns(NamedTuple):
+class _RunColumns(NamedTuple):
     """Columns of one file of runs as they were read, nothing of them judged but the numbers.
 
     Angles and signals are in the unit of ``period``; ``groups`` are unit, label, and the
@@ -190,13 +190,13 @@ class RunColumns(NamedTuple):
     source: Source
 
 
-def read_columns(data: Any, reading: Reading) -> list[RunColumns]:
+def read_columns(data: Any, reading: Reading) -> list[_RunColumns]:
     """The columns of every file or table, grouped by run; time may run backwards."""
     given = Conversion.of(reading)
     return each_table(data, lambda table: _columns(table, given), reading, "data")
 
 
-def _columns(table: FileReadings, given: Conversion) -> RunColumns:
+def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
     asked = {role for role, column in table.roles.items() if column.is_asked}
     filled = any(len(column) for column in table.columns.values())
     # A log of an angle called indicated_deg is no table.
@@ -237,10 +237,10 @@ def _columns(table: FileReadings, given: Conversion) -> RunColumns:
         groups.append((found, present))
         left_out.append(rows.size - present.size)
     _warn_of_empty(table, missing, {"reference": reference, "indicated": indicated, **signals})
-    return RunColumns(table, period, reference, indicated, signals, groups, left_out, table.source)
+    return _RunColumns(table, period, reference, indicated, signals, groups, left_out, table.source)
 
 
-def _entries(table: FileReadings, counts: float | None) -> RunColumns:
+def _entries(table: FileReadings, counts: float | None) -> _RunColumns:
     """A table of a turn as firmware holds it: entry i of n is the reading at i/n of a turn."""
     (name,) = table.columns
     column = table.roles.get("indicated", Column("indicated", name, None))
@@ -259,11 +259,11 @@ def _entries(table: FileReadings, counts: float | None) -> RunColumns:
         raise FileError(table.path, "has a header but no readings", line=1)
     left_out = indicated.size - rows.size
     _warn_of_empty(table, np.isnan(indicated), {"indicated": indicated})
-    groups: Groups = [(RunLabels(), rows)]
-    return RunColumns(table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source)
+    groups: Groups = [(_RunLabels(), rows)]
+    return _RunColumns(table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source)
 
 
-def runs_of_readings(table: FileReadings, given: Conversion) -> list[CalibrationRun]:
+def _runs_of_readings(table: FileReadings, given: Conversion) -> list[CalibrationRun]:
     """Runs of the rows of a table; raises as `read_runs`."""
     found = _columns(table, given)
     signals = found.signals
@@ -320,11 +320,11 @@ def _groups(table: FileReadings, size: int) -> Groups:
     """Labels and rows of every run, in the order of their first row: of one day each."""
     columns = {
         role: [*map(_label, table.columns[table.roles[role].name].tolist())]
-        for role in RunLabels._fields
+        for role in _RunLabels._fields
         if role in table.roles
     }
     if not columns:
-        return [(RunLabels(), np.arange(size))]
+        return [(_RunLabels(), np.arange(size))]
     days = {text: local_day(text) for text in set(columns.get("when", ()))}
     if not all(days.values()):
         row = next(i for i, text in enumerate(columns["when"]) if not days[text])
@@ -335,7 +335,7 @@ def _groups(table: FileReadings, size: int) -> Groups:
         del columns["when"]  # a column of this name that holds something else
         days = {}
     if not columns:
-        return [(RunLabels(), np.arange(size))]
+        return [(_RunLabels(), np.arange(size))]
     keys = dict(columns)
     if days:
         keys["when"] = [days[text] for text in columns["when"]]
@@ -344,7 +344,7 @@ def _groups(table: FileReadings, size: int) -> Groups:
         rows.setdefault(key, []).append(i)
     return [
         (
-            RunLabels(**{role: texts[places[0]] for role, texts in columns.items()}),
+            _RunLabels(**{role: texts[places[0]] for role, texts in columns.items()}),
             np.array(places, dtype=np.intp),
         )
         for places in rows.values()

@@ -174,7 +174,7 @@ class SelfCalibration(PlainResult):
             Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         """
-        return selfcal_summary(self, errors_in)
+        return _summary(self, errors_in)
 
 
 def estimates(
@@ -218,7 +218,7 @@ def listed(orders: Sequence[float]) -> str:
     return f"orders {ranges(orders)}" if any(orders) else "zero"
 
 
-def selfcal_summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
+def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
     """Numbers, what they are numbers of, what is blind, tests, notes."""
     sizes = [result.noise_arcsec, *(o.amplitude for o in (*result.orders, *result.sums))]
     period = result.model.period

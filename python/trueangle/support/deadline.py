@@ -228,20 +228,20 @@ def with_pace(within: float | None = None, style: str = "none") -> Iterator[Pace
         yield own
 
 
-class Interruption:
+class _Interruption:
     """Whether Ctrl-C ended the work."""
 
     happened = False
 
 
 @contextlib.contextmanager
-def ending_early() -> Iterator[Interruption]:
+def ending_early() -> Iterator[_Interruption]:
     """Let a first Ctrl-C ask the work at its pace to end with what it has; a second one ends it.
 
     Where no pace is in force, outside the main thread, or where Ctrl-C is ignored (a job in the
     background), it is what it always is.
     """
-    found = Interruption()
+    found = _Interruption()
     ignored = signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None)
     if ignored or threading.current_thread() is not threading.main_thread():
         yield found

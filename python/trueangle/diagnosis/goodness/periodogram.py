@@ -60,7 +60,7 @@ LEAST_READINGS = 32
 
 
 @dataclass(frozen=True, eq=False)
-class Periodogram:
+class _Periodogram:
     """Sum over runs of periodograms divided by their levels.
 
     Attributes
@@ -99,7 +99,7 @@ def periodogram(
     bounds: list[tuple[int, int]],
     top: float | None = None,
     correlation: float = 0.0,
-) -> Periodogram | None:
+) -> _Periodogram | None:
     """Periodogram of ``values`` along ``axis``, phases of the runs left out.
 
     Parameters
@@ -185,7 +185,7 @@ def periodogram(
     reach = int(WIDTHS[k] * over)
     near = slice(max(j - reach, first), j + reach + 1)
     amplitude = float(np.sqrt(max(float(raw[near].max()), 0.0)))
-    return Periodogram(
+    return _Periodogram(
         frequency[first:last],
         total[0, first:] / freedom[0],
         float(frequency[j]),

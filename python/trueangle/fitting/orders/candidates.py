@@ -111,7 +111,7 @@ class Candidates:
         return limits
 
 
-def effective_positions(positions: Positions) -> Positions:
+def _effective_positions(positions: Positions) -> Positions:
     """Positions as a grid even where small shifts of the zero blur it.
 
     Unnamed orders are looked for only below the Nyquist limit of that grid.
@@ -149,7 +149,7 @@ def choose_candidates(
     """
     gear = [] if gear_ratio is None else [float(m) for m in gear_orders(gear_ratio, fixed_member)]
     gear += [k * float(f) for f in (shafts or {}).values() for k in SHAFT_HARMONICS]
-    effective = effective_positions(positions)
+    effective = _effective_positions(positions)
     highest = effective.highest_order
     if effective.divisions is None:
         highest = min(highest, math.floor((len(positions) - 1) / (2.0 * positions.span)))

@@ -76,7 +76,7 @@ def selected_of(
     # The ends of the travel are known of all readings.
     ends = [] if summed is None else [CalibrationRun(summed.ends, summed.ends, kept[0].period)]
     positions = distinct_positions([*kept, *ends], tolerance)
-    held_from, agree = held_orders(kept, declared_cycles(gear_ratio, shafts))
+    held_from, agree = held_orders(kept, _declared_cycles(gear_ratio, shafts))
     if agree and covariance == "auto":
         covariance = "hac"
     chosen = choose_candidates(
@@ -116,7 +116,7 @@ def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
     )
 
 
-def declared_cycles(gear_ratio: float | None, shafts: Mapping[str, float] | None) -> list[float]:
+def _declared_cycles(gear_ratio: float | None, shafts: Mapping[str, float] | None) -> list[float]:
     """Cycles per output turn of all shafts that were declared."""
     return [*(shafts or {}).values(), *(() if gear_ratio is None else (gear_ratio,))]
 
@@ -127,7 +127,7 @@ def _travelled(
     shafts: Mapping[str, float] | None,
 ) -> Array | None:
     """Angles of the readings in turns, whole turns kept; None where every order is whole."""
-    cycles = declared_cycles(gear_ratio, shafts)
+    cycles = _declared_cycles(gear_ratio, shafts)
     if all(float(f).is_integer() for f in cycles):
         return None
     turns = np.concatenate([over_turns(run).reference for run in runs]) / runs[0].period

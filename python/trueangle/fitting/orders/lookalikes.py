@@ -48,13 +48,13 @@ def find_lookalikes(
         coherence[[int(k) - 1 for k in orders if k <= highest and k == int(k)]] = 0.0
         same = {int(m): 0.0 for m in every[coherence > _SAME]}
         alike = [int(m) for m in every[coherence > _ALIKE] if m not in same]
-        losses = substitution_losses(units, orders, order, alike) if alike else []
+        losses = _substitution_losses(units, orders, order, alike) if alike else []
         tried = same | dict(zip(alike, losses, strict=True))
         found.append({m: tried[m] for m in sorted(tried) if tried[m] < DECISIVE * variance})
     return found
 
 
-def substitution_losses(
+def _substitution_losses(
     units: Sequence[ZeroGroupReadings],
     orders: Sequence[float],
     order: float,

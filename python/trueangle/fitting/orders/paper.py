@@ -39,7 +39,7 @@ PHASE_RANGE_DEG: Final = 60.0
 PROMINENCE: Final = 0.1
 
 
-def run_coefficients(
+def _run_coefficients(
     units: Sequence[ZeroGroupReadings], orders: Sequence[float]
 ) -> tuple[Array, Array]:
     """A and B of Eq. 1 for each run by itself, its constant fitted too.
@@ -105,7 +105,7 @@ def select_by_paper(
     units, places = zero_units(runs, candidates.whole)
     placed = positions.of_rows(places)
     training, held = units[:-1], units[-1]
-    each, left = run_coefficients(training, orders)
+    each, left = _run_coefficients(training, orders)
     mean = each.mean(axis=0)
     amplitude = np.abs(mean)
     scatter = (np.abs(each - mean) ** 2).sum(axis=0) / (2.0 * (len(training) - 1) * len(training))

@@ -29,7 +29,7 @@ def circular_range_deg(phases: ArrayLike) -> float:
     return float(np.degrees(2.0 * math.pi - gaps.max()))
 
 
-def unit_coefficients(
+def _unit_coefficients(
     sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
 ) -> tuple[Array, Array]:
     """A and B of each order in each unit, the other chosen orders held at the common fit.
@@ -63,5 +63,5 @@ def unit_coefficients(
 
 def unit_phases(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]) -> Array:
     """Phase ``atan2(A, B)`` of each order in each unit, shape (units, orders), radians."""
-    cosine, sine = unit_coefficients(sums, chosen, orders)
+    cosine, sine = _unit_coefficients(sums, chosen, orders)
     return np.asarray(np.arctan2(cosine, sine))

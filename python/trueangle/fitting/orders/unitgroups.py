@@ -56,7 +56,7 @@ def units_in_groups(units: Sequence[ZeroGroupReadings]) -> list[list[int]]:
     return [list(range(group, len(units), GROUPS)) for group in range(GROUPS)]
 
 
-def unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
+def _unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     """Weighted means of cosines and sines of each order, a row a unit, for short units."""
     found = np.empty((len(units), 2 * orders.size))
     sizes = np.array([unit.turns.size for unit in units])
@@ -87,6 +87,6 @@ def columns_summed(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     for begin, end in pairwise([*range(0, len(units), size), len(units)]):
         block = units[begin:end]
         root = np.sqrt([float(unit.weights.sum()) for unit in block])
-        scaled = unit_means(block, orders) * root[:, None]
+        scaled = _unit_means(block, orders) * root[:, None]
         total += scaled.T @ scaled
     return total
