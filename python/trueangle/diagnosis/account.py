@@ -18,14 +18,14 @@ from ..support.arrays import Array
 from ..support.deadline import pace
 from .believed import corrected_effects
 from .delay import Delay, error_before, find_delay
-from .exchange import exchanged
-from .gearedlines import GearedLines, Ratio
-from .gearratio import aligned, find_ratio, near_ratio
+from .exchange import exchanged_causes
+from .gearedlines import GearedLines, GearedLinesRatio
+from .gearratio import find_ratio, near_ratio, signals_at_ratio
 from .identifiability import blind_spots, in_common_form
 from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
 from .remainder import unexplained_after
-from .rounding import beyond_rounding, tells_no_more, unrounded
-from .selection import select
+from .rounding import account_beyond_rounding, is_rounding_only, unrounded
+from .selection import select_causes
 from .unnamed import is_named
 
 #: Readings used at most: beyond, one of every so many in a row is drawn at random.
@@ -54,7 +54,7 @@ class CauseSelection:
 
 
 @dataclass(frozen=True)
-class Seen:
+class PreparedData:
     """Readings as they are held against a simulation.
 
     Attributes
@@ -74,7 +74,7 @@ class Seen:
     """
 
     sim: Simulation
-    ratio: Ratio | None
+    ratio: GearedLinesRatio | None
     delay: Delay | None
     every: Signals
     signals: Signals
@@ -87,13 +87,13 @@ class Seen:
         every: Signals,
         error: Array,
         sim: Simulation,
-        ratio: Ratio | None = None,
+        ratio: GearedLinesRatio | None = None,
         delay: Delay | None = None,
-    ) -> Seen:
+    ) -> PreparedData:
         """With another ratio, or as the simulation states it; as they were a time before."""
         if ratio is not None:
             sim = ratio.simulation
-            every = aligned(sim, every, error)
+            every = signals_at_ratio(sim, every, error)
         then = every
         if delay is not None:
             then, error = error_before(every, error, delay.seconds)
@@ -118,7 +118,7 @@ class Account:
         The readings as they are, without any cause.
     """
 
-    seen: Seen
+    seen: PreparedData
     choice: CauseSelection
     believed: Simulation
     first: Regression
@@ -141,16 +141,16 @@ def account_of(every: Signals, error: Array, sim: Simulation) -> Account:
     """
     geared = GearedLines.of(sim, every, error)
     ratio = None if geared is None else find_ratio(geared)
-    account = _believed(Seen.of(every, error, sim, ratio))
+    account = _believed(PreparedData.of(every, error, sim, ratio))
     near = None if geared is None or ratio else near_ratio(geared)
     if near is not None and not pace().over:
-        seen = Seen.of(every, error, sim, near)
+        seen = PreparedData.of(every, error, sim, near)
         if _helps(seen, account.choice.chosen):
             account = _better(account, _believed(seen), NEW_CAUSE)
     delay = None if pace().over else find_delay(account.seen.every, error, account.seen.sim)
     if delay is None or pace().over:
         return account
-    other = _believed(Seen.of(every, error, sim, account.seen.ratio, delay))
+    other = _believed(PreparedData.of(every, error, sim, account.seen.ratio, delay))
     return _better(account, other, NEW_CAUSE + account.choice.chosen.log_n)
 
 
@@ -162,14 +162,14 @@ def _better(account: Account, other: Account, price: float) -> Account:
     return account
 
 
-def _helps(seen: Seen, chosen: Regression) -> bool:
+def _helps(seen: PreparedData, chosen: Regression) -> bool:
     """Whether another ratio helps, alone or beside what was chosen; a whole account is slower."""
     start = _start(seen, seen.sim)
     hopes = (start, start.with_terms(chosen.terms))
     return min(map(total_penalty, hopes)) < total_penalty(chosen)
 
 
-def _believed(seen: Seen) -> Account:
+def _believed(seen: PreparedData) -> Account:
     """The account, and the simulation with the effects it claims as the readings show them."""
     choice, believed = _chosen(seen, seen.sim), seen.sim
     # Twice each: what one was taken for is only known once the others are right.
@@ -195,7 +195,7 @@ def _corrections(
     return [other for other in found if other is not None]
 
 
-def _start(seen: Seen, sim: Simulation) -> Regression:
+def _start(seen: PreparedData, sim: Simulation) -> Regression:
     """The readings against a simulation, without any cause.
 
     A delay stays free beside all else: what follows the direction, say, is judged jointly with it.
@@ -205,12 +205,14 @@ def _start(seen: Seen, sim: Simulation) -> Regression:
     return Regression.of(seen.signals, error, sim.surroundings, beside=beside)
 
 
-def _chosen(seen: Seen, sim: Simulation) -> CauseSelection:
+def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:
     """Choose the causes by which readings differ from a simulation."""
     start = _start(seen, sim)
     # What is always free is no blind spot.
     spots = blind_spots(start if seen.delay is None else _start(replace(seen, delay=None), sim))
-    chosen = start if tells_no_more(start) else beyond_rounding(start, select(start))
+    chosen = (
+        start if is_rounding_only(start) else account_beyond_rounding(start, select_causes(start))
+    )
     scatter: list[ScatterFinding] = []
     if pace().over:
         return CauseSelection(start, chosen, scatter, spots)  # what is left is no scatter yet
@@ -218,10 +220,10 @@ def _chosen(seen: Seen, sim: Simulation) -> CauseSelection:
     if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit_of_scatter(start, chosen):
         scatter.append(uneven)
         start = start.weighted(uneven.weights)
-        chosen = select(start, chosen.terms)
+        chosen = select_causes(start, chosen.terms)
     if not all(map(is_named, chosen.terms)) and not unexplained_after(chosen).found:
-        chosen = select(start, unnamed=False)
-    chosen = beyond_rounding(start, in_common_form(exchanged(chosen), spots))
+        chosen = select_causes(start, unnamed=False)
+    chosen = account_beyond_rounding(start, in_common_form(exchanged_causes(chosen), spots))
     scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
     return CauseSelection(start, chosen, scatter, spots)
 

@@ -12,16 +12,16 @@ from ..effects.blindness import Blindness
 from ..effects.missing_order import MissingOrder
 from ..estimation.extension import Extension
 from ..estimation.regression import ROUNDING, Regression
-from ..joint.pattern import Harmonic, Surroundings
+from ..joint.pattern import Harmonic, JointPattern
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array
 from ..support.distributions import normal_tail
 from .beliefs import LEVEL, Belief, judge_line, verdict_of_factor
 from .gain import measure_belief_gains
-from .identifiability import doubts_about, open_origins, with_open_origins
+from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
-from .unnamed import effect_of
+from .unnamed import effect_or_unnamed
 
 #: Fields of effects, beside those in arcsec, that their signal is proportional to.
 LINEAR = ("delay_s", "relative_error", "pattern_per_K", "coefficient")
@@ -34,7 +34,7 @@ NOTHING = 0.05
 
 
 def _scaled_effect(
-    effect: Effect, factor: float, signals: Signals, around: Surroundings
+    effect: Effect, factor: float, signals: Signals, around: JointPattern
 ) -> Effect | None:
     """The effect ``factor`` times as strong; None where its signal is not proportional."""
     changes: dict[str, object] = {}
@@ -164,7 +164,9 @@ def _lines(
     regression: Regression, sim: Simulation, spots: list[Blindness], with_gain: bool
 ) -> tuple[list[Belief], tuple[Harmonic, ...]]:
     pattern, joint = regression.belief.pattern, regression.belief.joint
-    if pattern.orders.size == 0 or any(effect_of(t.cause).changes_lines for t in regression.terms):
+    if pattern.orders.size == 0 or any(
+        effect_or_unnamed(t.cause).changes_lines for t in regression.terms
+    ):
         return [], sim.harmonics
     modulated = {term.shape["carrier"] for term in regression.terms if "carrier" in term.shape}
     found: list[Belief] = []
@@ -204,7 +206,7 @@ def _doubt(
     extension = Extension(
         MissingOrder.kind, {"output_order": order}, np.zeros((regression.n, 0)), 2, log_grid
     )
-    doubt = doubts_about(extension, regression, spots)
+    doubt = ambiguity_of_cause(extension, regression, spots)
     origins = open_origins(extension, regression, spots) if doubt is None else [doubt]
     if not origins:
         return False

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 from ..effects import Effect
-from ..estimation.cache import Proposal
+from ..estimation.cache import CachedProposal
 from ..estimation.regression import Extension, Regression
 from ..support.deadline import pace
 from .forms import told_from_forms
-from .penalty import before_forms, left_by_forms, misfit, penalty_of, total_penalty
-from .unnamed import effect_of
+from .penalty import before_forms, form_misfit, left_by_forms, penalty_of, total_penalty
+from .unnamed import effect_or_unnamed
 
 #: An extension, what it extends, and its net BIC gain.
 Candidate: TypeAlias = tuple[Extension, Regression, float]
@@ -20,14 +20,14 @@ Candidate: TypeAlias = tuple[Extension, Regression, float]
 AFTER_CHOICE = 0.7
 
 
-def propose(effect: type[Effect], regression: Regression) -> Extension | None:
+def propose_candidates(effect: type[Effect], regression: Regression) -> Extension | None:
     """What a cause proposes; nothing where a wider one that contains it is chosen already."""
-    if any(effect in effect_of(term.cause).contains for term in regression.terms):
+    if any(effect in effect_or_unnamed(term.cause).contains for term in regression.terms):
         return None
     return effect.propose(regression)
 
 
-def extensions(
+def candidate_extensions(
     regression: Regression,
     causes: Sequence[str],
     least: Callable[[list[Candidate]], float] | None = None,
@@ -50,7 +50,7 @@ def extensions(
         at.at(f"trying causes{beside}", tried, len(causes), then)
         if at.over:
             break
-        contained = {special.kind for special in effect_of(cause).contains}
+        contained = {special.kind for special in effect_or_unnamed(cause).contains}
         if any(term.cause in contained for term in regression.terms):
             start = regression.with_terms(t for t in regression.terms if t.cause not in contained)
             penalty = total_penalty(start) - total_penalty(regression)
@@ -58,7 +58,7 @@ def extensions(
             start, penalty = regression, 0.0
         # Alone every cause is searched as far as it can be: that is reported.
         wanted = max(least(found) + penalty, 0.0) if start.terms and least is not None else 0.0
-        extension = proposed_above(start, cause, wanted)
+        extension = candidates_above(start, cause, wanted)
         if at.over:
             break  # a search that was cut short says nothing of its cause
         if extension is not None:
@@ -68,7 +68,7 @@ def extensions(
     return [found[k] for k in sorted(range(len(found)), key=places.__getitem__)]
 
 
-def proposed_above(regression: Regression, cause: str, least: float = 0.0) -> Extension | None:
+def candidates_above(regression: Regression, cause: str, least: float = 0.0) -> Extension | None:
     """What a cause proposes, searched only as far as candidates above ``least`` ask for.
 
     None where the time is up and it has not been searched yet.
@@ -81,13 +81,15 @@ def proposed_above(regression: Regression, cause: str, least: float = 0.0) -> Ex
     if kept is None and pace().over:
         return None
     if kept is None:
-        kept = Proposal(propose(effect_of(cause), regression.with_least(least)), least)
+        kept = CachedProposal(
+            propose_candidates(effect_or_unnamed(cause), regression.with_least(least)), least
+        )
         if not pace().over:
             regression.cache.propose(key, kept)
     return kept.extension
 
 
-class Scores:
+class CandidateScores:
     """Scores of candidates of one step, and the best one of them."""
 
     def __init__(self) -> None:
@@ -99,10 +101,12 @@ class Scores:
         """Net gain less what a cause costs beyond its parameters."""
         extension, start, gain = candidate
         explained = before_forms(start) - start.deviance
-        if not effect_of(extension.cause).has_exact_form:
+        if not effect_or_unnamed(extension.cause).has_exact_form:
             explained += extension.deviance
         after = penalty_of([*start.terms, extension], left_by_forms(explained, start.n))
-        paid: float = start.cache.of_fit("penalty", lambda: penalty_of(start.terms, misfit(start)))
+        paid: float = start.cache.of_fit(
+            "penalty", lambda: penalty_of(start.terms, form_misfit(start))
+        )
         return gain - (after - paid)
 
     def told_score(self, candidate: Candidate) -> float:

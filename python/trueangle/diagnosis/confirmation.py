@@ -13,7 +13,7 @@ from ..effects.non_integer_order import NonIntegerOrder
 from ..estimation.regression import Regression
 from ..joint.pattern import line_columns
 from ..support.arrays import Array
-from ..support.display_units import brief
+from ..support.display_units import brief_number
 from ..support.quantiles import quantile
 from .forms import FORM
 from .gain import Gain
@@ -43,7 +43,7 @@ ENOUGH_RUNS = 4
 RESAMPLES, LOWER = 1000, 0.025
 
 
-def status_of(
+def confirmation_status(
     cause: str,
     gain: Gain | None,
     regression: Regression | None,
@@ -73,13 +73,13 @@ def status_of(
         is_seen = drift > 0.0 and _is_seen_without_a_name(regression, group)
         if not is_seen and drift > _size(regression, group):
             return NOT_CONFIRMED, (
-                f"the drift of {brief(drift)} arcsec rms, which is larger, may leave it"
+                f"the drift of {brief_number(drift)} arcsec rms, which is larger, may leave it"
             )
     beside = unexplained.beside_path
     if beside and regression is not None and group:
         if not takes_up and _size(regression, group) < beside:
             return NOT_CONFIRMED, (
-                f"{brief(beside)} arcsec rms are unexplained, of which this may be a part"
+                f"{brief_number(beside)} arcsec rms are unexplained, of which this may be a part"
             )
         follows = _follows(regression, group)
         if follows:

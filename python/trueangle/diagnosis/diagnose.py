@@ -24,14 +24,14 @@ from ..support.deadline import Pace, pace, with_pace
 from ..support.kinds import of_type, told_kinds
 from .account import MOST_READINGS, account_of
 from .believed import judged_beliefs
-from .candidates import proposed_above
+from .candidates import candidates_above
 from .delay import delay_finding
 from .discrepancy import discrepancy_of, unfolded_error
-from .drive import torque_account
+from .drive import diagnose_drive
 from .finding import Finding
 from .findings import Diagnosis
 from .gates import many_causes
-from .gearedlines import Ratio
+from .gearedlines import GearedLinesRatio
 from .goodness import Unexplained, goodness_of_fit
 from .named import findings_of, reconsidered_findings, scatter_doubt, scatter_finding
 from .penalty import cause_terms
@@ -149,7 +149,7 @@ def diagnose(
         if log is None or not found.complete:
             return found
         joint = Simulation(stated.joint)
-        torque = torque_account(
+        torque = diagnose_drive(
             log, measured, lambda runs, drive: _diagnosis(runs, drive, joint, gain)
         )
         return replace(found, torque=torque)
@@ -245,7 +245,7 @@ def _incomplete(at: Pace, gain: bool) -> str:
     return f"INCOMPLETE: {at.why} while {at.cut}; {means}"
 
 
-def _ratio_finding(ratio: Ratio) -> Finding:
+def _ratio_finding(ratio: GearedLinesRatio) -> Finding:
     """All lines of the geared shafts at another ratio, as one cause."""
     parameters = {
         "gear_ratio": quantity(ratio.gear_ratio, ratio.std),
@@ -261,7 +261,7 @@ def _structure(start: Regression) -> dict[str, float]:
     before = start.left_within_runs
     alone = {}
     for cause in EFFECTS:
-        extension = proposed_above(start, cause)
+        extension = candidates_above(start, cause)
         if extension is not None and extension.bic_gain > 0.0:
             after = start.with_terms([extension], 0.0).left_within_runs
             alone[cause] = 1.0 - float(np.sum(after**2) / max(float(np.sum(before**2)), 1e-300))

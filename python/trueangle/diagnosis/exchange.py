@@ -10,7 +10,7 @@ from __future__ import annotations
 from ..effects import EFFECTS
 from ..estimation.regression import Regression
 from ..support.deadline import pace
-from .candidates import Scores, extensions
+from .candidates import CandidateScores, candidate_extensions
 from .overlap import finding_overlaps
 from .penalty import cause_terms, finding_groups, total_penalty
 from .selection import is_flexible, regrown
@@ -28,7 +28,7 @@ MOST_PAIRS, OVERLAP = 6, 0.5
 BETTER = 2.0
 
 
-def exchanged(regression: Regression) -> Regression:
+def exchanged_causes(regression: Regression) -> Regression:
     """The account of which no cause is better left out, or replaced by another one.
 
     Parameters
@@ -84,8 +84,8 @@ def _better(regression: Regression) -> Regression | None:
         others = [
             name for name, effect in EFFECTS.items() if not (name == own or is_flexible(effect))
         ]
-        scores = Scores()
-        best = scores.best(extensions(rest, others, scores.least))
+        scores = CandidateScores()
+        best = scores.best(candidate_extensions(rest, others, scores.least))
         if best is None or pace().over:
             continue
         extension, start, _ = best[1]

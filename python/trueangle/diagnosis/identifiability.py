@@ -7,16 +7,16 @@ from dataclasses import replace
 
 from ..effects import EFFECTS
 from ..effects.blindness import Blindness
-from ..effects.blindspots import blind_spots, place_among
+from ..effects.blindspots import blind_spot_place, blind_spots
 from ..estimation.regression import Extension, Regression
-from .candidates import propose
+from .candidates import propose_candidates
 from .penalty import cause_terms, finding_groups
-from .unnamed import effect_of
+from .unnamed import effect_or_unnamed
 
 __all__ = [
     "Blindness",
+    "ambiguity_of_cause",
     "blind_spots",
-    "doubts_about",
     "in_common_form",
     "open_origins",
     "with_open_origins",
@@ -26,7 +26,7 @@ __all__ = [
 DOUBTS = ("grid", "mount", "torque", "velocity")
 
 
-def doubts_about(
+def ambiguity_of_cause(
     extension: Extension, regression: Regression, spots: Sequence[Blindness]
 ) -> Blindness | None:
     """The reason not to name a supported cause, or None.
@@ -35,16 +35,16 @@ def doubts_about(
     (`open_origins`): what is seen has a size, and is named.
     """
     cause = extension.cause
-    if effect_of(cause).is_doubted:
+    if effect_or_unnamed(cause).is_doubted:
         for spot in spots:
             # What is seen of a crossing is none of a delay.
             may_be_told = spot.common or "turns_first" in extension.shape
             if spot.hides(cause) and not (
-                may_be_told and effect_of(cause).told(extension, regression)
+                may_be_told and effect_or_unnamed(cause).told(extension, regression)
             ):
                 return spot
     found = [doubt for doubt in _doubts(extension, regression, spots) if doubt.common != cause]
-    return min(found, key=lambda spot: place_among(DOUBTS, spot), default=None)
+    return min(found, key=lambda spot: blind_spot_place(DOUBTS, spot), default=None)
 
 
 def open_origins(
@@ -58,7 +58,7 @@ def open_origins(
     for doubt in _doubts(extension, regression, spots):
         if doubt.common == cause and doubt not in found:
             found.append(doubt)
-    return sorted(found, key=lambda spot: place_among(DOUBTS, spot))
+    return sorted(found, key=lambda spot: blind_spot_place(DOUBTS, spot))
 
 
 def with_open_origins(
@@ -88,11 +88,11 @@ def in_common_form(regression: Regression, spots: Sequence[Blindness]) -> Regres
     """
     for cause in [regression.terms[g[0]].cause for g in finding_groups(regression.terms)]:
         group = [k for k, term in enumerate(regression.terms) if term.cause == cause]
-        spot = doubts_about(regression.terms[group[0]], regression, spots) if group else None
+        spot = ambiguity_of_cause(regression.terms[group[0]], regression, spots) if group else None
         if spot is None or not spot.common or spot.common == cause:
             continue
         rest = cause_terms(regression, group, settled=True)
-        common = propose(EFFECTS[spot.common], rest)
+        common = propose_candidates(EFFECTS[spot.common], rest)
         if common is not None and common.bic_gain > 0.0:
             regression = rest.with_terms([*rest.terms, common])
     return regression

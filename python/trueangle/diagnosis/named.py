@@ -14,14 +14,14 @@ from ..estimation.estimate import Parameters, Quantity, quantity
 from ..estimation.regression import Regression
 from ..runs.checks.fault import DataFault
 from ..support.deadline import pace
-from .candidates import Candidate, extensions, propose
-from .confirmation import CONFIRMED, NOT_CONFIRMED, status_of
+from .candidates import Candidate, candidate_extensions, propose_candidates
+from .confirmation import CONFIRMED, NOT_CONFIRMED, confirmation_status
 from .finding import Finding
 from .forms import with_form_errors
 from .gain import Gain, measure_gain
 from .gates import gated_findings
 from .goodness import Unexplained
-from .identifiability import doubts_about, open_origins, with_open_origins
+from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE, cause_terms, finding_groups
 from .selection import is_flexible
 from .unnamed import is_named
@@ -51,7 +51,7 @@ def findings_of(
     for group in groups:
         if not is_named(regression.terms[group[0]]):
             continue
-        doubt = doubts_about(regression.terms[group[0]], regression, spots)
+        doubt = ambiguity_of_cause(regression.terms[group[0]], regression, spots)
         evidence = sum(regression.terms[k].bic_gain for k in group)
         if doubt is None:
             named.append(group)
@@ -89,7 +89,7 @@ def findings_of(
             "parameters": float(sum(t.parameters for t, _, _ in terms)),
             "log_grid": float(sum(t.log_grid for t, _, _ in terms)),
         }
-        status, reason = status_of(cause, gain, regression, group, unexplained)
+        status, reason = confirmation_status(cause, gain, regression, group, unexplained)
         if with_gain and gain is None and status == CONFIRMED:
             status, reason = NOT_CONFIRMED, NOT_HELD_OUT
         findings.append(
@@ -117,7 +117,7 @@ def reconsidered_findings(
     found = []
     for finding in findings:
         if finding.confirmed and finding.group:
-            status, reason = status_of(
+            status, reason = confirmation_status(
                 finding.cause, finding.gain, regression, finding.group, unexplained
             )
             finding = replace(finding, status=status, reason=reason)
@@ -145,7 +145,7 @@ def _alternatives(
     found = {}
     for cause in causes if not pace().over else ():
         effect = EFFECTS[cause]
-        extension = propose(effect, rest)
+        extension = propose_candidates(effect, rest)
         if extension is None or extension.bic_gain <= 0.0:
             continue
         fitted = rest.with_terms([*rest.terms, extension])
@@ -183,7 +183,7 @@ def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, flo
         gaps = gaps_of(candidates)
         return own - gaps[RIVALS - 1][1] if len(gaps) >= RIVALS else 0.0
 
-    gaps = gaps_of(extensions(rest, others, least))
+    gaps = gaps_of(candidate_extensions(rest, others, least))
     return [(name, float(gap)) for name, gap in gaps[:RIVALS]]
 
 
@@ -222,7 +222,7 @@ def _is_another_form(effect: type[Effect], other: type[Effect]) -> bool:
 def scatter_finding(item: ScatterFinding, unexplained: Unexplained) -> Finding:
     """Finding of a cause of the scatter."""
     evidence = {"bic_gain": item.bic_gain}
-    status, reason = status_of(item.cause, None, None, (), unexplained)
+    status, reason = confirmation_status(item.cause, None, None, (), unexplained)
     return Finding(item.cause, item.parameters, evidence, None, [], item.effects, status, reason)
 
 

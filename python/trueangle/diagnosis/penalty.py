@@ -9,7 +9,7 @@ import numpy as np
 from ..effects.missing_order import MissingOrder
 from ..estimation.regression import Extension, Regression
 from .forms import FORM
-from .unnamed import effect_of
+from .unnamed import effect_or_unnamed
 
 #: Evidence (in units of BIC) that a new cause must bring beyond its penalty: 6 is what
 #: Kass and Raftery call strong, odds of 20 to 1.
@@ -18,10 +18,10 @@ NEW_CAUSE = 6.0
 
 def total_penalty(regression: Regression) -> float:
     """BIC with the penalty of every cause: lower is better."""
-    return regression.bic + penalty_of(regression.terms, misfit(regression))
+    return regression.bic + penalty_of(regression.terms, form_misfit(regression))
 
 
-def misfit(regression: Regression) -> float:
+def form_misfit(regression: Regression) -> float:
     """Deviance that the causes found may leave because their forms are not exact.
 
     A step of the zero has no form that could be inexact, however far apart zeros are, and neither
@@ -32,7 +32,7 @@ def misfit(regression: Regression) -> float:
 
 def before_forms(regression: Regression) -> float:
     """Deviance before any cause with a form was added."""
-    effects = [(term, effect_of(term.cause)) for term in regression.terms]
+    effects = [(term, effect_or_unnamed(term.cause)) for term in regression.terms]
     formless = [term for term, e in effects if e.draws_zeros or e.has_exact_form]
     if not formless:
         return float(regression.start)
@@ -44,11 +44,11 @@ def before_forms(regression: Regression) -> float:
 
 def _exact_terms(regression: Regression) -> list[Extension]:
     """Terms whose forms leave nothing of them."""
-    return [term for term in regression.terms if effect_of(term.cause).has_exact_form]
+    return [term for term in regression.terms if effect_or_unnamed(term.cause).has_exact_form]
 
 
 def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
-    """As `misfit`, by how much smaller the readings' scatter has become.
+    """As `form_misfit`, by how much smaller the readings' scatter has become.
 
     Correlated noise takes up a part of what is not yet explained, and hides it from a likelihood.
     """
@@ -75,7 +75,7 @@ def penalty_of(terms: Sequence[Extension], left: float) -> float:
     """Of causes beyond that of their parameters; their forms may leave ``left``."""
     # A line of a declared shaft is expected, and stands where it was said to stand.
     declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
-    effects = [effect_of(term.cause) for term in terms]
+    effects = [effect_or_unnamed(term.cause) for term in terms]
     separate = [effect for effect in effects if effect.is_separate]
     # As many findings as `finding_groups` makes.
     causes = len(separate) + len({*effects} - {*separate}) - declared
@@ -89,7 +89,7 @@ def finding_groups(terms: Sequence[Extension]) -> list[list[int]]:
     groups: list[list[int]] = []
     place: dict[str, int] = {}
     for k, term in enumerate(terms):
-        if effect_of(term.cause).is_separate or term.cause not in place:
+        if effect_or_unnamed(term.cause).is_separate or term.cause not in place:
             place[term.cause] = len(groups)
             groups.append([k])
         else:
@@ -106,7 +106,7 @@ def cause_terms(regression: Regression, group: Sequence[int], settled: bool = Fa
 def net_loss(regression: Regression, group: Sequence[int]) -> float:
     """Deviance that dropping the terms ``group`` would cost, less the penalties it would save."""
     terms = regression.terms
-    left = misfit(regression)
+    left = form_misfit(regression)
     kept = [term for k, term in enumerate(terms) if k not in group]
     own = sum(terms[k].parameters * terms[k].log_n + 2.0 * terms[k].log_grid for k in group)
     return lost(regression, group) - own - (penalty_of(terms, left) - penalty_of(kept, left))

@@ -13,11 +13,11 @@ from ..effects import EFFECTS
 from ..estimation.regression import Regression
 from ..support.arrays import Array
 from ..support.distributions import f_tail
-from .candidates import propose
+from .candidates import propose_candidates
 from .goodness import Unexplained
 from .goodness.zeros import ZEROS
 from .penalty import NEW_CAUSE, cause_terms
-from .selection import on_runs
+from .selection import acts_on_runs
 
 #: Chance above which what unexplained zeros scatter by may as well have made a cause.
 CHANCE = 0.01
@@ -42,7 +42,7 @@ def chance_between_runs(
     within, _ = rest.jointly_with(zeros).gain(own)
     if within > NEW_CAUSE + own.shape[1] * float(np.log(regression.n)):
         return 0.0
-    laws = (propose(EFFECTS[cause], rest) for cause in on_runs())
+    laws = (propose_candidates(EFFECTS[cause], rest) for cause in acts_on_runs())
     tried = sum(law is not None and law.bic_gain > NEW_CAUSE for law in laws)
     return min(1.0, scatter_chance(regression, group) * max(tried, 1))
 

@@ -14,21 +14,21 @@ from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
 from ..estimation.regression import BEYOND_SHOWN, Extension, Regression
 from ..support.deadline import pace
-from .candidates import Candidate, Scores, extensions, propose
-from .forms import beside_bends, share_beside
+from .candidates import Candidate, CandidateScores, candidate_extensions, propose_candidates
+from .forms import beside_form_errors, share_beside
 from .goodness import estimate_noise
 from .penalty import (
     NEW_CAUSE,
     cause_terms,
     finding_groups,
+    form_misfit,
     lost,
-    misfit,
     net_loss,
     penalty_of,
     total_penalty,
 )
 from .remainder import remainder_of
-from .unnamed import UNNAMED, effect_of, is_named
+from .unnamed import UNNAMED, effect_or_unnamed, is_named
 
 #: Terms at most.
 MOST_TERMS = 14
@@ -51,7 +51,7 @@ WITHIN, MOST_CORRELATED = 2, 0.999
 RISING = 4.0
 
 
-def on_runs() -> list[str]:
+def acts_on_runs() -> list[str]:
     """Specific causes that act on whole runs: direction, speed, load, temperature, mount."""
     return [cause for cause, effect in EFFECTS.items() if effect.acts_on_runs]
 
@@ -61,7 +61,7 @@ def is_flexible(effect: type[Effect]) -> bool:
     return effect.flexible_below == ALWAYS
 
 
-def select(
+def select_causes(
     regression: Regression, known: Sequence[Extension] = (), unnamed: bool = True
 ) -> Regression:
     """The regression with the causes that its readings support, priced by the noise found.
@@ -94,7 +94,7 @@ def select(
     # The other paths take long: the first of them tells whether they stand a chance.
     chosen = direct
     if not ahead:
-        settled = _forward(regression, on_runs(), total_penalty(direct))
+        settled = _forward(regression, acts_on_runs(), total_penalty(direct))
         specific_first = _pruned(_forward(settled, list(EFFECTS)))
         chosen = min(direct, specific_first, key=total_penalty)
     if total_penalty(opened) > total_penalty(chosen) - DECISIVE:
@@ -117,19 +117,19 @@ def _specific_first(regression: Regression) -> list[Regression]:
     specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
     start = _beside_repeats(regression)
     if start is regression:
-        start = _forward(regression, on_runs())
+        start = _forward(regression, acts_on_runs())
     return [_in_form(_pruned(_forward(_forward(start, specific), list(EFFECTS))))]
 
 
 def _in_form(regression: Regression) -> Regression:
     """With the forms that causes of whole runs have beside all that was chosen since."""
     for term in regression.terms:
-        effect = effect_of(term.cause)
+        effect = effect_or_unnamed(term.cause)
         alone = sum(other.cause == term.cause for other in regression.terms) == 1
         if not (effect.acts_on_runs and alone):
             continue
         rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
-        again = propose(effect, rest)
+        again = propose_candidates(effect, rest)
         if again is not None and again.shape != term.shape:
             other = rest.with_terms([*rest.terms, again])
             regression = min(regression, other, key=total_penalty)
@@ -141,14 +141,14 @@ def _beside_repeats(regression: Regression) -> Regression:
     beyond = regression.without_repeats()
     if beyond is regression:
         return regression
-    settled = _forward(_forward(beyond, on_runs()), (ZeroSlip.kind,))
+    settled = _forward(_forward(beyond, acts_on_runs()), (ZeroSlip.kind,))
     return regression.with_terms(settled.terms)
 
 
 def _doubtful(regression: Regression) -> bool:
     """Flexible causes, or many: what an effect without a name is taken for."""
     terms = regression.terms
-    flexible = any(is_flexible(effect_of(term.cause)) for term in terms)
+    flexible = any(is_flexible(effect_or_unnamed(term.cause)) for term in terms)
     return flexible or len(finding_groups(terms)) >= MANY
 
 
@@ -186,7 +186,7 @@ def _under_its_noise(regression: Regression) -> Regression:
 
 def _takes_up(term: Extension) -> bool:
     """It follows what correlated noise does: drawn anew in every run, or flexible."""
-    return term.run_effect is not None or is_flexible(effect_of(term.cause))
+    return term.run_effect is not None or is_flexible(effect_or_unnamed(term.cause))
 
 
 def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
@@ -206,15 +206,15 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     found = {term.cause for term in (*direct.terms, *grown.terms)}
     # Over a part of a turn a bump, too, can stand for several lines at once: lines first.
     travel = regression.signals.run_turns().max()
-    if not any(travel < effect_of(cause).flexible_below for cause in found):
+    if not any(travel < effect_or_unnamed(cause).flexible_below for cause in found):
         return direct
     specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
     goal = total_penalty(direct)
-    starts = [_forward(regression, on_runs(), goal)]
+    starts = [_forward(regression, acts_on_runs(), goal)]
     settled = _beside_repeats(regression)
     if settled is not regression:
         starts.append(settled)
-    elif any(is_flexible(effect_of(cause)) for cause in found):
+    elif any(is_flexible(effect_or_unnamed(cause)) for cause in found):
         slip = ZeroSlip.propose(regression)
         if slip is not None and slip.bic_gain > NEW_CAUSE:
             starts.append(regression.with_terms([slip]))
@@ -265,8 +265,8 @@ def _made_specific(regression: Regression) -> Regression:
     What the form of a law leaves, the flexible one takes up in its place: this counts in the
     evidence, and no allowance for it is charged beside.
     """
-    for term in [t for t in regression.terms if is_flexible(effect_of(t.cause))]:
-        left = misfit(regression)
+    for term in [t for t in regression.terms if is_flexible(effect_or_unnamed(t.cause))]:
+        left = form_misfit(regression)
 
         def price(account: Regression, left: float = left) -> float:
             return account.bic + penalty_of(account.terms, left)
@@ -274,7 +274,7 @@ def _made_specific(regression: Regression) -> Regression:
         rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
         tried = [
             start.with_terms([*start.terms, extension])
-            for extension, start, gain in extensions(rest, on_runs())
+            for extension, start, gain in candidate_extensions(rest, acts_on_runs())
             if price(rest) - gain < price(regression)
         ]
         best = min(tried, key=price, default=regression)
@@ -301,8 +301,8 @@ def _forward(regression: Regression, causes: Sequence[str], goal: float = np.inf
 def _grown(regression: Regression, causes: Sequence[str], goal: float) -> Regression:
     found: list[Candidate] = []
     while len(regression.terms) < MOST_TERMS and not regression.is_explained:
-        scores = Scores()
-        found = extensions(regression, causes, scores.least, found)
+        scores = CandidateScores()
+        found = candidate_extensions(regression, causes, scores.least, found)
         best = scores.best(found)
         # A step that was not finished chose among some only: it chose nothing.
         if best is None or pace().over:
@@ -327,7 +327,7 @@ def _without_misfits(regression: Regression) -> Regression:
         told = []
         for group in groups:
             rest = cause_terms(regression, group, settled=True)
-            beside = beside_bends(rest, {regression.terms[group[0]].cause})
+            beside = beside_form_errors(rest, {regression.terms[group[0]].cause})
             if beside is not rest:
                 saved = lost(regression, group)
                 share = share_beside(rest, beside, [regression.terms[k] for k in group])
@@ -371,9 +371,11 @@ def _plainest(regression: Regression) -> Regression:
 
     What was chosen since may have explained what once spoke for the wider one.
     """
-    for cause in {term.cause for term in regression.terms if effect_of(term.cause).contains}:
+    for cause in {
+        term.cause for term in regression.terms if effect_or_unnamed(term.cause).contains
+    }:
         rest = regression.with_terms(term for term in regression.terms if term.cause != cause)
-        plain = _forward(rest, [special.kind for special in effect_of(cause).contains])
+        plain = _forward(rest, [special.kind for special in effect_or_unnamed(cause).contains])
         if total_penalty(plain) < total_penalty(regression):
             regression = plain
     return regression

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from ..effects.blindness import Blindness
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 from ..support.layout import laid_out
-from ..support.layout import wrapped as _wrapped
+from ..support.layout import wrapped_lines as _wrapped
 from .beliefs import Belief
 from .diagnosisdata import DiagnosisData
 from .finding import brief_finding, finding_lines, named_quantity, unit_of

@@ -16,7 +16,7 @@ from ..effects import EFFECTS, Effect
 from ..effects.time_periodic import WANDER, TimePeriodic
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from .goodness.periodogram import periodogram
@@ -123,7 +123,7 @@ class UnnamedPattern(Effect):
         return best
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         """The modulator times cosine and sine of every order."""
         g = modulator(signals, shape["by"], shape["mean"], shape["spread"])
         if g is None:
@@ -192,7 +192,7 @@ UnnamedLine.kind = UNNAMED_LINE
 UNNAMED: dict[str, type[Effect]] = {UNNAMED_PATTERN: UnnamedPattern, UNNAMED_LINE: UnnamedLine}
 
 
-def effect_of(cause: str) -> type[Effect]:
+def effect_or_unnamed(cause: str) -> type[Effect]:
     """The effect of a cause, or the structure without a name."""
     return EFFECTS[cause] if cause in EFFECTS else UNNAMED[cause]
 

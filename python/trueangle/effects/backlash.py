@@ -11,7 +11,7 @@ import numpy as np
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_sum
+from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec, line_values
 from ..model.terms.travel import BacklashTerm
@@ -67,7 +67,7 @@ class Backlash(Effect):
     measure: ClassVar[str] = "approach every position from both directions, within each run"
     acts_on_runs: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         width = self.half_width_arcsec + line_sum(signals.theta, self.lines)
         shape = {
             "turns_first": self.turns_first,
@@ -112,7 +112,7 @@ class Backlash(Effect):
         return replace(best, log_grid=float(np.log(3.0)))
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         first, width = shape.get("turns_first", ""), shape.get("half_width_arcsec", 0.0)
         if first == "reference" and width > 0.0:
             return signals.play(width / ARCSEC_PER_DEG, shape.get("start_state", 1.0))[:, None]

@@ -11,7 +11,7 @@ from ..estimation.estimate import Parameters
 from ..estimation.factor import orthonormal_basis
 from ..estimation.regression import Regression
 from ..support.arrays import Array
-from ..support.plainresult import Shown
+from ..support.plainresult import ShownResult
 
 #: Share of velocity that direction must leave for latency and backlash to be told apart.
 OWN_OF_VELOCITY = 0.10
@@ -27,7 +27,7 @@ RUNS_PER_LEVEL = 3
 
 
 @dataclass(frozen=True)
-class Blindness(Shown):
+class Blindness(ShownResult):
     """Causes that this data cannot tell apart, or not see at all.
 
     Attributes

@@ -27,9 +27,9 @@ def blind_spots(regression: Regression) -> list[Blindness]:
     found: list[Blindness] = []
     for effect in EFFECTS.values():
         found += effect.blind_spots(regression, found)
-    return sorted(found, key=lambda spot: place_among(FACTORS, spot))
+    return sorted(found, key=lambda spot: blind_spot_place(FACTORS, spot))
 
 
-def place_among(factors: tuple[str, ...], spot: Blindness) -> int:
+def blind_spot_place(factors: tuple[str, ...], spot: Blindness) -> int:
     """Where the factor of a blind spot stands among others; behind all where it does not."""
     return factors.index(spot.factor) if spot.factor in factors else len(factors)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_sum
+from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec, line_values
 from ..model.terms.load import CurrentCouplingTerm
@@ -56,7 +56,7 @@ class CurrentCoupling(FactorEffect):
     acts_on_runs: ClassVar[bool] = True
     changes_lines: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         if signals.current is None:
             return np.zeros(len(signals))
         per_ampere = self.arcsec_per_A + line_sum(signals.theta, self.lines_per_A)

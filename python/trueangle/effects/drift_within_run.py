@@ -13,8 +13,8 @@ import trueangle._core as _core
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..estimation.whitening import wander_basis
-from ..joint.pattern import Surroundings
+from ..estimation.whitening import drift_basis
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.plainresult import counted
 from .backlash import Backlash
@@ -109,7 +109,7 @@ class DriftWithinRun(Effect):
         "no signal shows the drift; log the temperature and look for its part"
     )
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         out = np.zeros(len(signals))
         for start, stop in signals.run_bounds():
             clock = signals.clock[start:stop]
@@ -122,7 +122,7 @@ class DriftWithinRun(Effect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         # A free path is no cause, and is not to be found as one.
         return cls(arcsec_per_s=size)
@@ -288,7 +288,7 @@ class DriftWithinRun(Effect):
             return None
         left = power = 0.0
         for start, stop in regression.bounds:
-            wander = wander_basis(signals.clock[start:stop])
+            wander = drift_basis(signals.clock[start:stop])
             q, _ = np.linalg.qr(np.column_stack([np.ones(stop - start), wander]))
             direction = signals.direction[start:stop]
             power += float(np.sum((direction - direction.mean()) ** 2))

@@ -13,12 +13,12 @@ from ..errors import ArgumentError
 from ..estimation.estimate import Parameters
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from .bends import departure_columns
 from .blindness import Blindness
-from .parameters import Tabled
+from .parameters import TabledParameters
 from .search import Array, Fitted
 
 #: Every effect by its kind, in the order in which they are tried: a class joins by being
@@ -29,7 +29,7 @@ EFFECTS: dict[str, type[Effect]] = {}
 ALWAYS = math.inf
 
 
-class Effect(Tabled):
+class Effect(TabledParameters):
     """Base of the effects; each is a frozen dataclass whose fields are its parameters.
 
     A class with a ``kind`` joins the vocabulary by being defined. What it must say is its
@@ -121,17 +121,17 @@ class Effect(Tabled):
 
     # -- simulate ------------------------------------------------------------------
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         """The effect's error at every reading, arcsec; random where its nature is random."""
         raise NotImplementedError
 
-    def expected(self, signals: Signals, around: Surroundings) -> Array:
+    def expected(self, signals: Signals, around: JointPattern) -> Array:
         """The part of `signal` that can be predicted: zeros for random effects."""
         if not self.transfers:
             return np.zeros(len(signals))
         return self.signal(signals, around, np.random.default_rng(0))
 
-    def noise_factor(self, signals: Signals, around: Surroundings) -> Array | None:
+    def noise_factor(self, signals: Signals, around: JointPattern) -> Array | None:
         """Factor on the standard deviation of the noise, or None."""
         return None
 
@@ -143,7 +143,7 @@ class Effect(Tabled):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         """One of this size with all else drawn at random, to be hidden in readings of ``signals``.
 
@@ -153,7 +153,7 @@ class Effect(Tabled):
         return cls(size)  # type: ignore[call-arg]
 
     @classmethod
-    def alike(cls, other: Effect, around: Surroundings) -> Self | None:
+    def alike(cls, other: Effect, around: JointPattern) -> Self | None:
         """The same error from this cause, where one design cannot tell it from ``other``."""
         return None
 
@@ -170,7 +170,7 @@ class Effect(Tabled):
         return None
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         """Regressors of ``shape`` at other readings, shape (n, p); none of a random effect."""
         return np.zeros((len(signals), 0))
 

@@ -16,7 +16,7 @@ import trueangle._core as _core
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Pattern, Surroundings
+from ..joint.pattern import JointPattern, Pattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import FilterLagTerm
@@ -90,7 +90,7 @@ class FilterLag(Effect):
     located: ClassVar[bool] = True
     changes_lines: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         pattern = around.pattern
         seen = pattern.passed(
             signals.theta, signals.turns_per_s, lambda f: _low_pass(f, self.cutoff_hz, self.damping)
@@ -99,7 +99,7 @@ class FilterLag(Effect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         return None if around.pattern.orders.size == 0 else cls(size)
 
@@ -182,7 +182,7 @@ class FilterLag(Effect):
         return best
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         waves = _waves(around.pattern, signals.theta)
         frequency = around.pattern.orders * signals.turns_per_s[:, None]
         return _lagged(waves, frequency, **shape)[:, None]

@@ -11,8 +11,8 @@ import numpy as np
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.earlier import earlier
-from ..joint.pattern import Surroundings
+from ..joint.earlier import earlier_signals
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import LatencyTerm
@@ -58,8 +58,8 @@ class Latency(Effect):
     confused_with: ClassVar[Mapping[type[Effect], str]] = {Backlash: TWO_SPEEDS}
     acts_on_runs: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
-        then = earlier(signals, self.delay_s).theta
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
+        then = earlier_signals(signals, self.delay_s).theta
         pattern = around.pattern
         ramp = np.degrees(then - signals.theta) * ARCSEC_PER_DEG
         return np.asarray(ramp + pattern.value(then) - pattern.value(signals.theta))
@@ -82,7 +82,7 @@ class Latency(Effect):
         return {"delay_s": quantity(delay, std)}, [Latency(float(delay))]
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         """Column whose coefficient is tau, arcsec per second, to first order in tau."""
         speed = signals.turns_per_s * (360.0 * ARCSEC_PER_DEG)
         return np.asarray(

@@ -14,14 +14,14 @@ from ..errors import ArgumentError
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec
 from ..model.terms.place import LocalDefectTerm
 from ..support.deadline import pace
 from .argument_error import ArgumentShift
 from .blindness import Blindness
-from .drawing import visited_place
+from .drawing import drawn_place
 from .effect import Effect
 from .missing_order import MissingOrder
 from .search import Array, Fitted, tangent_covariance
@@ -90,7 +90,7 @@ class LocalDefect(Effect):
     is_separate: ClassVar[bool] = True
     flexible_below: ClassVar[float] = WHOLE_TURN
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         phase = self._degrees(signals, around, self.shaft)
         return self.height_arcsec * self.bump(phase, self.place_deg, self.width_deg)
 
@@ -107,9 +107,9 @@ class LocalDefect(Effect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
-        return cls(visited_place(signals, rng), float(rng.uniform(3.0, 8.0)), size)
+        return cls(drawn_place(signals, rng), float(rng.uniform(3.0, 8.0)), size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
@@ -229,12 +229,12 @@ class LocalDefect(Effect):
         )
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         phase = cls._degrees(signals, around, shape["shaft"])
         return cls.bump(phase, shape["place_deg"], shape["width_deg"])[:, None]
 
     @staticmethod
-    def _degrees(signals: Signals, around: Surroundings, shaft: str) -> Array:
+    def _degrees(signals: Signals, around: JointPattern, shaft: str) -> Array:
         """Angles of a shaft."""
         return np.degrees(signals.theta * around.joint.output_order(shaft, 1))
 
@@ -306,7 +306,7 @@ def _circular(x: Waves, window: Waves) -> Array:
     return np.asarray(np.fft.irfft(x * window, PLACES))
 
 
-def _gear_lines(around: Surroundings) -> list[float]:
+def _gear_lines(around: JointPattern) -> list[float]:
     joint = around.joint
     lines = {joint.output_order(shaft, k) for shaft, k in joint.gear_orders()}
     if "wave_generator" in joint.shafts:

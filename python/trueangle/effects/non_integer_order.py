@@ -11,7 +11,7 @@ import numpy as np
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns, lines_columns
+from ..joint.pattern import JointPattern, line_columns, lines_columns
 from ..joint.signals import Signals
 from ..support.deadline import pace
 from .blindness import (
@@ -86,13 +86,13 @@ class NonIntegerOrder(Effect):
     flexible_below: ClassVar[float] = ALWAYS
     not_at_run_time: ClassVar[str] = "its phase is new in every run"
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         phase = rng.uniform(0.0, 2.0 * np.pi, signals.runs)[signals.run]
         return np.asarray(self.amplitude_arcsec * np.sin(self.order * signals.theta + phase))
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         return cls(float(rng.integers(5, 40)) + float(rng.uniform(0.3, 0.7)), size)
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec
 from ..model.terms.travel import PreslidingHysteresisTerm
@@ -20,7 +20,7 @@ from .bends import spring_transitions
 from .blindness import Blindness, share_left
 from .effect import Effect
 from .latency import TWO_SPEEDS, Latency
-from .search import Array, Fitted, golden_maximum, of_one_sign, tangent_covariance
+from .search import Array, Fitted, golden_maximum, is_of_one_sign, tangent_covariance
 
 _AFTER_REVERSAL = (
     "record the first 10 to 30 deg after each reversal in steps of 0.3 deg or less, "
@@ -83,12 +83,12 @@ class PreslidingHysteresis(Effect):
     acts_on_runs: ClassVar[bool] = True
     located: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return self.amplitude_arcsec * signals.presliding(self.length_deg, self.start_state)
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         return cls(size, float(rng.uniform(2.0, 6.0)))
 
@@ -139,7 +139,7 @@ class PreslidingHysteresis(Effect):
         if apart:
             further.append(extension)
         further.sort(key=lambda p: -p.bic_gain)
-        alike = (p for p in further if p.bic_gain > 0.0 and of_one_sign(regression, p))
+        alike = (p for p in further if p.bic_gain > 0.0 and is_of_one_sign(regression, p))
         return next(alike, None)
 
     @classmethod
@@ -149,7 +149,7 @@ class PreslidingHysteresis(Effect):
         return regression.propose(cls.kind, shape, columns)
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         if shape["length_deg"] == 0.0:
             return signals.direction[:, None]
         return signals.presliding(shape["length_deg"], shape["start_state"])[:, None]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from .blindness import Blindness
 
 Array: TypeAlias = NDArray[np.float64]
@@ -54,7 +54,7 @@ def golden_maximum(
     return (c, fc) if fc > fd else (d, fd)
 
 
-def of_one_sign(regression: Regression, extension: Extension) -> bool:
+def is_of_one_sign(regression: Regression, extension: Extension) -> bool:
     """With this term all elements of its cause have one sign, as springs have.
 
     Elements of unlike signs would only be a difference of two that are alike.
@@ -69,7 +69,7 @@ def of_one_sign(regression: Regression, extension: Extension) -> bool:
     return min(elements) * max(elements) > 0.0
 
 
-def known_orders(around: Surroundings) -> list[float]:
+def known_orders(around: JointPattern) -> list[float]:
     """Orders of the pattern and those that gears and encoders are known to have."""
     joint = around.joint
     orders = {float(m) for m in around.pattern.orders}
@@ -77,7 +77,7 @@ def known_orders(around: Surroundings) -> list[float]:
     return sorted(orders)
 
 
-def is_gear_order(around: Surroundings, order: float) -> bool:
+def is_gear_order(around: JointPattern, order: float) -> bool:
     """An order of the motor or the wave generator."""
     named = around.joint.name_order(order)
     return named is not None and named[0] != "output"

@@ -11,12 +11,12 @@ import numpy as np
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec
 from ..model.terms.load import StiffeningComplianceTerm
 from ..support.arrays import distinct
-from .bends import columns_beyond
+from .bends import bend_beyond
 from .blindness import OWN_POWER, Blindness, share_left
 from .drawing import largest_signal
 from .effect import Effect
@@ -73,7 +73,7 @@ class StiffeningCompliance(Effect):
     acts_on_runs: ClassVar[bool] = True
     located: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         torque = self.moment(signals, self.gravity_deg)
         return np.asarray(
             self.arcsec_per_Nm * torque
@@ -96,7 +96,7 @@ class StiffeningCompliance(Effect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         # What is taken off at the largest load is a quarter of the linear part there.
         return cls(4.0 * size * largest_signal(signals.torque) ** 2, -size)
@@ -164,7 +164,7 @@ class StiffeningCompliance(Effect):
         return float(-np.degrees(np.arctan2(a, b)))
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         moment = StiffeningCompliance.moment(signals, shape["gravity_deg"])
         if "power" in shape:
             second = moment**3
@@ -179,7 +179,7 @@ class StiffeningCompliance(Effect):
             moment = cls.moment(signals, term.shape["gravity_deg"])
             top = float(np.abs(moment).max())
             knees = [cls.beyond(moment, share * top) for share in KNEES]
-            columns.append(columns_beyond(np.column_stack([*knees, moment**3]), term.columns))
+            columns.append(bend_beyond(np.column_stack([*knees, moment**3]), term.columns))
         return np.hstack(columns)
 
     @classmethod

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_sum
+from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec, line_values
 from ..model.terms.place import ThermalDriftTerm
@@ -66,7 +66,7 @@ class ThermalDrift(FactorEffect):
     acts_on_runs: ClassVar[bool] = True
     changes_lines: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         if signals.temperature is None:
             return np.zeros(len(signals))
         per_kelvin = self.zero_arcsec_per_K + line_sum(signals.theta, self.lines_per_K)

@@ -15,7 +15,7 @@ import trueangle._core as _core
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..support.quantiles import quantile
 from .blindness import Blindness
@@ -89,14 +89,14 @@ class TimePeriodic(Effect):
     flexible_below: ClassVar[float] = ALWAYS
     not_at_run_time: ClassVar[str] = "its phase is new in every run; shield or filter its source"
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         phase = rng.uniform(0.0, 2.0 * np.pi, signals.runs)[signals.run]
         turn = 2.0 * np.pi * self.frequency_hz * signals.clock
         return np.asarray(self.amplitude_arcsec * np.sin(turn + phase))
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         if signals.time is None:
             return None

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, from_arcsec, line_values
 from ..model.terms.load import TorsionalComplianceTerm
@@ -46,7 +46,7 @@ class TorsionalCompliance(FactorEffect):
     measure: ClassVar[str] = "repeat the runs at a second, known load (or with the arm off)"
     acts_on_runs: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         torque = torque_of(signals)
         return np.asarray(
             torque * (self.arcsec_per_Nm + line_sum(signals.theta, self.lines_per_Nm))

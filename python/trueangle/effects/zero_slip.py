@@ -11,7 +11,7 @@ import numpy as np
 from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .backlash import Backlash, goes_both_ways
 from .blindness import (
@@ -68,7 +68,7 @@ class ZeroSlip(Effect):
         "the zero of a run is not known before the run is referenced: set it anew"
     )
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return self.standard_deviation_arcsec * rng.standard_normal(signals.runs)[signals.run]
 
     @classmethod

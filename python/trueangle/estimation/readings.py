@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from .extension import penalty_of_parameter
@@ -29,7 +29,7 @@ LEAST_SHARE = 0.2
 MOST_SHARE = 2.0
 
 
-def is_good_part(rounding: float, left: float, scatter: float) -> bool:
+def is_rounding_visible(rounding: float, left: float, scatter: float) -> bool:
     """A variance of rounding is a good part of that left, and no more than the readings' may be."""
     return LEAST_SHARE * left < rounding < MOST_SHARE * scatter
 
@@ -54,7 +54,7 @@ class Readings:
 
     signals: Signals
     residual: Array
-    belief: Surroundings
+    belief: JointPattern
     lines: LineBasis
     weights: Array | None = None
     beside: Array | None = None

@@ -15,7 +15,7 @@ from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance, TableRecord
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
-from ..support.files import Kind, Source, sha256_of
+from ..support.files import FileKind, InputFile, sha256_of
 from .pattern import TurnPattern
 from .reading import failed
 from .target import CommentBlock, Made, Option, TablePart, Target
@@ -37,7 +37,7 @@ class Admt4000(Target):
 
     name = "admt4000"
     what = "the harmonic registers of an ADMT4000"
-    kind: ClassVar[Kind] = Kind("register values of an ADMT4000", (".txt",))
+    kind: ClassVar[FileKind] = FileKind("register values of an ADMT4000", (".txt",))
     sign = "subtract"
     unknown = (
         "format checked, device not: sign and phase are those of the maker's own tool, and no "
@@ -150,7 +150,7 @@ class Admt4000(Target):
                 note="read from registers of an ADMT4000, whose argument is the indicated angle",
                 table=TableRecord(self.name, self.argument, 0.0, 0.0),
             ),
-            provenance=Provenance((Source(path, sha256_of(path)),)),
+            provenance=Provenance((InputFile(path, sha256_of(path)),)),
         )
 
 

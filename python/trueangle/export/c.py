@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..support.files import Kind
+from ..support.files import FileKind
 from .chain import Chain, source_identifier
 from .codetext import code_parts, filled, float_literal, rows
 from .cstep import c_step
@@ -24,7 +24,7 @@ class CHeader(PortableTarget):
 
     name = "c"
     what = "a C99 header with tables and one inline function per shaft"
-    kind: ClassVar[Kind] = Kind("a C header", (".h", ".hpp"))
+    kind: ClassVar[FileKind] = FileKind("a C header", (".h", ".hpp"))
 
     def write(self, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
         """The header."""

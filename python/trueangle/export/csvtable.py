@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.files import Kind
+from ..support.files import FileKind
 from .knots import linear_knots
 from .pattern import TurnPattern
 from .proof import Correction, Places, enough_bits
@@ -30,7 +30,7 @@ class CsvTable(Target):
 
     name = "csv"
     what = "lines of indicated_deg,correction_deg to interpolate between"
-    kind: ClassVar[Kind] = Kind("a table of corrections (CSV)", (".csv",))
+    kind: ClassVar[FileKind] = FileKind("a table of corrections (CSV)", (".csv",))
     sign = "subtract"
     tried = (36, 45, 60, 72, 90, 120, 180, 240, 360, 720, 1440, 3600, 7200, 36000)
     options = {

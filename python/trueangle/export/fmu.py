@@ -22,7 +22,7 @@ from ..model.file import embedded_model
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.text import model_text
-from ..support.files import Kind
+from ..support.files import FileKind
 from .fmufiles import (
     IDENTIFIER,
     Variable,
@@ -57,7 +57,7 @@ class Fmu(Target):
 
     name = "fmu"
     what = "a functional mock-up unit (FMI), sensor or correction, for simulators"
-    kind: ClassVar[Kind] = Kind("a functional mock-up unit", (".fmu",))
+    kind: ClassVar[FileKind] = FileKind("a functional mock-up unit", (".fmu",))
     sign = "subtract"
     arithmetic_known = False
     options = {

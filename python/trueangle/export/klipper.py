@@ -19,7 +19,7 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
-from ..support.files import Kind, read_whole
+from ..support.files import FileKind, read_whole
 from .knots import linear_knots, rounded_knots
 from .pattern import TurnPattern
 from .proof import Correction, Places
@@ -41,7 +41,7 @@ class Klipper(Target):
 
     name = "klipper"
     what = 'the calibrate list of an [angle] section; needs `existing="printer.cfg"`'
-    kind: ClassVar[Kind] = Kind("a section of a printer.cfg", (".cfg", ".txt"))
+    kind: ClassVar[FileKind] = FileKind("a section of a printer.cfg", (".cfg", ".txt"))
     sign = "absolute"
     files = ("existing",)
     unknown = (

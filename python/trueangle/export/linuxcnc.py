@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
-from ..support.files import Kind
-from .oneturn import line_floor
+from ..support.files import FileKind
+from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import failed
@@ -30,7 +30,9 @@ class LinuxCnc(Target):
 
     name = "linuxcnc"
     what = "a COMP_FILE of a rotary joint, forward and reverse"
-    kind: ClassVar[Kind] = Kind("a compensation file of LinuxCNC", (".comp", ".txt", ".dat"))
+    kind: ClassVar[FileKind] = FileKind(
+        "a compensation file of LinuxCNC", (".comp", ".txt", ".dat")
+    )
     sign = "add"
     argument = "reference"
     tried = (12, 18, 24, 36, 48, 60, 72, 90, 120, 180, 240)
@@ -70,7 +72,7 @@ class LinuxCnc(Target):
             entries=len(forward),
             bytes=24 * len(forward),
             part=travel.part(pattern, forward / 360.0, reverse / 360.0),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=pattern.zero * 360.0,
             bits=enough_bits(options["bits"], len(forward)),
             lost=lambda: travel.lost(pattern),

@@ -12,7 +12,7 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
-from ..support.files import Kind, read_whole
+from ..support.files import FileKind, read_whole
 from .codetext import rows
 from .oneturn import longest_array
 from .pattern import TurnPattern
@@ -31,7 +31,7 @@ class Mechaduino(Target):
 
     name = "mechaduino"
     what = "the lookup array of Mechaduino's Parameters.cpp"
-    kind: ClassVar[Kind] = Kind("a C++ source for Mechaduino", (".h", ".cpp", ".ino"))
+    kind: ClassVar[FileKind] = FileKind("a C++ source for Mechaduino", (".h", ".cpp", ".ino"))
     sign = "absolute"
     files = ("existing",)
     options = {

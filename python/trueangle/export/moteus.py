@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
-from ..support.files import Kind
+from ..support.files import FileKind
 from .knots import rounded_knots
-from .oneturn import line_floor, one_turn_knots
+from .oneturn import one_turn_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import failed, sampled_model
@@ -35,7 +35,7 @@ class Moteus(Target):
 
     name = "moteus"
     what = "conf set lines of a position source's compensation table"
-    kind: ClassVar[Kind] = Kind("a configuration of moteus", (".cfg", ".txt", ".conf"))
+    kind: ClassVar[FileKind] = FileKind("a configuration of moteus", (".cfg", ".txt", ".conf"))
     sign = "add"
     unknown = (
         "firmware 0x0109 or later is wanted (before, 32 floats without a scale). On the source "
@@ -70,7 +70,7 @@ class Moteus(Target):
             part=TablePart.at_readings(
                 pattern, *_device(table, scale, options["bits"]), zero=pattern.zero
             ),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=pattern.zero * 360.0,
             notes=(
                 "the reading is that of the source with its offset and sign applied, in its own "

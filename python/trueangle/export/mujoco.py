@@ -14,7 +14,7 @@ from ..model.file import embedded_model
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.text import model_text
-from ..support.files import Kind
+from ..support.files import FileKind
 from .pattern import TurnPattern
 from .proof import Proof
 from .reading import failed
@@ -34,7 +34,7 @@ class MuJoCo(Target):
 
     name = "mujoco"
     what = "a fragment of MJCF: the sensor's model, friction, damping and torque ripple of a joint"
-    kind: ClassVar[Kind] = Kind("a fragment of MJCF (XML)", (".xml", ".mjcf"))
+    kind: ClassVar[FileKind] = FileKind("a fragment of MJCF (XML)", (".xml", ".mjcf"))
     sign = "add"
     argument = "reference"
     arithmetic_known = False

@@ -37,7 +37,7 @@ def without_mean(knots: Array, pattern: TurnPattern) -> tuple[Array, float]:
     return knots - mean, (mean + pattern.zero) * 360.0
 
 
-def line_floor(step: float) -> float:
+def rounding_floor(step: float) -> float:
     """Arcsec rms between two rounded numbers: two thirds of the variance of each."""
     return step / math.sqrt(18.0) * ARCSEC_PER_TURN
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
-from ..support.files import Kind
-from .oneturn import line_floor
+from ..support.files import FileKind
+from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import ReadTable, failed, function_model
@@ -36,7 +36,7 @@ class Pmac(Target):
 
     name = "pmac"
     what = "the leadscrew compensation table of a PMAC motor"
-    kind: ClassVar[Kind] = Kind("commands for PMAC", (".pmc", ".cfg"))
+    kind: ClassVar[FileKind] = FileKind("commands for PMAC", (".pmc", ".cfg"))
     sign = "add"
     argument = "reference"
     unknown = (
@@ -108,7 +108,7 @@ class Pmac(Target):
             entries=entries,
             bytes=3 * entries,
             part=travel.part(pattern, printed, printed),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=(pattern.zero + first) * 360.0,
             bits=enough_bits(options["bits"], entries),
             lost=lambda: travel.lost(pattern),

@@ -14,7 +14,7 @@ from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance, TableRecord
 from ..support.arrays import Array
-from ..support.files import Source, sha256_of
+from ..support.files import InputFile, sha256_of
 from .chain import Chain
 from .inversion import inverse_rising
 from .proof import Correction
@@ -168,7 +168,7 @@ def _model(
         period=360.0,
         argument="indicated" if at_indicated else "reference",
         covariance=np.diag(variances) * 360.0**2,
-        provenance=Provenance((Source(path, sha256_of(path)),)),
+        provenance=Provenance((InputFile(path, sha256_of(path)),)),
         terms=terms,
     )
     rms, largest = _arithmetic(model.replace(terms=()), target, device, turns, travel)

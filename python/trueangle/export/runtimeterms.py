@@ -23,7 +23,7 @@ from ..model.forms import Form
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.terms import LocalDefect
-from ..support.signals import coupled_with
+from ..support.signals import coupled_joint
 
 #: What tells the direction of travel.
 DIRECTIONS = ("auto", "angle", "velocity", "signal")
@@ -65,7 +65,7 @@ class Waves(NamedTuple):
 
 def is_own(term: Term) -> bool:
     """Whether the joint's own signals tell it: a program of one has no angles of others."""
-    return not any(coupled_with(name) for name in term.needs)
+    return not any(coupled_joint(name) for name in term.needs)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 import trueangle._core as _core
 
-from ..support.files import Kind
+from ..support.files import FileKind
 from .chain import Chain, source_identifier
 from .codetext import code_parts, filled, float_literal, rows
 from .portable import PortableTarget, self_test, table_lines
@@ -26,7 +26,7 @@ class RustModule(PortableTarget):
 
     name = "rust"
     what = "a Rust module without std, tables and one function per shaft"
-    kind: ClassVar[Kind] = Kind("a Rust module", (".rs",))
+    kind: ClassVar[FileKind] = FileKind("a Rust module", (".rs",))
 
     def write(self, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
         """The module."""

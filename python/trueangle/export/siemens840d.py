@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..model.model import HarmonicModel
-from ..support.files import Kind
-from .oneturn import line_floor
+from ..support.files import FileKind
+from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import failed
@@ -32,7 +32,9 @@ class Siemens840d(Target):
 
     name = "siemens840d"
     what = "the $AA_ENC_COMP table of a rotary axis of a SINUMERIK"
-    kind: ClassVar[Kind] = Kind("a compensation file of SINUMERIK", (".ini", ".mpf", ".spf"))
+    kind: ClassVar[FileKind] = FileKind(
+        "a compensation file of SINUMERIK", (".ini", ".mpf", ".spf")
+    )
     sign = "add"
     tried = (36, 45, 60, 72, 90, 120, 144, 180, 240, 360, 480, 720, 1440)
     unknown = (
@@ -88,7 +90,7 @@ class Siemens840d(Target):
             entries=len(values),
             bytes=8 * len(values),
             part=travel.at_readings(pattern, -values / 360.0),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=pattern.zero * 360.0,
             bits=enough_bits(options["bits"], len(values)),
             lost=lambda: travel.lost(pattern),

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.files import Kind
+from ..support.files import FileKind
 from .codetext import rows
 from .knots import rounded_knots
-from .oneturn import line_floor, longest_array, one_turn_knots, without_mean
+from .oneturn import longest_array, one_turn_knots, rounding_floor, without_mean
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import failed, sampled_model
@@ -47,7 +47,9 @@ class SimpleFoc(Target):
 
     name = "simplefoc"
     what = "the calibrationLut array of SimpleFOC's CalibratedSensor"
-    kind: ClassVar[Kind] = Kind("a C++ source for SimpleFOC", (".h", ".cpp", ".hpp", ".ino"))
+    kind: ClassVar[FileKind] = FileKind(
+        "a C++ source for SimpleFOC", (".h", ".cpp", ".hpp", ".ino")
+    )
     sign = "subtract"
     unknown = (
         "the electrical zero and the sensor's direction belong to the motor: let initFOC() find "
@@ -95,7 +97,7 @@ class SimpleFoc(Target):
             part=TablePart.at_readings(
                 pattern, *_device(variant, table), zero=zero_deg / 360.0, resolution=3.0 * 2.0**-24
             ),
-            floor_arcsec=line_floor(step)
+            floor_arcsec=rounding_floor(step)
             if variant == "minus-u16"
             else step / math.sqrt(12.0) * ARCSEC_PER_TURN,
             zero_deg=zero_deg,

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
-from ..support.files import Kind
+from ..support.files import FileKind
 from .codetext import rows
 from .knots import rounded_knots
-from .oneturn import line_floor, longest_array, one_turn_knots
+from .oneturn import longest_array, one_turn_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import failed, sampled_model
@@ -27,7 +27,7 @@ class Tinymovr(Target):
 
     name = "tinymovr"
     what = "the rec_table of a Tinymovr sensor"
-    kind: ClassVar[Kind] = Kind("a C source for Tinymovr", (".h", ".c"))
+    kind: ClassVar[FileKind] = FileKind("a C source for Tinymovr", (".h", ".c"))
     sign = "add"
     unknown = (
         "no command that writes rec_table from outside is known: the firmware fills it by its own "
@@ -63,7 +63,7 @@ class Tinymovr(Target):
             bytes=4 * entries,
             part=TablePart.at_readings(pattern, _device(table, bits), zero=pattern.zero),
             # Whole ticks: of the entries, and of what is between them.
-            floor_arcsec=line_floor(1.0 / ticks) * 2.5**0.5,
+            floor_arcsec=rounding_floor(1.0 / ticks) * 2.5**0.5,
             zero_deg=pattern.zero * 360.0,
             bits=bits,
         )

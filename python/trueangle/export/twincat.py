@@ -14,8 +14,8 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
-from ..support.files import Kind
-from .oneturn import line_floor
+from ..support.files import FileKind
+from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import failed
@@ -38,7 +38,7 @@ class TwinCat(Target):
 
     name = "twincat"
     what = "the leadscrew compensation of a TwinCAT CNC axis, or points for an NC axis"
-    kind: ClassVar[Kind] = Kind("a compensation list of TwinCAT", (".lis", ".txt", ".csv"))
+    kind: ClassVar[FileKind] = FileKind("a compensation list of TwinCAT", (".lis", ".txt", ".csv"))
     sign = "subtract"
     argument = "reference"
     tried = (36, 45, 60, 72, 90, 120, 144, 180, 240, 360, 480, 720, 900, 1200, 1440)
@@ -97,7 +97,7 @@ class TwinCat(Target):
             entries=len(values[0]),
             bytes=8 * len(values[0]),
             part=travel.part(pattern, *(-v / TENTHS for v in values)),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=pattern.zero * 360.0,
             lost=lambda: travel.lost(pattern),
             notes=("switch it on by lr_param.ssfk 1 of the axis",),
@@ -120,7 +120,7 @@ class TwinCat(Target):
             entries=len(travel.nominal),
             bytes=16 * len(travel.nominal),
             part=travel.part(pattern, *(v / 360.0 for v in columns)),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=pattern.zero * 360.0,
             lost=lambda: travel.lost(pattern),
             notes=(

@@ -14,9 +14,9 @@ from ..runs.run import CalibrationRun
 from ..runs.travel import Span
 from ..support.arrays import Array
 from ..support.plainresult import PlainResult
-from .problem import Fitted, Problem
-from .robust import Weighted
-from .rounding import beside_rounding
+from .problem import Problem, SolvedProblem
+from .robust import RobustFit
+from .rounding import covariance_with_rounding
 from .uncertainty import CovarianceKind, Uncertainty, coefficient_uncertainty
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .nuisance import Nuisance
     from .orders.table import OrderSelection
     from .prior import Posterior
-    from .summed import Summed
+    from .summed import SummedReadings
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,8 +32,8 @@ class FitData(PlainResult):
     """What a `FitResult` holds."""
 
     problem: Problem
-    fitted: Fitted
-    weighted: Weighted
+    fitted: SolvedProblem
+    weighted: RobustFit
     loss: str
     ridge: float
     span: Span
@@ -83,7 +83,7 @@ class FitData(PlainResult):
         return tuple(self.problem.runs)
 
     @property
-    def _summed(self) -> Summed | None:
+    def _summed(self) -> SummedReadings | None:
         return self.problem.summed
 
     @property
@@ -140,7 +140,7 @@ class FitData(PlainResult):
         found = coefficient_uncertainty(
             self.problem, self.fitted, weights, self.ridge, self.covariance_asked
         )
-        found = beside_rounding(found, self.problem, self.fitted)
+        found = covariance_with_rounding(found, self.problem, self.fitted)
         if self.nuisance is None or not self.nuisance.inflation:
             return found
         wider = np.array([1.0, *self.nuisance.inflation])

@@ -12,8 +12,8 @@ from ..estimation.linear import (
     NormalEquations,
     least_squares,
     left_out,
+    linear_residual,
     pseudo_inverse,
-    unexplained,
 )
 from ..support.arrays import Array
 
@@ -54,7 +54,7 @@ def _held_out(rows: FoldRows, chosen: Sequence[str]) -> Array:
 def _told(rows: FoldRows, chosen: Sequence[str], name: str) -> float:
     """Part of a group's energy that the pattern and the chosen ones leave."""
     columns = rows.groups[name]
-    return float((unexplained(_design(rows, chosen), columns) ** 2).sum() / (columns**2).sum())
+    return float((linear_residual(_design(rows, chosen), columns) ** 2).sum() / (columns**2).sum())
 
 
 def choose_nuisance_groups(

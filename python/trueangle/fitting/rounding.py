@@ -24,7 +24,7 @@ from ..joint.signals import sensor_lattice
 from ..runs.aliasing import Positions, distinct_positions
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
-from .problem import Fitted, Problem
+from .problem import Problem, SolvedProblem
 from .uncertainty import Uncertainty
 
 if TYPE_CHECKING:
@@ -70,14 +70,16 @@ def repeated_variance(step: float, scatter: float) -> float:
     return repeated(low)
 
 
-def repeated_over(step: float, repeats: ReadingVariance | None, readings: float) -> float:
+def rounding_over_repeats(step: float, repeats: ReadingVariance | None, readings: float) -> float:
     """``R v(σ)`` of so many readings at each position; 0 without a step or repeated readings."""
     if not step or repeats is None:
         return 0.0
     return readings * repeated_variance(step, repeats.variance)
 
 
-def beside_rounding(found: Uncertainty, problem: Problem, fitted: Fitted) -> Uncertainty:
+def covariance_with_rounding(
+    found: Uncertainty, problem: Problem, fitted: SolvedProblem
+) -> Uncertainty:
     """The covariance with that of the rounding that repeats at each position.
 
     ::
@@ -88,7 +90,7 @@ def beside_rounding(found: Uncertainty, problem: Problem, fitted: Fitted) -> Unc
     all of them. Of more than `COUNTED` readings positions are not counted.
     """
     from .orders.noise import pure_error
-    from .orders.zerogroups import zero_units
+    from .orders.zerogroups import zero_groups
 
     variance = fitted.solution.residual_variance
     if problem.readings > COUNTED or not 0.0 < variance < math.inf:
@@ -97,10 +99,10 @@ def beside_rounding(found: Uncertainty, problem: Problem, fitted: Fitted) -> Unc
     step = rounding_step(problem.runs, positions)
     if step == 0.0:
         return found
-    units, places = zero_units(problem.runs, True)
+    units, places = zero_groups(problem.runs, True)
     scatter = pure_error(units, positions.of_rows(places))
     if scatter is None:
         return found
     missing = problem.readings / len(positions) - (1.0 if found.kind == "white" else 0.0)
-    added = repeated_over(step, scatter, missing)
+    added = rounding_over_repeats(step, scatter, missing)
     return found.beside(added / variance * np.asarray(fitted.solution.covariance))

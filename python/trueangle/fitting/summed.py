@@ -21,7 +21,7 @@ _WHOLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Summed:
+class SummedReadings:
     """What one pass over readings keeps of them.
 
     Attributes

@@ -11,7 +11,7 @@ from ..fitting.prior import Prior
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted, finite, result_picture
+from ..support.plainresult import PlainResult, counted, finite_or_none, result_picture
 from .history import HistoryRow
 from .text import save_fleet
 from .tolerance import Tolerance
@@ -117,7 +117,7 @@ class Fleet(PlainResult):
         """The object that ``trueangle fleet`` prints as JSON; angles in arcsec."""
         scale = arcsec(1.0, self.period)
         tolerance = {
-            key: finite(value) if isinstance(value, float) else value
+            key: finite_or_none(value) if isinstance(value, float) else value
             for key, value in self.tolerance.plain(scale).items()
         }
         return {

@@ -155,7 +155,7 @@ class Pattern:
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class JointPattern:
     """What an effect may depend on beyond the readings: the joint and its pattern."""
 
     joint: Joint

@@ -10,11 +10,11 @@ from typing import Any, TypeAlias
 from ..errors import ArgumentError, FileError, NoModelError
 from ..fitting.argument import AnyArgument
 from ..fitting.fit import fit, fitted_to
-from ..fitting.orders.choice import selected_of
+from ..fitting.orders.choice import selected_orders
 from ..fitting.orders.select import OrderSelection, select_orders
 from ..fitting.result import FitResult
 from ..fitting.robust import without_spikes
-from ..fitting.summed import Summed
+from ..fitting.summed import SummedReadings
 from ..fitting.uncertainty import CovarianceKind, check_covariance
 from ..joint.shafts import resolve_orders
 from ..runs.files import read_runs
@@ -150,7 +150,7 @@ def fit_logs(
     )
     passes = Passes(paths, asked, joint, files, threads, checksums, scheduler, progress, KEPT)
 
-    def fitted(summed: Summed) -> FitResult:
+    def fitted(summed: SummedReadings) -> FitResult:
         return fitted_to(summed.runs, orders, summed=summed, threads=threads, **options)  # type: ignore[arg-type]
 
     return fitted(passes.first(argument)) if loss == "linear" else passes.settled(argument, fitted)
@@ -178,7 +178,7 @@ def select_log_orders(
         return select_orders(runs, **options)  # type: ignore[arg-type]
     passes = Passes(paths, None, joint, files, threads, False, scheduler, progress, KEPT)
 
-    def fitted(summed: Summed) -> FitResult:
+    def fitted(summed: SummedReadings) -> FitResult:
         return fitted_to(summed.runs, None, loss="auto", summed=summed, **options)  # type: ignore[arg-type]
 
     try:
@@ -187,7 +187,7 @@ def select_log_orders(
     except NoModelError:
         summed = passes.last
         runs = [without_spikes(run) for run in summed.runs]
-        found = selected_of(runs, **options, summed=summed)  # type: ignore[arg-type]
+        found = selected_orders(runs, **options, summed=summed)  # type: ignore[arg-type]
     return found.with_notes((*found.notes, passes.last.note))
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError, MissingExtraError
 from ..model.model import HarmonicModel
 from ..support.kinds import told_kinds
-from ..support.labelled import take_apart
+from ..support.labelled import without_labels
 from .joints import Channel, JointState, LogSettings, logged_joints
 
 _DATA = "data"
@@ -123,7 +123,7 @@ def correct(
             result = convert(library, data, settings)
             if result is not NotImplemented:
                 return result
-    values, put_back = take_apart(data)
+    values, put_back = without_labels(data)
     if put_back is not None:
         return put_back(_array_channel(settings).correct(np.asarray(values)))
     if isinstance(data, np.ndarray):

@@ -22,7 +22,7 @@ from ..model.model import HarmonicModel
 from ..model.robot import Robot
 from ..model.robotfile import is_robot_file, load_robot
 from ..support.files import sha256_of
-from ..support.roles import Column, signal_code, wanted_columns
+from ..support.roles import RoleColumn, role_code, wanted_columns
 from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_joint_signal
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
@@ -158,7 +158,7 @@ class LogSettings:
         return self.counts_turns or self.follows_travel
 
 
-def _signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict[str, Column]:
+def _signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict[str, RoleColumn]:
     """Columns of the signals that the joint's model uses; time stands in for velocity.
 
     Raises
@@ -167,7 +167,7 @@ def _signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dic
         Names the column of a signal that the model cannot do without.
     """
     model = joint.model
-    found: dict[str, Column] = {}
+    found: dict[str, RoleColumn] = {}
     for signal in (*model.uses_signals, *(["time"] if "velocity" in model.uses_signals else [])):
         if signal == "time" and "velocity" in found:
             continue
@@ -184,7 +184,7 @@ def _signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dic
                 raise FileError(
                     path,
                     f"no column {columns}: the model's term '{term.kind}' needs {signal}; "
-                    f"name its column with {signal_code(signal, unit=None)}",
+                    f"name its column with {role_code(signal, unit=None)}",
                     line=1,
                 )
     return found
@@ -218,7 +218,7 @@ class Channel:
         self,
         joint: LogJoint,
         angle: AngleColumn,
-        signals: Mapping[str, Column],
+        signals: Mapping[str, RoleColumn],
         before: JointState,
         settings: LogSettings,
     ) -> None:
@@ -324,7 +324,7 @@ class Channel:
         }
 
 
-def _with_unit(column: Column, angle_unit: str) -> Column:
+def _with_unit(column: RoleColumn, angle_unit: str) -> RoleColumn:
     """A velocity whose column does not state a unit has that of the angle, per second."""
     if column.role == "velocity" and column.unit is None:
         return column._replace(unit=f"{angle_unit}/s")

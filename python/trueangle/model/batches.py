@@ -17,7 +17,7 @@ from ..runs.angles import Angles, find_angles
 from ..runs.files import Conversion
 from ..runs.source import Reading, checked_reading
 from ..support.arrays import Array
-from ..support.roles import Column, wanted_columns
+from ..support.roles import RoleColumn, wanted_columns
 from .model import HarmonicModel
 
 
@@ -108,7 +108,7 @@ class _WatchedColumns(NamedTuple):
     """Where a log has its angles and times."""
 
     angles: Angles
-    time: Column | None
+    time: RoleColumn | None
 
     @classmethod
     def of(

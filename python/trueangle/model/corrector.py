@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import ArgumentError
 from ..support.angles import wrap
 from ..support.arrays import Array
-from ..support.signals import GivenSignals, check_names
+from ..support.signals import GivenSignals, check_signal_names
 from .errormodel import ErrorModel
 from .step import Step
 
@@ -187,7 +187,7 @@ class Corrector:
         ArgumentError
             Shapes that do not fit.
         """
-        check_names(signals)
+        check_signal_names(signals)
         if (
             time is not None
             and signals.get("velocity") is None

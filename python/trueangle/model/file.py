@@ -13,7 +13,14 @@ import numpy as np
 from ..errors import ArgumentError, FileError, ModelFileError, OutsideSpanWarning
 from ..joint.shafts import Shaft
 from ..support.arrays import Array
-from ..support.decoding import MAX_LINE_ORDERS, MAX_LINES, MAX_ORDER, json_text, read_text, shown
+from ..support.decoding import (
+    MAX_LINE_ORDERS,
+    MAX_LINES,
+    MAX_ORDER,
+    json_value,
+    read_text,
+    shown_value,
+)
 from ..support.files import MODEL_BYTES
 from ..support.kinds import told_kinds
 from .model import HarmonicModel
@@ -76,7 +83,7 @@ def load_model(path: str | PathLike[str]) -> HarmonicModel:
 def embedded_model(text: str, path: str | PathLike[str]) -> HarmonicModel:
     """Model of the text of a model file that stands in another file; raises as `load_model`."""
     file = Path(path)
-    return part_of(file, json_text(file, text, ModelFileError, "a model file"), "")
+    return part_of(file, json_value(file, text, ModelFileError, "a model file"), "")
 
 
 def content_of(path: Path, wanted: str) -> dict[str, Any]:
@@ -106,7 +113,7 @@ class _ModelReader(RecordReader):
     def content(self, wanted: str) -> dict[str, Any]:
         """The file's object, of the format that is wanted."""
         text = read_text(self.path, MODEL_BYTES, self.kind, "a model")
-        return self.of_format(json_text(self.path, text, self.kind, "a model file"), wanted)
+        return self.of_format(json_value(self.path, text, self.kind, "a model file"), wanted)
 
     def of_format(self, value: Any, wanted: str) -> dict[str, Any]:
         """The object, where it is of the format that is wanted; names the other's reader."""
@@ -142,7 +149,7 @@ class _ModelReader(RecordReader):
         argument = content["argument"]
         if argument not in ("reference", "indicated"):
             raise self.error(
-                f"must be 'reference' or 'indicated', got {shown(argument)}", "argument"
+                f"must be 'reference' or 'indicated', got {shown_value(argument)}", "argument"
             )
         condition = content.get("condition_number")
         period = self.number(content["period"], "period")
@@ -289,11 +296,11 @@ class _ModelReader(RecordReader):
         for i, entry in enumerate(self.items(value, "terms", "terms", MAX_TERMS)):
             where = f"terms[{i}]"
             if not isinstance(entry, dict):
-                raise self.error(f"an object is needed, got {shown(entry)}", where)
+                raise self.error(f"an object is needed, got {shown_value(entry)}", where)
             kind = entry.get("kind")
             if not isinstance(kind, str) or kind not in TERMS:
                 raise self.error(
-                    f"{shown(kind)} is unknown; the kinds are {', '.join(TERMS)}; "
+                    f"{shown_value(kind)} is unknown; the kinds are {', '.join(TERMS)}; "
                     "a later trueangle may know it",
                     f"{where}.kind",
                 )

@@ -15,7 +15,7 @@ from ..errors import ArgumentError
 from ..joint.joint import Joint
 from ..support.angles import arcsec
 from ..support.kinds import of_type, told_kinds
-from ..support.plainresult import Shown, counted
+from ..support.plainresult import ShownResult, counted
 from ..support.runlength import chart_limit, rare
 from .alarm import WatchedOrder, WatchedWindow
 from .model import HarmonicModel
@@ -33,7 +33,7 @@ HIGHEST: Final = 4096
 
 
 @told_kinds
-class Monitor(Shown):
+class Monitor(ShownResult):
     """Watches the error of a running joint in constant memory.
 
     Errors are known where a second encoder, an index pulse or a reference switch gives some. Each

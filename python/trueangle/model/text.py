@@ -12,7 +12,7 @@ from ..errors import ArgumentError
 from ..support.angles import arcsec, unit_name
 from ..support.display_units import error_unit, sine_of_rms
 from ..support.files import MODEL, MODEL_BYTES, written_atomically
-from ..support.layout import laid_out, wrapped
+from ..support.layout import laid_out, wrapped_lines
 from ..support.plainresult import pretty_json
 from .errormodel import ErrorModel
 from .records import FitRecord
@@ -124,7 +124,7 @@ def model_summary(model: ErrorModel) -> str:
     rms = math.sqrt(0.5 * float(model.amplitudes @ model.amplitudes))
     shown = error_unit("auto", sine_of_rms(arcsec(rms, period)))
     lines = [
-        *wrapped(one_line(model)[1:-1], 2),
+        *wrapped_lines(one_line(model)[1:-1], 2),
         f"constant {model.constant:.6g} {unit}, {arcsec(model.constant, period):.6g} arcsec",
         f"{'shaft':16s} {'order':>10s} {f'amplitude, {shown.name}':>18s} {'phase, deg':>11s}",
     ]

@@ -25,7 +25,7 @@ from ..effects.blindness import Blindness
 from ..effects.effect import ALWAYS
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.arrays import Array
 
@@ -49,7 +49,7 @@ class Hypothesis:
     cause: str
     effects: tuple[Effect, ...]
 
-    def errors(self, signals: Signals, around: Surroundings) -> list[Array]:
+    def errors(self, signals: Signals, around: JointPattern) -> list[Array]:
         """Its error at every reading, arcsec; several draws of one that is random."""
         draws = 1 if all(EFFECTS[e.kind].transfers for e in self.effects) else DRAWS
         return [

@@ -24,10 +24,18 @@ from .evidence import (
     evidence_between,
     is_doubted,
 )
-from .further import base_of, choices, seconds_of
+from .further import plainest_run, run_choices, run_seconds
 from .hypotheses import Question, question_of
 from .limits import Limits
-from .worth import ALIKE, NOTHING, Answer, Worth, foretold, is_strong, weight
+from .worth import (
+    ALIKE,
+    NOTHING,
+    Answer,
+    Worth,
+    is_strong_answer,
+    run_is_foretold,
+    worth_of_evidence,
+)
 
 #: Error of a cause of which nothing is seen, in standard deviations of a reading.
 UNSEEN = 3.0
@@ -46,7 +54,7 @@ MOST_WEIGHED = 250
 MOST_READINGS = 2000
 
 
-class Scales:
+class DesignScales:
     """Weighs designs for a set of questions, beside earlier runs or by themselves.
 
     Parameters
@@ -142,18 +150,18 @@ class Scales:
         spots = blind_spots(regression)
         are_open = [self._open(question, regression, spots) for question in self.questions]
         opened = sum(are_open)
-        seconds = -sum(map(seconds_of, designs))
+        seconds = -sum(map(run_seconds, designs))
         if opened < least:
             return replace(NOTHING, opened=opened, plain=-changes, seconds=seconds)
         self._left -= 1
         told, total = 0, 0.0
         for question, is_open in zip(self.questions, are_open, strict=True):
             evidence = self._evidence(question, regression)
-            total += weight(evidence, question)
-            told += is_open and is_strong(evidence)
+            total += worth_of_evidence(evidence, question)
+            told += is_open and is_strong_answer(evidence)
         halves = round(total / (np.log(ALIKE) * len(self.questions)))
         clear = -sum(len(self._unclear(question, spots)) for question in self.questions)
-        worth = Worth(opened, told, foretold(regression), clear, halves, -changes, seconds)
+        worth = Worth(opened, told, run_is_foretold(regression), clear, halves, -changes, seconds)
         self._known[key] = worth
         return worth
 
@@ -167,7 +175,7 @@ class Scales:
             if chance is not None and not is_open:
                 chance = 0.0
             bic = min((e.bic for e in evidence), default=None)
-            yield Answer(is_open and is_strong(evidence), bic, chance)
+            yield Answer(is_open and is_strong_answer(evidence), bic, chance)
 
     def blind(self, designs: Sequence[RunDesign], start: Signals | None) -> list[Blindness]:
         """What nobody can tell from these runs."""
@@ -279,8 +287,8 @@ def _thinned(signals: Signals) -> Signals:
 
 def _rich(limits: Limits) -> RunDesign:
     """A run in which all varies that limits allow."""
-    design = base_of(limits, "rich")
-    for options in choices(limits):
+    design = plainest_run(limits, "rich")
+    for options in run_choices(limits):
         design = replace(design, **options[-1])
     return replace(
         design,

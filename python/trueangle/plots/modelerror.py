@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..support.display_units import ErrorsIn, error_unit, significant, sine_of_rms
+from ..support.display_units import ErrorsIn, error_unit, significant_digits, sine_of_rms
 from ..support.plainresult import counted
 from .canvas import described, legend, new_axes, turn_axis
 from .curves import model_curve, seen_span, strong_gear_order
@@ -62,7 +62,7 @@ def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsI
     terms = ", ".join(term.kind for term in model.terms)
     return described(
         ax,
-        f"Error of the model over the angle: {significant(float(np.ptp(curve.error)), 3)} "
+        f"Error of the model over the angle: {significant_digits(float(np.ptp(curve.error)), 3)} "
         f"{unit.name} peak-to-peak in {counted(len(model.orders), 'order')}"
         + (f"; not drawn: {terms}" if terms else "")
         + ".",

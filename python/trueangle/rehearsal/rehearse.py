@@ -22,7 +22,7 @@ from .result import Rehearsal
 from .search import SizeSearch
 from .trial import FAILED, measured_signals
 from .visibility import blind_causes, size_range
-from .workers import Here, Workers, usable_cores
+from .workers import LocalTrials, Workers, usable_cores
 
 #: Trials of a cause where not given.
 SEEDS = 20
@@ -146,7 +146,7 @@ def _ask(
         return
     by_cause = {search.cause: search for search in searches}
     count = min(workers, len(trials))
-    asking = Here(sim, signals, seed) if count == 1 else Workers(sim, seed, count)
+    asking = LocalTrials(sim, signals, seed) if count == 1 else Workers(sim, seed, count)
     total = sum(search.seeds for search in searches if not search.done)
     made = 0
     try:

@@ -33,7 +33,7 @@ ROUNDS, NEAR = 40, 1.2
 
 
 @dataclass(frozen=True)
-class Range:
+class SizeRange:
     """Sizes of a cause that are worth trying: ``first * 2 ** (k / STEPS)`` of a step k.
 
     Attributes
@@ -67,7 +67,7 @@ def blind_causes(sim: Simulation, signals: Signals) -> dict[str, Blindness]:
     return found
 
 
-def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Range | None:
+def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> SizeRange | None:
     """The sizes to try; None where these runs show nothing of the cause at any size."""
     effect = EFFECTS[cause]
     noise = np.random.default_rng(seed).standard_normal(len(signals)) * sim.sigma_arcsec
@@ -87,7 +87,7 @@ def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Rang
     if shown(start) == 0.0:
         return None
     if shown(start) == shown(start - 1.0):
-        return Range(1.0, 0, 0, effect.size_grows)  # it has one size only
+        return SizeRange(1.0, 0, 0, effect.size_grows)  # it has one size only
     log_size = start
     for _ in range(ROUNDS):
         value = shown(log_size)
@@ -98,7 +98,7 @@ def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Rang
     highest = 0.5 * np.log2(len(signals) * UP**2 / FIRST)
     highest = min(highest, limit - log_size)
     size = 2.0 ** (log_size if effect.size_grows else -log_size)
-    return Range(
+    return SizeRange(
         float(size),
         int(np.floor(np.log2(DOWN) * STEPS)),
         max(int(np.floor(highest * STEPS)), 0),

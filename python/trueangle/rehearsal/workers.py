@@ -17,7 +17,7 @@ from ..errors import TrueAngleError
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.deadline import Pace, entered, pace
-from .trial import ENDED, Trial, TrialOutcome, asked
+from .trial import ENDED, Trial, TrialOutcome, run_trial
 
 #: Variables that say how many threads a linear algebra library may use.
 THREADS = (
@@ -44,7 +44,7 @@ def usable_cores() -> int:
         return os.cpu_count() or 1
 
 
-class Here:
+class LocalTrials:
     """Trials one after the other, in this process."""
 
     def __init__(self, sim: Simulation, signals: Signals, seed: int) -> None:
@@ -64,7 +64,7 @@ class Here:
             trial = self._ready.pop(0)
             left = None if at.within is None else max(at.within - at.seconds, 1e-3)
             with entered(Pace(left)) as own:
-                outcome = asked(sim, signals, trial, seed)
+                outcome = run_trial(sim, signals, trial, seed)
             at.stopped = at.stopped or own.stopped
             if outcome.verdict != ENDED:
                 yield trial, outcome

@@ -18,7 +18,7 @@ from ..runs.source import Reading
 from ..support.blas import one_blas_thread
 from ..support.deadline import pace
 from ..support.display_units import ErrorsIn
-from ..support.files import CERTIFICATE, PDF, REPORT, Kind, check_output
+from ..support.files import CERTIFICATE, PDF, REPORT, FileKind, check_output
 from ..support.kinds import of_type, told_kinds
 from .diagnosed import diagnosis_content
 from .figures import figures_of_diagnosis, figures_of_runs
@@ -67,7 +67,7 @@ class Report(Page):
     content: dict[str, Any]
     figures: dict[str, dict[str, Any]]
 
-    _kind: ClassVar[Kind] = REPORT
+    _kind: ClassVar[FileKind] = REPORT
 
     def _written(self) -> str:
         return rendered_report(self.content, self.figures)

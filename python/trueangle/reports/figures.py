@@ -20,7 +20,7 @@ from ..plots.readingpictures import (
 )
 from ..plots.simulatedcurves import ErrorLeft, error_left_of, simulated_points
 from ..support.arrays import Array
-from ..support.display_units import significant
+from ..support.display_units import significant_digits
 from .charts import Chart, Figure, chart_figure, chart_run_marker, css_run_colour
 from .linenames import LineNames
 from .panelcharts import panel_figure
@@ -177,7 +177,7 @@ def _of_order(order: Phases, numbers: dict[str, int], name: str, scale: Scale) -
     if middle < 0.0:
         degrees, middle = degrees + 360.0, middle + 360.0
     half = min(max(1.3 * float(np.abs(np.degrees(around)).max()), _LEAST), 190.0)
-    size = significant(scale.factor * float(order.amplitude.mean()), 3)
+    size = significant_digits(scale.factor * float(order.amplitude.mean()), 3)
     chart = Chart(
         "run",
         "phase / deg",

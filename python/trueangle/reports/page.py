@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from ..errors import ArgumentError, MissingExtraError
-from ..support.files import PAGE, PDF, Kind, check_output, external_output, written_atomically
-from ..support.plainresult import Shown
+from ..support.files import PAGE, PDF, FileKind, check_output, external_output, written_atomically
+from ..support.plainresult import ShownResult
 from . import charts, wording
 from .numbers import Numbers
 
@@ -106,14 +106,14 @@ def filled_template(template: str, **values: Any) -> str:
     return text
 
 
-class Page(Shown):
+class Page(ShownResult):
     """A result that is a page: one HTML file that needs no network.
 
     A class says by ``_written`` what the page holds.
     """
 
     #: What it is written as.
-    _kind: ClassVar[Kind] = PAGE
+    _kind: ClassVar[FileKind] = PAGE
 
     @cached_property
     def html(self) -> str:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import EmptyCellsWarning, FileError, level_of_caller
-from ..support.files import Source
+from ..support.files import InputFile
 from ..support.kinds import told_kinds
-from ..support.roles import LABELS, Column, count_turn, signal_code, unit_in_name
+from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, unit_in_name
 from ..support.signals import FIELDS
 from ..support.times import local_day
 from .angles import find_angles
@@ -167,8 +167,8 @@ class Conversion(NamedTuple):
         """From the keywords of `read_runs`."""
         facets = reading["facets"]
         return cls(
-            count_turn(reading["counts_per_turn"], "counts_per_turn"),
-            count_turn(reading["counts_per_turn_reference"], "counts_per_turn_reference"),
+            checked_count_turn(reading["counts_per_turn"], "counts_per_turn"),
+            checked_count_turn(reading["counts_per_turn_reference"], "counts_per_turn_reference"),
             facets if facets is None or isinstance(facets, Facets) else read_facets(facets),
         )
 
@@ -187,7 +187,7 @@ class _RunColumns(NamedTuple):
     signals: dict[str, NDArray[np.float64]]
     groups: Groups
     left_out: list[int]
-    source: Source
+    source: InputFile
 
 
 def read_columns(data: Any, reading: Reading) -> list[_RunColumns]:
@@ -243,12 +243,12 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
 def _entries(table: FileReadings, counts: float | None) -> _RunColumns:
     """A table of a turn as firmware holds it: entry i of n is the reading at i/n of a turn."""
     (name,) = table.columns
-    column = table.roles.get("indicated", Column("indicated", name, None))
+    column = table.roles.get("indicated", RoleColumn("indicated", name, None))
     unit = column.unit or unit_in_name(name, "indicated") or (None if counts is None else "count")
     if unit is None or (unit == "count" and counts is None):
         raise table.error(
             "one column is taken for a table whose entry i of n is the reading at i/n of a turn, "
-            f"and its unit is not known: give {signal_code('indicated', name, 'deg')} (or another "
+            f"and its unit is not known: give {role_code('indicated', name, 'deg')} (or another "
             "unit), or `counts_per_turn=`; or name the file's reference column",
             name,
         )

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import ArgumentError, KindError
 from ..support.angles import check_period, circular_mean, wrap
 from ..support.arrays import Array
-from ..support.files import Source
+from ..support.files import InputFile
 from ..support.kinds import told_kinds
 from ..support.signals import FIELDS, find_signal, signal_column, signal_columns
 
@@ -88,7 +88,7 @@ class CalibrationRun:
     when: str | None = field(default=None, kw_only=True)
     left_out: int = field(default=0, kw_only=True)
     columns: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
-    source: Source | None = field(default=None, kw_only=True)
+    source: InputFile | None = field(default=None, kw_only=True)
 
     if TYPE_CHECKING:  # what is taken is more than what is kept
 
@@ -110,7 +110,7 @@ class CalibrationRun:
             when: str | None = None,
             left_out: int = 0,
             columns: Mapping[str, Any] = ...,
-            source: Source | None = None,
+            source: InputFile | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:

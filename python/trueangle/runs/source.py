@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import ArgumentError, FileError, KindError
 from ..support.angles import check_period, unit_name
-from ..support.roles import Column, wanted_columns
+from ..support.roles import RoleColumn, wanted_columns
 from ..support.suggestions import did_you_mean
 from .paths import find_logs
 from .readings import FileReadings, named_source, readings_of
@@ -205,7 +205,7 @@ def _of_joint(table: FileReadings, unit: str | None) -> FileReadings:
             table.roles["unit"].name,
         )
     rows = len(next(iter(table.columns.values()), ()))
-    roles = {**table.roles, "unit": Column("unit", "unit", None, True)}
+    roles = {**table.roles, "unit": RoleColumn("unit", "unit", None, True)}
     return table._replace(
         roles=roles, columns={**table.columns, "unit": np.full(rows, unit, dtype=object)}
     )
@@ -216,8 +216,8 @@ def _with_unit(table: FileReadings, period: float | None) -> FileReadings:
     if period is None:
         return table
     unit = unit_name(period)
-    bare: dict[str, Column] = {
-        role: Column(role, role, unit, True)
+    bare: dict[str, RoleColumn] = {
+        role: RoleColumn(role, role, unit, True)
         for role in ("reference", "indicated")
         if role not in table.roles and role in table.columns
     }

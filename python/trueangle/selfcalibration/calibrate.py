@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Final, Unpack
 
 from ..errors import ArgumentError, NoModelError
-from ..joint.shafts import MOST_ORDERS, counted_orders
+from ..joint.shafts import MOST_ORDERS, limited_orders
 from ..runs.source import OtherReading
 from ..support.angles import check_period
 from ..support.blas import one_blas_thread
@@ -157,7 +157,7 @@ def _orders(orders: Any) -> str | tuple[float, ...]:
             return orders
         raise ArgumentError(f"orders must be 'auto' or whole numbers from 1, got {orders!r}")
     try:
-        found = sorted({float(k) for k in counted_orders(orders)})
+        found = sorted({float(k) for k in limited_orders(orders)})
     except ArgumentError:
         raise
     except (TypeError, ValueError):

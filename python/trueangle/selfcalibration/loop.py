@@ -78,7 +78,7 @@ def followed_share(hertz: float, loop: str, bandwidth: float | None) -> float:
     return min(1.0, bandwidth / hertz)
 
 
-def widened(estimate: OrderEstimate, share: float) -> OrderEstimate:
+def widened_by_loop(estimate: OrderEstimate, share: float) -> OrderEstimate:
     """The estimate where any part of it up to ``share`` may be the loop's doing.
 
     In any phase: the standard deviation of a disc of that radius, along one direction.

@@ -19,8 +19,8 @@ from ..estimation.factor import BandedFactor
 from ..support.arrays import Array
 from .projected import Projected, Unknown
 from .splines import (
+    DriftPenalty,
     Knots,
-    Wander,
     banded_product,
     coarser_bands,
     coarser_rows,
@@ -89,7 +89,7 @@ class _Grid:
         self.sums = sums
         self.right = right  # S^T (e + S c)
         self.chain = chain  # parents from the finest grid down to this one
-        self.wander = Wander(sums.knots)
+        self.wander = DriftPenalty(sums.knots)
         self.trend = smooth_trends(sums.knots, trends)
         moved = (
             np.stack([banded_product(sums.bands, z) for z in self.trend.T], axis=1)

@@ -13,7 +13,7 @@ from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
-from ..support.layout import laid_out, wrapped
+from ..support.layout import laid_out, wrapped_lines
 from ..support.plainresult import PlainResult, counted
 
 #: Seconds of arc in a radian.
@@ -177,7 +177,7 @@ class SelfCalibration(PlainResult):
         return _summary(self, errors_in)
 
 
-def estimates(
+def order_estimates(
     orders: Sequence[float],
     coefficients: Array,
     covariance: Array,
@@ -213,9 +213,9 @@ def estimates(
     return found
 
 
-def listed(orders: Sequence[float]) -> str:
+def blind_words(orders: Sequence[float]) -> str:
     """What is blind, in words: orders, or the zero."""
-    return f"orders {ranges(orders)}" if any(orders) else "zero"
+    return f"orders {order_ranges(orders)}" if any(orders) else "zero"
 
 
 def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
@@ -233,8 +233,8 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
         lines += ["", "not the encoder's alone:", *_table(result.sums, unit)]
     lines += ["", "cannot be identified"]
     for blind in result.blind:
-        lines += wrapped(f"{listed(blind.orders)}: {blind.because}", 4, 2)
-        lines += wrapped(f"to see it: {blind.measure}", 6, 4)
+        lines += wrapped_lines(f"{blind_words(blind.orders)}: {blind.because}", 4, 2)
+        lines += wrapped_lines(f"to see it: {blind.measure}", 6, 4)
     if result.held_out:
         lines += ["", "held out"]
         for test in result.held_out.values():
@@ -263,7 +263,7 @@ def _table(orders: tuple[OrderEstimate, ...], unit: ErrorUnit) -> list[str]:
     return lines
 
 
-def ranges(orders: Sequence[float]) -> str:
+def order_ranges(orders: Sequence[float]) -> str:
     """Orders in words: ``1-4, 8``.
 
     Examples

@@ -91,7 +91,7 @@ def spline_basis(place: Array) -> Array:
     )
 
 
-class Wander:
+class DriftPenalty:
     """Prior of the motion: the acceleration is noise of one roughness with a memory.
 
     ::

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..support.arrays import Array
 from .motion import MotionFit, MotionSearch
-from .pattern import pattern_model, pattern_series, steepness
+from .pattern import pattern_model, pattern_series, pattern_steepness
 from .projected import Unknown, harmonic_rows, harmonic_sum
 from .readings import SegmentReadings
 from .splines import Knots, spline_basis, spline_values
@@ -20,7 +20,7 @@ from .sums import ordered_sums
 _STEEPEST: Final = 0.97
 
 
-class Steps:
+class GaussNewtonSteps:
     """Steps of Gauss and Newton towards pattern and motion, of all readings or every n-th."""
 
     def __init__(
@@ -141,7 +141,7 @@ class Steps:
         """
         for _ in range(12):
             parts = (unknowns + step)[: self.sets * self.per_set].reshape(self.sets, -1)
-            if all(steepness(self.orders, part) < _STEEPEST for part in parts):
+            if all(pattern_steepness(self.orders, part) < _STEEPEST for part in parts):
                 break
             step = 0.5 * step
         return unknowns + step

@@ -15,7 +15,7 @@ from ..joint.pattern import Pattern
 from ..runs.run import CalibrationRun
 from ..support.kinds import told_kinds
 from ..support.signals import COUPLED
-from .rotor import Drive, Motion, rotor_angle
+from .rotor import RotorDrive, RotorMotion, rotor_angle
 
 #: Readings of one run, at most: a simulation holds some 150 bytes of each.
 MAX_SAMPLES = 20_000_000
@@ -176,9 +176,9 @@ class RunDesign:
         return (self.speed_deg_s - self.speed_end_deg_s) / (360.0 * self.turns)
 
     @property
-    def _drive(self) -> Drive:
+    def _drive(self) -> RotorDrive:
         """What moves the shaft."""
-        return Drive(
+        return RotorDrive(
             math.radians(self.start_deg),
             math.radians(self.speed_deg_s) * self.direction,
             self.decay_per_s,
@@ -230,7 +230,7 @@ class RunDesign:
         else:
             speed = self.speed_deg_s - self.decay_per_s * travel
             time = np.log(self.speed_deg_s / speed) / self.decay_per_s
-        motion = Motion(angle, np.asarray(signs * speed), np.zeros(n))
+        motion = RotorMotion(angle, np.asarray(signs * speed), np.zeros(n))
         if self.is_moved:
             motion = rotor_angle(self._drive, time, pattern, rng)
         temperature = np.full(n, float(self.temperature_C))
@@ -253,7 +253,7 @@ class RunDesign:
         )
 
     def _signals(
-        self, motion: Motion, share: NDArray[np.float64]
+        self, motion: RotorMotion, share: NDArray[np.float64]
     ) -> dict[str, NDArray[np.float64]]:
         """Current, shift and the angles of other joints, where the run has them."""
         found = {}

@@ -35,7 +35,7 @@ ARCSEC_PER_RAD: Final = ARCSEC_PER_TURN / (2.0 * math.pi)
 _STEP: Final = 0.1
 
 
-class Drive(NamedTuple):
+class RotorDrive(NamedTuple):
     """What moves a shaft, in radians and seconds; the friction that wanders in deg/s^2."""
 
     place: float
@@ -51,7 +51,7 @@ class Drive(NamedTuple):
     memory_s: float
 
 
-class Motion(NamedTuple):
+class RotorMotion(NamedTuple):
     """Angle (deg), speed (deg/s) and acceleration by the motor (deg/s^2) at every reading."""
 
     angle: Array
@@ -59,7 +59,9 @@ class Motion(NamedTuple):
     driven: Array
 
 
-def rotor_angle(drive: Drive, time: Array, pattern: Pattern, rng: np.random.Generator) -> Motion:
+def rotor_angle(
+    drive: RotorDrive, time: Array, pattern: Pattern, rng: np.random.Generator
+) -> RotorMotion:
     """Where the shaft is at ``time``, integrated from the start of the run.
 
     Parameters
@@ -156,10 +158,10 @@ def rotor_angle(drive: Drive, time: Array, pattern: Pattern, rng: np.random.Gene
         if band:
             driven[i] = loop(now, x, v)
         before = now
-    return Motion(np.degrees(angle), np.degrees(speed), np.degrees(driven))
+    return RotorMotion(np.degrees(angle), np.degrees(speed), np.degrees(driven))
 
 
-def _wander(drive: Drive, time: Array, rng: np.random.Generator) -> Array:
+def _wander(drive: RotorDrive, time: Array, rng: np.random.Generator) -> Array:
     """A friction's acceleration at every reading, that forgets itself in ``memory_s``."""
     size = drive.friction_deg_s2
     if size == 0.0:

@@ -12,7 +12,7 @@ from ..errors import ArgumentError, FileError
 from ..joint.declared import Bearing, DeclaredShaft, Head
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic
-from ..support.decoding import finite_float, read_text, shown
+from ..support.decoding import finite_float, read_text, shown_value
 from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
 from ..support.suggestions import did_you_mean
 from .designs import MAX_SAMPLES, RunDesign
@@ -68,7 +68,7 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> Stated:
         if name not in _TABLES:
             raise FileError(
                 path,
-                f"unknown table {shown(name)}{did_you_mean(name, _TABLES)}; a simulation has "
+                f"unknown table {shown_value(name)}{did_you_mean(name, _TABLES)}; a simulation has "
                 f"{', '.join(_TABLES)}",
             )
     joint = _joint(path, document)
@@ -90,10 +90,10 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> Stated:
     noise = _table(path, document, "noise")
     for name in noise:
         if name != "sigma_arcsec":
-            raise FileError(path, f"[noise]: unknown key {shown(name)}; it has sigma_arcsec")
+            raise FileError(path, f"[noise]: unknown key {shown_value(name)}; it has sigma_arcsec")
     sigma = finite_float(noise.get("sigma_arcsec", 0.0))
     if sigma is None:
-        got = shown(noise["sigma_arcsec"])
+        got = shown_value(noise["sigma_arcsec"])
         raise FileError(path, f"[noise]: sigma_arcsec must be a finite number, got {got}")
     return Stated(joint, harmonics, effects, sigma, designs, str(path))
 
@@ -105,8 +105,8 @@ def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
         if name not in _JOINT_KEYS:
             raise FileError(
                 path,
-                f"[joint]: unknown key {shown(name)}{did_you_mean(name, _JOINT_KEYS)}; it has "
-                f"{', '.join(_JOINT_KEYS)}",
+                f"[joint]: unknown key {shown_value(name)}{did_you_mean(name, _JOINT_KEYS)}; it "
+                f"has {', '.join(_JOINT_KEYS)}",
             )
     gear = _build(path, "[joint]", Joint, _geared(table))
     further: dict[str, Any] = {
@@ -152,7 +152,7 @@ def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]
         if name not in known:
             raise FileError(
                 path,
-                f"{where}: unknown key {shown(name)}{did_you_mean(name, known)}; it has "
+                f"{where}: unknown key {shown_value(name)}{did_you_mean(name, known)}; it has "
                 f"{', '.join(known)}",
             )
         values[name] = _value(path, where, name, value, known[name])
@@ -165,7 +165,7 @@ def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]
 
 def _value(path: str | Path, where: str, name: str, value: Any, wanted: str) -> Any:
     def refuse(what: str) -> FileError:
-        return FileError(path, f"{where}: {name} must be {what}, got {shown(value)}")
+        return FileError(path, f"{where}: {name} must be {what}, got {shown_value(value)}")
 
     if wanted.startswith("str"):
         if not isinstance(value, str):
@@ -201,11 +201,11 @@ def _effect(path: str | Path, where: str, table: dict[str, Any]) -> Effect:
     if not isinstance(kind, str) or kind not in EFFECTS:
         raise FileError(
             path,
-            f"{where}: kind must be one of {', '.join(EFFECTS)}, got {shown(kind)}"
+            f"{where}: kind must be one of {', '.join(EFFECTS)}, got {shown_value(kind)}"
             f"{did_you_mean(kind, EFFECTS) if isinstance(kind, str) else ''}",
         )
     for name, value in parameters.items():
-        parameters[name] = _checked_numbers(path, f"{where}: {shown(name)}", value)
+        parameters[name] = _checked_numbers(path, f"{where}: {shown_value(name)}", value)
     return guarded_build(path, where, lambda: EFFECTS[kind].from_table(parameters))
 
 
@@ -217,7 +217,7 @@ def _checked_numbers(path: str | Path, where: str, value: Any) -> Any:
         return [_checked_numbers(path, where, item) for item in value]
     if isinstance(value, int | float) and not isinstance(value, bool):
         if finite_float(value) is None:
-            raise FileError(path, f"{where} must be a finite number, got {shown(value)}")
+            raise FileError(path, f"{where} must be a finite number, got {shown_value(value)}")
         return value if abs(value) < 2**53 else float(value)
     return value
 

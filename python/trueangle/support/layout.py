@@ -55,7 +55,7 @@ def text_columns() -> int:
     return min(max(found, _NARROWEST), _WIDEST)
 
 
-def wrapped(text: str, indent: int = 0, first: int = 0) -> list[str]:
+def wrapped_lines(text: str, indent: int = 0, first: int = 0) -> list[str]:
     """Lines of a paragraph; ``first`` and ``indent`` are how far the first and others stand in.
 
     Words are never broken, so that options and paths can be copied.

@@ -15,7 +15,7 @@ WIDTH = 100
 _SHORT = 30
 
 
-class Shown:
+class ShownResult:
     """A result that shows itself: one line as ``repr``, its summary as text and in notebooks.
 
     A class says what its line holds by ``_brief``, the two or three numbers that matter, and has
@@ -28,7 +28,7 @@ class Shown:
         super().__init_subclass__(**options)
         # `dataclass` leaves alone what a class defines itself.
         if "__repr__" not in cls.__dict__:
-            cls.__repr__ = Shown.__repr__  # type: ignore[method-assign]
+            cls.__repr__ = ShownResult.__repr__  # type: ignore[method-assign]
 
     def _brief(self) -> str:
         """What stands in the brackets of the line."""
@@ -55,12 +55,12 @@ class Shown:
         return repr(self) if summary is None else str(summary())
 
     def _repr_html_(self) -> str:
-        from .notebook import as_html
+        from .notebook import notebook_html
 
-        return as_html(self)
+        return notebook_html(self)
 
 
-class PlainResult(Shown):
+class PlainResult(ShownResult):
     """A result whose ``to_dict`` holds plain values: strings, numbers, lists and mappings."""
 
     __slots__ = ()
@@ -86,7 +86,7 @@ def counted(things: Sized | int, one: str, several: str = "") -> str:
     return f"{n} {one if n == 1 else several or one + 's'}"
 
 
-def finite(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
     """A number that JSON can hold, else None."""
     return float(value) if math.isfinite(value) else None
 
@@ -102,7 +102,7 @@ def json_text(value: Any, indent: int | None = None) -> str:
 
     def plain(entry: Any) -> Any:
         if isinstance(entry, float):
-            return finite(entry)
+            return finite_or_none(entry)
         if isinstance(entry, Mapping):
             return {name: plain(one) for name, one in entry.items()}
         return [plain(one) for one in entry] if isinstance(entry, (list, tuple)) else entry

@@ -9,7 +9,7 @@ import pytest
 
 from trueangle.cli import main
 from trueangle.cli.terminal import Plain, coloured_text, has_colours
-from trueangle.support.layout import laid_out, text_columns, wrapped
+from trueangle.support.layout import laid_out, text_columns, wrapped_lines
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "looks"))
 
@@ -40,7 +40,7 @@ def test_lines_are_as_wide_as_the_terminal_within_bounds(wanted, found, monkeypa
     monkeypatch.setenv("COLUMNS", wanted)
     text = "of words " * 60
     assert text_columns() == found
-    assert found - 9 < max(map(len, wrapped(text))) <= found
+    assert found - 9 < max(map(len, wrapped_lines(text))) <= found
     assert max(map(len, laid_out(["  label    " + text]).splitlines())) <= found
 
 

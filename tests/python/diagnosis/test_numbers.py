@@ -10,7 +10,7 @@ import pytest
 
 from trueangle.diagnosis import believed
 from trueangle.diagnosis.beliefs import Belief
-from trueangle.diagnosis.candidates import proposed_above
+from trueangle.diagnosis.candidates import candidates_above
 from trueangle.diagnosis.correction import _ranges
 from trueangle.diagnosis.diagnose import _noise, _overall, _structure
 from trueangle.diagnosis.discrepancy import unfolded_error
@@ -191,7 +191,7 @@ def test_a_finding_of_several_terms_has_the_evidence_of_all():
     gaps = [gap for _, gap in found.rivals]
     assert gaps == sorted(gaps)
     for cause, gap in found.rivals:
-        instead = proposed_above(start, cause)
+        instead = candidates_above(start, cause)
         assert gap == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
 
 
@@ -218,10 +218,10 @@ def test_form_errors_are_the_mean_square_of_bends_given_what_is_left(signals):
 
 def test_a_rival_that_explains_more_has_a_gap_below_zero(signals):
     start = regression(signals, 3.0 * signals.direction)
-    full = start.with_terms([proposed_above(start, "latency")])
+    full = start.with_terms([candidates_above(start, "latency")])
     found = dict(_rivals(full, [0]))
     assert found["backlash"] < -6.0
-    instead = proposed_above(start, "backlash")
+    instead = candidates_above(start, "backlash")
     assert found["backlash"] == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
 
 
@@ -259,7 +259,7 @@ def test_what_is_at_another_place_is_told_with_its_errors():
 def test_a_line_in_doubt_has_the_evidence_that_is_left_of_its_search(monkeypatch, signals):
     """Deviance less two coefficients and the choice among the believed lines."""
     spot = Blindness(("missing_order", "reference_error"), "why", "what")
-    monkeypatch.setattr(believed, "doubts_about", lambda *_: spot)
+    monkeypatch.setattr(believed, "ambiguity_of_cause", lambda *_: spot)
     lines = (*SIM.harmonics, Harmonic("output", 2, 5.0, 0.0), Harmonic("output", 3, 5.0, 0.0))
     around = replace(SIM, harmonics=lines).surroundings
     found = Regression.of(signals, np.zeros(len(signals)), around, rho=0.0)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from trueangle.selfcalibration.motion import MotionSearch
-from trueangle.selfcalibration.projected import pairs
+from trueangle.selfcalibration.projected import harmonic_unknowns
 from trueangle.selfcalibration.splines import (
+    DriftPenalty,
     Knots,
-    Wander,
     banded_product,
     coarser_bands,
     coarser_rows,
@@ -105,7 +105,7 @@ def test_a_coarser_spline_is_a_finer_one() -> None:
 
 @pytest.mark.parametrize("memory", [0.3, 7.0])
 def test_the_prior_is_that_of_its_differences(memory: float) -> None:
-    wander = Wander(KNOTS)
+    wander = DriftPenalty(KNOTS)
     third, second = differences(KNOTS, 3), differences(KNOTS, 2)
     mu = (0.5 / memory) ** 2
     prior = third.T @ third + mu * second.T @ second
@@ -180,7 +180,7 @@ def test_sums_are_those_of_the_rows(kept: float | None, repeat: int) -> None:
 def test_a_fit_of_motion_is_penalised_least_squares(level: int, trends: tuple) -> None:
     """Motion, columns, covariance and evidence against one dense system."""
     sums, (s, x, y) = summed()
-    columns = pairs("the encoder", [3.0])
+    columns = harmonic_unknowns("the encoder", [3.0])
     motion = np.random.default_rng(9).normal(size=KNOTS.size)
     found = MotionSearch(sums, motion, columns, trends).fit(level, 4.0, 2.0)
     knots = KNOTS if level == 0 else KNOTS.coarser
@@ -219,7 +219,7 @@ def test_a_fit_of_motion_is_penalised_least_squares(level: int, trends: tuple) -
         * (
             freedom * math.log(variance)
             + np.linalg.slogdet(normal)[1]
-            - Wander(knots).log_determinant(4.0, 2.0)
+            - DriftPenalty(knots).log_determinant(4.0, 2.0)
         ),
         abs=1e-6,
     )

@@ -249,7 +249,7 @@ def test_a_diagnosis_comes_to_an_end_by_itself_and_says_so(command, files, capsy
 
 def test_a_search_that_was_cut_short_is_not_remembered():
     """What it found so far would stand for its cause when rivals are told."""
-    from trueangle.diagnosis.candidates import extensions
+    from trueangle.diagnosis.candidates import candidate_extensions
     from trueangle.estimation.regression import Regression
     from trueangle.joint.signals import join_runs
 
@@ -259,13 +259,13 @@ def test_a_search_that_was_cut_short_is_not_remembered():
     start = Regression.of(signals, error, BELIEVED.surroundings)
     for within in range(4, 40, 3):
         with entered(Pace(float(within), clock=Ticks())) as at:
-            found = extensions(start, ["local_defect", "backlash"])
+            found = candidate_extensions(start, ["local_defect", "backlash"])
             cut = at.over
         if cut:
             assert len(found) < 2
         alone = Regression.of(signals, error, BELIEVED.surroundings)
-        for extension, _, gain in extensions(start, ["local_defect", "backlash"]):
-            fresh = [g for e, _, g in extensions(alone, [extension.cause])]
+        for extension, _, gain in candidate_extensions(start, ["local_defect", "backlash"]):
+            fresh = [g for e, _, g in candidate_extensions(alone, [extension.cause])]
             assert fresh == [gain]
         start = Regression.of(signals, error, BELIEVED.surroundings)
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ...support.arrays import Array, distinct
-from ...support.display_units import brief
+from ...support.display_units import brief_number
 from ...support.distributions import f_tail
 from .evidence import Evidence, largest_of
 from .leftover import Leftover
@@ -264,8 +264,8 @@ def time_test(left: Leftover, correlation: float = 0.0) -> Evidence | None:
         "time periodogram",
         found.statistic,
         found.p,
-        f"a line of {found.peak:.5g} {unit}{detail}, about {brief(found.amplitude)} arcsec, its "
-        "phase new in every run",
+        f"a line of {found.peak:.5g} {unit}{detail}, about {brief_number(found.amplitude)} arcsec, "
+        "its phase new in every run",
         looks_like="a line in time",
         rms=float(found.amplitude / np.sqrt(2.0)),
         at=found.peak,
@@ -282,8 +282,8 @@ def order_test(left: Leftover, top: float, correlation: float = 0.0) -> Evidence
         "place within runs",
         found.statistic,
         found.p,
-        f"a line of order {found.peak:.5g}, about {brief(found.amplitude)} arcsec, comes back at "
-        "the same place within runs and not between them",
+        f"a line of order {found.peak:.5g}, about {brief_number(found.amplitude)} arcsec, comes "
+        "back at the same place within runs and not between them",
         looks_like="a line whose size changes in time",
         rms=float(found.amplitude / np.sqrt(2.0)),
         at=found.peak,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...errors import ArgumentError
 from ...joint.gear import COMMON_RATIOS, HIGHEST_LOW_ORDER, gear_orders
-from ...joint.shafts import counted_orders
+from ...joint.shafts import limited_orders
 from ...runs.aliasing import POSITION_TOLERANCE, Positions, distinct_positions, position_coherence
 from ...runs.run import CalibrationRun
 from ...support.arrays import Array
@@ -216,7 +216,7 @@ def _apart(positions: Positions, order: float, others: Sequence[float]) -> bool:
 
 def _checked(orders: Iterable[float], name: str) -> list[float]:
     found = []
-    for k in counted_orders(orders, name):
+    for k in limited_orders(orders, name):
         value = float(k)
         if not (math.isfinite(value) and value > 0.0):
             raise ArgumentError(f"{name} must be positive orders, got {k!r}")

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from ...runs.aliasing import Positions, position_coherence
-from .evidence import fit_subset
+from .evidence import fit_chosen_orders
 from .harmonicsums import harmonic_sums
 from .unitgroups import ZeroGroupReadings
 
@@ -65,5 +65,7 @@ def _substitution_losses(
     together = [*rest, order, *others]
     sums = harmonic_sums(units, together)
     kept = list(range(len(rest)))
-    best = fit_subset(sums, [*kept, len(rest)])[2]
-    return [fit_subset(sums, [*kept, len(rest) + 1 + j])[2] - best for j in range(len(others))]
+    best = fit_chosen_orders(sums, [*kept, len(rest)])[2]
+    return [
+        fit_chosen_orders(sums, [*kept, len(rest) + 1 + j])[2] - best for j in range(len(others))
+    ]

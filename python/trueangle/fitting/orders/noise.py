@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...runs.aliasing import Positions
 from ...support.arrays import Array
 from ...support.quantiles import median
-from .evidence import COLLINEAR, OVERDISPERSED, fit_subset, log_chi2_tail
+from .evidence import COLLINEAR, OVERDISPERSED, fit_chosen_orders, log_chi2_tail
 from .harmonicsums import HarmonicSums
 from .unitgroups import ZeroGroupReadings
 
@@ -117,7 +117,7 @@ def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
     index = np.asarray(orders, dtype=np.intp)
     if sums.units < 2 or index.size == 0:
         return np.full(index.size, math.inf)
-    coefficients, _, _ = fit_subset(sums, chosen)
+    coefficients, _, _ = fit_chosen_orders(sums, chosen)
     n = index.size
     parts = []
     # What one order has in common with itself does not depend on those chosen.
@@ -153,7 +153,7 @@ def neighbour_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array | None
     if others.size < 2 * NEIGHBOURS:
         return None
     total, rhs, _ = sums.total()
-    coefficients, inverse, _ = fit_subset(sums, chosen)
+    coefficients, inverse, _ = fit_chosen_orders(sums, chosen)
     base = sums.columns(chosen)
     n = sums.orders.size
     cosine, sine = others, others + n

@@ -20,7 +20,7 @@ from ...runs.run import CalibrationRun
 from ...support.arrays import Array
 from ...support.quantiles import median
 from .candidates import Candidates
-from .evidence import log_tail
+from .evidence import log_chance
 from .lookalikes import find_lookalikes
 from .noise import ReadingVariance
 from .phases import circular_range_deg
@@ -28,7 +28,7 @@ from .rows import OrderRow
 from .table import OrderSelection
 from .unitgroups import ZeroGroupReadings
 from .verdicts import explained_row, selection_notes
-from .zerogroups import zero_units
+from .zerogroups import zero_groups
 
 #: Phases of a retained order lie within this arc over the runs. Noise alone stays within
 #: 60 degrees over five runs in 0.4 % of cases, within the paper's "about 10" in 3e-6,
@@ -102,7 +102,7 @@ def select_by_paper(
     orders = [k for k in candidates.orders if k in candidates.main and k <= candidates.highest]
     if not orders:
         raise ArgumentError("none of the candidates lies below the Nyquist limit of the positions")
-    units, places = zero_units(runs, candidates.whole)
+    units, places = zero_groups(runs, candidates.whole)
     placed = positions.of_rows(places)
     training, held = units[:-1], units[-1]
     each, left = _run_coefficients(training, orders)
@@ -127,7 +127,7 @@ def select_by_paper(
     rows = []
     for n, k in enumerate(orders):
         t = float(amplitude[n] ** 2 / scatter[n]) if scatter[n] > 0.0 else math.inf
-        chance = (float(log_tail(t, dof)) + math.log(len(orders))) / math.log(10.0)
+        chance = (float(log_chance(t, dof)) + math.log(len(orders))) / math.log(10.0)
         verdict = "retained" if kept[n] else ("small" if not prominent[n] else "phase varies")
         row = OrderRow(
             order=k,

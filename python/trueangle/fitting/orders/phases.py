@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...support.arrays import Array
-from .evidence import fit_subset
+from .evidence import fit_chosen_orders
 from .harmonicsums import HarmonicSums
 
 
@@ -41,7 +41,7 @@ def _unit_coefficients(
     both = np.concatenate([index, np.asarray(chosen, dtype=np.intp)])
     mine = np.stack([np.arange(n), np.arange(n) + both.size], axis=1)
     theirs = np.concatenate([np.arange(n, both.size), np.arange(n, both.size) + both.size])
-    coefficients, _, _ = fit_subset(sums, chosen)
+    coefficients, _, _ = fit_chosen_orders(sums, chosen)
     common = np.zeros((n, 2))
     for j, k in enumerate(orders):
         if k in chosen:

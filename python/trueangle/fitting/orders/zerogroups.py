@@ -23,7 +23,7 @@ _BLOCKS: Final = 24
 _SHORT: Final = 1000
 
 
-def zero_units(
+def zero_groups(
     runs: Sequence[CalibrationRun], whole: bool
 ) -> tuple[list[ZeroGroupReadings], NDArray[np.intp]]:
     """Units with a zero of their own: runs, split where the mount changes within one.

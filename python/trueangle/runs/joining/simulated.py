@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ...errors import ArgumentError
 from ...support.angles import ARCSEC_PER_TURN
 from ...support.arrays import Array
-from ...support.layout import wrapped
-from ...support.plainresult import Shown
+from ...support.layout import wrapped_lines
+from ...support.plainresult import ShownResult
 from ...support.signals import FIELDS
 from ..files import runs_of
 from ..run import CalibrationRun
@@ -37,7 +37,7 @@ _LEAST = 4
 
 
 @dataclass(frozen=True)
-class MeasuredMinusSimulated(Shown):
+class MeasuredMinusSimulated(ShownResult):
     """Measured runs without the error that a simulator's log says.
 
     Attributes
@@ -102,7 +102,7 @@ class MeasuredMinusSimulated(Shown):
         )
         if self.left_out:
             text += f"; {self.left_out} readings at which it says nothing are left out"
-        return "\n".join(wrapped(". ".join([text, *self.notes]) + "."))
+        return "\n".join(wrapped_lines(". ".join([text, *self.notes]) + "."))
 
 
 class _Expected(NamedTuple):

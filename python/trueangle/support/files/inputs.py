@@ -31,7 +31,7 @@ _LOOK_MS: Final = 100
 _NOTHING: Final = "__HIVE_DEFAULT_PARTITION__"
 
 
-class Source(NamedTuple):
+class InputFile(NamedTuple):
     """A file that readings came from: its name and the sha256 of its bytes."""
 
     file: str

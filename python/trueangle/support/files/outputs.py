@@ -13,7 +13,7 @@ from typing import IO
 
 from ...errors import FileError, KindError
 from .inputs import is_null_device, sha256_of
-from .kinds import Kind, log_endings
+from .kinds import FileKind, log_endings
 from .samefile import named_again, what_it_is
 from .workplace import (
     PARTIAL,
@@ -37,7 +37,7 @@ __all__ = [
 
 def check_output(
     path: str | PathLike[str],
-    kind: Kind | None = None,
+    kind: FileKind | None = None,
     inputs: Iterable[str | PathLike[str]] = (),
     hashes: Iterable[str] = (),
     *,
@@ -123,7 +123,7 @@ def check_output(
 def written_atomically(
     path: str | PathLike[str],
     *,
-    kind: Kind | None = None,
+    kind: FileKind | None = None,
     inputs: Iterable[str | PathLike[str]] = (),
     hashes: Iterable[str] = (),
 ) -> Iterator[IO[str]]:
