@@ -17,8 +17,8 @@ from ..fitting.summary import fit_error_unit
 from ..runs.provenance import provenance
 from ..runs.run import CalibrationRun, as_runs
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.argumentkinds import told_kinds
 from ..support.display_units import ErrorsIn
-from ..support.kinds import told_kinds
 from ..support.plainresult import finite_or_none
 from .budget import LEVEL, Budget, Contribution
 from .conformity import conformity

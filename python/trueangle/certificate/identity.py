@@ -13,8 +13,8 @@ from typing import Any, Final
 
 from ..errors import ArgumentError, FileError
 from ..support.angles import ARCSEC_PER_DEG
+from ..support.argumentkinds import told_kinds
 from ..support.files import read_whole
-from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice, did_you_mean
 from .budget import DISTRIBUTIONS, Contribution
 from .conformity import RULES, Specification

@@ -14,7 +14,7 @@ from ..support.plainresult import json_text
 from .options import add_argument_choice, add_errors_in, add_joint, add_progress, errors_in
 from .paths import Input, Output
 from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
-from .signal_options import reading, signals_by_joint
+from .signal_options import reading_options, signals_by_joint
 from .values import declared_shafts, seconds
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def run(args: argparse.Namespace) -> int:
         from ..runs.joining import minus_simulated
 
         columns = (signals_by_joint(own, single=False) or {}).get("simulated")
-        given = {**reading(args), "signals": columns}
+        given = {**reading_options(args), "signals": columns}
         simulated = minus_simulated(runs, args.simulated, by=args.simulated_by, **given)
     with ending_early() as interruption:
         result = diagnose(

@@ -22,7 +22,7 @@ from .robots import add_robot, each_joint, joints_asked
 from .values import declared_shafts, parse_orders
 
 if TYPE_CHECKING:
-    from ..fitting.orders.table import OrderSelection
+    from ..fitting.orders.result import OrderSelection
     from .robots import JointAsked
 
 HELP = "say which orders of the angle error are real, and what they may be"

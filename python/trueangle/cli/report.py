@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
-from ..support.deadline import with_pace
+from ..support.deadline import with_deadline
 from ..support.files import PDF, REPORT
 from ..support.plainresult import json_text
 from .options import add_errors_in, add_joint, add_orders, add_progress, errors_in
@@ -161,7 +161,7 @@ def _made(args: argparse.Namespace, path: str | None, title: str | None = None) 
 
         simulation = load_simulation(args.simulation)
     known = declared_shafts(args.shaft) if simulation is None else simulation.joint.shafts
-    with with_pace(style=args.progress):
+    with with_deadline(style=args.progress):
         return report(
             runs,
             path,

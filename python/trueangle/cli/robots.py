@@ -151,11 +151,11 @@ def each_joint(
     ArgumentError
         The one of a joint, with its name before it.
     """
-    from ..runs.readings import read_once
+    from ..runs.readings import reading_files_once
 
     found: dict[str, T] = {}
     failed: dict[str, TrueAngleError] = {}
-    with read_once():
+    with reading_files_once():
         for joint in joints:
             try:
                 found[joint.name] = work(joint)

@@ -10,7 +10,7 @@ from ..errors import ArgumentError
 from ..runs.files import read_runs
 from ..runs.run import CalibrationRun
 from ..support.suggestions import did_you_mean, listed_names
-from .signal_options import reading
+from .signal_options import reading_options
 
 __all__ = ["listed_names", "read_selected"]
 
@@ -54,7 +54,7 @@ def read_checked(args: argparse.Namespace) -> list[CalibrationRun]:
     from ..runs.checks.check import data_faults
     from ..runs.checks.record import records_of
 
-    runs = read_runs(args.runs, **reading(args))
+    runs = read_runs(args.runs, **reading_options(args))
     for fault in data_faults(records_of(runs)):
         print(f"trueangle: warning: {fault}", file=sys.stderr)
     return runs

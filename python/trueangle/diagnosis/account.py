@@ -8,20 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.effect import ScatterFinding
 from ..effects.scatter import NEW_SCATTER
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array
-from ..support.deadline import pace
-from .believed import corrected_effects
+from ..support.deadline import current_deadline
 from .delay import Delay, error_before, find_delay
 from .exchange import exchanged_causes
 from .gearedlines import GearedLines, GearedLinesRatio
 from .gearratio import find_ratio, near_ratio, signals_at_ratio
 from .identifiability import blind_spots, in_common_form
+from .judgedbeliefs import effects_as_measured
 from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
 from .remainder import unexplained_after
 from .rounding import account_beyond_rounding, is_rounding_only, unrounded
@@ -50,7 +50,7 @@ class CauseSelection:
     start: Regression
     chosen: Regression
     scatter: list[ScatterFinding]
-    spots: list[Blindness]
+    spots: list[Ambiguity]
 
 
 @dataclass(frozen=True)
@@ -143,12 +143,14 @@ def account_of(every: Signals, error: Array, sim: Simulation) -> Account:
     ratio = None if geared is None else find_ratio(geared)
     account = _believed(PreparedData.of(every, error, sim, ratio))
     near = None if geared is None or ratio else near_ratio(geared)
-    if near is not None and not pace().over:
+    if near is not None and not current_deadline().over:
         seen = PreparedData.of(every, error, sim, near)
         if _helps(seen, account.choice.chosen):
             account = _better(account, _believed(seen), NEW_CAUSE)
-    delay = None if pace().over else find_delay(account.seen.every, error, account.seen.sim)
-    if delay is None or pace().over:
+    delay = (
+        None if current_deadline().over else find_delay(account.seen.every, error, account.seen.sim)
+    )
+    if delay is None or current_deadline().over:
         return account
     other = _believed(PreparedData.of(every, error, sim, account.seen.ratio, delay))
     return _better(account, other, NEW_CAUSE + account.choice.chosen.log_n)
@@ -174,7 +176,7 @@ def _believed(seen: PreparedData) -> Account:
     choice, believed = _chosen(seen, seen.sim), seen.sim
     # Twice each: what one was taken for is only known once the others are right.
     for _ in range(2 * len(seen.sim.effects)):
-        others = [] if pace().over else _corrections(choice, believed, seen.sim)
+        others = [] if current_deadline().over else _corrections(choice, believed, seen.sim)
         tried = [(_chosen(seen, other), other) for other in others]
         best = min(tried, key=lambda each: total_penalty(each[0].chosen), default=None)
         if best is None or total_penalty(best[0].chosen) >= total_penalty(choice.chosen):
@@ -191,7 +193,7 @@ def _corrections(
     Another size of what is believed comes before further causes that make up for it.
     """
     settled = [choice.chosen, choice.start] if choice.chosen.terms else [choice.start]
-    found = (corrected_effects(each, believed, stated, choice.spots) for each in settled)
+    found = (effects_as_measured(each, believed, stated, choice.spots) for each in settled)
     return [other for other in found if other is not None]
 
 
@@ -214,7 +216,7 @@ def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:
         start if is_rounding_only(start) else account_beyond_rounding(start, select_causes(start))
     )
     scatter: list[ScatterFinding] = []
-    if pace().over:
+    if current_deadline().over:
         return CauseSelection(start, chosen, scatter, spots)  # what is left is no scatter yet
     uneven = _uneven(start, chosen)
     if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit_of_scatter(start, chosen):

@@ -8,9 +8,9 @@ from typing import TypeAlias
 from ..effects import Effect
 from ..estimation.cache import CachedProposal
 from ..estimation.regression import Extension, Regression
-from ..support.deadline import pace
-from .forms import told_from_forms
-from .penalty import before_forms, form_misfit, left_by_forms, penalty_of, total_penalty
+from ..support.deadline import current_deadline
+from .formerrors import told_from_form_errors
+from .penalty import before_forms, deviance_of_form_errors, form_misfit, penalty_of, total_penalty
 from .unnamed import effect_or_unnamed
 
 #: An extension, what it extends, and its net BIC gain.
@@ -42,7 +42,7 @@ def candidate_extensions(
     """
     found: list[Candidate] = []
     places: list[int] = []
-    at = pace()
+    at = current_deadline()
     beside = f" beside {len(regression.terms)}" if regression.terms else ""
     gains = {extension.cause: extension.bic_gain for extension, _, _ in before}
     for tried, cause in enumerate(sorted(causes, key=lambda cause: -gains.get(cause, 0.0))):
@@ -78,13 +78,13 @@ def candidates_above(regression: Regression, cause: str, least: float = 0.0) -> 
     )
     key = (cause, beside)
     kept = regression.cache.proposed(key, least)
-    if kept is None and pace().over:
+    if kept is None and current_deadline().over:
         return None
     if kept is None:
         kept = CachedProposal(
             propose_candidates(effect_or_unnamed(cause), regression.with_least(least)), least
         )
-        if not pace().over:
+        if not current_deadline().over:
             regression.cache.propose(key, kept)
     return kept.extension
 
@@ -103,7 +103,7 @@ class CandidateScores:
         explained = before_forms(start) - start.deviance
         if not effect_or_unnamed(extension.cause).has_exact_form:
             explained += extension.deviance
-        after = penalty_of([*start.terms, extension], left_by_forms(explained, start.n))
+        after = penalty_of([*start.terms, extension], deviance_of_form_errors(explained, start.n))
         paid: float = start.cache.of_fit(
             "penalty", lambda: penalty_of(start.terms, form_misfit(start))
         )
@@ -113,7 +113,7 @@ class CandidateScores:
         """Score once what bends of the causes found explain as well is taken off."""
         extension, start, _ = candidate
         if id(extension) not in self.told:
-            less = extension.deviance - told_from_forms(start, extension).deviance
+            less = extension.deviance - told_from_form_errors(start, extension).deviance
             self.told[id(extension)] = less
         return self.score(candidate) - self.told[id(extension)]
 

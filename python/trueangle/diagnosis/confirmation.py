@@ -15,7 +15,7 @@ from ..joint.pattern import line_columns
 from ..support.arrays import Array
 from ..support.display_units import brief_number
 from ..support.quantiles import quantile
-from .forms import FORM
+from .formerrors import FORM
 from .gain import Gain
 from .goodness import FREE_PATH, Unexplained
 from .goodness.periodogram import order_test, time_test

@@ -15,7 +15,7 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..runs.run import CalibrationRun, as_runs
 from ..simulation.simulation import EFFECT
-from ..support.kinds import of_type
+from ..support.argumentkinds import of_type
 from ..support.signals import coupled_joint
 
 if TYPE_CHECKING:

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..effects.latency import Latency
-from ..estimation.estimate import quantity
 from ..estimation.extension import Extension
 from ..estimation.factor import orthonormal_basis
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.earlier import earlier_signals
 from ..joint.pattern import ARCSEC_PER_RAD, Pattern, lines_columns

@@ -10,32 +10,32 @@ import numpy as np
 from ..effects import EFFECTS
 from ..effects.wrong_gear_ratio import WrongGearRatio
 from ..errors import ArgumentError
-from ..estimation.estimate import quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.signals import join_runs
 from ..runs.checks.check import data_faults
 from ..runs.checks.record import records_of
 from ..runs.files import runs_of
 from ..runs.run import CalibrationRun
-from ..runs.source import Reading
+from ..runs.source import ReadingOptions
 from ..simulation.simulation import SIMULATION, Simulation
+from ..support.argumentkinds import of_type, told_kinds
 from ..support.blas import one_blas_thread
-from ..support.deadline import Pace, pace, with_pace
-from ..support.kinds import of_type, told_kinds
+from ..support.deadline import Deadline, current_deadline, with_deadline
 from .account import MOST_READINGS, account_of
-from .believed import judged_beliefs
 from .candidates import candidates_above
 from .delay import delay_finding
 from .discrepancy import discrepancy_of, unfolded_error
 from .drive import diagnose_drive
 from .finding import Finding
-from .findings import Diagnosis
+from .findings import findings_of, reconsidered_findings, scatter_doubt, scatter_finding
 from .gates import many_causes
 from .gearedlines import GearedLinesRatio
 from .goodness import Unexplained, goodness_of_fit
-from .named import findings_of, reconsidered_findings, scatter_doubt, scatter_finding
+from .judgedbeliefs import judged_beliefs
 from .penalty import cause_terms
 from .remainder import leftover_of, unexplained_after
+from .result import Diagnosis
 from .rounding import rounding_of
 from .wrongplace import misplaced_beliefs
 
@@ -61,7 +61,7 @@ def diagnose(
     gain: bool = True,
     within: float | None = None,
     progress: str = "none",
-    **reading: Unpack[Reading],
+    **reading: Unpack[ReadingOptions],
 ) -> Diagnosis:
     """Name the physical causes that a simulation of the joint lacks.
 
@@ -143,7 +143,7 @@ def diagnose(
         log = simulated if is_joined else minus_simulated(measured, simulated)
     elif sim is None:
         raise ArgumentError("nothing is believed: give a simulation, or a log as `simulated=`")
-    with with_pace(within, progress) as at, at.bounded(_used(measured)), one_blas_thread():
+    with with_deadline(within, progress) as at, at.bounded(_used(measured)), one_blas_thread():
         stated = Simulation() if sim is None else sim
         found = _diagnosis(measured, log, stated, gain)
         if log is None or not found.complete:
@@ -161,7 +161,7 @@ def _diagnosis(
     stated: Simulation,
     gain: bool,
 ) -> Diagnosis:
-    at = pace()
+    at = current_deadline()
     found = measured if log is None else log.runs
     every = join_runs(found)
     if len(every) < LEAST_READINGS:
@@ -237,7 +237,7 @@ def _used(runs: list[CalibrationRun]) -> int:
     return min(sum(map(len, runs)), MOST_READINGS)
 
 
-def _incomplete(at: Pace, gain: bool) -> str:
+def _incomplete(at: Deadline, gain: bool) -> str:
     """That the account was ended, while what, and what that means."""
     means = "causes may be missing or stand for others"
     if gain:

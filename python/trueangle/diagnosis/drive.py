@@ -22,10 +22,10 @@ from ..effects.direction_dependent_pattern import DirectionalPattern
 from ..effects.latency import Latency
 from ..effects.missing_order import MissingOrder
 from ..effects.presliding_hysteresis import PreslidingHysteresis
-from ..estimation.estimate import Quantity, quantity
+from ..estimation.quantity import Quantity, quantity
 from ..runs.run import CalibrationRun
 from .finding import Finding
-from .findings import Diagnosis
+from .result import Diagnosis
 from .torque import TorqueAccount, TorqueFinding, number_of_quantity
 
 if TYPE_CHECKING:

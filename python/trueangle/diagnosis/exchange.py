@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ..effects import EFFECTS
 from ..estimation.regression import Regression
-from ..support.deadline import pace
+from ..support.deadline import current_deadline
 from .candidates import CandidateScores, candidate_extensions
 from .overlap import finding_overlaps
 from .penalty import cause_terms, finding_groups, total_penalty
@@ -42,7 +42,7 @@ def exchanged_causes(regression: Regression) -> Regression:
         every finding, and these are kept for that.
     """
     for _ in range(MOST_EXCHANGES):
-        better = None if pace().over else _better(regression)
+        better = None if current_deadline().over else _better(regression)
         if better is None:
             break
         regression = better
@@ -61,10 +61,10 @@ def _better_pair(regression: Regression) -> Regression | None:
     pairs = [pair for pair in finding_overlaps(regression, groups) if pair[2] > OVERLAP]
     specific = [name for name, effect in EFFECTS.items() if not is_flexible(effect)]
     for i, j, _ in sorted(pairs, key=lambda pair: -pair[2]):
-        if pace().over:
+        if current_deadline().over:
             return None
         tried = regrown(cause_terms(regression, [*groups[i], *groups[j]]), specific)
-        if total_penalty(tried) < limit and not pace().over:
+        if total_penalty(tried) < limit and not current_deadline().over:
             return tried
     return None
 
@@ -86,7 +86,7 @@ def _better(regression: Regression) -> Regression | None:
         ]
         scores = CandidateScores()
         best = scores.best(candidate_extensions(rest, others, scores.least))
-        if best is None or pace().over:
+        if best is None or current_deadline().over:
             continue
         extension, start, _ = best[1]
         tried = start.with_terms([*start.terms, extension])

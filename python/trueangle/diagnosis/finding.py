@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..effects import EFFECTS, Effect
-from ..estimation.estimate import Parameters, Quantity
+from ..estimation.quantity import Parameters, Quantity
 from ..support.display_units import ErrorUnit, error_unit, significant_digits, sine_of_rms
 from ..support.layout import wrapped_lines
 from ..support.plainresult import ShownResult

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array
-from ..support.deadline import pace
+from ..support.deadline import current_deadline
 from ..support.plainresult import ShownResult
 from .holdout import (
     HoldOutModel,
@@ -102,7 +102,7 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
     own_zero = any(effect_or_unnamed(term.cause).draws_zeros for term in regression.terms)
     left = np.zeros((len(groups) + 1, regression.n))
     parts = int(folds.max()) + 1
-    at = pace()
+    at = current_deadline()
     for fold in range(parts):
         at.at("holding out parts", fold, parts)
         if at.over:

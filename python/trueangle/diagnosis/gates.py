@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.presliding_hysteresis import PreslidingHysteresis
 from ..effects.scale_error import ScaleError
 from ..estimation.regression import Regression
@@ -144,7 +144,7 @@ assert _NOUNS.keys() == UNITS.keys()
 
 def gated_findings(
     regression: Regression, findings: Sequence[Finding]
-) -> tuple[list[Finding], list[Blindness], set[int]]:
+) -> tuple[list[Finding], list[Ambiguity], set[int]]:
     """Findings as the gates leave them, the pairs that are not told apart, and their terms."""
     found = []
     for finding in findings:
@@ -153,13 +153,13 @@ def gated_findings(
             reason = next((r for gate in GATES if (r := gate(finding))), "")
             reason = reason or _not_in_every_part(regression, finding)
         found.append(replace(finding, status=NOT_CONFIRMED, reason=reason) if reason else finding)
-    spots: list[Blindness] = []
+    spots: list[Ambiguity] = []
     shared: set[int] = set()
     for i, j, correlation in alike_columns(regression, found):
         shared.update(found[i].group, found[j].group)
         causes = (found[i].cause, found[j].cause)
         because = f"in these runs they are one column (correlation {correlation:.3f})"
-        spots.append(Blindness(causes, because, EFFECTS[causes[0]].measure, supported=True))
+        spots.append(Ambiguity(causes, because, EFFECTS[causes[0]].measure, supported=True))
         for k, other in ((i, causes[1]), (j, causes[0])):
             reason = f"{because.removeprefix('in these runs they are ')} with {other}"
             found[k] = replace(found[k], status=NOT_CONFIRMED, reason=f"it is {reason}")

@@ -13,7 +13,7 @@ from ..estimation.whitening import RunEffect
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.arrays import Array
-from ..support.deadline import pace
+from ..support.deadline import current_deadline
 from ..support.quantiles import quantile
 from .unnamed import effect_or_unnamed
 
@@ -44,7 +44,7 @@ def held_out_residuals(
     terms = [rebuilt_term(term, ~test) for term in regression.terms]
     full = train.with_terms(terms)
     for group in groups[: SEARCHED if search else 0]:
-        if pace().over:
+        if current_deadline().over:
             break
         cause = regression.terms[group[0]].cause
         if effect_or_unnamed(cause).located and effect_or_unnamed(cause).transfers:

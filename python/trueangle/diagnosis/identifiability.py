@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.blindspots import blind_spot_place, blind_spots
 from ..estimation.regression import Extension, Regression
 from .candidates import propose_candidates
@@ -14,7 +14,7 @@ from .penalty import cause_terms, finding_groups
 from .unnamed import effect_or_unnamed
 
 __all__ = [
-    "Blindness",
+    "Ambiguity",
     "ambiguity_of_cause",
     "blind_spots",
     "in_common_form",
@@ -27,8 +27,8 @@ DOUBTS = ("grid", "mount", "torque", "velocity")
 
 
 def ambiguity_of_cause(
-    extension: Extension, regression: Regression, spots: Sequence[Blindness]
-) -> Blindness | None:
+    extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+) -> Ambiguity | None:
     """The reason not to name a supported cause, or None.
 
     Where all that it may be have one form, and it is that, only its origin is open
@@ -48,8 +48,8 @@ def ambiguity_of_cause(
 
 
 def open_origins(
-    extension: Extension, regression: Regression, spots: Sequence[Blindness]
-) -> list[Blindness]:
+    extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+) -> list[Ambiguity]:
     """What else may make an error of this form, in the order of `DOUBTS`."""
     cause = extension.cause
     shared = (spot for spot in spots if spot.common == cause and cause in spot.causes)
@@ -62,11 +62,11 @@ def open_origins(
 
 
 def with_open_origins(
-    spots: Sequence[Blindness], origins: Sequence[Blindness], evidence: float
-) -> list[Blindness]:
+    spots: Sequence[Ambiguity], origins: Sequence[Ambiguity], evidence: float
+) -> list[Ambiguity]:
     """Blind spots, and those by which only the origin of what is named is open."""
 
-    def is_told(spot: Blindness) -> bool:
+    def is_told(spot: Ambiguity) -> bool:
         return any(set(spot.causes) <= set(of.causes) for of in origins)
 
     kept = [spot for spot in spots if not is_told(spot)]
@@ -74,13 +74,13 @@ def with_open_origins(
 
 
 def _doubts(
-    extension: Extension, regression: Regression, spots: Sequence[Blindness]
-) -> Iterator[Blindness]:
+    extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+) -> Iterator[Ambiguity]:
     doubts = (effect.doubt(extension, regression, spots) for effect in EFFECTS.values())
     yield from (doubt for doubt in doubts if doubt is not None)
 
 
-def in_common_form(regression: Regression, spots: Sequence[Blindness]) -> Regression:
+def in_common_form(regression: Regression, spots: Sequence[Ambiguity]) -> Regression:
     """The regression with the common form in place of causes that are not told apart.
 
     A reversal error may be play or a spring, a ramp the ratio's or a clock's: which of them is

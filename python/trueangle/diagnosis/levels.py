@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array, distinct
-from ..support.deadline import pace
+from ..support.deadline import current_deadline
 from .holdout import held_out_residuals, numbers, rebuilt_term, reducible_share
 from .unnamed import effect_or_unnamed
 
@@ -155,7 +155,7 @@ def gains_by_level(
     Of a factor whose levels were not all asked when the time was up, nothing is said.
     """
     found: dict[int, LevelGain] = {}
-    at = pace()
+    at = current_deadline()
     for factor in UNITS:
         causes = [regression.terms[group[0]].cause for group in groups]
         concerned = [

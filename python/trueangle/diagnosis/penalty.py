@@ -8,7 +8,7 @@ import numpy as np
 
 from ..effects.missing_order import MissingOrder
 from ..estimation.regression import Extension, Regression
-from .forms import FORM
+from .formerrors import FORM
 from .unnamed import effect_or_unnamed
 
 #: Evidence (in units of BIC) that a new cause must bring beyond its penalty: 6 is what
@@ -27,7 +27,7 @@ def form_misfit(regression: Regression) -> float:
     A step of the zero has no form that could be inexact, however far apart zeros are, and neither
     has a share that counts of teeth make: what such terms explain is not counted.
     """
-    return left_by_forms(before_forms(regression) - regression.deviance, regression.n)
+    return deviance_of_form_errors(before_forms(regression) - regression.deviance, regression.n)
 
 
 def before_forms(regression: Regression) -> float:
@@ -58,10 +58,10 @@ def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
         for one in (start.with_terms(exact) if exact else start, chosen)
     )
     ratio = before / max(after, 1e-300)
-    return left_by_forms(chosen.n * float(np.log(max(ratio, 1.0))), chosen.n)
+    return deviance_of_form_errors(chosen.n * float(np.log(max(ratio, 1.0))), chosen.n)
 
 
-def left_by_forms(deviance: float, readings: int) -> float:
+def deviance_of_form_errors(deviance: float, readings: int) -> float:
     """Deviance of a share of the energy that a deviance stands for.
 
     n readings of noise 1 with an error of energy n E give a deviance of

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..estimation.cache import Cache
 from ..estimation.regression import Regression
-from ..estimation.stretches import less_local_level, short_segments
+from ..estimation.segments import less_local_level, short_segments
 from ..estimation.whitening import Whitener
 from ..joint.signals import Signals
 from ..support.arrays import Array

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..estimation.factor import orthonormal_basis
-from ..estimation.readings import is_rounding_visible
 from ..estimation.regression import Extension, Regression
-from ..estimation.rounded import Rounded, fit_rounded
+from ..estimation.rounded import Rounded, fit_rounded, is_rounding_visible
 from ..estimation.whitening import RunEffect
 from ..support.arrays import Array
 from .penalty import NEW_CAUSE, finding_groups

@@ -13,9 +13,9 @@ from ..effects.local_defect import LocalDefect
 from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
 from ..estimation.regression import BEYOND_SHOWN, Extension, Regression
-from ..support.deadline import pace
+from ..support.deadline import current_deadline
 from .candidates import Candidate, CandidateScores, candidate_extensions, propose_candidates
-from .forms import beside_form_errors, share_beside
+from .formerrors import beside_form_errors, share_beside_form_errors
 from .goodness import estimate_noise
 from .penalty import (
     NEW_CAUSE,
@@ -83,7 +83,7 @@ def select_causes(
         noisy = _under_its_noise(direct)
         regression = regression.with_terms((), noisy.whiten.rho)
         direct = min(noisy, _pruned(_forward(regression, list(EFFECTS))), key=total_penalty)
-    if pace().over:
+    if current_deadline().over:
         return direct
     direct = _with_lines_for_bumps(direct)
     if not (unnamed and _doubtful(direct)):
@@ -199,7 +199,7 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     angle, or with the lines of shafts that the joint declares). All are pruned
     backward; the best by BIC is kept.
     """
-    if pace().over:
+    if current_deadline().over:
         return direct
     # What a flexible one was dropped from since was chosen beside it, too.
     grown = _forward(regression, list(EFFECTS))
@@ -305,7 +305,7 @@ def _grown(regression: Regression, causes: Sequence[str], goal: float) -> Regres
         found = candidate_extensions(regression, causes, scores.least, found)
         best = scores.best(found)
         # A step that was not finished chose among some only: it chose nothing.
-        if best is None or pace().over:
+        if best is None or current_deadline().over:
             return regression
         score, (extension, start, _) = best
         reach = RISING * (MOST_TERMS - len(regression.terms)) * score
@@ -320,7 +320,7 @@ def _without_misfits(regression: Regression) -> Regression:
 
     They may have been chosen when the others were not known, or not in their form.
     """
-    while not pace().over:
+    while not current_deadline().over:
         groups = finding_groups(regression.terms)
         if len(groups) < 2:
             return regression
@@ -330,7 +330,7 @@ def _without_misfits(regression: Regression) -> Regression:
             beside = beside_form_errors(rest, {regression.terms[group[0]].cause})
             if beside is not rest:
                 saved = lost(regression, group)
-                share = share_beside(rest, beside, [regression.terms[k] for k in group])
+                share = share_beside_form_errors(rest, beside, [regression.terms[k] for k in group])
                 told.append((net_loss(regression, group) - (1.0 - share) * saved, group))
         if not told or min(told)[0] > 0.0:
             return regression
@@ -340,7 +340,7 @@ def _without_misfits(regression: Regression) -> Regression:
 
 def _pruned(regression: Regression) -> Regression:
     """Without the terms that the others have made superfluous."""
-    while regression.terms and not pace().over:
+    while regression.terms and not current_deadline().over:
         # Terms larger than all that the readings show only take each other off again.
         beyond = [[k] for k in range(len(regression.terms)) if _is_beyond_shown(regression, k)]
         least = min(beyond or _droppable(regression), key=lambda g: net_loss(regression, g))

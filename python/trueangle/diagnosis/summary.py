@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 from ..support.layout import laid_out
 from ..support.layout import wrapped_lines as _wrapped
+from .ambiguitytext import ambiguity_entries
 from .beliefs import Belief
 from .diagnosisdata import DiagnosisData
 from .finding import brief_finding, finding_lines, named_quantity, unit_of
 from .goodness.evidence import Evidence
 from .goodness.scatter import AGAINST_STATED
-from .untold import ambiguity_entries
 
 #: Share by which the noise must differ from what the simulation states to be told first.
 MATERIAL = 0.1
@@ -75,7 +75,7 @@ def diagnosis_summary(
     return laid_out(lines)
 
 
-def _if_it_is(spot: Blindness, unit: ErrorUnit) -> Iterator[str]:
+def _if_it_is(spot: Ambiguity, unit: ErrorUnit) -> Iterator[str]:
     """What each of the causes in question would amount to."""
     for cause, parameters in spot.estimates.items():
         known = {name: q for name, q in parameters.items() if q.value is not None}
@@ -135,7 +135,7 @@ def _is_material(item: Evidence) -> bool:
     return item.test != AGAINST_STATED or abs(item.statistic - 1.0) > MATERIAL
 
 
-def _seen(spot: Blindness, unit: ErrorUnit) -> str:
+def _seen(spot: Ambiguity, unit: ErrorUnit) -> str:
     """Causes of which one is seen, each with the size that it would have."""
     sizes = []
     for cause in spot.causes:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ..estimation.estimate import Parameters, Quantity
+from ..estimation.quantity import Parameters, Quantity
 from ..support.plainresult import ShownResult
 
 #: What parameters are called, and their units.

@@ -8,15 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec, line_values
+from ..model.term import Term, line_values
 from ..model.terms.travel import BacklashTerm
-from ..support.angles import ARCSEC_PER_DEG
-from .blindness import Blindness
+from ..support.angles import ARCSEC_PER_DEG, from_arcsec
+from .ambiguity import Ambiguity
 from .effect import Effect
 from .search import Array, Fitted
 
@@ -145,7 +145,7 @@ class Backlash(Effect):
         return parameters, [Backlash(float(width), turns_first=first, start_state=start)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         if not goes_both_ways(regression.signals):
             yield cls.blind(ONE_WAY)
 

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.joint import Joint
 from ..joint.pattern import JointPattern, line_columns
@@ -17,7 +17,7 @@ from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import ChannelSkewTerm
 from ..support.angles import ARCSEC_PER_DEG
-from .blindness import OWN_POWER, Blindness, share_left
+from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .drawing import drawn_phase
 from .effect import Effect
 from .filter_lag import FilterLag
@@ -132,7 +132,7 @@ class ChannelSkew(Effect):
         return parameters, [ChannelSkew(float(delay), order, phase)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.velocity is None:
             yield cls.blind(UNTIMED)

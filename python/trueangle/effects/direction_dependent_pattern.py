@@ -9,15 +9,15 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.travel import DirectionalPatternTerm
+from .ambiguity import Ambiguity
 from .backlash import ONE_WAY, Backlash, goes_both_ways
-from .blindness import Blindness
 from .drawing import drawn_phase
 from .effect import Effect
 from .latency import Latency
@@ -122,7 +122,7 @@ class DirectionalPattern(Effect):
         return parameters, [DirectionalPattern(orders, amplitudes, phases)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         if not goes_both_ways(regression.signals):
             yield cls.blind(ONE_WAY)
 

@@ -10,20 +10,20 @@ import numpy as np
 
 import trueangle._core as _core
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..estimation.whitening import drift_basis
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from ..support.plainresult import counted
-from .backlash import Backlash
-from .blindness import (
+from ..support.layout import counted
+from .ambiguity import (
     OWN_OF_VELOCITY,
     RUNS_PER_LEVEL,
-    Blindness,
+    Ambiguity,
     share_left,
 )
+from .backlash import Backlash
 from .effect import ALWAYS, Effect
 from .latency import Latency
 from .missing_order import MissingOrder
@@ -249,7 +249,7 @@ class DriftWithinRun(Effect):
         return parameters, [effect]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         clocks = (signals.clock[a:b] for a, b in regression.bounds)
         clock = np.concatenate([c / max(float(np.ptp(c)), 1e-300) for c in clocks])
@@ -276,8 +276,8 @@ class DriftWithinRun(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         """A wander in time may be an error of reversal: few runs that reverse once."""
         signals = regression.signals
         if (

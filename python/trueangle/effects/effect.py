@@ -10,14 +10,14 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term
-from .bends import departure_columns
-from .blindness import Blindness
+from .ambiguity import Ambiguity
+from .departures import departure_columns
 from .parameters import TabledParameters
 from .search import Array, Fitted
 
@@ -178,7 +178,7 @@ class Effect(TabledParameters):
     def bends(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
         """Columns by which the error of this cause's ``terms`` may depart from its form.
 
-        By its factor (`trueangle.effects.bends`); of one that has an exact form none.
+        By its factor (`trueangle.effects.departures`); of one that has an exact form none.
         """
         signal = sum((t.columns @ c for t, c in terms if c.size), np.zeros(len(signals)))
         return departure_columns(signals, cls.factor, np.asarray(signal))
@@ -194,7 +194,7 @@ class Effect(TabledParameters):
         raise NotImplementedError
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         """What the design of the runs cannot tell of it; the readings are not looked at.
 
         ``found`` are those of the effects before it in the list.
@@ -203,8 +203,8 @@ class Effect(TabledParameters):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         """Why this effect may be behind what another (or it) explains, or None."""
         return None
 
@@ -217,7 +217,7 @@ class Effect(TabledParameters):
     def told(cls, extension: Extension, regression: Regression) -> bool:
         """Whether the readings show what the design alone does not promise to tell.
 
-        Asked of a blind spot whose causes have a common form (`Blindness`).
+        Asked of a blind spot whose causes have a common form (`Ambiguity`).
         """
         return False
 
@@ -237,7 +237,7 @@ class Effect(TabledParameters):
         first: bool = True,
         factor: str | None = None,
         common: type[Effect] | None = None,
-    ) -> Blindness:
+    ) -> Ambiguity:
         """Blind spot of this effect, or of it and ``others`` which it is taken for.
 
         ``first=False`` names the others before it; ``factor`` is what in the design is at
@@ -249,7 +249,7 @@ class Effect(TabledParameters):
             measure = telling_apart(effects[0], effects[1]) or effects[0].measure
         causes = tuple(effect.kind for effect in effects)
         shared = "" if common is None else common.kind
-        return Blindness(causes, because, measure, factor=factor or cls.factor, common=shared)
+        return Ambiguity(causes, because, measure, factor=factor or cls.factor, common=shared)
 
     # -- correct -------------------------------------------------------------------
 

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, Pattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import FilterLagTerm
 from ..support.quantiles import quantile
-from .blindness import Blindness
+from .ambiguity import Ambiguity
 from .effect import Effect
 from .latency import UNTIMED, Latency
 from .missing_order import MissingOrder
@@ -211,7 +211,7 @@ class FilterLag(Effect):
         return parameters, [FilterLag(equivalent, damping)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.velocity is None:
             yield cls.blind(UNTIMED)
@@ -228,8 +228,8 @@ class FilterLag(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != MissingOrder.kind:
             return None
         order = float(extension.shape["output_order"])

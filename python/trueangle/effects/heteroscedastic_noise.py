@@ -8,8 +8,8 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.projection import EXCITED
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals

@@ -8,15 +8,15 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.place import JointCouplingTerm
 from ..support.angles import ARCSEC_PER_DEG
-from .blindness import OWN_POWER, Blindness, share_left
+from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .effect import Effect
 from .scale_error import ScaleError
 from .search import Array, Fitted
@@ -103,7 +103,7 @@ class JointCoupling(_OfOthers):
         return parameters, found
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         for because in filter(None, _hidden(regression).values()):
             yield cls.blind(because)
 

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.earlier import earlier_signals
 from ..joint.pattern import JointPattern
@@ -17,8 +17,8 @@ from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import LatencyTerm
 from ..support.angles import ARCSEC_PER_DEG
+from .ambiguity import OWN_OF_VELOCITY, OWN_POWER, Ambiguity, share_left
 from .backlash import Backlash
-from .blindness import OWN_OF_VELOCITY, OWN_POWER, Blindness, share_left
 from .effect import Effect
 from .search import Array, Fitted
 
@@ -90,7 +90,7 @@ class Latency(Effect):
         )
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.velocity is None:
             yield cls.blind(UNTIMED)

@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec
+from ..model.term import Term
 from ..model.terms.place import LocalDefectTerm
-from ..support.deadline import pace
+from ..support.angles import from_arcsec
+from ..support.deadline import current_deadline
+from .ambiguity import Ambiguity
 from .argument_error import ArgumentShift
-from .blindness import Blindness
 from .drawing import drawn_place
 from .effect import Effect
 from .missing_order import MissingOrder
@@ -124,7 +125,7 @@ class LocalDefect(Effect):
                 continue  # the readings are too few a turn of it to show a place
             reached: list[tuple[float, float]] = []
             for score, place, width in cls._search(regression, shaft, cycles, e):
-                if pace().over:
+                if current_deadline().over:
                     return best
                 # From within a bump that was found the way leads there.
                 if any(abs((place - c + 180.0) % 360.0 - 180.0) < w for c, w in reached):
@@ -200,7 +201,7 @@ class LocalDefect(Effect):
         Clipped at so many standard deviations it has a flat top, and looks wide.
         """
         for _ in range(UNCLIPPED):
-            if pace().over:
+            if current_deadline().over:
                 return shape
             columns = cls.columns(regression.signals, regression.around, shape)
             if not regression.outlying[columns[:, 0] > ON_BUMP].any():
@@ -257,7 +258,7 @@ class LocalDefect(Effect):
         return parameters, [LocalDefect(place, width, float(height), shape["shaft"])]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         grid = regression.signals.grid
         if grid is None or grid.positions > 2.0 * regression.lines.orders.max():
             return

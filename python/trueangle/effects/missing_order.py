@@ -8,13 +8,13 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
-from .blindness import (
-    Blindness,
+from .ambiguity import (
+    Ambiguity,
 )
 from .drawing import drawn_free_line, drawn_phase
 from .effect import Effect
@@ -160,8 +160,8 @@ class MissingOrder(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != cls.kind:
             return None
         order = float(extension.shape["output_order"])
@@ -188,7 +188,7 @@ class MissingOrder(Effect):
         return None
 
     @classmethod
-    def also_from(cls, other: type[Effect], spot: Blindness) -> Blindness:
+    def also_from(cls, other: type[Effect], spot: Ambiguity) -> Ambiguity:
         """That ``other`` may make a line for the reason of ``spot``: a line it is in any case."""
         return replace(spot, causes=(cls.kind, other.kind), common=cls.kind)
 

@@ -8,20 +8,20 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns, lines_columns
 from ..joint.signals import Signals
-from ..support.deadline import pace
-from .blindness import (
-    Blindness,
+from ..support.deadline import current_deadline
+from .ambiguity import (
+    Ambiguity,
 )
-from .drawnline import DrawnLine
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
 from .orderspectrum import OrderSpectrum
+from .randomphase import RandomPhaseLine
 from .search import (
     Array,
     Fitted,
@@ -112,7 +112,7 @@ class NonIntegerOrder(Effect):
             return None
         peaks = np.flatnonzero((net[1:-1] >= net[:-2]) & (net[1:-1] >= net[2:])) + 1
         for k in peaks[np.argsort(net[peaks])[::-1][:PEAKS]]:
-            if pace().over:
+            if current_deadline().over:
                 return best
             extension = cls._at(regression, float(orders[k]), float(penalty[k]))
             if best is None or extension.bic_gain > best.bic_gain:
@@ -199,8 +199,8 @@ class NonIntegerOrder(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         return grid_doubt(regression, spots) if extension.cause == cls.kind else None
 
     @classmethod
@@ -210,7 +210,7 @@ class NonIntegerOrder(Effect):
         extension = terms[0][0]
         theta = regression.signals.theta
         waves = line_columns(theta, extension.shape["order"])
-        line = DrawnLine(regression, cls.kind, waves)
+        line = RandomPhaseLine(regression, cls.kind, waves)
         amplitude, amplitude_std = line.amplitude()
         order_std = line.place_std(theta)
         parameters = {
@@ -223,6 +223,6 @@ class NonIntegerOrder(Effect):
         return parameters, [NonIntegerOrder(extension.shape["order"], amplitude)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         if regression.signals.runs < 2:
             yield cls.blind("one run: a phase cannot change", MissingOrder)

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..estimation.estimate import Parameters, quantity
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..estimation.stretches import MOST_IN_ROW, flagged_segments, less_local_level, within_segments
+from ..estimation.segments import MOST_IN_ROW, flagged_segments, less_local_level, within_segments
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .effect import Effect, ScatterFinding

@@ -8,16 +8,17 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec
+from ..model.term import Term
 from ..model.terms.travel import PreslidingHysteresisTerm
+from ..support.angles import from_arcsec
+from .ambiguity import Ambiguity, share_left
 from .backlash import ONE_WAY, Backlash, goes_both_ways
-from .bends import spring_transitions
-from .blindness import Blindness, share_left
+from .departures import spring_transitions
 from .effect import Effect
 from .latency import TWO_SPEEDS, Latency
 from .search import Array, Fitted, golden_maximum, is_of_one_sign, tangent_covariance
@@ -210,7 +211,7 @@ class PreslidingHysteresis(Effect):
         return float(np.sqrt(covariance[:n, :n].sum())), length_std
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.velocity is None and bool(np.ptp(signals.direction) > 0.0):
             yield cls.blind(

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import quantity
-from ..estimation.readings import is_rounding_visible
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
+from ..estimation.rounded import is_rounding_visible
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.angles import ARCSEC_PER_DEG

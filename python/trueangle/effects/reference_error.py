@@ -9,12 +9,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
-from .blindness import Blindness
+from .ambiguity import Ambiguity
 from .drawing import drawn_phase
 from .effect import Effect
 from .missing_order import MissingOrder
@@ -149,7 +149,7 @@ class ReferenceLines(Effect):
         return parameters, effects
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         mount = regression.signals.mount
         if mount is None:
             yield cls.blind("the mount of the reference was not recorded")
@@ -163,8 +163,8 @@ class ReferenceLines(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != MissingOrder.kind or regression.signals.mount is None:
             return None
         order = float(extension.shape["output_order"])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
-from .blindness import Blindness
+from .ambiguity import Ambiguity
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def is_gear_order(around: JointPattern, order: float) -> bool:
     return named is not None and named[0] != "output"
 
 
-def grid_doubt(regression: Regression, spots: Sequence[Blindness]) -> Blindness | None:
+def grid_doubt(regression: Regression, spots: Sequence[Ambiguity]) -> Ambiguity | None:
     """On a grid of positions: lines behind aliases, which change from run to run as noise does."""
     if regression.signals.grid is None:
         return None

@@ -9,12 +9,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
-from .blindness import Blindness
+from .ambiguity import Ambiguity
 from .drawing import drawn_carrier, drawn_phase
 from .effect import Effect
 from .missing_order import FREE_ANGLES, MissingOrder
@@ -187,8 +187,8 @@ class Sidebands(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != cls.kind:
             return None
         carrier, k = extension.shape["carrier"], extension.shape["offset"]
@@ -197,7 +197,7 @@ class Sidebands(Effect):
             return None
         because = f"{', '.join(shared)} as well as a sideband of order {carrier:g}"
         causes = (cls.kind, MissingOrder.kind)
-        return Blindness(causes, because, TURNED, factor="angle", common=cls.kind)
+        return Ambiguity(causes, because, TURNED, factor="angle", common=cls.kind)
 
     def to_lines(self) -> Sequence[tuple[str, float]]:
         return tuple(("output", self.carrier + offset) for offset in self.offsets)

@@ -8,16 +8,17 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec
+from ..model.term import Term
 from ..model.terms.load import StiffeningComplianceTerm
+from ..support.angles import from_arcsec
 from ..support.arrays import distinct
-from .bends import bend_beyond
-from .blindness import OWN_POWER, Blindness, share_left
+from .ambiguity import OWN_POWER, Ambiguity, share_left
+from .departures import departure_beyond
 from .drawing import largest_signal
 from .effect import Effect
 from .search import Array, Fitted, golden_maximum, tangent_covariance
@@ -179,7 +180,7 @@ class StiffeningCompliance(Effect):
             moment = cls.moment(signals, term.shape["gravity_deg"])
             top = float(np.abs(moment).max())
             knees = [cls.beyond(moment, share * top) for share in KNEES]
-            columns.append(bend_beyond(np.column_stack([*knees, moment**3]), term.columns))
+            columns.append(departure_beyond(np.column_stack([*knees, moment**3]), term.columns))
         return np.hstack(columns)
 
     @classmethod
@@ -223,7 +224,7 @@ class StiffeningCompliance(Effect):
         return np.column_stack(columns) if columns else np.zeros((len(signals), 0))
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         because = unloaded(regression.signals)
         if because:
             yield cls.blind(because)

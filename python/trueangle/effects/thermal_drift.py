@@ -8,14 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec, line_values
+from ..model.term import Term, line_values
 from ..model.terms.place import ThermalDriftTerm
+from ..support.angles import from_arcsec
+from .ambiguity import LEAST_KELVIN, Ambiguity
 from .backlash import Backlash
-from .blindness import LEAST_KELVIN, Blindness
 from .effect import Effect
 from .factor import FactorEffect
 from .search import Array, Fitted, known_orders
@@ -118,7 +119,7 @@ class ThermalDrift(FactorEffect):
         return parameters, [effect]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         temperature = regression.signals.temperature
         if temperature is None:
             yield cls.blind("no temperature was recorded")

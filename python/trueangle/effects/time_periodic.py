@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..support.quantiles import quantile
-from .blindness import Blindness
+from .ambiguity import Ambiguity
 from .drawing import reading_rate
-from .drawnline import DrawnLine
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
 from .non_integer_order import NonIntegerOrder
+from .randomphase import RandomPhaseLine
 from .search import Array, Fitted, golden_maximum
 
 #: Trial frequencies per resolution cell (one over the length of a run), and at most.
@@ -170,7 +170,7 @@ class TimePeriodic(Effect):
         frequencies = np.array(extension.shape["frequency_hz"])
         frequency = float(np.median(frequencies))
         waves = cls.waves(regression.signals, extension.shape["frequency_hz"])
-        line = DrawnLine(regression, cls.kind, waves)
+        line = RandomPhaseLine(regression, cls.kind, waves)
         amplitude, amplitude_std = line.amplitude()
         std = line.place_std(2.0 * np.pi * regression.signals.clock)
         if std is not None:
@@ -184,15 +184,15 @@ class TimePeriodic(Effect):
         return parameters, [TimePeriodic(frequency, amplitude)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.time is None:
             yield cls.blind("no time stamps were recorded")
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != cls.kind or regression.signals.velocity is None:
             return None
         speed = np.abs(regression.signals.turns_per_s)

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import quantity
 from ..estimation.linear import NormalEquations
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals

@@ -10,13 +10,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
+from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .backlash import Backlash
-from .blindness import OWN_POWER, Blindness, share_left
 from .direction_dependent_pattern import DirectionalPattern
 from .effect import Effect
 from .search import Array, Fitted, golden_maximum, is_of_one_sign, tangent_covariance
@@ -162,7 +162,7 @@ class TorqueHysteresis(Effect):
         ]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         because = unloaded(signals)
         if because:

@@ -8,14 +8,14 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.motion import VaryingLineTerm
-from .blindness import Blindness
+from .ambiguity import Ambiguity
 from .channel_skew import ChannelSkew, sensor_order
 from .drawing import drawn_carrier, drawn_free_line, drawn_phase
 from .effect import ALWAYS, Effect
@@ -124,8 +124,8 @@ class VaryingLine(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         return grid_doubt(regression, spots) if extension.cause == cls.kind else None
 
     @classmethod

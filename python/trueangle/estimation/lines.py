@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..joint.joint import Joint
-from .batch import BlockProducts
+from .blocks import BlockProducts
 
 #: Orders searched at least, and at most: bounds memory and the penalty of the search.
 LEAST_ORDERS, MOST_ORDERS = 128, 1024

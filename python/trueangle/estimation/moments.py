@@ -14,7 +14,7 @@ import trueangle._core as _core
 from ..errors import ArgumentError
 from ..joint.shafts import ShaftOrders, resolve_orders
 from ..model.model import Argument
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from ..support.plainresult import ShownResult
 from .forgetting import Forgetting
 from .momentsfit import MomentsFit, Spectrum

@@ -13,7 +13,7 @@ import trueangle._core as _core
 
 from ..joint.pattern import VANISHES
 from ..support.arrays import Array
-from .batch import BlockProducts, Blocks
+from .blocks import BlockProducts, Blocks
 from .whitening import Whitener
 
 #: Arcsec below which what is left is the rounding of angles (1e-12 of a turn).

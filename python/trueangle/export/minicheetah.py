@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 
 from ..model.model import HarmonicModel
 from ..support.files import FileKind
-from .codetext import rows
+from .codetext import number_rows
 from .pattern import TurnPattern
-from .reading import failed
+from .reading import table_error
 from .target import CommentBlock, Made, Option
 from .tinymovr import Tinymovr, Whole
 
@@ -44,12 +44,12 @@ class MiniCheetah(Tinymovr):
             "reading; entry k stands at the reading 512 k."
         )
         lines = header.comment("// ", own)
-        values = rows([str(int(value)) for value in table])
+        values = number_rows([str(int(value)) for value in table])
         return "\n".join([*lines, f"int offset_lut[{_ENTRIES}] = {{", values, "};", ""])
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         model = super().read(text, path, {"bits": _BITS})
         entries = 0 if model.fit is None else model.fit.samples
         if entries != _ENTRIES:
-            raise failed(path, f"holds {entries} numbers: offset_lut has {_ENTRIES}")
+            raise table_error(path, f"holds {entries} numbers: offset_lut has {_ENTRIES}")
         return model

@@ -17,7 +17,7 @@ from .knots import rounded_knots
 from .oneturn import one_turn_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import failed, sampled_model
+from .reading import sampled_model, table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 ENTRIES = 256
@@ -91,16 +91,18 @@ class Moteus(Target):
                 if not np.isfinite(value):
                     raise ValueError
             except ValueError:
-                raise failed(path, f"{found[4]!r} is not a number", number) from None
+                raise table_error(path, f"{found[4]!r} is not a number", number) from None
             if found[3]:
                 scale = value
             elif int(found[2]) >= ENTRIES or abs(value) > 128 or value != int(value):
-                raise failed(path, f"{line.strip()!r} is not an entry of a table of int8", number)
+                raise table_error(
+                    path, f"{line.strip()!r} is not an entry of a table of int8", number
+                )
             else:
                 table[int(found[2])] = value
                 seen += 1
         if seen != ENTRIES:
-            raise failed(
+            raise table_error(
                 path,
                 f"{seen} of {ENTRIES} lines of motor_position.sources.{source}."
                 "compensation_table are there; write them by moteus_tool --dump-config",

@@ -14,8 +14,8 @@ from ..support.files import FileKind
 from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
-from .reading import ReadTable, failed, function_model
-from .setpoint import Travel
+from .reading import ReadTable, function_model, table_error
+from .setpoint import SetpointTravel
 from .table import TURN
 from .target import CommentBlock, Made, Option, Target
 
@@ -77,7 +77,7 @@ class Pmac(Target):
                 f"are {', '.join(map(str, near)) or 'none'}"
             )
         whole_turn = {"entries": entries, "start": 0.0, "stop": 360.0}
-        travel = Travel.of(pattern, self.name, whole_turn, _MOST + 1)
+        travel = SetpointTravel.of(pattern, self.name, whole_turn, _MOST + 1)
         # The correction at zero is zero by definition: what it is there is left to the zero.
         first = float(travel.forward[0])
         values = np.rint((travel.forward - first) * counts * SIXTEENTHS).astype(np.int64)
@@ -122,18 +122,18 @@ class Pmac(Target):
         plain = "\n".join(line.partition(";")[0] for line in text.split("\n"))
         found = _DEFINE.search(plain)
         if found is None:
-            raise failed(path, f"no DEFINE COMP: no table of {self.name}")
+            raise table_error(path, f"no DEFINE COMP: no table of {self.name}")
         count, span = int(found[1]), int(found[2])
         line = plain.count("\n", 0, found.start()) + 1
         words = plain[found.end() :].split()
         try:
             values = np.array([int(word) for word in words[:count]])
         except ValueError as error:
-            raise failed(path, f"entries are whole numbers: {error}", line) from None
+            raise table_error(path, f"entries are whole numbers: {error}", line) from None
         if not 4 <= count <= _MOST or len(values) != count or not 1 <= span <= _LARGEST:
-            raise failed(path, f"DEFINE COMP {count},{span} with {len(values)} entries", line)
+            raise table_error(path, f"DEFINE COMP {count},{span} with {len(values)} entries", line)
         if np.max(np.abs(values)) > _LARGEST:
-            raise failed(path, f"an entry is beyond {_LARGEST}: no table of {self.name}", line)
+            raise table_error(path, f"an entry is beyond {_LARGEST}: no table of {self.name}", line)
         counts = options["counts_per_turn"] or span
         turned = np.append(values[-1], values) / (SIXTEENTHS * counts)
         places = np.arange(count + 1) / count

@@ -42,7 +42,7 @@ _GRID = 1 << 18
 
 
 @dataclass(frozen=True)
-class Travel:
+class SetpointTravel:
     """Nominal positions over the travel of an axis, and the errors there, in turns.
 
     Attributes
@@ -75,7 +75,7 @@ class Travel:
         options: Mapping[str, Any],
         most: int,
         function: Function | None = None,
-    ) -> Travel:
+    ) -> SetpointTravel:
         """Knots over the travel that is asked for, else over what the model was fitted on.
 
         They are of the error at the true angle, for each direction, or of a ``function``.
@@ -212,7 +212,7 @@ def _directed(pattern: TurnPattern, direction: int) -> tuple[Array, Array]:
     return np.append(grid, 1.0), np.append(values, values[0] + 1.0)
 
 
-def axis_steepness(travel: Travel) -> tuple[float, float]:
+def axis_steepness(travel: SetpointTravel) -> tuple[float, float]:
     """Largest slope (deg per deg) and its change per degree: what an axis must follow."""
     h = 360.0 / travel.entries
     slopes = [np.diff(values) * 360.0 / h for values in (travel.forward, travel.reverse)]

@@ -15,12 +15,12 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.files import FileKind
-from .codetext import rows
+from .codetext import longest_array, number_rows
 from .knots import rounded_knots
-from .oneturn import longest_array, one_turn_knots, rounding_floor, without_mean
+from .oneturn import one_turn_knots, rounding_floor, without_mean
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import failed, sampled_model
+from .reading import sampled_model, table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 Single = NDArray[np.float32]
@@ -140,7 +140,7 @@ class SimpleFoc(Target):
         lines += [
             f"const int n_lut = {len(table)};",
             f"{kind} {array}[{'n_lut + 1' if guard else 'n_lut'}] = {{",
-            rows(values),
+            number_rows(values),
             "};",
         ]
         if guard:
@@ -159,11 +159,13 @@ class SimpleFoc(Target):
         declared = re.search(r"\bn_lut\s*=\s*(\d+)", text)
         entries = int(declared[1]) if declared else len(numbers)
         if len(numbers) not in (entries, entries + 1):
-            raise failed(path, f"n_lut is {entries}, the table has {len(numbers)} numbers", line)
+            raise table_error(
+                path, f"n_lut is {entries}, the table has {len(numbers)} numbers", line
+            )
         numbers = numbers[:entries]
         whole = bool(np.all(numbers == np.rint(numbers)) and np.ptp(numbers) > 1.0)
         if whole != (variant == "minus-u16"):
-            raise failed(
+            raise table_error(
                 path,
                 f"these are {'whole numbers' if whole else 'radians'}, and variant {variant} is "
                 f"asked for; give `variant={'minus-u16' if whole else 'minus-float'!r}`"

@@ -18,8 +18,8 @@ from ..support.files import FileKind
 from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
-from .reading import failed
-from .setpoint import ENDS, POSITIONS, Travel
+from .reading import table_error
+from .setpoint import ENDS, POSITIONS, SetpointTravel
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
@@ -59,11 +59,11 @@ class TwinCat(Target):
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         cnc = options["variant"] == "cnc"
-        travel = Travel.of(pattern, self.name, options, MOST if cnc else 100_000)
+        travel = SetpointTravel.of(pattern, self.name, options, MOST if cnc else 100_000)
         made = self._cnc(pattern, travel) if cnc else self._nc(pattern, travel)
         return replace(made, bits=enough_bits(options["bits"], made.entries))
 
-    def _cnc(self, pattern: TurnPattern, travel: Travel) -> Made:
+    def _cnc(self, pattern: TurnPattern, travel: SetpointTravel) -> Made:
         if TENTHS % travel.entries:
             raise ArgumentError(
                 f"`entries={travel.entries}` a turn are no whole number of 0.0001 deg apart: use "
@@ -103,7 +103,7 @@ class TwinCat(Target):
             notes=("switch it on by lr_param.ssfk 1 of the axis",),
         )
 
-    def _nc(self, pattern: TurnPattern, travel: Travel) -> Made:
+    def _nc(self, pattern: TurnPattern, travel: SetpointTravel) -> Made:
         columns = [np.round(v * 360.0, _DECIMALS) for v in (travel.forward, travel.reverse)]
 
         def text(header: CommentBlock) -> str:
@@ -142,10 +142,12 @@ def _cnc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
         found = _LINE.match(line)
         if found is None:
             if line.strip().startswith("kw.ssfk."):
-                raise failed(path, f"{line.strip()[:50]!r} is not a whole number of a key", number)
+                raise table_error(
+                    path, f"{line.strip()[:50]!r} is not a whole number of a key", number
+                )
             continue
         if len(found[4]) > _DIGITS:
-            raise failed(path, f"{found[4][:_DIGITS]}... is no number of a key", number)
+            raise table_error(path, f"{found[4][:_DIGITS]}... is no number of a key", number)
         if found[2] is None:
             settings[found[1]] = int(found[4])
         else:
@@ -156,15 +158,19 @@ def _cnc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     points = columns.get("setpoint", {})
     interval = settings.get("interval", 0)
     if count < 4 or any(set(c) != set(range(count)) for c in (pos, neg)):
-        raise failed(path, f"kw_nr_max is {count}, but pos has {len(pos)} and neg {len(neg)} lines")
+        raise table_error(
+            path, f"kw_nr_max is {count}, but pos has {len(pos)} and neg {len(neg)} lines"
+        )
     if interval:
         nominal = settings.get("kw_startpos", 0) + interval * np.arange(count)
     elif set(points) == set(range(count)):
         nominal = np.array([points[i] for i in range(count)])
     else:
-        raise failed(path, "interval is 0 or missing, and not every table entry has a setpoint")
+        raise table_error(
+            path, "interval is 0 or missing, and not every table entry has a setpoint"
+        )
     if np.any(np.diff(nominal) <= 0):
-        raise failed(path, "positions must increase")
+        raise table_error(path, "positions must increase")
     values = [[-column[i] for i in range(count)] for column in (pos, neg)]
     return np.array([nominal, *values]).T / 1e4
 
@@ -179,10 +185,12 @@ def _nc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
             if len(values) not in (2, 3) or not all(map(math.isfinite, values)):
                 raise ValueError
         except ValueError:
-            raise failed(path, f"Position,Compensation is wanted, got {row!r}", number) from None
+            raise table_error(
+                path, f"Position,Compensation is wanted, got {row!r}", number
+            ) from None
         if rows and values[0] <= rows[-1][0]:
-            raise failed(path, "positions must increase", number)
+            raise table_error(path, "positions must increase", number)
         rows.append((*values, values[-1])[:3])
     if len(rows) < 4:
-        raise failed(path, f"holds {len(rows)} points: no table of {TwinCat.name}")
+        raise table_error(path, f"holds {len(rows)} points: no table of {TwinCat.name}")
     return np.array(rows)

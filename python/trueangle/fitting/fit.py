@@ -13,9 +13,9 @@ from ..model.validity import check_invertible
 from ..runs.files import runs_of
 from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
-from ..runs.source import Reading
+from ..runs.source import ReadingOptions
 from ..runs.travel import CONDITION, travelled_span, without_drift
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument, ArgumentChoice, choose_argument
 from .problem import Problem
@@ -31,7 +31,7 @@ from .robust import (
 from .uncertainty import CovarianceKind, check_covariance
 
 if TYPE_CHECKING:
-    from .orders.table import OrderSelection
+    from .orders.result import OrderSelection
     from .summed import SummedReadings
 
 #: Rounding of angles around a whole turn, in parts of a turn: smaller deviations are
@@ -56,7 +56,7 @@ def fit(
     method: str | None = None,
     threads: int | None = None,
     prior: Any = None,
-    **reading: Unpack[Reading],
+    **reading: Unpack[ReadingOptions],
 ) -> FitResult:
     """Fit a harmonic model to one run or several.
 
@@ -296,7 +296,7 @@ def fitted_to(
     if taken is not None:
         remarks += taken.sentences(problem.period)
     if len(found) > 1:
-        from .likeness import run_names, unlike_runs, unlike_runs_sentence
+        from .unlikeruns import run_names, unlike_runs, unlike_runs_sentence
 
         unlike = unlike_runs(problem, fitted)
         if unlike:

@@ -22,7 +22,7 @@ from .uncertainty import CovarianceKind, Uncertainty, coefficient_uncertainty
 if TYPE_CHECKING:
     from ..estimation.moments import Moments
     from .nuisance import Nuisance
-    from .orders.table import OrderSelection
+    from .orders.result import OrderSelection
     from .prior import Posterior
     from .summed import SummedReadings
 

@@ -21,7 +21,7 @@ from .fitdata import FitData
 from .rounding import COUNTED
 
 if TYPE_CHECKING:
-    from .orders.table import OrderSelection
+    from .orders.result import OrderSelection
 
 
 def _build_model(fit: FittedCoefficients) -> HarmonicModel:

@@ -15,14 +15,14 @@ from ..errors import FileError
 from ..fitting.prior import Prior
 from ..joint.shafts import ShaftOrders
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.argumentkinds import told_kinds
 from ..support.decoding import Decoder, json_value, read_text
 from ..support.files import RUNS_BYTES
-from ..support.kinds import told_kinds
 from .history import HistoryOrder, HistoryRow
 from .result import BetweenOrder, CommonOrder, Fleet
-from .text import FORMAT, VERSION
 from .tolerance import Tolerance
 from .unit import VERDICTS, FleetUnit, UnitOrder
+from .writing import FORMAT, VERSION
 
 __all__ = ["FORMAT", "load_fleet"]
 

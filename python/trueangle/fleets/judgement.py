@@ -18,7 +18,7 @@ from .outliers import Deviates
 from .result import BetweenOrder, CommonOrder, Fleet
 from .tolerance import tolerance_of
 from .unit import VERDICTS, FleetUnit, UnitOrder, Verdict
-from .units import FEWEST, SharedPattern, Units, pattern_of
+from .units import FEWEST, SharedPattern, Units, shared_pattern
 
 
 def judged_fleet(
@@ -31,9 +31,9 @@ def judged_fleet(
 ) -> Fleet:
     """Verdicts, and what the fleet is like."""
     n = len(units.last)
-    chosen = pattern_of(units, aligned=False)
+    chosen = shared_pattern(units, aligned=False)
     if n > 2:
-        shared = pattern_of(units, aligned=True)
+        shared = shared_pattern(units, aligned=True)
         both = shared.belong & chosen.belong
         if float((shared.scores - chosen.scores)[both].sum()) > 0.0:
             chosen = shared

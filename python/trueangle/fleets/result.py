@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..fitting.prior import Prior
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted, finite_or_none, result_picture
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult, finite_or_none, result_picture
 from .history import HistoryRow
-from .text import save_fleet
 from .tolerance import Tolerance
 from .unit import FleetUnit
+from .writing import save_fleet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

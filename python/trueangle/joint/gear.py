@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
 from ..errors import ArgumentError
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from ..support.suggestions import check_choice
 from .members import FIXED_MEMBERS
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..errors import ArgumentError
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.kinds import told_kinds
 from .joint import Joint
 
 ARCSEC_PER_RAD = 1_296_000.0 / (2.0 * math.pi)

@@ -10,8 +10,8 @@ from typing import Final, NamedTuple, TypeVar
 import numpy as np
 
 from ..errors import ArgumentError
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .members import FIXED_MEMBERS
 

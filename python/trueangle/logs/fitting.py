@@ -21,10 +21,10 @@ from ..runs.files import read_runs
 from ..runs.follows import check_follows
 from ..runs.paths import find_logs
 from ..runs.run import CalibrationRun
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from .keeping import KEPT
 from .passes import Passes
-from .sources import hold_at_most
+from .sources import logs_hold_at_most
 
 _Logs: TypeAlias = str | PathLike[str] | Iterable[str | PathLike[str]]
 
@@ -140,7 +140,7 @@ def fit_logs(
         "facets": facets,
     }
     paths = [path for path, _name in find_logs(_listed(logs))]
-    if hold_at_most(paths, KEPT, topic):
+    if logs_hold_at_most(paths, KEPT, topic):
         runs = _runs_of(paths, files, scheduler)
         return fit(runs, orders, threads=threads, **options)  # type: ignore[arg-type]
     asked = (
@@ -173,7 +173,7 @@ def select_log_orders(
     joint = {"gear_ratio": gear_ratio, "fixed_member": fixed_member, "shafts": shafts}
     options = {**joint, "argument": argument, "covariance": covariance}
     paths = [path for path, _name in find_logs(_listed(logs))]
-    if hold_at_most(paths, KEPT, files.get("topic")):
+    if logs_hold_at_most(paths, KEPT, files.get("topic")):
         runs = [without_spikes(run) for run in _runs_of(paths, files, scheduler)]
         return select_orders(runs, **options)  # type: ignore[arg-type]
     passes = Passes(paths, None, joint, files, threads, False, scheduler, progress, KEPT)

@@ -105,7 +105,7 @@ class LogSettings:
         header: Sequence[str],
         before: Mapping[str, JointState] | None = None,
         unit: str | None = None,
-    ) -> list[Channel]:
+    ) -> list[JointChannel]:
         """One channel per joint for a log with the columns ``header``.
 
         ``before`` tells by joint how the log before ended; ``unit`` is that of the log's
@@ -116,7 +116,7 @@ class LogSettings:
         FileError
             A joint has no angle among the columns, or two have the same.
         """
-        found: list[Channel] = []
+        found: list[JointChannel] = []
         taken = list(header)
         for joint in self.joints:
             angle = find_angle_column(
@@ -130,7 +130,9 @@ class LogSettings:
             )
             taken.append(angle.corrected)
             state = (before or {}).get(joint.name or "", JointState())
-            found.append(Channel(joint, angle, _signal_columns(path, header, joint), state, self))
+            found.append(
+                JointChannel(joint, angle, _signal_columns(path, header, joint), state, self)
+            )
         return found
 
     @property
@@ -206,7 +208,7 @@ class JointState(NamedTuple):
         return cls(TurnState(*turns), tuple(travel))
 
 
-class Channel:
+class JointChannel:
     """The indicated angle of one joint in one log, corrected batch after batch.
 
     Batches must come in the order of the rows: turns are counted over their borders where

@@ -25,7 +25,7 @@ from ..joint.shafts import Shaft, ShaftOrders, shaft_cycles
 from ..model.model import Argument, HarmonicModel
 from ..runs.files import Conversion
 from ..runs.run import CalibrationRun
-from ..runs.source import checked_reading
+from ..runs.source import checked_reading_options
 from ..support.angles import wrap
 from ..support.files import InputFile, partition_name
 from ..support.roles import wanted_columns
@@ -84,7 +84,7 @@ class Passes:
             signals=wanted_columns(files.get("signals")),
             topic=files.get("topic"),
             unit_from=files.get("unit_from"),
-            facets=Conversion.of(checked_reading(files)).facets,
+            facets=Conversion.of(checked_reading_options(files)).facets,
             threads=threads,
             checksums=checksums,
             kept=max(min(most, SAMPLE) // len(paths), 1),

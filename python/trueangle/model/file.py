@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import ArgumentError, FileError, ModelFileError, OutsideSpanWarning
 from ..joint.shafts import Shaft
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.decoding import (
     MAX_LINE_ORDERS,
@@ -22,11 +23,10 @@ from ..support.decoding import (
     shown_value,
 )
 from ..support.files import MODEL_BYTES
-from ..support.kinds import told_kinds
 from .model import HarmonicModel
 from .records import MAX_TERMS, MOST_TURNS, RecordReader
 from .term import Term
-from .text import FORMAT, ROBOT_FORMAT, VERSION, save_model
+from .writing import FORMAT, ROBOT_FORMAT, VERSION, save_model
 
 __all__ = [
     "FORMAT",

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 import trueangle._core as _core
 
 from ..errors import ArgumentError
-from ..support.kinds import of_type, told_kinds
+from ..support.argumentkinds import of_type, told_kinds
 from ..support.plainresult import result_picture
 from .corrector import Corrector
 from .errormodel import Argument, ErrorModel
-from .step import ExchangeableStep, Step, exchangeable
-from .text import model_summary, one_line, save_model
+from .step import ExchangeableStep, Step, exchangeable_step
+from .summary import model_line, model_summary
 from .validity import check_invertible
+from .writing import save_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -110,7 +111,9 @@ class HarmonicModel(ErrorModel):
         90.0
         """
         core = self._prepared()
-        step: ExchangeableStep[HarmonicModel] = exchangeable(core.step, partial(_swap, core, self))
+        step: ExchangeableStep[HarmonicModel] = exchangeable_step(
+            core.step, partial(_swap, core, self)
+        )
         return step
 
     def _prepared(self) -> Any:
@@ -120,7 +123,7 @@ class HarmonicModel(ErrorModel):
     # -- description --------------------------------------------------------------
 
     def __repr__(self) -> str:
-        return one_line(self)
+        return model_line(self)
 
     def summary(self) -> str:
         """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""

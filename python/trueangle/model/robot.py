@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..errors import ArgumentError, KindError, MissingSignalError
 from ..support.angles import arcsec, unit_name
-from ..support.kinds import of_type, told_kinds
-from ..support.layout import laid_out
-from ..support.plainresult import ShownResult, counted
+from ..support.argumentkinds import of_type, told_kinds
+from ..support.layout import counted, laid_out
+from ..support.plainresult import ShownResult
 from ..support.roles import wanted_columns
 from ..support.signals import GivenSignals, check_signal_names, coupled_joint
 from .model import HarmonicModel
-from .step import AllJoints, exchangeable
-from .text import save_robot
+from .step import JointsStep, exchangeable_step
+from .writing import save_robot
 
 #: Columns of a log by role, each with its unit where its name does not tell it.
 Columns: TypeAlias = Mapping[str, tuple[str, str | None]]
@@ -175,7 +175,7 @@ class Robot(ShownResult, Mapping[str, HarmonicModel]):
                 raise type(error)(f"joint {joint}: {error}") from None
         return corrected.T
 
-    def compensator(self) -> AllJoints[Robot]:
+    def compensator(self) -> JointsStep[Robot]:
         """``step(positions) -> corrected`` for one sample of all joints at a time.
 
         One call of the compiled core for all joints: of an array of float64 it allocates
@@ -203,7 +203,7 @@ class Robot(ShownResult, Mapping[str, HarmonicModel]):
         array([90.,  0.])
         """
         core = self._prepared()
-        step: AllJoints[Robot] = exchangeable(core.step, partial(_swap, core, self))
+        step: JointsStep[Robot] = exchangeable_step(core.step, partial(_swap, core, self))
         return step
 
     def _prepared(self) -> _core.RobotStep:

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from ..errors import ArgumentError, ModelFileError
+from ..support.argumentkinds import told_kinds
 from ..support.decoding import Decoder
-from ..support.kinds import told_kinds
 from .file import content_of, part_of
 from .robot import Robot
-from .text import ROBOT_FORMAT
+from .writing import ROBOT_FORMAT
 
 #: Joints of one robot, at most.
 MAX_JOINTS: Final = 256

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..joint.shafts import limited_orders
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.kinds import told_kinds
-from ..support.plainresult import counted
+from ..support.layout import counted
 from .arcplan import ArcPlan
 from .counts import exchanged, rounded
 from .doptimal import ArcDesign, OrthonormalColumns, d_optimal

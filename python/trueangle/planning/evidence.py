@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import EFFECTS, Effect
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.effect import ALWAYS
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
@@ -155,7 +155,7 @@ def evidence_between(
     return found
 
 
-def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Blindness]) -> bool:
+def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Ambiguity]) -> bool:
     """Whether readings with this cause would leave it in doubt, whatever their evidence.
 
     ``spots`` are what the design of the readings cannot tell.

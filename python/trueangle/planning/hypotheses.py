@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import EFFECTS, Effect
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .evidence import Hypothesis
@@ -48,7 +48,7 @@ class Question:
     draws: tuple[Hypothesis, ...] = ()
 
 
-def question_of(spot: Blindness, rich: Signals, around: JointPattern, rms: float) -> Question:
+def question_of(spot: Ambiguity, rich: Signals, around: JointPattern, rms: float) -> Question:
     """What an entry of ``not_identifiable`` asks.
 
     Parameters

@@ -13,8 +13,8 @@ import numpy as np
 from ..errors import ArgumentError, FileError
 from ..joint.signals import Signals, join_runs
 from ..runs.run import CalibrationRun
+from ..support.argumentkinds import told_kinds
 from ..support.decoding import finite_float, read_text, shown_value
-from ..support.kinds import told_kinds
 from ..support.suggestions import did_you_mean
 
 #: Speeds of a further run where none are stated, deg/s.

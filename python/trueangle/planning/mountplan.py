@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted, finite_or_none
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult, finite_or_none
 from .tables import factor_table, plain_plan
 
 

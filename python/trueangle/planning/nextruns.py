@@ -10,8 +10,8 @@ from typing import Any
 
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult
 from .evidence import Hypothesis
 from .further import run_steps
 

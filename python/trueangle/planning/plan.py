@@ -14,8 +14,8 @@ from ..errors import ArgumentError, NoModelError
 from ..joint.gear import HIGHEST_LOW_ORDER, wanted_orders
 from ..joint.shafts import limited_orders
 from ..runs.aliasing import fold
+from ..support.argumentkinds import told_kinds
 from ..support.distributions import random_numbers
-from ..support.kinds import told_kinds
 from .mountplan import CalibrationPlan
 from .mountsearch import offset_tolerance, search_offsets, search_shifts
 from .noisefactors import mount_noise_factors, noise_factors

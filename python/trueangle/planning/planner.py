@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 from ..support.blas import one_blas_thread
-from ..support.deadline import with_pace
+from ..support.deadline import with_deadline
 from .evidence import ReadingNoise
 from .further import run_seconds
 from .limits import Limits
@@ -25,7 +25,7 @@ WORK = 20_000
 def next_runs(
     earlier: Signals | None,
     believed: Simulation,
-    spots: Sequence[Blindness],
+    spots: Sequence[Ambiguity],
     noise: ReadingNoise,
     limits: Limits | None = None,
 ) -> NextRuns:
@@ -52,14 +52,14 @@ def next_runs(
     those, as long as there are any. Half a second to some seconds; after ten of the processor
     where no time is given, the best so far is the answer, and ``notes`` say so.
     """
-    with with_pace() as at, at.bounded(WORK), one_blas_thread():
+    with with_deadline() as at, at.bounded(WORK), one_blas_thread():
         return _next_runs(earlier, believed, spots, noise, limits)
 
 
 def _next_runs(
     earlier: Signals | None,
     believed: Simulation,
-    spots: Sequence[Blindness],
+    spots: Sequence[Ambiguity],
     noise: ReadingNoise,
     limits: Limits | None,
 ) -> NextRuns:
@@ -86,7 +86,7 @@ def _told(plan: NextRuns) -> int:
 
 
 def _found(
-    scales: DesignScales, limits: Limits, others: Sequence[Blindness], seen: Limits
+    scales: DesignScales, limits: Limits, others: Sequence[Ambiguity], seen: Limits
 ) -> NextRuns:
     """The best runs within limits, beside the earlier ones or by themselves."""
     search, earlier, alone = RunSearch(scales, limits), scales.earlier, False
@@ -114,7 +114,7 @@ def _found(
 def _entries(
     scales: DesignScales,
     designs: Sequence[RunDesign],
-    others: Sequence[Blindness],
+    others: Sequence[Ambiguity],
     start: Signals | None,
 ) -> Iterator[RivalEvidence]:
     """What the runs say of every question, and of what nobody asked."""

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult
 from .tables import factor_table, plain_plan
 
 

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.blindspots import blind_spots
 from ..effects.effect import telling_apart
 from ..estimation.regression import Regression
 from ..joint.signals import Signals, join_runs
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
-from ..support.deadline import pace
+from ..support.deadline import current_deadline
 from .evidence import (
     ExpectedEvidence,
     Hypothesis,
@@ -71,7 +71,7 @@ class DesignScales:
         self,
         earlier: Signals | None,
         believed: Simulation,
-        asked: Sequence[Blindness],
+        asked: Sequence[Ambiguity],
         noise: ReadingNoise,
         limits: Limits,
     ) -> None:
@@ -95,7 +95,7 @@ class DesignScales:
     @property
     def over(self) -> bool:
         """As many designs were weighed as a search may take, or its time is up."""
-        return self._left <= 0 or pace().over
+        return self._left <= 0 or current_deadline().over
 
     @property
     def all_seen(self) -> bool:
@@ -177,7 +177,7 @@ class DesignScales:
             bic = min((e.bic for e in evidence), default=None)
             yield Answer(is_open and is_strong_answer(evidence), bic, chance)
 
-    def blind(self, designs: Sequence[RunDesign], start: Signals | None) -> list[Blindness]:
+    def blind(self, designs: Sequence[RunDesign], start: Signals | None) -> list[Ambiguity]:
         """What nobody can tell from these runs."""
         return self._at(designs, start)[1]
 
@@ -224,7 +224,7 @@ class DesignScales:
 
     def _at(
         self, designs: Sequence[RunDesign], start: Signals | None
-    ) -> tuple[Regression, list[Blindness]]:
+    ) -> tuple[Regression, list[Ambiguity]]:
         regression = self._readings(self._signals(designs, start))
         return regression, blind_spots(regression)
 
@@ -249,7 +249,7 @@ class DesignScales:
         """Whether rivals take the form that imitates best: of many questions that is too slow."""
         return len(self.questions) <= SEARCHED or any(q.seen for q in self.questions)
 
-    def _open(self, question: Question, regression: Regression, spots: Sequence[Blindness]) -> bool:
+    def _open(self, question: Question, regression: Regression, spots: Sequence[Ambiguity]) -> bool:
         """Whether nothing in the design of the readings hides one of the causes."""
         if any(spot.hides(cause) for spot in spots for cause in question.causes):
             return False
@@ -261,7 +261,7 @@ class DesignScales:
             )
         )
 
-    def _unclear(self, question: Question, spots: Sequence[Blindness]) -> set[str]:
+    def _unclear(self, question: Question, spots: Sequence[Ambiguity]) -> set[str]:
         """What acts on whole runs, may be taken for a cause in question, and is not told by these.
 
         What cannot act at all, as a spring without a load, takes the place of nothing.

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError
 from ..joint.shafts import limited_orders
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .plan import readings_needed
 from .referencefree import SelfPlan

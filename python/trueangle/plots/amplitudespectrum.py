@@ -9,7 +9,7 @@ import numpy as np
 
 from ..fitting import summary as fitting_summary
 from ..fitting.orders import summary as orders_summary
-from ..fitting.orders.table import OrderSelection
+from ..fitting.orders.result import OrderSelection
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn
 from . import palette

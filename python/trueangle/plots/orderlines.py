@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ..fitting.orders.rows import OrderRow
+from ..fitting.orders.result import OrderSelection
 from ..fitting.orders.selection import FALSE_ALARM
-from ..fitting.orders.table import OrderSelection
+from ..fitting.orders.table import OrderRow
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.display_units import ErrorUnit, significant_digits

@@ -10,7 +10,7 @@ import numpy as np
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, wrap
 from ..support.display_units import ErrorUnit, significant_digits
-from ..support.plainresult import counted
+from ..support.layout import counted
 from . import curves
 from .curves import Points, Signal
 from .panel import (
@@ -48,8 +48,8 @@ def errors_picture(
     if fit is None:
         size = significant_digits(max(float(np.ptp(cloud.points.y)) for cloud in clouds), 3)
         told = f"{about}, without a model: up to {size} {unit.name} peak-to-peak."
-        return PanelPicture((Panel(ANGLE, y, clouds, curves.travelled_span(runs)),), told)
-    low, high = span = curves.seen_span(fit.model)
+        return PanelPicture((Panel(ANGLE, y, clouds, curves.travelled_degrees(runs)),), told)
+    low, high = span = curves.fitted_degrees(fit.model)
     strong = curves.strong_gear_order(fit.orders, fit.amplitudes, high - low)
     model = curves.model_curve(fit.model).scaled(unit.per_arcsec)
     whole = Panel(ANGLE, y, clouds, span, model=model, dense=strong is not None)
@@ -66,7 +66,7 @@ def errors_picture(
 
 def _measured(runs: Sequence[CalibrationRun]) -> list[Points]:
     """Readings where there is no model, on the turn that begins where the travel does."""
-    low, _ = curves.travelled_span(runs)
+    low, _ = curves.travelled_degrees(runs)
     found = []
     for number, run in enumerate(runs):
         error = wrap(run.indicated - run.reference - run.zero, run.period)
@@ -118,7 +118,7 @@ def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> PanelP
         shift = _BESIDE * ((np.arange(len(parts)) + 0.5) / len(parts) - 0.5)
         parts = [Points(p.label, p.x + s, p.y) for p, s in zip(parts, shift, strict=True)]
     scaled = [part.scaled(unit.per_arcsec) for part in parts]
-    span = {"angle": curves.seen_span(fit.model), "direction": (-1.5, 1.5)}.get(against)
+    span = {"angle": curves.fitted_degrees(fit.model), "direction": (-1.5, 1.5)}.get(against)
     panel = Panel(
         curves.SIGNALS[against],
         f"residual / {unit.name}",

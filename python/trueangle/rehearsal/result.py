@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..planning.nextruns import NextRuns
-from ..support.layout import laid_out, wrapped_lines
-from ..support.plainresult import PlainResult, counted, result_picture
+from ..support.layout import counted, laid_out, wrapped_lines
+from ..support.plainresult import PlainResult, result_picture
 from .cause import RehearsedCause
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from .cause import RehearsedCause, rehearsed_cause
 from .detection import Chance
 from .trial import Trial, TrialOutcome
@@ -73,7 +73,7 @@ class SizeSearch:
 
     cause: str
     sizes: SizeRange | None
-    spot: Blindness | None
+    spot: Ambiguity | None
     seeds: int
     start: int = 0
     answers: list[tuple[int, TrialOutcome]] = field(default_factory=list)
@@ -82,7 +82,7 @@ class SizeSearch:
 
     @classmethod
     def of(
-        cls, cause: str, sizes: SizeRange | None, spot: Blindness | None, seeds: int
+        cls, cause: str, sizes: SizeRange | None, spot: Ambiguity | None, seeds: int
     ) -> SizeSearch:
         """The search of a cause; one that the design cannot tell is tried large, to make sure."""
         if spot is None or sizes is None:

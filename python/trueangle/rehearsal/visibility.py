@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import EFFECTS, Effect
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.blindspots import blind_spots
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
@@ -56,10 +56,10 @@ class SizeRange:
         return float(self.first * 2.0 ** ((step if self.grows else -step) / STEPS))
 
 
-def blind_causes(sim: Simulation, signals: Signals) -> dict[str, Blindness]:
+def blind_causes(sim: Simulation, signals: Signals) -> dict[str, Ambiguity]:
     """Causes that a diagnosis of such readings does not name, and why."""
     noise = np.random.default_rng(0).standard_normal(len(signals)) * sim.sigma_arcsec
-    found: dict[str, Blindness] = {}
+    found: dict[str, Ambiguity] = {}
     for spot in blind_spots(Regression.of(signals, noise, sim.surroundings)):
         for cause in spot.causes:
             if EFFECTS[cause].is_doubted and spot.hides(cause):

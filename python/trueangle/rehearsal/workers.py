@@ -16,7 +16,7 @@ from typing import Any
 from ..errors import TrueAngleError
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
-from ..support.deadline import Pace, entered, pace
+from ..support.deadline import Deadline, current_deadline, under_deadline
 from .trial import ENDED, Trial, TrialOutcome, run_trial
 
 #: Variables that say how many threads a linear algebra library may use.
@@ -59,11 +59,11 @@ class LocalTrials:
     def answers(self) -> Iterator[tuple[Trial, TrialOutcome]]:
         """Answers as they come, until none is outstanding or the time is up."""
         sim, signals, seed = self._asked
-        at = pace()
+        at = current_deadline()
         while self._ready and not at.over:
             trial = self._ready.pop(0)
             left = None if at.within is None else max(at.within - at.seconds, 1e-3)
-            with entered(Pace(left)) as own:
+            with under_deadline(Deadline(left)) as own:
                 outcome = run_trial(sim, signals, trial, seed)
             at.stopped = at.stopped or own.stopped
             if outcome.verdict != ENDED:
@@ -102,7 +102,7 @@ class Workers:
 
     def answers(self) -> Iterator[tuple[Trial, TrialOutcome]]:
         """Answers as they come, until none is outstanding or the time is up."""
-        at = pace()
+        at = current_deadline()
         while self._outstanding and not at.over:
             try:
                 trial, answer = self._done.get(timeout=LOOK)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.model import HarmonicModel
-from ..plots.curves import seen_span
+from ..plots.curves import fitted_degrees
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..support.plainresult import finite_or_none
@@ -53,7 +53,7 @@ def model_content(fit: FitResult, name: LineNames) -> dict[str, Any]:
         )
     return {
         "argument": model.argument,
-        "span_deg": list(seen_span(model)),
+        "span_deg": list(fitted_degrees(model)),
         "constant_deg": model.constant * 360.0 / model.period,
         "coefficients": coefficients,
         "residual_std_arcsec": finite_or_none(factor * fit.residual_std),

@@ -28,7 +28,7 @@ class _Part(NamedTuple):
         return values if self.factor == 1.0 else values * self.factor
 
 
-class Angles(NamedTuple):
+class RunAngles(NamedTuple):
     """Columns of the reference with what is added to it, of the indicated angle, or of the error.
 
     ::
@@ -81,7 +81,7 @@ class Angles(NamedTuple):
         return reference, indicated
 
 
-def find_angles(
+def find_run_angles(
     path: object,
     header: Sequence[str],
     roles: Mapping[str, RoleColumn],
@@ -90,7 +90,7 @@ def find_angles(
     counts_per_turn: float | None = None,
     counts_per_turn_reference: float | None = None,
     facets: Facets | None = None,
-) -> Angles:
+) -> RunAngles:
     """What the angles of a table are made of, and their period.
 
     ``unit`` is that of angles whose columns state none, ``path`` stands in messages.
@@ -165,7 +165,7 @@ def find_angles(
             )
         offsets.append(_Part(column.name, column.scale(period, counts_per_turn_reference)[0]))
     mount = part(roles.get("mount")) if facets is not None else None
-    return Angles(
+    return RunAngles(
         path,
         period,
         part(found.get("reference")),

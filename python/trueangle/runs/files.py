@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import EmptyCellsWarning, FileError, level_of_caller
+from ..support.argumentkinds import told_kinds
 from ..support.files import InputFile
-from ..support.kinds import told_kinds
 from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, unit_in_name
 from ..support.signals import FIELDS
 from ..support.times import local_day
-from .angles import find_angles
+from .angles import find_run_angles
 from .facets import Facets, read_facets
 from .readings import FileReadings
-from .run import CalibrationRun, as_runs, given_runs
-from .source import Reading, checked_reading, each_table
+from .run import CalibrationRun, as_runs, runs_or_data
+from .source import ReadingOptions, checked_reading_options, each_table
 
 
 class _RunLabels(NamedTuple):
@@ -38,7 +38,7 @@ _PERIOD = 360.0
 
 
 @told_kinds
-def read_runs(path: Any, **reading: Unpack[Reading]) -> list[CalibrationRun]:
+def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationRun]:
     """Calibration runs of files or tables, in the order these name them.
 
     Parameters
@@ -93,7 +93,7 @@ def read_runs(path: Any, **reading: Unpack[Reading]) -> list[CalibrationRun]:
     >>> read_runs({"reference": [0.0, 90.0], "indicated": [0.1, 90.1]}, period=360.0)
     [CalibrationRun(None, 2 readings, period=360)]
     """
-    return _read(path, checked_reading(reading), "path")
+    return _read(path, checked_reading_options(reading), "path")
 
 
 def runs_of(
@@ -111,8 +111,8 @@ def runs_of(
     FileError
         As `read_runs`.
     """
-    asked = checked_reading(reading)
-    runs, data = given_runs(data)
+    asked = checked_reading_options(reading)
+    runs, data = runs_or_data(data)
     if runs is not None:
         return as_runs(runs)
     return _read(data, asked, name, table)
@@ -130,8 +130,8 @@ def each_runs(
     ArgumentError, FileError
         As `runs_of`; runs in different units are left to ``take``.
     """
-    asked = checked_reading(reading)
-    runs, data = given_runs(data)
+    asked = checked_reading_options(reading)
+    runs, data = runs_or_data(data)
     if runs is not None:
         take(as_runs(runs))
         return
@@ -139,7 +139,9 @@ def each_runs(
     each_table(data, lambda table: take(_runs_of_readings(table, given)), asked)
 
 
-def _read(data: Any, reading: Reading, name: str, table: str = "table") -> list[CalibrationRun]:
+def _read(
+    data: Any, reading: ReadingOptions, name: str, table: str = "table"
+) -> list[CalibrationRun]:
     given = Conversion.of(reading)
     found = each_table(data, lambda t: _runs_of_readings(t, given), reading, name, table)
     runs = [run for part in found for run in part]
@@ -163,7 +165,7 @@ class Conversion(NamedTuple):
     facets: Facets | None = None
 
     @classmethod
-    def of(cls, reading: Reading) -> Conversion:
+    def of(cls, reading: ReadingOptions) -> Conversion:
         """From the keywords of `read_runs`."""
         facets = reading["facets"]
         return cls(
@@ -190,7 +192,7 @@ class _RunColumns(NamedTuple):
     source: InputFile
 
 
-def read_columns(data: Any, reading: Reading) -> list[_RunColumns]:
+def read_columns(data: Any, reading: ReadingOptions) -> list[_RunColumns]:
     """The columns of every file or table, grouped by run; time may run backwards."""
     given = Conversion.of(reading)
     return each_table(data, lambda table: _columns(table, given), reading, "data")
@@ -203,7 +205,7 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
     if len(table.columns) == 1 and filled and table.roles.keys() <= asked & {"indicated"}:
         return _entries(table, given.counts)
     roles, path = table.roles, table.path
-    angles = find_angles(
+    angles = find_run_angles(
         path,
         list(table.columns),
         roles,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from ..formats.budget import DecodedSizeError, check_decoded
 from ..formats.columns import find_columns
-from ..formats.csvheader import number
+from ..formats.csvheader import cell_number
 from ..formats.format import TEXTS, Batch, Format, Labels, Selection
 from ..formats.formats import format_of_content
 from ..support.files import (
@@ -46,7 +46,7 @@ _ONCE: ContextVar[_Kept | None] = ContextVar("columns of files", default=None)
 
 
 @contextmanager
-def read_once() -> Iterator[None]:
+def reading_files_once() -> Iterator[None]:
     """Files that are asked for their readings again, of another joint, are not read again.
 
     The columns of as many as a table of runs may hold are kept meanwhile.
@@ -234,7 +234,7 @@ def _source(path: Path) -> InputFile:
 
 def _repeated(value: str, size: int, is_text: bool) -> NDArray[Any]:
     """A column of one value: a number where it is written as one and is no label."""
-    found = None if is_text or not _is_number(value) else number(value, ".")
+    found = None if is_text or not _is_number(value) else cell_number(value, ".")
     return np.full(size, value, dtype=object) if found is None else np.full(size, found)
 
 
@@ -284,7 +284,7 @@ def _is_number(text: str | None) -> bool:
     """A number that is written as one: 007 is a name."""
     if text is None:
         return True
-    return number(text, ",") is not None and not _NUMBERED.match(text)
+    return cell_number(text, ",") is not None and not _NUMBERED.match(text)
 
 
 _NUMBERED = re.compile(r"[+-]?0\d")

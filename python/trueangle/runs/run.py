@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError, KindError
 from ..support.angles import check_period, circular_mean, wrap
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.files import InputFile
-from ..support.kinds import told_kinds
 from ..support.signals import FIELDS, find_signal, signal_column, signal_columns
 
 
@@ -267,7 +267,7 @@ def as_runs(runs: CalibrationRun | Iterable[CalibrationRun]) -> list[Calibration
     return found
 
 
-def given_runs(data: Any) -> tuple[list[CalibrationRun] | None, Any]:
+def runs_or_data(data: Any) -> tuple[list[CalibrationRun] | None, Any]:
     """The list where ``data`` is a run or runs, else None; and the data, iterators as lists."""
     if isinstance(data, CalibrationRun):
         return [data], data

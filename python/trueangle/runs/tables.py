@@ -14,7 +14,7 @@ from ..errors import ArgumentError, KindError, MissingExtraError
 from ..formats.columns import find_columns
 from ..formats.format import Format
 from ..support.files import InputFile
-from ..support.labelled import without_labels
+from ..support.labelled import take_apart
 from ..support.roles import Wanted
 from .readings import FileReadings
 
@@ -108,7 +108,7 @@ def _values(column: Any) -> NDArray[Any]:
 
     Times of day and durations are seconds, from the first and as they are.
     """
-    values = np.asarray(without_labels(column)[0])
+    values = np.asarray(take_apart(column)[0])
     if values.dtype.kind == "M" and values.ndim == 1:
         known = values[~np.isnat(values)]
         values = values - (known[0] if known.size else np.datetime64("NaT"))
@@ -125,7 +125,7 @@ def _values(column: Any) -> NDArray[Any]:
 
 def _dates(column: Any) -> NDArray[Any]:
     """Dates and times as ISO 8601 writes them; texts as they are."""
-    values = np.asarray(without_labels(column)[0])
+    values = np.asarray(take_apart(column)[0])
     if values.dtype.kind == "M":
         return np.datetime_as_string(values, "us").astype(object)
     return values.astype(object)

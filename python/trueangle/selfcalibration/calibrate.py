@@ -7,10 +7,10 @@ from typing import Any, Final, Unpack
 
 from ..errors import ArgumentError, NoModelError
 from ..joint.shafts import MOST_ORDERS, limited_orders
-from ..runs.source import OtherReading
+from ..runs.source import OtherReadingOptions
 from ..support.angles import check_period
+from ..support.argumentkinds import told_kinds
 from ..support.blas import one_blas_thread
-from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .dual import dual
 from .heads import head_patterns
@@ -37,7 +37,7 @@ def selfcal(
     ripple: str | Sequence[float] = "auto",
     head_angles: Sequence[float] | None = None,
     period: float | None = None,
-    **reading: Unpack[OtherReading],
+    **reading: Unpack[OtherReadingOptions],
 ) -> SelfCalibration:
     """Calibrate a joint without a reference: from time stamps, heads, shifts or a motor.
 

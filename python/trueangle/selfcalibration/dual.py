@@ -42,7 +42,7 @@ from .gearlines import (
     motion_varies,
     slope_ratio,
 )
-from .modelling import reference_free_model
+from .model import reference_free_model
 from .projected import harmonic_unknowns
 from .recording import Recording
 from .result import (

@@ -18,9 +18,9 @@ import numpy as np
 from ..errors import ArgumentError, NoModelError
 from ..support.angles import wrap
 from ..support.arrays import Array
-from .choice import significant_orders
 from .dense import DenseFit, DenseRows, dense_fixed_point, fit_dense
-from .modelling import reference_free_model
+from .model import reference_free_model
+from .orderchoice import significant_orders
 from .pattern import ENCODER, pattern_model
 from .projected import harmonic_rows, harmonic_unknowns
 from .recording import Recording

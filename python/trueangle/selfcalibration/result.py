@@ -13,8 +13,8 @@ from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
-from ..support.layout import laid_out, wrapped_lines
-from ..support.plainresult import PlainResult, counted
+from ..support.layout import counted, laid_out, wrapped_lines
+from ..support.plainresult import PlainResult
 
 #: Seconds of arc in a radian.
 ARCSEC = ARCSEC_PER_TURN / (2.0 * math.pi)

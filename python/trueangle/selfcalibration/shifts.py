@@ -20,10 +20,10 @@ from ..errors import NoModelError
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import f_tail
-from .choice import significant_orders
 from .clampings import Clampings, clampings_of
 from .dense import DenseFit, DenseRows, dense_fixed_point, fit_dense
-from .modelling import reference_free_model
+from .model import reference_free_model
+from .orderchoice import significant_orders
 from .pattern import ENCODER, pattern_model
 from .projected import Unknown, harmonic_rows, harmonic_unknowns
 from .recording import Recording

@@ -15,11 +15,11 @@ import numpy as np
 
 from ..errors import NoModelError
 from ..support.arrays import Array
-from ..support.plainresult import counted
-from .choice import choose_selfcal_orders, highest_order
-from .colour import noise_spectrum_at
+from ..support.layout import counted
 from .loop import followed_orders, followed_share, widened_by_loop
-from .modelling import reference_free_model
+from .model import reference_free_model
+from .noisespectrum import noise_spectrum_at
+from .orderchoice import choose_selfcal_orders, highest_order
 from .pattern import ENCODER, pattern_series
 from .readings import SegmentReadings
 from .recording import Recording
@@ -33,8 +33,8 @@ from .result import (
     order_ranges,
 )
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
+from .segments import cut_stretches
 from .steady import SteadyFit, fit_steady
-from .stretches import cut_stretches
 from .verification import held_out_patterns
 
 #: An order of which motion leaves less is not the encoder's to say.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..joint.pattern import Pattern
 from ..runs.run import CalibrationRun
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from ..support.signals import COUPLED
 from .rotor import RotorDrive, RotorMotion, rotor_angle
 

@@ -16,12 +16,13 @@ from ..joint.pattern import Harmonic, JointPattern, Pattern
 from ..joint.signals import Signals, join_runs
 from ..runs.run import CalibrationRun, as_runs
 from ..support.angles import ARCSEC_PER_DEG
+from ..support.argumentkinds import all_of_type, of_type, told_kinds
 from ..support.arrays import Array
 from ..support.distributions import random_numbers
-from ..support.kinds import all_of_type, of_type, told_kinds
-from ..support.plainresult import ShownResult, counted
+from ..support.layout import counted
+from ..support.plainresult import ShownResult
 from .designs import RunDesign
-from .simulationtext import Stated, simulation_text, write_simulation
+from .simulationtext import StatedSimulation, simulation_text, write_simulation
 
 #: What must be given, for messages.
 SIMULATION = "a trueangle.Simulation (trueangle.load_simulation reads one)"
@@ -145,8 +146,8 @@ class Simulation(ShownResult):
         return simulation_text(self._stated)
 
     @property
-    def _stated(self) -> Stated:
-        return Stated(*(getattr(self, entry.name) for entry in fields(self)))
+    def _stated(self) -> StatedSimulation:
+        return StatedSimulation(*(getattr(self, entry.name) for entry in fields(self)))
 
 
 @told_kinds

@@ -33,7 +33,7 @@ MAX_TABLES = 10_000
 T = TypeVar("T")
 
 
-class Stated(NamedTuple):
+class StatedSimulation(NamedTuple):
     """What a simulation file says, the fields of `Simulation` in their order."""
 
     joint: Joint
@@ -44,7 +44,7 @@ class Stated(NamedTuple):
     source: str | None
 
 
-def decoded_simulation(path: str | Path) -> Stated:
+def decoded_simulation(path: str | Path) -> StatedSimulation:
     """The checked parts of a simulation file; see `load_simulation`."""
     text = read_text(path, SIMULATION_BYTES, FileError, "a simulation")
     return _decoded(path, _document(path, text))
@@ -63,7 +63,7 @@ def _document(path: str | Path, text: str) -> dict[str, Any]:
         raise FileError(path, "holds a number or date that cannot be read") from None
 
 
-def _decoded(path: str | Path, document: Mapping[str, Any]) -> Stated:
+def _decoded(path: str | Path, document: Mapping[str, Any]) -> StatedSimulation:
     for name in document:
         if name not in _TABLES:
             raise FileError(
@@ -95,7 +95,7 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> Stated:
     if sigma is None:
         got = shown_value(noise["sigma_arcsec"])
         raise FileError(path, f"[noise]: sigma_arcsec must be a finite number, got {got}")
-    return Stated(joint, harmonics, effects, sigma, designs, str(path))
+    return StatedSimulation(joint, harmonics, effects, sigma, designs, str(path))
 
 
 def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
@@ -232,7 +232,7 @@ def guarded_build(path: str | Path, where: str, build: Callable[[], T]) -> T:
         raise FileError(path, f"{where}: {cause}") from None
 
 
-def to_table(sim: Stated) -> dict[str, Any]:
+def simulation_table(sim: StatedSimulation) -> dict[str, Any]:
     """The tables of a simulation file; keys at their defaults are left out of ``run``."""
     runs = []
     for design in sim.runs:
@@ -261,7 +261,7 @@ def _given(entry: Any) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def write_simulation(sim: Stated, path: str | Path) -> None:
+def write_simulation(sim: StatedSimulation, path: str | Path) -> None:
     """Write a simulation file, beside and then renamed; floats round-trip exactly.
 
     Where the simulation was read from a file, that file's text is kept and only what
@@ -272,14 +272,14 @@ def write_simulation(sim: Stated, path: str | Path) -> None:
         file.write(text)
 
 
-def simulation_text(sim: Stated) -> str:
+def simulation_text(sim: StatedSimulation) -> str:
     """The text of a simulation file, as `write_simulation` writes it."""
-    whole = to_table(sim)
+    whole = simulation_table(sim)
     if sim.source is not None and Path(sim.source).is_file():
         import tomllib
 
         text = Path(sim.source).read_text(encoding="utf-8").rstrip("\n")
-        old = to_table(decoded_simulation(sim.source))
+        old = simulation_table(decoded_simulation(sim.source))
         appended: dict[str, Any] = {
             name: whole[name][len(old[name]) :] for name in ("harmonic", "effect", "run")
         }

@@ -50,6 +50,11 @@ def normal_quantile(p: float) -> float:
     return NormalDist().inv_cdf(_probability(p))
 
 
+def two_sided_quantile(chance: float) -> float:
+    """The x with ``P(|Z| > x) = chance``: what a standard normal number exceeds in size."""
+    return normal_quantile(1.0 - 0.5 * chance)
+
+
 def student_tail(t: float, degrees_of_freedom: float) -> float:
     """Probability ``P(T_ν > t)`` of Student's distribution, to about 1e-13 relative.
 

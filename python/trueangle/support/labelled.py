@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 PutBack: TypeAlias = Callable[[NDArray[Any]], Any]
 
 
-def without_labels(data: Any) -> tuple[Any, PutBack | None]:
+def take_apart(data: Any) -> tuple[Any, PutBack | None]:
     """The numbers of labelled data, and what makes such data of other numbers.
 
     Missing values are NaN, and anything else than such data is returned as it is.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sized
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final
@@ -106,3 +106,15 @@ def _folded(line: str, width: int, indent: int) -> list[str]:
         parts.append(line[:cut].rstrip())
         line = " " * indent + line[cut:].lstrip()
     return [*parts, line.rstrip()]
+
+
+def counted(things: Sized | int, one: str, several: str = "") -> str:
+    """How many there are, in words.
+
+    Examples
+    --------
+    >>> counted(1, "run"), counted([1, 2], "run"), counted(0, "reversal", "reversals")
+    ('1 run', '2 runs', '0 reversals')
+    """
+    n = things if isinstance(things, int) else len(things)
+    return f"{n} {one if n == 1 else several or one + 's'}"

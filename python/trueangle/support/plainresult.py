@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sized
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 #: Characters of a result's ``repr`` at most: one line of a screen.
@@ -72,18 +72,6 @@ class PlainResult(ShownResult):
     def to_json(self) -> str:
         """`to_dict` as JSON text."""
         return json_text(self.to_dict(), indent=2)
-
-
-def counted(things: Sized | int, one: str, several: str = "") -> str:
-    """How many there are, in words.
-
-    Examples
-    --------
-    >>> counted(1, "run"), counted([1, 2], "run"), counted(0, "reversal", "reversals")
-    ('1 run', '2 runs', '0 reversals')
-    """
-    n = things if isinstance(things, int) else len(things)
-    return f"{n} {one if n == 1 else several or one + 's'}"
 
 
 def finite_or_none(value: float) -> float | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from trueangle.cli import main
-from trueangle.cli.terminal import Plain, coloured_text, has_colours
+from trueangle.cli.terminal import PlainStream, coloured_text, has_colours
 from trueangle.support.layout import laid_out, text_columns, wrapped_lines
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "looks"))
@@ -66,14 +66,14 @@ def test_a_terminal_has_colours_unless_it_is_told_otherwise(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     seen = Terminal()
-    Plain(seen).write("trueangle: error: no\x1b[31m file")
+    PlainStream(seen).write("trueangle: error: no\x1b[31m file")
     assert seen == ["trueangle: \x1b[1;31merror:\x1b[0m no\\x1b[31m file"]
     for name, value in (("NO_COLOR", "1"), ("TERM", "dumb")):
         with monkeypatch.context() as changed:
             changed.setenv(name, value)
             assert not has_colours(seen)
             plain = Terminal()
-            Plain(plain).write("error: x")
+            PlainStream(plain).write("error: x")
             assert plain == ["error: x"]
     assert not has_colours(io.StringIO())
     assert coloured_text('[{"says": "warning: x"}]') == '[{"says": "warning: x"}]'
@@ -134,7 +134,7 @@ def test_what_is_written_is_as_long_as_what_was_given(colours, encoding, monkeyp
     for name in ("NO_COLOR", "TERM"):
         monkeypatch.delenv(name, raising=False)
     held = io.BytesIO()
-    stream = Plain(Terminal(held, encoding, newline=""), wording=lambda text: f"<{text}>")
+    stream = PlainStream(Terminal(held, encoding, newline=""), wording=lambda text: f"<{text}>")
     for text in ("error: none", "a\x1b[31m", "\u2212 3 \u2192 4\n", "", "Confirmed:\nretained\n"):
         before = len(held.getvalue())
         assert stream.write(text) == len(text)

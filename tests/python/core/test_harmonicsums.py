@@ -13,8 +13,7 @@ from trueangle.fitting.orders.evidence import (
     log_chance,
 )
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
-from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
-from trueangle.fitting.orders.zerogroups import zero_groups
+from trueangle.fitting.orders.zerogroups import ZeroGroupReadings, zero_groups
 from trueangle.runs.aliasing import distinct_positions
 
 # Normal equations of a few hundred readings, relative to their size.

@@ -12,7 +12,7 @@ import trueangle as ta
 from trueangle.diagnosis.confirmation import _by_run, _size
 from trueangle.diagnosis.delay import error_before, find_delay
 from trueangle.diagnosis.diagnose import _noise, _overall, _ratio_finding, _structure
-from trueangle.diagnosis.forms import share_beside
+from trueangle.diagnosis.formerrors import share_beside_form_errors
 from trueangle.diagnosis.unnamed import CHANNELS, UnnamedPattern, is_line_of, modulator, modulators
 from trueangle.effects import EFFECTS
 from trueangle.effects.time_periodic import WANDER
@@ -226,10 +226,10 @@ def test_the_share_beside_bends_is_that_of_what_they_leave(signals: Signals) -> 
     extension = EFFECTS["backlash"].propose(fitted)
     other = np.random.default_rng(7).normal(size=len(signals)) + signals.direction
     beside = fitted.jointly_with(100.0 * other[:, None], 1.0)
-    share = share_beside(fitted, beside, [extension])
+    share = share_beside_form_errors(fitted, beside, [extension])
     gains = [one.gain(extension.columns)[0] for one in (fitted, beside)]
     assert share == pytest.approx(gains[1] / gains[0])
     assert 0.0 < share < 0.9
-    assert share_beside(fitted, fitted, [extension]) == 1.0
+    assert share_beside_form_errors(fitted, fitted, [extension]) == 1.0
     # Never more than it had.
-    assert share_beside(beside, fitted, [extension]) == 1.0
+    assert share_beside_form_errors(beside, fitted, [extension]) == 1.0

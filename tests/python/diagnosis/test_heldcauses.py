@@ -7,10 +7,10 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.confirmation import confirmation_status
-from trueangle.diagnosis.findings import Diagnosis
 from trueangle.diagnosis.gain import Gain, measure_gain
 from trueangle.diagnosis.goodness import Noise, Unexplained
 from trueangle.diagnosis.holdout import held_out_residuals, reducible_share
+from trueangle.diagnosis.result import Diagnosis
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs

@@ -12,7 +12,7 @@ from trueangle.diagnosis.discrepancy import unfolded_error
 from trueangle.diagnosis.drive import diagnose_drive
 from trueangle.diagnosis.finding import Finding
 from trueangle.effects import Backlash, Latency
-from trueangle.estimation.estimate import quantity
+from trueangle.estimation.quantity import quantity
 from trueangle.joint.signals import join_runs
 from trueangle.runs.joining import minus_simulated
 from trueangle.simulation import Simulation

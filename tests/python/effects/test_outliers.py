@@ -16,7 +16,7 @@ from trueangle.effects.outliers import (
     _interpolated,
 )
 from trueangle.estimation.regression import Regression
-from trueangle.estimation.stretches import (
+from trueangle.estimation.segments import (
     MOST_IN_ROW,
     flagged_segments,
     less_local_level,

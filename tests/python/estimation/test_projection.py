@@ -7,7 +7,7 @@ import pytest
 
 from trueangle._core import Factor
 from trueangle.effects.search import golden_maximum
-from trueangle.estimation.batch import BlockProducts, Blocks
+from trueangle.estimation.blocks import BlockProducts, Blocks
 from trueangle.estimation.factor import orthonormal_basis
 from trueangle.estimation.projection import Projection, project
 from trueangle.estimation.solution import common_blocks

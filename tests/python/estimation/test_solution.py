@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from trueangle import CalibrationRun
-from trueangle.estimation.estimate import Quantity, quantity
 from trueangle.estimation.extension import Extension, penalty_of_parameter
 from trueangle.estimation.lines import LineBasis, plausible_orders
+from trueangle.estimation.quantity import Quantity, quantity
 from trueangle.estimation.readings import Readings
 from trueangle.estimation.regression import Regression
 from trueangle.estimation.whitening import RunEffect

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from trueangle.estimation.batch import BlockProducts, Blocks
+from trueangle.estimation.blocks import BlockProducts, Blocks
 from trueangle.estimation.whitening import (
     LagCorrelation,
     RunEffect,

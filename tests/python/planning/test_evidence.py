@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trueangle.effects import EFFECTS
-from trueangle.effects.blindness import Blindness
+from trueangle.effects.ambiguity import Ambiguity
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 from trueangle.planning.evidence import ExpectedEvidence, Hypothesis, ReadingNoise, evidence_between
@@ -135,7 +135,7 @@ def test_an_effect_that_a_run_cannot_show_has_no_size():
 def test_what_is_too_small_to_be_seen_is_not_in_question():
     """The argument's error of a line of 14 arcsec is a thousandth of an arcsec; of 1000 it is 5."""
     rich = join_runs(simulate(SIM, 0, [RunDesign(reversals=(0.4,))]))
-    spot = Blindness(("local_defect", "argument_error"), "", "")
+    spot = Ambiguity(("local_defect", "argument_error"), "", "")
 
     def asked(around):
         return {one.cause for one in question_of(spot, rich, around, 3.0).hypotheses}
@@ -143,5 +143,5 @@ def test_what_is_too_small_to_be_seen_is_not_in_question():
     assert asked(SIM.surroundings) == {"local_defect"}
     steep = Simulation(harmonics=(Harmonic("output", 1, 2000.0, 240.0),))
     assert asked(steep.surroundings) == {"local_defect", "argument_error"}
-    alone = Blindness(("argument_error",), "", "")
+    alone = Ambiguity(("argument_error",), "", "")
     assert question_of(alone, rich, SIM.surroundings, 3.0).hypotheses

@@ -13,10 +13,10 @@ import pytest
 import trueangle as ta
 from fleets.made import units
 from trueangle.diagnosis.finding import named_quantity
-from trueangle.estimation.estimate import quantity
+from trueangle.estimation.quantity import quantity
 from trueangle.export.export import _source
 from trueangle.export.pattern import TurnPattern
-from trueangle.fitting.likeness import unlike_runs_sentence
+from trueangle.fitting.unlikeruns import unlike_runs_sentence
 from trueangle.fleets.fleet import Fleet
 from trueangle.formats.columns import listed_columns
 from trueangle.model.records import Provenance

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trueangle.selfcalibration.choice import significant_orders
 from trueangle.selfcalibration.dense import (
     DenseRows,
     _evidence,
@@ -14,6 +13,7 @@ from trueangle.selfcalibration.dense import (
     fit_dense,
     low_frequency_inflation,
 )
+from trueangle.selfcalibration.orderchoice import significant_orders
 from trueangle.selfcalibration.projected import Projected, Unknown, harmonic_unknowns
 
 N = 300

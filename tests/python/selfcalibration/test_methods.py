@@ -8,7 +8,7 @@ from scipy import stats
 
 import trueangle as ta
 from trueangle.errors import ArgumentError, NoModelError
-from trueangle.selfcalibration.choice import significant_orders
+from trueangle.selfcalibration.orderchoice import significant_orders
 from trueangle.selfcalibration.projected import Projected, harmonic_unknowns
 
 from .test_other_methods import dual_log, heads_log, shifts_log

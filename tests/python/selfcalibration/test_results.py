@@ -9,14 +9,14 @@ import pytest
 
 from trueangle.errors import ArgumentError, NotInvertibleError
 from trueangle.model.model import HarmonicModel
-from trueangle.selfcalibration.colour import noise_spectrum_at, spectrum_at
 from trueangle.selfcalibration.loop import (
     check_loop,
     followed_orders,
     followed_share,
     widened_by_loop,
 )
-from trueangle.selfcalibration.modelling import reference_free_model
+from trueangle.selfcalibration.model import reference_free_model
+from trueangle.selfcalibration.noisespectrum import noise_spectrum_at, spectrum_at
 from trueangle.selfcalibration.pattern import pattern_model, pattern_series, pattern_steepness
 from trueangle.selfcalibration.projected import harmonic_rows, harmonic_sum
 from trueangle.selfcalibration.recording import Recording

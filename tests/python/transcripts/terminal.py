@@ -92,7 +92,7 @@ class Terminal:
         """Commands run in the folder, on a terminal of so many columns; figures are kept."""
         from matplotlib.figure import Figure
 
-        from trueangle.diagnosis.findings import Diagnosis
+        from trueangle.diagnosis.result import Diagnosis
 
         before, width, save = os.getcwd(), os.environ.get("COLUMNS"), Figure.savefig
         planned = Diagnosis.next_runs

@@ -19,8 +19,8 @@ from ...support.suggestions import check_choice
 from ..argument import AnyArgument, choose_argument, run_at_indicated
 from ..uncertainty import CovarianceKind, check_covariance
 from .candidates import choose_candidates
+from .result import OrderSelection
 from .selection import EvidenceSelection
-from .table import OrderSelection
 
 if TYPE_CHECKING:
     from ..summed import SummedReadings

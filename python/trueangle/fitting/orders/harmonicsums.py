@@ -20,7 +20,8 @@ import trueangle._core as _core
 from ...estimation.linear import NormalEquations
 from ...support.arrays import Array
 from ...support.powersums import power_sums
-from .unitgroups import GROUPS, MOST_UNITS, ZeroGroupReadings, columns_summed, units_in_groups
+from .unitgroups import GROUPS, MOST_UNITS, columns_summed, units_in_groups
+from .zerogroups import ZeroGroupReadings
 
 #: From so many readings on the core's piecewise moments are faster than this file's powers.
 _LARGE: Final = 1024

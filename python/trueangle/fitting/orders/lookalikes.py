@@ -15,7 +15,7 @@ import numpy as np
 from ...runs.aliasing import Positions, position_coherence
 from .evidence import fit_chosen_orders
 from .harmonicsums import harmonic_sums
-from .unitgroups import ZeroGroupReadings
+from .zerogroups import ZeroGroupReadings
 
 #: Two orders are told apart when one explains better by this many noise variances: a
 #: likelihood ratio of e^5, about 150 to 1.

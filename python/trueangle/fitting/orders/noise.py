@@ -14,7 +14,7 @@ from ...support.arrays import Array
 from ...support.quantiles import median
 from .evidence import COLLINEAR, OVERDISPERSED, fit_chosen_orders, log_chi2_tail
 from .harmonicsums import HarmonicSums
-from .unitgroups import ZeroGroupReadings
+from .zerogroups import ZeroGroupReadings
 
 #: Sweeps of alternating means (positions, zeros); whole grids need one.
 _SWEEPS: Final = 20

@@ -24,11 +24,10 @@ from .evidence import log_chance
 from .lookalikes import find_lookalikes
 from .noise import ReadingVariance
 from .phases import circular_range_deg
-from .rows import OrderRow
-from .table import OrderSelection
-from .unitgroups import ZeroGroupReadings
+from .result import OrderSelection
+from .table import OrderRow
 from .verdicts import explained_row, selection_notes
-from .zerogroups import zero_groups
+from .zerogroups import ZeroGroupReadings, zero_groups
 
 #: Phases of a retained order lie within this arc over the runs. Noise alone stays within
 #: 60 degrees over five runs in 0.4 % of cases, within the paper's "about 10" in 3e-6,

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...estimation.factor import orthonormal_basis
-from ...estimation.readings import is_rounding_visible
-from ...estimation.rounded import fit_rounded
+from ...estimation.rounded import fit_rounded, is_rounding_visible
 from ...joint.pattern import lines_columns
 from ...support.arrays import Array
-from .unitgroups import ZeroGroupReadings
+from .zerogroups import ZeroGroupReadings
 
 
 def orders_beyond_rounding(

@@ -10,15 +10,15 @@ from ...errors import TrueAngleError, UnlikeRunsWarning
 from ...joint.shafts import limited_orders
 from ...runs.files import runs_of
 from ...runs.run import CalibrationRun
-from ...runs.source import Reading
-from ...support.kinds import told_kinds
+from ...runs.source import ReadingOptions
+from ...support.argumentkinds import told_kinds
 from ..argument import AnyArgument
 from ..fit import fitted_to
 from ..uncertainty import CovarianceKind
 from .choice import Method, selected_orders
-from .rows import OrderRow
+from .result import OrderSelection
 from .selection import FALSE_ALARM
-from .table import OrderSelection
+from .table import OrderRow
 
 __all__ = ["FALSE_ALARM", "OrderRow", "OrderSelection", "select_orders"]
 
@@ -37,7 +37,7 @@ def select_orders(
     nuisance: str | Iterable[str] = "none",
     reference_orders: Iterable[float] = (),
     tolerance: float | None = None,
-    **reading: Unpack[Reading],
+    **reading: Unpack[ReadingOptions],
 ) -> OrderSelection:
     """Orders of the angle error that the readings support.
 

@@ -18,10 +18,10 @@ from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
 from .noise import pure_error
 from .phases import circular_range_deg, unit_phases
+from .result import OrderSelection
 from .rounding import orders_beyond_rounding
-from .rows import OrderRow
 from .search import FALSE_ALARM, EvidenceSearch
-from .table import OrderSelection
+from .table import OrderRow
 from .verdicts import explained_row, selection_notes, verdict_reason
 from .zerogroups import angle_blocks, zero_groups
 

@@ -10,7 +10,7 @@ from ...support.angles import arcsec
 from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, rounded_phase, sine_of_rms
 from ...support.layout import laid_out, wrapped_lines
 from ...support.plainresult import finite_or_none
-from .rows import OrderRow, OrderTable
+from .table import OrderRow, OrderTable
 
 #: Rejected orders listed beside the retained ones, the strongest first.
 _REJECTED = 8

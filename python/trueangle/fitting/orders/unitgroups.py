@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...support.arrays import Array
+from .zerogroups import ZeroGroupReadings
 
 #: With more units than this they are taken together, in so many groups.
 MOST_UNITS: Final = 96
@@ -25,30 +25,6 @@ _RESEED: Final = 64
 
 #: Numbers of a block of units: it stays small beside the readings.
 _BLOCK: Final = 1 << 21
-
-
-class ZeroGroupReadings(NamedTuple):
-    """Readings of one unit: a run, or a run on one mount, that has its own zero.
-
-    Attributes
-    ----------
-    turns : ndarray, shape (n,)
-        Reference angle in turns; unwrapped where the orders are not whole.
-    error : ndarray, shape (n,)
-        Error around its zero, in any unit.
-    weights : ndarray, shape (n,)
-        Positive.
-    label : str
-    """
-
-    turns: Array
-    error: Array
-    weights: Array
-    label: str
-
-    def part(self, mask: NDArray[np.bool_], label: str) -> ZeroGroupReadings:
-        """The readings where ``mask`` is true."""
-        return ZeroGroupReadings(self.turns[mask], self.error[mask], self.weights[mask], label)
 
 
 def units_in_groups(units: Sequence[ZeroGroupReadings]) -> list[list[int]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
 from ...runs.travel import over_turns
 from ...support.angles import wrap
-from .unitgroups import ZeroGroupReadings
+from ...support.arrays import Array
 
 #: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
 _FOLDS: Final = 6
@@ -21,6 +21,30 @@ _BLOCKS: Final = 24
 
 #: Readings a run up to which the call of a function costs more than what it computes.
 _SHORT: Final = 1000
+
+
+class ZeroGroupReadings(NamedTuple):
+    """Readings of one unit: a run, or a run on one mount, that has its own zero.
+
+    Attributes
+    ----------
+    turns : ndarray, shape (n,)
+        Reference angle in turns; unwrapped where the orders are not whole.
+    error : ndarray, shape (n,)
+        Error around its zero, in any unit.
+    weights : ndarray, shape (n,)
+        Positive.
+    label : str
+    """
+
+    turns: Array
+    error: Array
+    weights: Array
+    label: str
+
+    def part(self, mask: NDArray[np.bool_], label: str) -> ZeroGroupReadings:
+        """The readings where ``mask`` is true."""
+        return ZeroGroupReadings(self.turns[mask], self.error[mask], self.weights[mask], label)
 
 
 def zero_groups(

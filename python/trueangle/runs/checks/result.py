@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...support.layout import laid_out, wrapped_lines
-from ...support.plainresult import PlainResult, counted
+from ...support.layout import counted, laid_out, wrapped_lines
+from ...support.plainresult import PlainResult
 from .extent import Extent
 from .fault import DataFault
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ...errors import ArgumentError, FileError
 from ...formats.columns import matching_column
 from ...support.angles import ARCSEC_PER_TURN
+from ...support.argumentkinds import told_kinds
 from ...support.arrays import Array
-from ...support.kinds import told_kinds
 from ...support.roles import checked_count_turn, role_code, wanted_columns
 from ...support.signals import FIELDS
 from ..readings import FileReadings, read_readings

@@ -20,7 +20,7 @@ from ..files import runs_of
 from ..run import CalibrationRun
 from .clocks import estimated_clocks
 from .stream import Stream
-from .travel import Travelled
+from .travel import TravelledError
 
 #: How a log may be brought to the readings.
 BY = ("time", "angle")
@@ -241,7 +241,7 @@ def _expected(run: CalibrationRun, log: CalibrationRun, by: str | None, source: 
         elif by == "time":
             lacks = source if log.time is None else f"run {run.label or '1'}"
             raise ArgumentError(f"{lacks} has no time: give a column time_s, or join by angle")
-    travelled = Travelled(_degrees(log), _error(log), log.direction)
+    travelled = TravelledError(_degrees(log), _error(log), log.direction)
     error, known = travelled.at(_degrees(run), run.direction)
     note = ""
     if by is None and run.time is not None and log.time is not None:

@@ -16,7 +16,7 @@ from trueangle.fitting.orders.evidence import (
 )
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
 from trueangle.fitting.orders.noise import neighbour_scatter, pooled_scatter, run_scatter
-from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
+from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 SIGMA = 0.3
 

@@ -10,7 +10,7 @@ import pytest
 import trueangle as ta
 from coarse import Sensor, any_sensor
 from trueangle.fitting.orders.rounding import orders_beyond_rounding
-from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
+from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 
 @pytest.mark.parametrize("seed", range(40, 70))

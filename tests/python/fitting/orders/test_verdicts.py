@@ -11,7 +11,7 @@ from scipy import stats
 
 import trueangle as ta
 from trueangle.fitting.orders.evidence import log_chance, log_chi2_tail
-from trueangle.fitting.orders.rows import OrderRow
+from trueangle.fitting.orders.table import OrderRow
 
 SEED = 71_000
 THETA = np.arange(36) * 10.0

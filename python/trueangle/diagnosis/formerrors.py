@@ -58,16 +58,16 @@ def beside_form_errors(regression: Regression, exempt: Collection[str] = ()) -> 
     return regression if made is None else made
 
 
-def told_from_forms(regression: Regression, extension: Extension) -> Extension:
+def told_from_form_errors(regression: Regression, extension: Extension) -> Extension:
     """The extension with the evidence that it has beside bends of the other causes."""
     beside = beside_form_errors(regression, {extension.cause})
     if beside is regression:
         return extension
-    share = share_beside(regression, beside, [extension])
+    share = share_beside_form_errors(regression, beside, [extension])
     return replace(extension, deviance=extension.deviance * share)
 
 
-def share_beside(
+def share_beside_form_errors(
     regression: Regression, beside: Regression, extensions: Sequence[Extension]
 ) -> float:
     """Share of the deviance of ``extensions`` together that is left beside the bends."""

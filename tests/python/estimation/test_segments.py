@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trueangle.estimation.stretches import (
+from trueangle.estimation.segments import (
     flagged_segments,
     less_local_level,
     short_segments,

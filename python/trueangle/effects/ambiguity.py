@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..estimation.estimate import Parameters
 from ..estimation.factor import orthonormal_basis
+from ..estimation.quantity import Parameters
 from ..estimation.regression import Regression
 from ..support.arrays import Array
 from ..support.plainresult import ShownResult
@@ -27,7 +27,7 @@ RUNS_PER_LEVEL = 3
 
 
 @dataclass(frozen=True)
-class Blindness(ShownResult):
+class Ambiguity(ShownResult):
     """Causes that this data cannot tell apart, or not see at all.
 
     Attributes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.missing_order import MissingOrder
 from .diagnosisdata import DiagnosisData
 
@@ -12,7 +12,7 @@ from .diagnosisdata import DiagnosisData
 Entry = tuple[str, int, int]
 
 
-def ambiguity_matters(spot: Blindness, diagnosis: DiagnosisData) -> bool:
+def ambiguity_matters(spot: Ambiguity, diagnosis: DiagnosisData) -> bool:
     """Something is seen, or one of the causes is believed or found beside it."""
     asked = {effect.kind for effect in diagnosis.extended.effects}
     asked |= {belief.what for belief in diagnosis.beliefs}
@@ -22,7 +22,7 @@ def ambiguity_matters(spot: Blindness, diagnosis: DiagnosisData) -> bool:
 
 
 def ambiguity_entries(
-    diagnosis: DiagnosisData, verbose: bool, sizes: Callable[[Blindness], Iterator[str]]
+    diagnosis: DiagnosisData, verbose: bool, sizes: Callable[[Ambiguity], Iterator[str]]
 ) -> Iterator[Entry]:
     """Entries on what cannot be told, what is seen first.
 
@@ -53,7 +53,7 @@ def ambiguity_entries(
         )
 
 
-def _head(spot: Blindness) -> str:
+def _head(spot: Ambiguity) -> str:
     names = ", ".join(spot.causes)
     if not spot.supported:
         return names

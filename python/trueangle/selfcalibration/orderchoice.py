@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..support.distributions import chi_squared_quantile
-from .colour import spectrum_at
+from .noisespectrum import spectrum_at
 from .pattern import ENCODER, pattern_series
 from .projected import Projected
 from .readings import SegmentReadings

@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ..effects import EFFECTS, Effect
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.missing_order import MissingOrder
 from ..estimation.extension import Extension
 from ..estimation.regression import ROUNDING, Regression
@@ -50,11 +50,11 @@ def _scaled_effect(
     return other if float(np.abs(after - factor * before).max()) <= limit else None
 
 
-def corrected_effects(
+def effects_as_measured(
     regression: Regression,
     believed: Simulation,
     sim: Simulation,
-    spots: Sequence[Blindness] = (),
+    spots: Sequence[Ambiguity] = (),
 ) -> Simulation | None:
     """The simulation with the strength of one refuted effect as measured; None where none is.
 
@@ -106,7 +106,7 @@ def judged_beliefs(
     regression: Regression,
     sim: Simulation,
     believed: Simulation,
-    spots: list[Blindness],
+    spots: list[Ambiguity],
     with_gain: bool,
 ) -> tuple[list[Belief], Simulation]:
     """Verdicts on every line and effect, and the simulation with refuted ones as measured.
@@ -161,7 +161,7 @@ def _effect(regression: Regression, sim: Simulation, old: Effect, new: Effect) -
 
 
 def _lines(
-    regression: Regression, sim: Simulation, spots: list[Blindness], with_gain: bool
+    regression: Regression, sim: Simulation, spots: list[Ambiguity], with_gain: bool
 ) -> tuple[list[Belief], tuple[Harmonic, ...]]:
     pattern, joint = regression.belief.pattern, regression.belief.joint
     if pattern.orders.size == 0 or any(
@@ -196,7 +196,7 @@ def _lines(
 
 
 def _doubt(
-    regression: Regression, order: float, change: Array, spread: Array, spots: list[Blindness]
+    regression: Regression, order: float, change: Array, spread: Array, spots: list[Ambiguity]
 ) -> bool:
     """Whether a line may be another one behind the positions.
 
