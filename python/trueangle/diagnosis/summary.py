@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from ..effects.ambiguity import Ambiguity
+from ..effects.missing_order import MissingOrder
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 from ..support.layout import laid_out
 from ..support.layout import wrapped_lines as _wrapped
-from .ambiguitytext import ambiguity_entries
 from .beliefs import Belief
 from .diagnosisdata import DiagnosisData
 from .finding import brief_finding, finding_lines, named_quantity, unit_of
@@ -17,6 +17,9 @@ from .goodness.scatter import AGAINST_STATED
 
 #: Share by which the noise must differ from what the simulation states to be told first.
 MATERIAL = 0.1
+
+#: What adds an entry to a text: how far its further lines are set in, and the first one.
+Entry = tuple[str, int, int]
 
 
 def diagnosis_summary(
@@ -66,7 +69,7 @@ def diagnosis_summary(
         lines.append("")
         for text in diagnosis.torque.lines():
             lines += _wrapped(text, 2)
-    open_still = [*ambiguity_entries(diagnosis, verbose, lambda spot: _if_it_is(spot, unit))]
+    open_still = [*_ambiguity_entries(diagnosis, verbose, lambda spot: _if_it_is(spot, unit))]
     if diagnosis.next_runs is not None and diagnosis.next_runs.runs:
         lines += ["", *diagnosis.next_runs.summary().splitlines()]
     lines += [""] if open_still else []
@@ -169,3 +172,54 @@ def _belief(belief: Belief, unit: ErrorUnit) -> str:
 
 def _chance(p: float) -> str:
     return "below 1e-12" if p < 1e-12 else f"{p:.1g}"
+
+
+def _ambiguity_matters(spot: Ambiguity, diagnosis: DiagnosisData) -> bool:
+    """Something is seen, or one of the causes is believed or found beside it."""
+    asked = {effect.kind for effect in diagnosis.extended.effects}
+    asked |= {belief.what for belief in diagnosis.beliefs}
+    asked |= {finding.cause for finding in diagnosis.findings}
+    # A line beside it is no reason to speak of all that may make one.
+    return spot.supported or bool(set(spot.causes) & (asked - {MissingOrder.kind}))
+
+
+def _ambiguity_entries(
+    diagnosis: DiagnosisData, verbose: bool, sizes: Callable[[Ambiguity], Iterator[str]]
+) -> Iterator[Entry]:
+    """Entries on what cannot be told, what is seen first.
+
+    What was not asked, and is not seen either, is named in one line, but where ``verbose``.
+    ``sizes`` gives what each cause of a blind spot would amount to.
+    """
+    plan = diagnosis.next_runs
+    planned = {entry.causes for entry in (plan.between if plan and plan.runs else ()) if entry.told}
+    spots = sorted(diagnosis.not_identifiable, key=lambda spot: not spot.supported)
+    shown = [spot for spot in spots if verbose or _ambiguity_matters(spot, diagnosis)]
+    if shown:
+        yield "What these readings cannot tell:", 0, 0
+    for spot in shown:
+        how = "" if spot.causes in planned and not verbose else f" To find out: {spot.measure}."
+        yield f"- {_head(spot)}: {spot.because}.{how}", 2, 0
+        for text in sizes(spot):
+            yield text, 6, 4
+    named = {finding.cause for finding in diagnosis.findings}
+    others = (cause for spot in spots if spot not in shown for cause in spot.causes)
+    rest = [cause for cause in others if cause not in named]
+    if rest:
+        names = ", ".join(dict.fromkeys(rest))
+        again = " either" if shown else ""
+        yield (
+            f"Not seen, and could not be in such runs{again}: {names} (why: `verbose=True`).",
+            2,
+            0,
+        )
+
+
+def _head(spot: Ambiguity) -> str:
+    names = ", ".join(spot.causes)
+    if not spot.supported:
+        return names
+    if spot.common:
+        others = ", ".join(cause for cause in spot.causes if cause != spot.common)
+        return f"whether {spot.common} is due to {others}"
+    return f"{names} ({'one of them' if len(spot.causes) > 1 else 'something'} is seen)"

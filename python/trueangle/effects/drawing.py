@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
@@ -34,19 +33,9 @@ def drawn_carrier(around: JointPattern, rng: np.random.Generator) -> float | Non
     return found[int(rng.integers(len(found)))] if found else None
 
 
-def drawn_place(signals: Signals, rng: np.random.Generator) -> float:
-    """A place that the runs pass, degrees of the output."""
-    return float(np.mod(signals.degrees[int(rng.integers(len(signals)))], 360.0))
-
-
 def reading_rate(signals: Signals) -> float:
     """Readings a second in the slowest of the runs."""
     steps = [
         float(np.median(np.diff(signals.clock[a:b]))) for a, b in signals.run_bounds() if b > a + 1
     ]
     return 1.0 / max(max(steps, default=1.0), 1e-12)
-
-
-def largest_signal(values: NDArray[np.float64] | None) -> float:
-    """Largest absolute value of a channel; 0 where it was not recorded."""
-    return 0.0 if values is None else float(np.abs(values).max(initial=0.0))

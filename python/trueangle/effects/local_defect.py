@@ -22,7 +22,6 @@ from ..support.angles import from_arcsec
 from ..support.deadline import current_deadline
 from .ambiguity import Ambiguity
 from .argument_error import ArgumentShift
-from .drawing import drawn_place
 from .effect import Effect
 from .missing_order import MissingOrder
 from .search import Array, Fitted, tangent_covariance
@@ -110,7 +109,8 @@ class LocalDefect(Effect):
     def drawn(
         cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
-        return cls(drawn_place(signals, rng), float(rng.uniform(3.0, 8.0)), size)
+        place = float(np.mod(signals.degrees[int(rng.integers(len(signals)))], 360.0))
+        return cls(place, float(rng.uniform(3.0, 8.0)), size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -19,7 +19,6 @@ from ..support.angles import from_arcsec
 from ..support.arrays import distinct
 from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .departures import departure_beyond
-from .drawing import largest_signal
 from .effect import Effect
 from .search import Array, Fitted, golden_maximum, tangent_covariance
 from .shapes import best_shape
@@ -100,7 +99,9 @@ class StiffeningCompliance(Effect):
         cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         # What is taken off at the largest load is a quarter of the linear part there.
-        return cls(4.0 * size * largest_signal(signals.torque) ** 2, -size)
+        torque = signals.torque
+        largest = 0.0 if torque is None else float(np.abs(torque).max(initial=0.0))
+        return cls(4.0 * size * largest**2, -size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -32,7 +32,7 @@ RENAMED: Final = {
     "logs.ahead": "formats.ahead",
     "logs.checksum": "formats.checksum",
     "modelfile": "model.file",
-    "modelsummary": "model.summary",
+    "modelsummary": "model.model",
     "modeltext": "model.writing",
     "moments": "estimation.moments",
     "momentsfit": "estimation.momentsfit",

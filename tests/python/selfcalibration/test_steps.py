@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from selfcalibration.test_stretches import TURN, segment
+from selfcalibration.test_segments import TURN, segment
 from trueangle.selfcalibration import steps as module
 from trueangle.selfcalibration.projected import Unknown
 from trueangle.selfcalibration.readings import SegmentReadings
