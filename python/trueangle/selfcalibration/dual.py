@@ -48,7 +48,7 @@ from .recording import Recording
 from .result import (
     ARCSEC,
     Blind,
-    HeldOut,
+    HeldOutPattern,
     OrderEstimate,
     SelfCalibration,
     blind_words,
@@ -302,7 +302,7 @@ def _notes(fit: DualFit, ratio: float, channels: GearedChannels) -> list[str]:
     return notes
 
 
-def _held_out(channels: GearedChannels, ratio: float, fit: DualFit) -> dict[str, HeldOut]:
+def _held_out(channels: GearedChannels, ratio: float, fit: DualFit) -> dict[str, HeldOutPattern]:
     """One part of the readings predicts the other: halves, or blocks in turn over one pass."""
     if min(o.size for o in channels.output) < _READINGS:
         return {}
@@ -331,7 +331,7 @@ def _held_out(channels: GearedChannels, ratio: float, fit: DualFit) -> dict[str,
         freedom = math.inf if many else _FREEDOM
     names = ("the first half", "the second half") if halves else ("odd blocks", "even blocks")
     return {
-        "halves" if halves else "blocks": HeldOut(
+        "halves" if halves else "blocks": HeldOutPattern(
             *names,
             before * ARCSEC,
             after * ARCSEC,

@@ -27,7 +27,7 @@ from .recording import Recording
 from .result import (
     ARCSEC,
     Blind,
-    HeldOut,
+    HeldOutPattern,
     OrderEstimate,
     SelfCalibration,
     blind_words,
@@ -247,7 +247,7 @@ def _notes(
 
 def _held_out(
     readings: Sequence[Array], orders: Sequence[float], noise: float
-) -> dict[str, HeldOut]:
+) -> dict[str, HeldOutPattern]:
     """Odd turns against even ones."""
     odd, even = [], []
     for h in readings:

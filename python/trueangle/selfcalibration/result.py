@@ -82,7 +82,7 @@ class Blind:
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutPattern:
     """A pattern found on one part of the readings, judged on another."""
 
     fitted_on: str
@@ -136,7 +136,7 @@ class SelfCalibration(PlainResult):
     orders: tuple[OrderEstimate, ...]
     sums: tuple[OrderEstimate, ...]
     blind: tuple[Blind, ...]
-    held_out: Mapping[str, HeldOut]
+    held_out: Mapping[str, HeldOutPattern]
     notes: tuple[str, ...]
     noise_arcsec: float
     readings: int

@@ -30,7 +30,7 @@ from .recording import Recording
 from .result import (
     ARCSEC,
     Blind,
-    HeldOut,
+    HeldOutPattern,
     SelfCalibration,
     blind_words,
     order_estimates,
@@ -262,7 +262,9 @@ def _notes(design: Clampings, fit: DenseFit) -> list[str]:
     return [*notes, *fit.notes]
 
 
-def _held_out(design: Clampings, orders: Sequence[float], whole: DenseFit) -> dict[str, HeldOut]:
+def _held_out(
+    design: Clampings, orders: Sequence[float], whole: DenseFit
+) -> dict[str, HeldOutPattern]:
     """Each clamping predicted by the others."""
     runs = len(design.joint)
     if runs < 3:
@@ -295,7 +297,7 @@ def _held_out(design: Clampings, orders: Sequence[float], whole: DenseFit) -> di
     variance = whole.projected.variance
     ratio = after / (count * variance + expected)
     return {
-        "clampings": HeldOut(
+        "clampings": HeldOutPattern(
             "all clampings but one",
             "the one left out",
             math.sqrt(before / count) * ARCSEC,

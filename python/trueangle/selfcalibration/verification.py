@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, f_tail
 from .readings import SegmentReadings
-from .result import ARCSEC, HeldOut
+from .result import ARCSEC, HeldOutPattern
 from .steady import SteadyFit, fit_steady
 
 #: Speeds that differ by less than this ratio test nothing.
@@ -24,13 +24,13 @@ _TURNS: Final = 4.0
 
 def judged_patterns(
     first: Array, second: Array, covariance: Array, noise: float, names: tuple[str, str]
-) -> HeldOut:
+) -> HeldOutPattern:
     """Two patterns (cosine and sine in turn, radians) of two parts of the readings.
 
     ``covariance`` is that of ``second - first``.
     """
     gap = second - first
-    return HeldOut(
+    return HeldOutPattern(
         fitted_on=names[0],
         judged_on=names[1],
         rms_before=math.hypot(noise, math.sqrt(0.5 * float(second @ second))) * ARCSEC,
@@ -58,7 +58,7 @@ def chance_of_difference(gap: Array, covariance: Array, freedom: float = math.in
 
 def held_out_patterns(
     fit: SteadyFit, tested: Sequence[float], colour: float = 1.0
-) -> dict[str, HeldOut]:
+) -> dict[str, HeldOutPattern]:
     """Odd turns against even ones, fast against slow, one direction against the other.
 
     Both parts share the motion; each has a pattern of its own. Slow against fast is made
@@ -109,7 +109,7 @@ def _compare(
     colour: float,
     *,
     ripple: bool = True,
-) -> HeldOut:
+) -> HeldOutPattern:
     parts = fit_steady(
         fit.readings,
         fit.orders,

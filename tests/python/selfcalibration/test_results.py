@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from trueangle import selfcalibration
 from trueangle.errors import ArgumentError, NotInvertibleError
 from trueangle.model.model import HarmonicModel
 from trueangle.selfcalibration.loop import (
@@ -22,7 +23,7 @@ from trueangle.selfcalibration.projected import harmonic_rows, harmonic_sum
 from trueangle.selfcalibration.recording import Recording
 from trueangle.selfcalibration.result import (
     Blind,
-    HeldOut,
+    HeldOutPattern,
     OrderEstimate,
     SelfCalibration,
     blind_words,
@@ -97,8 +98,8 @@ def test_halves_are_judged_by_chi_squared() -> None:
     assert found.rms_before == pytest.approx(math.sqrt(9.0 + 0.5 * 5.0) * 1e-5 * ARCSEC)
     assert found.rms_after == pytest.approx(math.sqrt(9.0 + 0.5 * 4.0) * 1e-5 * ARCSEC)
     assert (found.fitted_on, found.judged_on) == ("a", "b")
-    assert HeldOut("a", "b", 1.0, 2.0, 0.0011).to_dict()["agrees"]
-    assert not HeldOut("a", "b", 1.0, 2.0, 0.001).to_dict()["agrees"]
+    assert HeldOutPattern("a", "b", 1.0, 2.0, 0.0011).to_dict()["agrees"]
+    assert not HeldOutPattern("a", "b", 1.0, 2.0, 0.001).to_dict()["agrees"]
     none = judged_patterns(np.zeros(0), np.zeros(0), np.zeros((0, 0)), 1e-5, ("a", "b"))
     assert none.p == 1.0
 
@@ -330,8 +331,8 @@ def test_a_summary_tells_every_number() -> None:
     assert order_ranges([1, 2, 3, 7.3, 8, 9, 10]) == "1-3, 7.3, 8-10"
     assert blind_words([0.0]) == "zero"
     assert blind_words([1.0, 2.0, 3.0]) == "orders 1-3"
-    tests = {"a": HeldOut("odd turns", "even turns", 9.0, 2.0, 0.5),
-             "b": HeldOut("forward", "backward", 9.0, 2.0, 0.0005)}  # fmt: skip
+    tests = {"a": HeldOutPattern("odd turns", "even turns", 9.0, 2.0, 0.5),
+             "b": HeldOutPattern("forward", "backward", 9.0, 2.0, 0.0005)}  # fmt: skip
     result = SelfCalibration(
         "dual", pattern_model([], np.zeros(0)), (order(1.0),), (), (Blind((2.0, 3.5), "x", "y"),),
         tests, ("careful",), 1.5, 900, 12.34,
@@ -355,3 +356,9 @@ def test_a_summary_tells_every_number() -> None:
     assert "not the encoder's alone" in named
     assert "both" in named
     assert result.to_dict()["blind"][0]["orders"] == [2, 3.5]
+
+
+def test_the_former_name_of_a_pattern_held_out() -> None:
+    with pytest.warns(DeprecationWarning, match="HeldOutPattern"):
+        assert selfcalibration.HeldOut is HeldOutPattern
+    assert not hasattr(selfcalibration, "HeldIn")
