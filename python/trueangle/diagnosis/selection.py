@@ -110,7 +110,7 @@ def regrown(regression: Regression, causes: Sequence[str]) -> Regression:
 def _specific_first(regression: Regression) -> list[Regression]:
     """Over a part of a turn: the choice by a path that takes flexible causes last; else none.
 
-    A bump stands for several lines there, and a wander, whose search takes longest, for most else.
+    A bump stands for several lines there, and a drift, whose search takes longest, for most else.
     """
     if regression.signals.run_turns().max() >= LocalDefect.flexible_below:
         return []
@@ -155,9 +155,9 @@ def _doubtful(regression: Regression) -> bool:
 def _priced_with_noise(regression: Regression) -> Regression:
     """Causes that the noise's own correlation does not pay for are dropped.
 
-    It is estimated beside a flexible pattern; what selection took for it, with wander taken
+    It is estimated beside a flexible pattern; what selection took for it, with drift taken
     out, is too low for noise that is correlated over many readings, and run means then look
-    significant. A wander in time competes with correlation alone.
+    significant. A drift in time competes with correlation alone.
     """
     return _without_misfits(_under_its_noise(regression))
 
@@ -223,7 +223,7 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
         starts.append(declared)
     paths = [_pruned(_forward(_forward(s, specific, goal), list(EFFECTS))) for s in starts]
     if declared is not regression:
-        # Beside the declared lines what wanders is a wander, not what else bends as slowly.
+        # Beside the declared lines what drifts is a drift, not what else bends as slowly.
         flexible = [cause for cause, effect in EFFECTS.items() if is_flexible(effect)]
         paths.append(_pruned(_forward(_forward(declared, flexible), list(EFFECTS))))
     return _made_specific(min([direct, *paths], key=total_penalty))
@@ -247,7 +247,7 @@ def _with_lines_for_bumps(regression: Regression) -> Regression:
 
 
 def _with_declared_lines(regression: Regression) -> Regression:
-    """With the lines of the shafts that the joint declares, before a wander may take them.
+    """With the lines of the shafts that the joint declares, before a drift may take them.
 
     What a random walk is fitted beside it leaves alone; those without evidence are pruned.
     """

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..effects import EFFECTS, Effect
-from ..effects.time_periodic import WANDER, TimePeriodic
+from ..effects.time_periodic import FREQUENCY_DRIFT, TimePeriodic
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns
@@ -208,8 +208,10 @@ def is_line_in_time(term: Extension) -> bool:
 
 
 def is_line_of(term: Extension, frequency: float) -> bool:
-    """The term is a line in time whose frequencies wander about as far as this one."""
+    """The term is a line in time whose frequencies drift about as far as this one."""
     if not is_line_in_time(term):
         return False
     own = np.asarray(term.shape["frequency_hz"], dtype=np.float64)
-    return bool(own.min() * (1.0 - WANDER) <= frequency <= own.max() * (1.0 + WANDER))
+    return bool(
+        own.min() * (1.0 - FREQUENCY_DRIFT) <= frequency <= own.max() * (1.0 + FREQUENCY_DRIFT)
+    )

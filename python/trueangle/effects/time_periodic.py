@@ -38,7 +38,7 @@ BINS = 8
 LEAST_CYCLES = 3.0
 
 #: Share of its frequency by which a line may differ from run to run (a converter's clock).
-WANDER = 0.015
+FREQUENCY_DRIFT = 0.015
 
 #: Readings that a run must have to be searched.
 LEAST_READINGS = 16
@@ -113,7 +113,7 @@ class TimePeriodic(Effect):
         # No frequency of its own in every run can bring more.
         if regression.is_dominated(float(p.max(axis=0).sum()), 1, np.log(frequencies.size)):
             return None
-        tried = [_fixed(frequencies, p, sizes), _wandering(frequencies, p)]
+        tried = [_fixed(frequencies, p, sizes), _drifting(frequencies, p)]
         step = float(frequencies[1] - frequencies[0])
         best: Extension | None = None
         refined: dict[tuple[float, ...], list[float]] = {}
@@ -153,7 +153,9 @@ class TimePeriodic(Effect):
         if speed == 0.0:
             return False
         order = float(np.median(found.shape["frequency_hz"])) / speed
-        near = max(UNRESOLVED / max(float(np.median(signals.run_turns())), 1e-9), WANDER * order)
+        near = max(
+            UNRESOLVED / max(float(np.median(signals.run_turns())), 1e-9), FREQUENCY_DRIFT * order
+        )
         orders = regression.lines.orders
         known = np.concatenate([orders, regression.around.pattern.orders])
         share = 0.5 + 1.0 / signals.runs
@@ -254,13 +256,15 @@ def _fixed(frequencies: Array, p: Array, sizes: Array) -> tuple[NDArray[np.int64
     return np.full(sizes.size, k), float(best[k]), log_grid
 
 
-def _wandering(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, float]:
+def _drifting(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, float]:
     """Places of a frequency that differs a little from run to run."""
     nowhere = np.zeros(p.shape[1], dtype=np.int64)
-    bands = np.log(frequencies[-1] / frequencies[0]) / WANDER
-    count = max(int(np.ceil(bands * WANDER / np.log1p(WANDER))) - 1, 0)
-    middles = float(frequencies[0]) * (1.0 + WANDER) ** np.arange(1, count + 1)
-    low, high = np.searchsorted(frequencies, np.outer([1.0 - WANDER, 1.0 + WANDER], middles))
+    bands = np.log(frequencies[-1] / frequencies[0]) / FREQUENCY_DRIFT
+    count = max(int(np.ceil(bands * FREQUENCY_DRIFT / np.log1p(FREQUENCY_DRIFT))) - 1, 0)
+    middles = float(frequencies[0]) * (1.0 + FREQUENCY_DRIFT) ** np.arange(1, count + 1)
+    low, high = np.searchsorted(
+        frequencies, np.outer([1.0 - FREQUENCY_DRIFT, 1.0 + FREQUENCY_DRIFT], middles)
+    )
     wide = high - low > OVERSAMPLING
     low, high = low[wide], high[wide]
     if not low.size:

@@ -17,7 +17,7 @@ from .detection import detection
 from .diagnosispictures import error_left, gains
 from .drawnreadings import before_after, error_curves, measured_and_simulated, residuals
 from .fleetpictures import fleet_overview, fleet_patterns, fleet_phasors, fleet_sizes
-from .kinds import draw_result as draw_result
+from .kinds import drawn as drawn
 from .kinds import fit_plot
 from .kinds import thumbnail as thumbnail
 from .modelerror import model_error

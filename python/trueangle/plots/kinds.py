@@ -58,6 +58,6 @@ def thumbnail(result: object) -> str:
         return ""
 
 
-def draw_result(result: object, *args: Any, **options: Any) -> Any:
+def drawn(result: object, *args: Any, **options: Any) -> Any:
     """The picture of a result (`trueangle.support.plainresult.result_picture`)."""
     return _RESULTS[type(result).__name__](result, *args, **options)

@@ -92,7 +92,7 @@ def selfcal(
     Notes
     -----
     Reaches the Cramer-Rao limit of white noise where motion is smooth; standard errors
-    include what the wander of the motion, fitted beside, takes away. Never seen: the zero;
+    include what the drift of the motion, fitted beside, takes away. Never seen: the zero;
     see `SelfCalibration.blind` for the rest. A million readings, 30 orders: about a second.
 
     References

@@ -74,7 +74,7 @@ class RunDesign:
     imbalance_deg_s2, imbalance_phase_deg : float
         Acceleration ``u sin(theta + phase)`` by imbalance.
     friction_deg_s2, friction_memory_s : float
-        Standard deviation and memory of a friction that wanders.
+        Standard deviation and memory of a friction that drifts.
     deg_s2_per_A : float, optional
         Acceleration per ampere; the current that the loop asks for joins ``current_A``.
     motor_sigma_arcsec : float, optional

@@ -5,7 +5,7 @@
     θ̈ = -γθ̇ + c sin(mθ + φ) + u sin(θ + ψ) + f(t) + a
 
 with viscous friction ``γ`` (none at constant speed), cogging, imbalance and a friction
-that wanders, all as accelerations, and ``a`` what a velocity loop asks of the motor. The
+that drifts, all as accelerations, and ``a`` what a velocity loop asks of the motor. The
 loop is closed on the encoder under test: with what the encoder reads, r, and its speed,
 
 ::
@@ -36,7 +36,7 @@ _STEP: Final = 0.1
 
 
 class RotorDrive(NamedTuple):
-    """What moves a shaft, in radians and seconds; the friction that wanders in deg/s^2."""
+    """What moves a shaft, in radians and seconds; the friction that drifts, in deg/s^2."""
 
     place: float
     speed: float
@@ -72,7 +72,7 @@ def rotor_angle(
     pattern : Pattern
         Lines that the loop sees; other effects and noise do not move the shaft.
     rng : numpy.random.Generator
-        Of the friction that wanders.
+        Of the friction that drifts.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def rotor_angle(
 
     fastest = max([order if cogging else 1.0, *(m for m, _ in lines)])
     longest = _STEP / max(fastest * abs(start) * max(1.0, math.exp(-rate * time[-1])), band, 1e-12)
-    friction = np.radians(_wander(drive, time, rng)).tolist()
+    friction = np.radians(_drift(drive, time, rng)).tolist()
     n = time.size
     angle, speed, driven = np.empty(n), np.empty(n), np.zeros(n)
     x, v, before = place, start, 0.0
@@ -161,7 +161,7 @@ def rotor_angle(
     return RotorMotion(np.degrees(angle), np.degrees(speed), np.degrees(driven))
 
 
-def _wander(drive: RotorDrive, time: Array, rng: np.random.Generator) -> Array:
+def _drift(drive: RotorDrive, time: Array, rng: np.random.Generator) -> Array:
     """A friction's acceleration at every reading, that forgets itself in ``memory_s``."""
     size = drive.friction_deg_s2
     if size == 0.0:

@@ -15,7 +15,7 @@ from trueangle.diagnosis.diagnose import _noise, _overall, _ratio_finding, _stru
 from trueangle.diagnosis.formerrors import share_beside_form_errors
 from trueangle.diagnosis.unnamed import CHANNELS, UnnamedPattern, is_line_of, modulator, modulators
 from trueangle.effects import EFFECTS
-from trueangle.effects.time_periodic import WANDER
+from trueangle.effects.time_periodic import FREQUENCY_DRIFT
 from trueangle.estimation.regression import Regression
 from trueangle.joint.pattern import ARCSEC_PER_RAD
 from trueangle.joint.signals import Signals, join_runs
@@ -211,10 +211,10 @@ def test_modulators_are_in_units_of_their_spread(signals: Signals) -> None:
 
 def test_a_line_is_another_s_within_what_that_wanders() -> None:
     term = SimpleNamespace(cause="time_periodic", shape={"frequency_hz": [3.0, 3.1]})
-    for frequency, same in ((3.0, True), (3.0 * (1.0 - 0.99 * WANDER), True), (3.1, True),
-                            (3.0 * (1.0 - 1.01 * WANDER), False),
-                            (3.1 * (1.0 + 0.99 * WANDER), True),
-                            (3.1 * (1.0 + 1.01 * WANDER), False)):  # fmt: skip
+    for frequency, same in ((3.0, True), (3.0 * (1.0 - 0.99 * FREQUENCY_DRIFT), True), (3.1, True),
+                            (3.0 * (1.0 - 1.01 * FREQUENCY_DRIFT), False),
+                            (3.1 * (1.0 + 0.99 * FREQUENCY_DRIFT), True),
+                            (3.1 * (1.0 + 1.01 * FREQUENCY_DRIFT), False)):  # fmt: skip
         assert is_line_of(term, frequency) == same
     assert not is_line_of(SimpleNamespace(cause="latency", shape={}), 3.0)
 

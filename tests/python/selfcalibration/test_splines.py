@@ -105,15 +105,15 @@ def test_a_coarser_spline_is_a_finer_one() -> None:
 
 @pytest.mark.parametrize("memory", [0.3, 7.0])
 def test_the_prior_is_that_of_its_differences(memory: float) -> None:
-    wander = DriftPenalty(KNOTS)
+    drift = DriftPenalty(KNOTS)
     third, second = differences(KNOTS, 3), differences(KNOTS, 2)
     mu = (0.5 / memory) ** 2
     prior = third.T @ third + mu * second.T @ second
-    np.testing.assert_allclose(dense(wander.bands(2.5, memory)), 2.5 * prior, atol=1e-12)
+    np.testing.assert_allclose(dense(drift.bands(2.5, memory)), 2.5 * prior, atol=1e-12)
     c = np.random.default_rng(6).normal(size=KNOTS.size)
-    assert wander.energy(c, memory) == pytest.approx(c @ prior @ c)
-    np.testing.assert_allclose(wander.pull(c, memory), prior @ c, atol=1e-12)
-    assert wander.rank == np.linalg.matrix_rank(prior) == 26
+    assert drift.energy(c, memory) == pytest.approx(c @ prior @ c)
+    np.testing.assert_allclose(drift.pull(c, memory), prior @ c, atol=1e-12)
+    assert drift.rank == np.linalg.matrix_rank(prior) == 26
     # Of what the prior holds: with the lines of each stretch measured in place and speed.
     lines = np.zeros((KNOTS.size, 4))
     for g, (first, n) in enumerate(zip(KNOTS.first, KNOTS.intervals, strict=False)):
@@ -123,7 +123,7 @@ def test_the_prior_is_that_of_its_differences(memory: float) -> None:
     held = np.linalg.slogdet(2.5 * prior + lines @ np.linalg.inv(lines.T @ lines) @ lines.T)[1]
     # The measure of the lines: the volume that one second of place and speed spans.
     volume = np.linalg.slogdet(lines.T @ lines)[1]
-    assert wander.log_determinant(2.5, memory) == pytest.approx(held - volume, abs=1e-8)
+    assert drift.log_determinant(2.5, memory) == pytest.approx(held - volume, abs=1e-8)
 
 
 def test_trends_are_polynomials_that_no_straight_line_is() -> None:

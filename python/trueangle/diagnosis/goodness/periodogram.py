@@ -1,7 +1,7 @@
 """Lines that every run draws anew: of one frequency in time, or of one order in angle.
 
 The periodograms of the runs, each divided by its own level about every frequency (which takes
-correlation and wander away), add up to
+correlation and drift away), add up to
 
 ::
 
