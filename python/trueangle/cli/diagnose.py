@@ -109,7 +109,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the diagnosis."""
     from ..diagnosis import diagnose
-    from .run_lists import read_checked
+    from .run_lists import read_checked_runs
 
     if args.model is not None and args.corrected_model is None:
         raise ArgumentError(
@@ -132,7 +132,7 @@ def run(args: argparse.Namespace) -> int:
         model = load_model(args.model)
     own = [entry for entry in args.signal or () if entry[0] == "simulated"]
     args.signal = [entry for entry in args.signal or () if entry[0] != "simulated"]
-    runs = read_checked(args)
+    runs = read_checked_runs(args)
     simulated = None
     if args.simulated is not None:
         from ..runs.joining import minus_simulated
@@ -158,7 +158,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     """Diagnose every joint against its simulation, or an empty one of its gear."""
     from ..diagnosis import diagnose
     from ..reports.robot import diagnosed_rank, plain_ranking, ranked
-    from .run_lists import read_checked
+    from .run_lists import read_checked_runs
 
     if any(given is not None for given in (args.simulated, args.extend, args.model, args.plan)):
         raise ArgumentError(
@@ -168,7 +168,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
 
     def work(joint: JointAsked) -> Diagnosis:
         simulation = _believed(joint.args, empty=True)
-        runs = read_checked(joint.args)
+        runs = read_checked_runs(joint.args)
         return diagnose(runs, simulation, within=args.within, progress=args.progress)
 
     found, _ = each_joint(joints, work)

@@ -78,7 +78,7 @@ def _of_joint(joint: JointAsked) -> OrderSelection:
 def _in_memory(args: argparse.Namespace) -> OrderSelection:
     from ..fitting.orders.select import select_orders
     from ..fitting.robust import without_spikes
-    from .run_lists import read_selected
+    from .run_lists import read_selected_runs
 
     reference = (
         ()
@@ -86,7 +86,7 @@ def _in_memory(args: argparse.Namespace) -> OrderSelection:
         else parse_orders(args.reference_orders, "--reference-orders")
     )
     return select_orders(
-        [without_spikes(run) for run in read_selected(args)],
+        [without_spikes(run) for run in read_selected_runs(args)],
         None if args.orders is None else parse_orders(args.orders),
         args.gear_ratio,
         args.fixed_member,

@@ -152,9 +152,9 @@ def _fleet(args: argparse.Namespace) -> int:
 def _made(args: argparse.Namespace, path: str | None, title: str | None = None) -> Any:
     """The report or certificate that is asked for, written to ``path``."""
     from ..reports import report
-    from .run_lists import read_checked
+    from .run_lists import read_checked_runs
 
-    runs = read_checked(args)
+    runs = read_checked_runs(args)
     simulation = None
     if args.simulation is not None:
         from ..simulation import load_simulation

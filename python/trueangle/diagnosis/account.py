@@ -1,4 +1,4 @@
-"""Account of readings: the causes chosen, against the simulation or nearly it."""
+"""Account of readings: data prepared, and causes chosen, against the simulation or nearly it."""
 
 from __future__ import annotations
 

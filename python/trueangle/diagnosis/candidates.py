@@ -10,7 +10,13 @@ from ..estimation.cache import CachedProposal
 from ..estimation.regression import Extension, Regression
 from ..support.deadline import current_deadline
 from .formerrors import told_from_form_errors
-from .penalty import before_forms, deviance_of_form_errors, form_misfit, penalty_of, total_penalty
+from .penalty import (
+    deviance_before_forms,
+    deviance_of_form_errors,
+    form_misfit,
+    penalty_of,
+    total_penalty,
+)
 from .unnamed import effect_or_unnamed
 
 #: An extension, what it extends, and its net BIC gain.
@@ -100,7 +106,7 @@ class CandidateScores:
     def score(self, candidate: Candidate) -> float:
         """Net gain less what a cause costs beyond its parameters."""
         extension, start, gain = candidate
-        explained = before_forms(start) - start.deviance
+        explained = deviance_before_forms(start) - start.deviance
         if not effect_or_unnamed(extension.cause).has_exact_form:
             explained += extension.deviance
         after = penalty_of([*start.terms, extension], deviance_of_form_errors(explained, start.n))

@@ -19,7 +19,7 @@ from .formerrors import FORM
 from .gain import Gain
 from .goodness import FREE_PATH, Unexplained
 from .goodness.periodogram import order_test, time_test
-from .penalty import NEW_CAUSE, cause_terms
+from .penalty import NEW_CAUSE, regression_without
 from .remainder import free_paths, remainder_of
 from .runzeros import CHANCE, chance_between_runs
 from .selection import is_flexible
@@ -153,7 +153,7 @@ def _is_whole(regression: Regression, group: Sequence[int], order: float) -> boo
     whole = float(round(order))
     if whole < 1.0 or abs(order - whole) > NEAR:
         return False
-    rest = cause_terms(regression, list(group), settled=True)
+    rest = regression_without(regression, list(group), settled=True)
     theta = regression.signals.theta
     found, own = (
         rest.propose_run_effect(NonIntegerOrder.kind, {"order": m}, line_columns(theta, m))
@@ -197,7 +197,7 @@ def _of_scatter(cause: str) -> bool:
 
 def _explains_runs(regression: Regression, group: Sequence[int]) -> bool:
     """The likelihood of the runs one by one is better with it: bootstrap over runs."""
-    without = cause_terms(regression, list(group), settled=True)
+    without = regression_without(regression, list(group), settled=True)
     gains = _by_run(regression) - _by_run(without)
     if gains.size < ENOUGH_RUNS:
         return True

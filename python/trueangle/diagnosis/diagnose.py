@@ -33,7 +33,7 @@ from .gates import many_causes
 from .gearedlines import GearedLinesRatio
 from .goodness import Unexplained, goodness_of_fit
 from .judgedbeliefs import judged_beliefs
-from .penalty import cause_terms
+from .penalty import regression_without
 from .remainder import leftover_of, unexplained_after
 from .result import Diagnosis
 from .rounding import rounding_of
@@ -180,7 +180,7 @@ def _diagnosis(
         findings, spots, doubtful = findings_of(chosen, account.choice.spots, gain, rest)
     if doubtful and not rest.found and not at.cut:
         # What is not confirmed explains nothing; the others may well without it.
-        others = cause_terms(chosen, doubtful, settled=True)
+        others = regression_without(chosen, doubtful, settled=True)
         rest = unexplained_after(others, sim.sigma_arcsec or None)
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)

@@ -12,7 +12,7 @@ from ..estimation.regression import Regression
 from ..support.deadline import current_deadline
 from .candidates import CandidateScores, candidate_extensions
 from .overlap import finding_overlaps
-from .penalty import cause_terms, finding_groups, total_penalty
+from .penalty import finding_groups, regression_without, total_penalty
 from .selection import is_flexible, regrown
 from .unnamed import is_named
 
@@ -63,7 +63,7 @@ def _better_pair(regression: Regression) -> Regression | None:
     for i, j, _ in sorted(pairs, key=lambda pair: -pair[2]):
         if current_deadline().over:
             return None
-        tried = regrown(cause_terms(regression, [*groups[i], *groups[j]]), specific)
+        tried = regrown(regression_without(regression, [*groups[i], *groups[j]]), specific)
         if total_penalty(tried) < limit and not current_deadline().over:
             return tried
     return None
@@ -74,7 +74,7 @@ def _better(regression: Regression) -> Regression | None:
     groups = [g for g in finding_groups(regression.terms) if is_named(regression.terms[g[0]])]
     groups.sort(key=lambda group: sum(regression.terms[k].bic_gain for k in group))
     for group in groups:
-        rest = cause_terms(regression, group)
+        rest = regression_without(regression, group)
         if total_penalty(rest) < limit:
             return rest
         if len(groups) > LOOKED_AT:

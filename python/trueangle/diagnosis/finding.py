@@ -192,7 +192,7 @@ def _by_level(gain: LevelGain, unit: ErrorUnit) -> str:
     )
 
 
-def unit_of(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
+def parameter_unit(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
     """What a parameter is called in ``unit``, and the unit that it is shown in."""
     # The amplitudes of several lines, whose name says no unit.
     name = "amplitudes_arcsec" if name == "amplitudes" else name
@@ -202,7 +202,7 @@ def unit_of(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
 
 def named_quantity(name: str, entry: Quantity, unit: ErrorUnit) -> tuple[str, str]:
     """Name and value of a parameter, an error in ``unit``."""
-    shown, of = unit_of(name, unit)
+    shown, of = parameter_unit(name, unit)
     value, std = entry.value, entry.std
     if isinstance(value, list):
         text = ", ".join(_number(item, of) for item in value[:12])

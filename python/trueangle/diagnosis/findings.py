@@ -22,7 +22,7 @@ from .gain import Gain, measure_gain
 from .gates import gated_findings
 from .goodness import Unexplained
 from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
-from .penalty import NEW_CAUSE, cause_terms, finding_groups
+from .penalty import NEW_CAUSE, finding_groups, regression_without
 from .selection import is_flexible
 from .unnamed import is_named
 
@@ -145,7 +145,7 @@ def _alternatives(
     regression: Regression, group: Sequence[int], causes: Sequence[str]
 ) -> dict[str, tuple[Parameters, tuple[Effect, ...]]]:
     """Every cause that may be the one, alone in place of a finding: parameters and effects."""
-    rest = cause_terms(regression, group, settled=True)
+    rest = regression_without(regression, group, settled=True)
     found = {}
     for cause in causes if not current_deadline().over else ():
         effect = EFFECTS[cause]
@@ -175,7 +175,7 @@ def _in_doubt(doubt: Ambiguity, regression: Regression, group: Sequence[int]) ->
 def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, float]]:
     """The best other causes in place of a finding, and how much less they explain."""
     cause = regression.terms[group[0]].cause
-    rest = cause_terms(regression, group)
+    rest = regression_without(regression, group)
     own = rest.bic - regression.bic
     others = [name for name in EFFECTS if name != cause]
 

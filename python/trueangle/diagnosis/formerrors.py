@@ -1,4 +1,4 @@
-"""What a cause is worth beside what the forms of the larger ones leave: none is exact."""
+"""Form errors: what a cause is worth jointly with what the forms of the larger ones leave."""
 
 from __future__ import annotations
 

@@ -16,8 +16,8 @@ from ..support.deadline import current_deadline
 from ..support.plainresult import ShownResult
 from .holdout import (
     HoldOutModel,
+    error_numbers,
     held_out_residuals,
-    numbers,
     rebuilt_term,
     reducible_share,
     residual_at_held_out,
@@ -127,8 +127,8 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
             Gain(
                 f"{what} ({parts} parts)"
                 + (", zero of each held-out run taken from itself" if own_zero else ""),
-                numbers(before),
-                numbers(after),
+                error_numbers(before),
+                error_numbers(after),
                 share,
                 interval,
                 control,
@@ -159,7 +159,9 @@ def measure_delay_gain(without: Regression, delayed: Regression) -> Gain:
     before, after = before[clean], after[clean]
     share, interval = reducible_share(before, after, unit[clean], delayed.variance, rng)
     holdout = f"{what} ({parts} parts)"
-    return Gain(holdout, numbers(before), numbers(after), share, interval, None, _note(share))
+    return Gain(
+        holdout, error_numbers(before), error_numbers(after), share, interval, None, _note(share)
+    )
 
 
 def measure_belief_gains(
@@ -204,7 +206,15 @@ def measure_belief_gains(
         share, interval = reducible_share(was, is_now, unit[clean], regression.variance, rng)
         holdout = f"{what} ({int(folds.max()) + 1} parts)"
         gains.append(
-            Gain(holdout, numbers(was), numbers(is_now), share, interval, None, _note(share))
+            Gain(
+                holdout,
+                error_numbers(was),
+                error_numbers(is_now),
+                share,
+                interval,
+                None,
+                _note(share),
+            )
         )
     return gains
 

@@ -21,7 +21,7 @@ from .confirmation import NOT_CONFIRMED
 from .finding import Finding
 from .levels import UNITS
 from .overlap import finding_overlaps
-from .penalty import cause_terms
+from .penalty import regression_without
 
 #: Standard errors by which the size of a cause must differ from zero.
 TOLD = 2.0
@@ -113,7 +113,7 @@ def _not_in_every_part(regression: Regression, finding: Finding) -> str:
     column = regression.terms[k].columns[:, 0]
     edges = [quantile(column, k / PARTS) for k in range(PARTS + 1)]
     parts = np.column_stack([np.clip(column, *pair) for pair in itertools.pairwise(edges)])
-    rest = cause_terms(regression, [k], settled=True)
+    rest = regression_without(regression, [k], settled=True)
     own, excited = rest.projected(parts)
     if not excited.all():
         return ""

@@ -177,7 +177,7 @@ def reducible_share(
     return float(of(np.ones((1, count.size)))[0]), (low, high)
 
 
-def numbers(e: Array) -> tuple[float, float, float]:
+def error_numbers(e: Array) -> tuple[float, float, float]:
     """rms, peak-to-peak and max abs."""
     return (
         float(np.sqrt(np.mean(e**2))),

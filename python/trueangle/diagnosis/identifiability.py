@@ -10,7 +10,7 @@ from ..effects.ambiguity import Ambiguity
 from ..effects.blindspots import blind_spot_place, blind_spots
 from ..estimation.regression import Extension, Regression
 from .candidates import propose_candidates
-from .penalty import cause_terms, finding_groups
+from .penalty import finding_groups, regression_without
 from .unnamed import effect_or_unnamed
 
 __all__ = [
@@ -91,7 +91,7 @@ def in_common_form(regression: Regression, spots: Sequence[Ambiguity]) -> Regres
         spot = ambiguity_of_cause(regression.terms[group[0]], regression, spots) if group else None
         if spot is None or not spot.common or spot.common == cause:
             continue
-        rest = cause_terms(regression, group, settled=True)
+        rest = regression_without(regression, group, settled=True)
         common = propose_candidates(EFFECTS[spot.common], rest)
         if common is not None and common.bic_gain > 0.0:
             regression = rest.with_terms([*rest.terms, common])

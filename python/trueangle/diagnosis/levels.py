@@ -16,7 +16,7 @@ from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array, distinct
 from ..support.deadline import current_deadline
-from .holdout import held_out_residuals, numbers, rebuilt_term, reducible_share
+from .holdout import error_numbers, held_out_residuals, rebuilt_term, reducible_share
 from .unnamed import effect_or_unnamed
 
 Rows = NDArray[np.bool_]
@@ -198,8 +198,8 @@ def gains_by_level(
                 UNITS[factor],
                 values,
                 held,
-                numbers(before_k[used])[0],
-                numbers(after_k[used])[0],
+                error_numbers(before_k[used])[0],
+                error_numbers(after_k[used])[0],
                 share,
                 interval,
                 _reach(values, held),

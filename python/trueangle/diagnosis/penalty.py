@@ -1,4 +1,4 @@
-"""What a cause must bring, and what is lost without one."""
+"""Penalties of causes: what one must bring, and the deviance that is lost without it."""
 
 from __future__ import annotations
 
@@ -27,10 +27,12 @@ def form_misfit(regression: Regression) -> float:
     A step of the zero has no form that could be inexact, however far apart zeros are, and neither
     has a share that counts of teeth make: what such terms explain is not counted.
     """
-    return deviance_of_form_errors(before_forms(regression) - regression.deviance, regression.n)
+    return deviance_of_form_errors(
+        deviance_before_forms(regression) - regression.deviance, regression.n
+    )
 
 
-def before_forms(regression: Regression) -> float:
+def deviance_before_forms(regression: Regression) -> float:
     """Deviance before any cause with a form was added."""
     effects = [(term, effect_or_unnamed(term.cause)) for term in regression.terms]
     formless = [term for term, e in effects if e.draws_zeros or e.has_exact_form]
@@ -97,7 +99,9 @@ def finding_groups(terms: Sequence[Extension]) -> list[list[int]]:
     return groups
 
 
-def cause_terms(regression: Regression, group: Sequence[int], settled: bool = False) -> Regression:
+def regression_without(
+    regression: Regression, group: Sequence[int], settled: bool = False
+) -> Regression:
     """Without the terms ``group``; ``settled`` keeps the correlation of the noise."""
     terms = [t for k, t in enumerate(regression.terms) if k not in group]
     return regression.with_terms(terms, regression.whiten.rho if settled else None)
@@ -109,14 +113,16 @@ def net_loss(regression: Regression, group: Sequence[int]) -> float:
     left = form_misfit(regression)
     kept = [term for k, term in enumerate(terms) if k not in group]
     own = sum(terms[k].parameters * terms[k].log_n + 2.0 * terms[k].log_grid for k in group)
-    return lost(regression, group) - own - (penalty_of(terms, left) - penalty_of(kept, left))
+    return (
+        deviance_lost(regression, group) - own - (penalty_of(terms, left) - penalty_of(kept, left))
+    )
 
 
-def lost(regression: Regression, group: Sequence[int]) -> float:
+def deviance_lost(regression: Regression, group: Sequence[int]) -> float:
     """Deviance that the terms ``group`` save beside all the others (Wald, or without them)."""
     if any(regression.terms[k].run_effect is not None for k in group):
         without: float = regression.cache.of_fit(
-            ("lost", *group), lambda: cause_terms(regression, group).deviance
+            ("lost", *group), lambda: regression_without(regression, group).deviance
         )
         return without - regression.deviance
     columns = np.concatenate([regression.place(k) for k in group])

@@ -1,4 +1,4 @@
-"""The diagnosis: what was found, what is left, what could not be seen."""
+"""The `Diagnosis`: what was found, what is left, what could not be seen."""
 
 from __future__ import annotations
 

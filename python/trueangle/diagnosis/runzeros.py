@@ -16,7 +16,7 @@ from ..support.distributions import f_tail
 from .candidates import propose_candidates
 from .goodness import Unexplained
 from .goodness.zeros import ZEROS
-from .penalty import NEW_CAUSE, cause_terms
+from .penalty import NEW_CAUSE, regression_without
 from .selection import acts_on_runs
 
 #: Chance above which what unexplained zeros scatter by may as well have made a cause.
@@ -38,7 +38,7 @@ def chance_between_runs(
     own = np.hstack([regression.terms[k].columns for k in group])
     runs = _numbered(regression)
     zeros = (runs[:, None] == np.arange(1, int(runs.max()) + 1)).astype(np.float64)
-    rest = cause_terms(regression, group, settled=True)
+    rest = regression_without(regression, group, settled=True)
     within, _ = rest.jointly_with(zeros).gain(own)
     if within > NEW_CAUSE + own.shape[1] * float(np.log(regression.n)):
         return 0.0

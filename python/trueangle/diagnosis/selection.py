@@ -19,12 +19,12 @@ from .formerrors import beside_form_errors, share_beside_form_errors
 from .goodness import estimate_noise
 from .penalty import (
     NEW_CAUSE,
-    cause_terms,
+    deviance_lost,
     finding_groups,
     form_misfit,
-    lost,
     net_loss,
     penalty_of,
+    regression_without,
     total_penalty,
 )
 from .remainder import remainder_of
@@ -326,15 +326,15 @@ def _without_misfits(regression: Regression) -> Regression:
             return regression
         told = []
         for group in groups:
-            rest = cause_terms(regression, group, settled=True)
+            rest = regression_without(regression, group, settled=True)
             beside = beside_form_errors(rest, {regression.terms[group[0]].cause})
             if beside is not rest:
-                saved = lost(regression, group)
+                saved = deviance_lost(regression, group)
                 share = share_beside_form_errors(rest, beside, [regression.terms[k] for k in group])
                 told.append((net_loss(regression, group) - (1.0 - share) * saved, group))
         if not told or min(told)[0] > 0.0:
             return regression
-        regression = _pruned(cause_terms(regression, min(told)[1]))
+        regression = _pruned(regression_without(regression, min(told)[1]))
     return regression
 
 
@@ -344,13 +344,14 @@ def _pruned(regression: Regression) -> Regression:
         # Terms larger than all that the readings show only take each other off again.
         beyond = [[k] for k in range(len(regression.terms)) if _is_beyond_shown(regression, k)]
         least = min(beyond or _droppable(regression), key=lambda g: net_loss(regression, g))
-        without = cause_terms(regression, least)
+        without = regression_without(regression, least)
         if not beyond and total_penalty(without) > total_penalty(regression):
             break
         regression = without
     regression = _plainest(regression)
     terms = [
-        replace(term, deviance=lost(regression, [k])) for k, term in enumerate(regression.terms)
+        replace(term, deviance=deviance_lost(regression, [k]))
+        for k, term in enumerate(regression.terms)
     ]
     return regression.with_evidence(terms)
 

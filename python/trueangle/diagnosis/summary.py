@@ -11,7 +11,7 @@ from ..support.layout import laid_out
 from ..support.layout import wrapped_lines as _wrapped
 from .beliefs import Belief
 from .diagnosisdata import DiagnosisData
-from .finding import brief_finding, finding_lines, named_quantity, unit_of
+from .finding import brief_finding, finding_lines, named_quantity, parameter_unit
 from .goodness.evidence import Evidence
 from .goodness.scatter import AGAINST_STATED
 
@@ -161,7 +161,7 @@ def _belief(belief: Belief, unit: ErrorUnit) -> str:
         f"{shown.replace('_', ' ')} {' +- '.join(of.pair(measured[name], std[name]))}, "
         f"believed {of.number(value)}"
         for name, value in believed.items()
-        for shown, of in [unit_of(name, unit)]
+        for shown, of in [parameter_unit(name, unit)]
     ]
     text += "; ".join(parts)
     gain = belief.gain

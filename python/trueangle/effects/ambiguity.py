@@ -1,4 +1,4 @@
-"""What a design of runs cannot tell: the causes in question, why, and what to measure."""
+"""An ambiguity of a design of runs: the causes in question, why, and what to measure."""
 
 from __future__ import annotations
 

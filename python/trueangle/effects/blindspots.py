@@ -1,4 +1,4 @@
-"""Which causes a design of runs can tell apart; the readings are not looked at."""
+"""`blind_spots`: which causes a design of runs can tell apart, the readings not looked at."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the form of a cause may bend: no real effect follows its textbook law exactly."""
+"""Departures of an effect from its textbook law, which no real one follows exactly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every effect is: parameters, a signal, a search for it, and how it is corrected."""
+"""What every effect is: parameters, a signal, a search and its finding, how it is corrected."""
 
 from __future__ import annotations
 

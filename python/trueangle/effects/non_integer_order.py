@@ -25,7 +25,7 @@ from .randomphase import RandomPhaseLine
 from .search import (
     Array,
     Fitted,
-    grid_doubt,
+    grid_ambiguity,
 )
 
 #: Trial orders per resolution cell (one order over the turns of a run).
@@ -201,7 +201,7 @@ class NonIntegerOrder(Effect):
     def doubt(
         cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
     ) -> Ambiguity | None:
-        return grid_doubt(regression, spots) if extension.cause == cls.kind else None
+        return grid_ambiguity(regression, spots) if extension.cause == cls.kind else None
 
     @classmethod
     def report(

@@ -83,7 +83,7 @@ def is_gear_order(around: JointPattern, order: float) -> bool:
     return named is not None and named[0] != "output"
 
 
-def grid_doubt(regression: Regression, spots: Sequence[Ambiguity]) -> Ambiguity | None:
+def grid_ambiguity(regression: Regression, spots: Sequence[Ambiguity]) -> Ambiguity | None:
     """On a grid of positions: lines behind aliases, which change from run to run as noise does."""
     if regression.signals.grid is None:
         return None

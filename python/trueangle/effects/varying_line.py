@@ -21,7 +21,7 @@ from .drawing import drawn_carrier, drawn_free_line, drawn_phase
 from .effect import ALWAYS, Effect
 from .filter_lag import FilterLag
 from .load_dependent_gear_error import LoadDependentGearError
-from .search import Array, Fitted, grid_doubt, is_gear_order, line_parameters
+from .search import Array, Fitted, grid_ambiguity, is_gear_order, line_parameters
 from .shapes import best_shape
 
 #: Lines at most, and the price of a broad cause: one of so many beside every narrow one.
@@ -126,7 +126,7 @@ class VaryingLine(Effect):
     def doubt(
         cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
     ) -> Ambiguity | None:
-        return grid_doubt(regression, spots) if extension.cause == cls.kind else None
+        return grid_ambiguity(regression, spots) if extension.cause == cls.kind else None
 
     @classmethod
     def report(

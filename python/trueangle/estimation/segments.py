@@ -1,4 +1,4 @@
-"""Stretches of readings that follow each other in a run, and the level about them."""
+"""Segments of readings that follow each other in a run, and the level about them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Wild readings: losses of robust fitting, setting readings aside, and where both break down.
+"""Outliers: robust losses, readings set aside, and where both break down.
 
 A bit flip or a slipped tooth leaves one reading degrees off, and least squares spreads
 it over every coefficient.

@@ -1,4 +1,4 @@
-"""Periodic part of the error: lines and the pattern they add up to."""
+"""Periodic part of the error: lines, the pattern they add up to, and a joint with its pattern."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Correcting data in memory or in a stream: arrays, tables and frames of any library."""
+"""`correct`: data in memory or in a stream, as arrays, tables and frames of any library."""
 
 from __future__ import annotations
 

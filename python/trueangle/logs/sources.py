@@ -1,4 +1,4 @@
-"""How many rows logs hold, and where each output goes."""
+"""Logs before they are read: how many rows they hold, and where each output goes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a window of a watched joint said, and what an alarm is about."""
+"""Windows of a watched joint: what each said of every order, and what an alarm is about."""
 
 from __future__ import annotations
 

@@ -31,10 +31,10 @@ from .writing import FORMAT, ROBOT_FORMAT, VERSION, save_model
 __all__ = [
     "FORMAT",
     "VERSION",
-    "content_of",
     "embedded_model",
     "load_model",
-    "part_of",
+    "model_file_content",
+    "model_of_part",
     "save_model",
 ]
 
@@ -83,10 +83,10 @@ def load_model(path: str | PathLike[str]) -> HarmonicModel:
 def embedded_model(text: str, path: str | PathLike[str]) -> HarmonicModel:
     """Model of the text of a model file that stands in another file; raises as `load_model`."""
     file = Path(path)
-    return part_of(file, json_value(file, text, ModelFileError, "a model file"), "")
+    return model_of_part(file, json_value(file, text, ModelFileError, "a model file"), "")
 
 
-def content_of(path: Path, wanted: str) -> dict[str, Any]:
+def model_file_content(path: Path, wanted: str) -> dict[str, Any]:
     """The object of a file of the format that is wanted and of a version that is known."""
     reader = _ModelReader(path, ModelFileError)
     content = reader.content(wanted)
@@ -94,7 +94,7 @@ def content_of(path: Path, wanted: str) -> dict[str, Any]:
     return content
 
 
-def part_of(path: Path, value: Any, prefix: str) -> HarmonicModel:
+def model_of_part(path: Path, value: Any, prefix: str) -> HarmonicModel:
     """The model that a part of a file is; ``prefix`` stands before its keys in messages."""
     reader = _ModelReader(path, ModelFileError)
     reader.prefix = prefix

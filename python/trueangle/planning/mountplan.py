@@ -1,4 +1,4 @@
-"""A plan of positions and mounts, and its words."""
+"""`CalibrationPlan`: a plan of positions and mounts, and its words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The next runs: those within limits that are expected to tell rival causes apart."""
+"""`next_runs`: those within limits that are expected to tell rival causes apart."""
 
 from __future__ import annotations
 

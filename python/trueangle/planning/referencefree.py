@@ -1,4 +1,4 @@
-"""A plan of a calibration without a reference, and its words."""
+"""`SelfPlan`: a plan of a calibration without a reference, and its words."""
 
 from __future__ import annotations
 

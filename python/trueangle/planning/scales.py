@@ -25,8 +25,8 @@ from .evidence import (
     is_doubted,
 )
 from .further import plainest_run, run_choices, run_seconds
-from .hypotheses import Question, question_of
 from .limits import Limits
+from .questions import Question, question_of
 from .worth import (
     ALIKE,
     NOTHING,

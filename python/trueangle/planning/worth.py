@@ -9,7 +9,7 @@ import numpy as np
 
 from ..estimation.regression import Regression
 from .evidence import ExpectedEvidence
-from .hypotheses import Question
+from .questions import Question
 
 #: Chance of a strong difference of evidence that is wanted.
 WANTED = 0.95

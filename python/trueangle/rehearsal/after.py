@@ -1,4 +1,4 @@
-"""Plan the runs that tell what a diagnosis could not, and rehearse them."""
+"""`plan_after`: the runs that tell what a diagnosis could not, planned and rehearsed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Noise beside the orders: whether what is left of the readings is white where it matters."""
+"""The noise spectrum about the orders: whether what is left is white where it matters."""
 
 from __future__ import annotations
 

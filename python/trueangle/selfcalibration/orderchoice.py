@@ -1,4 +1,4 @@
-"""Which orders the readings show: found in what is left, kept by their significance."""
+"""Choice of orders: found in what is left of the readings, kept by their significance."""
 
 from __future__ import annotations
 

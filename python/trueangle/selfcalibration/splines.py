@@ -1,4 +1,4 @@
-"""Uniform cubic B-splines in time over several stretches: basis, penalty, coarser grids.
+"""Uniform cubic B-splines in time over several segments: basis, drift penalty, coarser grids.
 
 All stretches share one list of coefficients; a stretch of ``N`` intervals takes ``N + 3``
 of them. A reading touches four neighbours, so everything is banded.

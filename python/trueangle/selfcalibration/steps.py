@@ -14,7 +14,7 @@ from .pattern import pattern_model, pattern_series, pattern_steepness
 from .projected import Unknown, harmonic_rows, harmonic_sum
 from .readings import SegmentReadings
 from .splines import Knots, spline_basis, spline_values
-from .sums import ordered_sums
+from .sums import ordered_motion_sums
 
 #: Slope of the error that no step goes beyond: at 1 an angle would be read twice.
 _STEEPEST: Final = 0.97
@@ -113,7 +113,7 @@ class GaussNewtonSteps:
                 out[at:] = extra[:, part] * weight[part]
 
         good = valid[rows]
-        sums = ordered_sums(
+        sums = ordered_motion_sums(
             knots,
             index,
             place,

@@ -1,4 +1,4 @@
-"""The shaft as an inertia: what moves it beside the speed that a run asks for.
+"""The rotor as an inertia: what moves it beside the speed that a run asks for.
 
 ::
 

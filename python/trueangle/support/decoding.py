@@ -1,4 +1,4 @@
-"""Decoding what files say: any text gives checked values, or an error that names the place."""
+"""Decoding what files say: any text gives checked values, or an error that shows what and where."""
 
 from __future__ import annotations
 

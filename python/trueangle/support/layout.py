@@ -1,4 +1,4 @@
-"""Text for people, laid out: lines no wider than the terminal, folded under their text."""
+"""Text for people: counts in words, lines no wider than the terminal, folded under their text."""
 
 from __future__ import annotations
 

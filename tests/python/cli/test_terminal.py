@@ -13,7 +13,10 @@ from trueangle.support.layout import laid_out, text_columns, wrapped_lines
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "looks"))
 
-from terminal import COLUMNS, furnish, scenes, shown
+from scenes import furnish, scenes
+from transcripts.terminal import ran
+
+COLUMNS = 80
 
 #: Commands that take seconds, and what each of them prints is told by another here.
 LONG = ("bench", "rehearse")
@@ -29,7 +32,8 @@ def desk(tmp_path_factory):
 def test_no_command_is_wider_than_its_terminal(desk):
     for command, lines in scenes().items():
         for line in lines if command not in LONG else ():
-            status, text = shown(line, desk)
+            status, *told = ran(line.split(), desk, COLUMNS)
+            text = "".join(told)
             assert status == 0, text
             wide = [row for row in text.splitlines() if len(row) > COLUMNS]
             assert not wide, f"{line}: {wide}"
@@ -105,7 +109,7 @@ def test_a_mistyped_cause_is_answered_by_the_nearest(desk, capsys):
 
 
 def test_one_model_has_one_picture(desk, capsys):
-    shown("fit runs.csv -o joint.json --orders 1", desk)
+    ran(["fit", "runs.csv", "-o", "joint.json", "--orders", "1"], desk, COLUMNS)
     for more in (["--kind", "residuals"], [str(desk / "runs.csv")]):
         out = ["-o", str(desk / "x.png")]
         assert main(["plot", str(desk / "joint.json"), *more, *out]) == 1
@@ -115,8 +119,8 @@ def test_one_model_has_one_picture(desk, capsys):
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
 def test_a_picture_is_of_the_format_that_its_ending_says(ending, desk):
     begins = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
-    shown("fit runs.csv -o joint.json --orders 1", desk)
-    status, told = shown(f"plot joint.json -o drawn.{ending} --json", desk)
+    ran(["fit", "runs.csv", "-o", "joint.json", "--orders", "1"], desk, COLUMNS)
+    status, told, _ = ran(f"plot joint.json -o drawn.{ending} --json".split(), desk, COLUMNS)
     assert status == 0
     assert '"shows": "Error of the model' in told
     assert (desk / f"drawn.{ending}").read_bytes().startswith(begins[ending])

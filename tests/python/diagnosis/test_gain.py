@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from trueangle.diagnosis.gain import Gain, _control, _shuffled, _units, measure_delay_gain
-from trueangle.diagnosis.holdout import HoldOutModel, numbers, residual_at_held_out
+from trueangle.diagnosis.holdout import HoldOutModel, error_numbers, residual_at_held_out
 from trueangle.diagnosis.levels import LevelGain, _reach, gains_by_level, levels_of_runs
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
@@ -275,4 +275,4 @@ def test_zeros_of_their_own_are_the_medians_of_held_out_runs() -> None:
     # The three numbers of what is left, of either sign.
     for sign in (-1.0, 1.0):
         e = sign * np.array([1.0, -2.0, 4.0])
-        assert numbers(e) == pytest.approx((np.sqrt(7.0), 6.0, 4.0))
+        assert error_numbers(e) == pytest.approx((np.sqrt(7.0), 6.0, 4.0))

@@ -20,7 +20,7 @@ from trueangle.selfcalibration.splines import (
     spline_basis,
     spline_values,
 )
-from trueangle.selfcalibration.sums import MotionSums, ordered_sums
+from trueangle.selfcalibration.sums import MotionSums, ordered_motion_sums
 
 KNOTS = Knots((1.0, 30.0), (16, 8), 0.5)
 
@@ -150,7 +150,7 @@ def summed(valid: np.ndarray | None = None, repeat: int = 1) -> tuple[MotionSums
     def columns(part: slice, out: np.ndarray) -> None:
         out[:] = common[:, part]
 
-    found = ordered_sums(KNOTS, index, place, target, weight, columns, 2, valid)
+    found = ordered_motion_sums(KNOTS, index, place, target, weight, columns, 2, valid)
     return found, (design(KNOTS, stretch, time) * weight[:, None], common.T, target)
 
 

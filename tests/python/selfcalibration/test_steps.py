@@ -67,7 +67,7 @@ def test_columns_are_what_each_unknown_takes_of_what_is_left(
         write(slice(0, left.size), out)
         raise CaughtError(weight, out)
 
-    monkeypatch.setattr(module, "ordered_sums", caught)
+    monkeypatch.setattr(module, "ordered_motion_sums", caught)
     with pytest.raises(CaughtError) as raised:
         steps.step(knots, spline, unknowns, np.ones(600, bool), 1)
     weight, out = raised.value.args

@@ -39,7 +39,7 @@ def log_chance(statistic: Array | float, dof: float) -> Array:
     return np.asarray(-0.5 * t if math.isinf(dof) else -0.5 * dof * np.log1p(t / dof))
 
 
-def log_chi2_tail(x: Array, dof: int) -> Array:
+def log_chi_squared_tail(x: Array, dof: int) -> Array:
     """Log of the upper tail of chi-square with an even number of degrees of freedom."""
     half = 0.5 * np.asarray(x, dtype=np.float64)[..., None]
     i = np.arange(dof // 2)
@@ -167,7 +167,7 @@ def examine_orders(
     if scatter is not None:
         each = 2 * (sums.units - 1) if freedom is None else freedom
         ratio = np.maximum(scatter, 0.0) / noise[0] * each
-        own = np.isfinite(scatter) & (log_chi2_tail(ratio, each) < math.log(OVERDISPERSED))
+        own = np.isfinite(scatter) & (log_chi_squared_tail(ratio, each) < math.log(OVERDISPERSED))
         np.copyto(level, scatter, where=own)
         dof[own] = each
     position = {k: i for i, k in enumerate(chosen)}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...runs.aliasing import Positions
 from ...support.arrays import Array
 from ...support.quantiles import median
-from .evidence import COLLINEAR, OVERDISPERSED, fit_chosen_orders, log_chi2_tail
+from .evidence import COLLINEAR, OVERDISPERSED, fit_chosen_orders, log_chi_squared_tail
 from .harmonicsums import HarmonicSums
 from .zerogroups import ZeroGroupReadings
 
@@ -191,7 +191,7 @@ def pooled_scatter(scatter: Array, units: int) -> tuple[float, float] | None:
     middle = float(median(finite)) / (1.0 - 2.0 / (9.0 * each)) ** 3
     if middle <= 0.0:  # copies of one run
         return None
-    usual = finite[log_chi2_tail(finite / middle * each, each) > math.log(OVERDISPERSED)]
+    usual = finite[log_chi_squared_tail(finite / middle * each, each) > math.log(OVERDISPERSED)]
     if usual.size * each < 20:
         return None
     return float(usual.mean()), float(usual.size * each)

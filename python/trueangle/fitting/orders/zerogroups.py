@@ -1,4 +1,4 @@
-"""Units of readings with a zero of their own, and folds of a single run."""
+"""Groups of readings with a zero of their own, and folds of a single run."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from typing import IO
 from ...errors import FileError, KindError
 from .inputs import is_null_device, sha256_of
 from .kinds import FileKind, log_endings
-from .samefile import named_again, what_it_is
+from .samefile import irregular_file_kind, named_again
 from .workplace import (
     PARTIAL,
     hidden_name,
@@ -100,7 +100,7 @@ def check_output(
         return target
     elif not stat.S_ISREG(found.st_mode):
         raise FileError(
-            path, f"is {what_it_is(found.st_mode)}: only files are written; name a file"
+            path, f"is {irregular_file_kind(found.st_mode)}: only files are written; name a file"
         )
     elif not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, "is write-protected", text)

@@ -1,4 +1,4 @@
-"""Causes that may be behind what is seen, and as large as the noise where nothing is."""
+"""Questions that further runs are to answer: the causes that may be behind what is seen."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def question_of(spot: Ambiguity, rich: Signals, around: JointPattern, rms: float
         if any(special.kind in spot.causes for special in EFFECTS[cause].contains):
             effects = ()  # its estimate is the special case, where the runs do not tell them
         if not effects:
-            made = [hypothesis_of_size(cause, rms, rich, around, k * TRIES) for k in range(DRAWS)]
+            made = [effect_of_size(cause, rms, rich, around, k * TRIES) for k in range(DRAWS)]
             drawn = [Hypothesis(cause, (one,)) for one in made if one is not None]
             effects = drawn[0].effects if drawn else ()
             draws += drawn[1:]
@@ -100,7 +100,7 @@ def _alike(
     return ()
 
 
-def hypothesis_of_size(
+def effect_of_size(
     cause: str, rms: float, signals: Signals, around: JointPattern, first: int = 0
 ) -> Effect | None:
     """An effect of this cause whose error has this rms; None where the runs cannot have it.
