@@ -1,4 +1,4 @@
-"""Errors at nominal positions: what a fit says, what it leaves; readings as a model leaves them."""
+"""Errors at nominal positions: what a fit says and leaves, reversal; runs that were corrected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arguments that name files: marked by their type, checked before a command begins."""
+"""Arguments that name inputs and outputs: marked by their type, checked before a command begins."""
 
 from __future__ import annotations
 

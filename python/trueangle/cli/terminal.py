@@ -1,4 +1,4 @@
-"""The terminal: text that never steers it, colours where it has them, signals that end the work."""
+"""The terminal: plain streams that nothing steers, colours where it has them, ending by signals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One cause that the readings support, and its words."""
+"""One cause that the readings support, its quantities with their units, and its words."""
 
 from __future__ import annotations
 

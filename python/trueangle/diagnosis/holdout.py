@@ -1,4 +1,4 @@
-"""Readings held out: what a model fitted to the others leaves of them."""
+"""Readings held out: what a model of the others leaves of them in numbers; the reducible share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which causes this design of runs can tell apart, worked out before naming any."""
+"""Which causes this design of runs can tell apart, and which origins stay open, before any name."""
 
 from __future__ import annotations
 

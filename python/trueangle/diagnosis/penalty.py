@@ -1,4 +1,4 @@
-"""Penalties of causes: what one must bring, and the deviance that is lost without it."""
+"""Penalties of groups of causes, the misfit of their forms, the deviance lost without them."""
 
 from __future__ import annotations
 

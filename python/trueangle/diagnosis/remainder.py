@@ -1,4 +1,4 @@
-"""What an account leaves of the readings, as goodness of fit asks for it."""
+"""The remainder of an account, as goodness of fit asks for it: what is left, free paths in time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Choose the causes: forward by evidence, flexible ones last, then backward."""
+"""Select the causes: forward by evidence, flexible ones last, then backward."""
 
 from __future__ import annotations
 

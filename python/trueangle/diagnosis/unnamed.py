@@ -1,4 +1,4 @@
-"""Structure without a name: it competes with the causes, so that they do not take it up.
+"""Structure without a name, in lines and modulators: it competes with the causes that have one.
 
 A discrepancy that is allowed to be unexplained (Kennedy and O'Hagan 2001). Three kinds are
 offered: a pattern of the angle times something that was measured (direction, speed, load,

@@ -1,4 +1,4 @@
-"""What searches have in common: lines from pairs, one peak, doubts, joint covariances."""
+"""What searches share: known orders, lines from pairs, golden maxima, signs, joint covariances."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The slow truth in plain numpy: evaluation, correction and least squares.
+"""The slow truth in plain numpy: error and slope, correction and least-squares fit.
 
 Every function here does the obvious thing with one sine and one cosine per order and
 the whole design matrix in memory. Tests hold the compiled core against it, benchmarks

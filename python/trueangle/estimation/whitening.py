@@ -1,4 +1,4 @@
-"""Noise that is not white: correlation in time and errors that are common to a run."""
+"""Noise that is not white: correlation and drift in time, errors that are common to a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a table leaves out of its model, and how large that is at the joint."""
+"""What a table leaves out of its model: terms, their sizes and ranges, bounds at run time."""
 
 from __future__ import annotations
 

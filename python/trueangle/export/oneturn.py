@@ -1,4 +1,4 @@
-"""What the tables of one turn of the output have in common."""
+"""What the tables of one turn of the output share: knots, the mean, the floor of rounding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a target is: a format that some firmware reads, and its own arithmetic."""
+"""What a target is: options, a comment and tables that some firmware reads, its own arithmetic."""
 
 from __future__ import annotations
 

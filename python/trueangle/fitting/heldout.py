@@ -1,4 +1,4 @@
-"""What a fit gains on readings that took no part in it: one run left out at a time."""
+"""What a fit gains on readings that took no part in it: runs or folds of them left out in turn."""
 
 from __future__ import annotations
 

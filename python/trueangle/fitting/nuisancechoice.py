@@ -1,4 +1,4 @@
-"""Choosing nuisances by the error of stretches held out, and fitting them beside a pattern."""
+"""Choosing groups of nuisances by the error of folds held out, and fitting them with a pattern."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A prior for the coefficients of a unit, and the fit with it: what others of its design are like.
+"""A prior for the coefficients of a unit, and the posterior: what others of its design are like.
 
 With ``b ~ N(μ, T)`` and readings of noise s the coefficients are normal about
 

@@ -1,4 +1,4 @@
-"""Outliers: robust losses, readings set aside, and where both break down.
+"""Outliers: robust losses, spikes and readings set aside, weights, and where both break down.
 
 A bit flip or a slipped tooth leaves one reading degrees off, and least squares spreads
 it over every coefficient.

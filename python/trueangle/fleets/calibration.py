@@ -1,4 +1,4 @@
-"""One calibration of one unit: its coefficients and their covariance, from sums of its runs."""
+"""One calibration of one unit: coefficients of its orders, their covariance, normal equations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units calibrated again: what moved, whether by a step or slowly, and when the next is due."""
+"""Units calibrated again: what changed, whether by a step or drift, and when the next is due."""
 
 from __future__ import annotations
 

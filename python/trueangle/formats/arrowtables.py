@@ -1,4 +1,4 @@
-"""Arrow data: columns as numpy arrays, corrected columns added, checksums of any type."""
+"""Arrow data: names, elements, labels, numpy arrays, corrected columns added, checksums."""
 
 from __future__ import annotations
 

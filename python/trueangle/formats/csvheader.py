@@ -1,4 +1,4 @@
-"""What stands before the readings of a text file: preamble, names, units, and its dialect."""
+"""What stands before the readings of a text file: preamble, names, units; how its cells are cut."""
 
 from __future__ import annotations
 

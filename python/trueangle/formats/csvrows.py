@@ -1,4 +1,4 @@
-"""Rows of CSV text with the lines they came from, cut by the standard library."""
+"""Rows of CSV text in quoted blocks with the lines they came from, by the standard library."""
 
 from __future__ import annotations
 

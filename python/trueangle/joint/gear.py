@@ -1,4 +1,4 @@
-"""Known lines of a joint: which physical cause an order may have."""
+"""Known lines of a joint: explanations of an order by its gear, harmonics and shafts."""
 
 from __future__ import annotations
 

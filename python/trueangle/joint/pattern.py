@@ -1,4 +1,4 @@
-"""Periodic part of the error: lines, the pattern they add up to, and a joint with its pattern."""
+"""Harmonics and the pattern they add up to, the periodic part of the error; a joint with it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What happened at every reading: angle, direction, travel, speed, load, temperature."""
+"""Signals of runs, joined: angle, direction, travel, speed, load, temperature of every reading."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A model evaluated: its error at an angle, the angle behind an indicated one."""
+"""A model evaluated: its error at an angle, the angle behind an indicated one, its span guarded."""
 
 from __future__ import annotations
 

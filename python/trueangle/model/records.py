@@ -1,4 +1,4 @@
-"""What a model file says of its making: the fit and where its readings came from, also as read."""
+"""What a model file says of its making: the record of the fit, its provenance, also as read."""
 
 from __future__ import annotations
 

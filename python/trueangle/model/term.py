@@ -1,4 +1,4 @@
-"""What every term is: named parameters in the model's unit, and the signals it follows."""
+"""What every term is: named parameters in the model's unit, the signals and lines it follows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Expected evidence between rival causes: T-optimality under correlated noise.
+"""Expected evidence between rival hypotheses: T-optimality under correlated noise.
 
 Where A is the cause, with error s at the readings, the best imitation by another cause B leaves
 

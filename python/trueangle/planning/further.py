@@ -1,4 +1,4 @@
-"""Further runs that limits allow, one choice of each kind at a time."""
+"""Further runs that limits allow: choices of each kind, changes counted, numbers to dial in."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The next runs as a result: what to measure, and what it is expected to say."""
+"""The next runs as a result: what to measure, and the evidence expected of the rivals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What designs of further runs are worth: the questions they open and the evidence they add."""
+"""What designs of further runs are worth: questions opened, answers and the evidence they add."""
 
 from __future__ import annotations
 

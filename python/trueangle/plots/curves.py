@@ -1,4 +1,4 @@
-"""What the pictures show, as plain arrays in degrees and arcsec; draws nothing."""
+"""What the pictures show, as points and curves in degrees and arcsec; draws nothing."""
 
 from __future__ import annotations
 

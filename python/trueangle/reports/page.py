@@ -1,4 +1,4 @@
-"""The page: content and figures set into one HTML file that needs no network; saved or printed."""
+"""The page: content and figures in templates, one HTML file that needs no network; printed too."""
 
 from __future__ import annotations
 

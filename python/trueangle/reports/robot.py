@@ -1,4 +1,4 @@
-"""The joints of a robot: in one table, the worst first, and on one page, a section for each."""
+"""The joints of a robot ranked: in one table, the worst first, and on one page, a section each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The two readings of a geared joint, and the orders that both shafts give the output."""
+"""The two readings of a geared joint, their motion, and the lines that both shafts leave."""
 
 from __future__ import annotations
 

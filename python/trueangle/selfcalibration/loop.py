@@ -1,4 +1,4 @@
-"""Was the speed held by the encoder under test? Then it hides its own error."""
+"""Was the speed held by the encoder under test? Then the loop followed, and hides, its error."""
 
 from __future__ import annotations
 

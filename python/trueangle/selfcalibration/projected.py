@@ -1,4 +1,4 @@
-"""The one estimator: patterns beside nuisances, covariance of what is left, null vectors."""
+"""The one estimator: harmonics unknown beside nuisances, their covariance, null vectors."""
 
 from __future__ import annotations
 

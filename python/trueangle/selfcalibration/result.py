@@ -1,4 +1,4 @@
-"""What a self-calibration found: numbers, of what each is, and what stays unseen; as text."""
+"""What a self-calibration found: orders estimated, what is blind, patterns held out; as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Honest tests of a pattern: one part of the readings predicts another."""
+"""Tests of a pattern: one part of the readings predicts another; the chance of their difference."""
 
 from __future__ import annotations
 

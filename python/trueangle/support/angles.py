@@ -1,4 +1,4 @@
-"""Units of angle, wrapping, unwrapping and circular means."""
+"""Angles: periods and other units, arcsec, wrapping, unwrapping and circular means."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units that errors are shown in, and numbers rounded to their uncertainty.
+"""Units that errors are shown in, and numbers rounded to digits or to their uncertainty.
 
 Results keep errors in arcsec, or in the unit of their period; a summary chooses one unit for
 all that it prints, so that its numbers can be compared.

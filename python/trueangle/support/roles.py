@@ -1,4 +1,4 @@
-"""Roles of columns: what one is for, and the units that it may be in.
+"""Roles of columns: what one is for, the units it may be in, offsets, counts of a turn.
 
 A role is what a column is for: ``reference``, ``indicated``, ``run``, ``unit``, or a signal
 of `trueangle.support.signals.SIGNALS`.

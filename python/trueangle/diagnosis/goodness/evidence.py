@@ -1,4 +1,4 @@
-"""One test of a goodness of fit, and p values of the largest of many."""
+"""One test of a goodness of fit; p values of the largest of many, made even, by drawn signs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What comes back at the same place, alike or by direction, speed or load.
+"""What comes back at the same place: alike, or modulated by direction, speed or load; unit sums.
 
 Each unit u (a run, or a piece of one of few runs) gives one complex sum per order m,
 

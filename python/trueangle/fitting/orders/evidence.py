@@ -1,4 +1,4 @@
-"""Evidence for orders: significance with a bound for the search, and held-out gain.
+"""Evidence for orders: log chances with a bound for the search, forward choice, held-out gain.
 
 All of it works on the normal equations of `HarmonicSums`; the readings are not touched
 again. An order has two coefficients, so that with noise variance s^2 known from v

@@ -1,4 +1,4 @@
-"""The noise of readings: by repeats, and at each order by units and neighbouring orders."""
+"""The noise of readings: pure error of repeats, scatter by units, runs and neighbouring orders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Phases of orders, run by run."""
+"""Phases of orders, run by run, and the circular range that holds them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a joining made, and how far it can be trusted."""
+"""Joined runs: what a joining made, its gaps, and how far it can be trusted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reading files: what may be read, and how much of it."""
+"""Reading files: what may be read, and how much of it; hashes, and partitions in their names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writing files: only regular ones, never an input, complete or not there at all."""
+"""Writing files: only regular ones, never an input; published atomically, or not there at all."""
 
 from __future__ import annotations
 
