@@ -16,14 +16,14 @@ from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array
 from ..support.deadline import current_deadline
-from .delay import Delay, error_before, find_delay
+from .delay import Delay, error_before_delay, find_delay
 from .exchange import exchanged_causes
 from .gearedlines import GearedLines, GearedLinesRatio
 from .gearratio import find_ratio, near_ratio, signals_at_ratio
 from .identifiability import blind_spots, in_common_form
 from .judgedbeliefs import effects_as_measured
 from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
-from .remainder import unexplained_after
+from .remainder import unexplained_remainder
 from .rounding import account_beyond_rounding, is_rounding_only, unrounded
 from .selection import select_causes
 from .unnamed import is_named
@@ -96,7 +96,7 @@ class PreparedData:
             every = signals_at_ratio(sim, every, error)
         then = every
         if delay is not None:
-            then, error = error_before(every, error, delay.seconds)
+            then, error = error_before_delay(every, error, delay.seconds)
         rows = _directed(every)
         rows = rows[_subsample(rows.size)]
         if rows.size == len(every):
@@ -223,7 +223,7 @@ def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:
         scatter.append(uneven)
         start = start.weighted(uneven.weights)
         chosen = select_causes(start, chosen.terms)
-    if not all(map(is_named, chosen.terms)) and not unexplained_after(chosen).found:
+    if not all(map(is_named, chosen.terms)) and not unexplained_remainder(chosen).found:
         chosen = select_causes(start, unnamed=False)
     chosen = account_beyond_rounding(start, in_common_form(exchanged_causes(chosen), spots))
     scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]

@@ -76,7 +76,7 @@ class Delay:
         return np.asarray(-(then.turns_per_s * ARCSEC_PER_TURN * (1.0 + slope))[:, None])
 
 
-def error_before(signals: Signals, error: Array, delay_s: float) -> tuple[Signals, Array]:
+def error_before_delay(signals: Signals, error: Array, delay_s: float) -> tuple[Signals, Array]:
     """Signals and error (arcsec) at the angle of a time before each reading."""
     then = earlier_signals(signals, delay_s)
     return then, error + (signals.theta - then.theta) * ARCSEC_PER_RAD
@@ -95,7 +95,7 @@ def find_delay(signals: Signals, error: Array, sim: Simulation) -> Delay | None:
     longest = LONGEST * min(float(np.ptp(signals.time[a:b])) for a, b in signals.run_bounds())
     delay, linear = 0.0, np.inf
     for step in range(STEPS):
-        then, moved = error_before(signals, error, delay)
+        then, moved = error_before_delay(signals, error, delay)
         y = (moved - sim.predict(then))[rows]
         then = then.take(rows)
         change, std, left, unmoved, pattern = _newton(then, y, orders, sim)

@@ -34,7 +34,7 @@ from .gearedlines import GearedLinesRatio
 from .goodness import Unexplained, goodness_of_fit
 from .judgedbeliefs import judged_beliefs
 from .penalty import regression_without
-from .remainder import leftover_of, unexplained_after
+from .remainder import leftover_of, unexplained_remainder
 from .result import Diagnosis
 from .rounding import rounding_of
 from .wrongplace import misplaced_beliefs
@@ -174,14 +174,14 @@ def _diagnosis(
     seen = account.seen
     sim, every, signals, rows = seen.sim, seen.every, seen.signals, seen.rows
     chosen = account.choice.chosen
-    rest = unexplained_after(chosen, sim.sigma_arcsec or None)
+    rest = unexplained_remainder(chosen, sim.sigma_arcsec or None)
     first = account.first
     with at.part(FOR_FINDINGS):
         findings, spots, doubtful = findings_of(chosen, account.choice.spots, gain, rest)
     if doubtful and not rest.found and not at.cut:
         # What is not confirmed explains nothing; the others may well without it.
         others = regression_without(chosen, doubtful, settled=True)
-        rest = unexplained_after(others, sim.sigma_arcsec or None)
+        rest = unexplained_remainder(others, sim.sigma_arcsec or None)
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)

@@ -13,7 +13,7 @@ from ..support.deadline import current_deadline
 from .candidates import CandidateScores, candidate_extensions
 from .overlap import finding_overlaps
 from .penalty import finding_groups, regression_without, total_penalty
-from .selection import is_flexible, regrown
+from .selection import is_flexible, select_again
 from .unnamed import is_named
 
 #: Exchanges at most, and findings up to which others are tried in the place of each: of more, which
@@ -63,7 +63,7 @@ def _better_pair(regression: Regression) -> Regression | None:
     for i, j, _ in sorted(pairs, key=lambda pair: -pair[2]):
         if current_deadline().over:
             return None
-        tried = regrown(regression_without(regression, [*groups[i], *groups[j]]), specific)
+        tried = select_again(regression_without(regression, [*groups[i], *groups[j]]), specific)
         if total_penalty(tried) < limit and not current_deadline().over:
             return tried
     return None

@@ -202,7 +202,7 @@ class GearedLines:
         )
         # Ratios are made of teeth: a whole or half number that explains as much is meant.
         limit = -left * (1.0 + PLAIN / max(self.y.size, 1))
-        for denominator in plain_denominators():
+        for denominator in gear_denominators():
             plain = round(best * denominator) / denominator
             if abs(plain - best) < width and self.left(plain, common) < limit:
                 return plain
@@ -263,6 +263,6 @@ class GearedLines:
         return np.asarray(values - np.repeat(means, sizes, axis=-1).T)
 
 
-def plain_denominators() -> Iterator[int]:
+def gear_denominators() -> Iterator[int]:
     """Of ratios as gears have them."""
     yield from (1, 2, 3, 4, 5, 10)

@@ -16,7 +16,7 @@ from ..joint.pattern import Pattern
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array
-from .gearedlines import GearedLines, GearedLinesRatio, plain_denominators
+from .gearedlines import GearedLines, GearedLinesRatio, gear_denominators
 
 #: Share of the believed lines up to which they are missing at the believed ratio, and share of
 #: their power that must be found at another one for that to be the ratio: where less is found,
@@ -96,6 +96,6 @@ def signals_at_ratio(sim: Simulation, signals: Signals, error: Array) -> Signals
 
 def _turns_until_back(ratio: float) -> int:
     """Turns of the output after which the geared lines are back in phase, or nearly so."""
-    plain = (q for q in plain_denominators() if abs(ratio * q % 1.0) < 1e-9)
+    plain = (q for q in gear_denominators() if abs(ratio * q % 1.0) < 1e-9)
     away = abs(ratio - round(ratio))
     return next(plain, min(round(1.0 / away), MOST_TURNS) if away > 0.0 else 1)

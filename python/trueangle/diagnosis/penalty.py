@@ -107,7 +107,7 @@ def regression_without(
     return regression.with_terms(terms, regression.whiten.rho if settled else None)
 
 
-def net_loss(regression: Regression, group: Sequence[int]) -> float:
+def net_deviance_lost(regression: Regression, group: Sequence[int]) -> float:
     """Deviance that dropping the terms ``group`` would cost, less the penalties it would save."""
     terms = regression.terms
     left = form_misfit(regression)

@@ -113,7 +113,7 @@ def remainder_of(
     return leftover_of(regression.signals, left * regression.root_weights, regression.cache)
 
 
-def unexplained_after(regression: Regression, sigma: float | None = None) -> Unexplained:
+def unexplained_remainder(regression: Regression, sigma: float | None = None) -> Unexplained:
     """Goodness of fit of what a regression leaves, up to the orders that it looks for."""
     regression = unrounded(regression)
     path = path_evidence(regression)

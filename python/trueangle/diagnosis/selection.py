@@ -22,7 +22,7 @@ from .penalty import (
     deviance_lost,
     finding_groups,
     form_misfit,
-    net_loss,
+    net_deviance_lost,
     penalty_of,
     regression_without,
     total_penalty,
@@ -102,7 +102,7 @@ def select_causes(
     return _priced_with_noise(min(chosen, opened, key=total_penalty))
 
 
-def regrown(regression: Regression, causes: Sequence[str]) -> Regression:
+def select_again(regression: Regression, causes: Sequence[str]) -> Regression:
     """With the best of some causes beside the terms, without what they make superfluous."""
     return _pruned(_forward(regression, causes))
 
@@ -331,7 +331,7 @@ def _without_misfits(regression: Regression) -> Regression:
             if beside is not rest:
                 saved = deviance_lost(regression, group)
                 share = share_beside_form_errors(rest, beside, [regression.terms[k] for k in group])
-                told.append((net_loss(regression, group) - (1.0 - share) * saved, group))
+                told.append((net_deviance_lost(regression, group) - (1.0 - share) * saved, group))
         if not told or min(told)[0] > 0.0:
             return regression
         regression = _pruned(regression_without(regression, min(told)[1]))
@@ -343,7 +343,9 @@ def _pruned(regression: Regression) -> Regression:
     while regression.terms and not current_deadline().over:
         # Terms larger than all that the readings show only take each other off again.
         beyond = [[k] for k in range(len(regression.terms)) if _is_beyond_shown(regression, k)]
-        least = min(beyond or _droppable(regression), key=lambda g: net_loss(regression, g))
+        least = min(
+            beyond or _droppable(regression), key=lambda g: net_deviance_lost(regression, g)
+        )
         without = regression_without(regression, least)
         if not beyond and total_penalty(without) > total_penalty(regression):
             break

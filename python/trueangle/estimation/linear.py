@@ -1,4 +1,4 @@
-"""Linear models by the core's one solver: rows, normal equations, groups left out, clusters.
+"""Linear least squares by the core's one solver: rows, normal equations, groups, clusters.
 
 Columns are scaled to unit length. Directions of which less is left than rounding makes are left
 out, ``32 n ε`` of the greatest singular value (of rows) or eigenvalue (of sums) of

@@ -46,7 +46,7 @@ def rounding_step(runs: Sequence[CalibrationRun], positions: Positions) -> float
     return sensor_lattice(runs, theta)[0] * runs[0].period / ARCSEC_PER_TURN
 
 
-def repeated_variance(step: float, scatter: float) -> float:
+def repeated_rounding_variance(step: float, scatter: float) -> float:
     """Variance of the rounding that repeats at each position, by that of the readings there.
 
     Examples
@@ -74,7 +74,7 @@ def rounding_over_repeats(step: float, repeats: ReadingVariance | None, readings
     """``R v(σ)`` of so many readings at each position; 0 without a step or repeated readings."""
     if not step or repeats is None:
         return 0.0
-    return readings * repeated_variance(step, repeats.variance)
+    return readings * repeated_rounding_variance(step, repeats.variance)
 
 
 def covariance_with_rounding(

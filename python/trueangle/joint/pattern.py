@@ -1,4 +1,4 @@
-"""Harmonics and the pattern they add up to, the periodic part of the error; a joint with it."""
+"""Harmonics, their lines and the pattern they add up to; the joint with its pattern."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.confirmation import _by_run, _size
-from trueangle.diagnosis.delay import error_before, find_delay
+from trueangle.diagnosis.delay import error_before_delay, find_delay
 from trueangle.diagnosis.diagnose import _noise, _overall, _ratio_finding, _structure
 from trueangle.diagnosis.formerrors import share_beside_form_errors
 from trueangle.diagnosis.unnamed import CHANNELS, UnnamedPattern, is_line_of, modulator, modulators
@@ -164,7 +164,7 @@ def test_an_error_at_the_angle_of_before_says_the_same_indication() -> None:
     signals = join_runs([stale(0, 0.02, 1.0)])
     error = np.cos(signals.theta)
     for tau in (0.013, -0.04, 0.0):
-        then, moved = error_before(signals, error, tau)
+        then, moved = error_before_delay(signals, error, tau)
         np.testing.assert_allclose(
             then.theta * ARCSEC_PER_RAD + moved, signals.theta * ARCSEC_PER_RAD + error, atol=1e-6
         )

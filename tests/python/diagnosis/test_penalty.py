@@ -9,7 +9,7 @@ import pytest
 
 from trueangle.diagnosis.penalty import (
     deviance_lost,
-    net_loss,
+    net_deviance_lost,
     regression_without,
     total_penalty,
 )
@@ -44,4 +44,4 @@ def test_a_cause_is_worth_what_the_account_without_it_lacks(
         saved = without.deviance - fitted.deviance
         assert deviance_lost(fitted, group) == pytest.approx(saved, abs=ROUNDING)
         lacking = total_penalty(without) - total_penalty(fitted)
-        assert net_loss(fitted, group) == pytest.approx(lacking, abs=ROUNDING)
+        assert net_deviance_lost(fitted, group) == pytest.approx(lacking, abs=ROUNDING)

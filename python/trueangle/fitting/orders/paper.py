@@ -26,7 +26,7 @@ from .noise import ReadingVariance
 from .phases import circular_range_deg
 from .result import OrderSelection
 from .table import OrderRow
-from .verdicts import explained_row, selection_notes
+from .verdicts import row_with_verdict, selection_notes
 from .zerogroups import ZeroGroupReadings, zero_groups
 
 #: Phases of a retained order lie within this arc over the runs. Noise alone stays within
@@ -143,7 +143,7 @@ def select_by_paper(
         )
         rows.append(row)
     amplitudes = {row.order: row.amplitude for row in rows if row.retained}
-    rows = [explained_row(row, candidates, placed, amplitudes) for row in rows]
+    rows = [row_with_verdict(row, candidates, placed, amplitudes) for row in rows]
     before, after = (_residual(held, orders, mean, which) for which in (np.zeros_like(kept), kept))
     selection = OrderSelection(
         orders=tuple(retained),

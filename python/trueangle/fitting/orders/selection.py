@@ -22,8 +22,8 @@ from .result import OrderSelection
 from .rounding import orders_beyond_rounding
 from .search import FALSE_ALARM, EvidenceSearch
 from .table import OrderRow
-from .verdicts import explained_row, selection_notes, verdict_reason
-from .zerogroups import angle_blocks, zero_groups
+from .verdicts import row_with_verdict, selection_notes, verdict_reason
+from .zerogroups import folds_of_run, zero_groups
 
 if TYPE_CHECKING:
     from ..summed import SummedReadings
@@ -58,7 +58,7 @@ class EvidenceSelection(EvidenceSearch):
                 self.holdout = f"one of {sums.units} groups of runs at a time"
             folds: HarmonicSums | None = sums
         else:
-            parts = angle_blocks(self.units[0], self.positions)
+            parts = folds_of_run(self.units[0], self.positions)
             self.holdout = "whole blocks of neighbouring positions (single run)"
             folds = harmonic_sums(parts, candidates.orders) if parts else None
         repeats = pure_error(self.units, self.positions)
@@ -164,7 +164,7 @@ class EvidenceSelection(EvidenceSearch):
                 )
             )
         retained = {row.order: row.amplitude for row in rows if row.retained}
-        rows = [explained_row(row, self.candidates, self.positions, retained) for row in rows]
+        rows = [row_with_verdict(row, self.candidates, self.positions, retained) for row in rows]
         orders = tuple(retained)
         without, with_ = self._held_out_rms(model)
         selection = OrderSelection(

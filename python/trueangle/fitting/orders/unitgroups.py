@@ -56,7 +56,7 @@ def _unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     return found
 
 
-def columns_summed(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
+def sums_of_unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     """``sum of weight x mean x mean'`` over the units, in blocks of them."""
     size = max(1, _BLOCK // (2 * orders.size))
     total = np.zeros((2 * orders.size, 2 * orders.size))

@@ -57,7 +57,7 @@ def verdict_reason(verdict: str) -> str:
     return _VERDICTS[verdict]
 
 
-def explained_row(
+def row_with_verdict(
     row: OrderRow, candidates: Candidates, positions: Positions, retained: Mapping[float, float]
 ) -> OrderRow:
     """The row with its explanations and the reason of its verdict.

@@ -89,7 +89,7 @@ def _centred(runs: Sequence[CalibrationRun]) -> Iterator[NDArray[np.float64]]:
     yield from np.split(zero + wrap(error - zero, period), ends[:-1])
 
 
-def angle_blocks(unit: ZeroGroupReadings, positions: Positions) -> list[ZeroGroupReadings]:
+def folds_of_run(unit: ZeroGroupReadings, positions: Positions) -> list[ZeroGroupReadings]:
     """Folds of a single run: blocks of neighbouring positions, dealt in turn."""
     blocks = min(_BLOCKS, len(positions) // 2)
     folds = min(_FOLDS, blocks)
