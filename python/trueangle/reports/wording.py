@@ -1,4 +1,4 @@
-"""Words of the page that depend on the content; numbers are set in by the template."""
+"""Words that the template of a page asks for: titles, sentences, lists, conditions, gains."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _OTHERS: Final = 20
 _WORTH: Final = 1.0
 
 
-def _figure_title(name: str, modelled: bool) -> str:
+def figure_title(name: str, modelled: bool) -> str:
     """What stands above a figure.
 
     Examples
@@ -57,7 +57,7 @@ def gain_verdict(content: dict[str, Any]) -> str:
     return "gain" if low >= _WORTH else "no-gain"
 
 
-def _as_sentence(text: str) -> str:
+def as_sentence(text: str) -> str:
     """A remark as a sentence.
 
     Examples
@@ -81,7 +81,7 @@ def joined_list(items: list[Any]) -> str:
     return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"
 
 
-def _residual_signals(figures: dict[str, Any]) -> list[str]:
+def residual_signals(figures: dict[str, Any]) -> list[str]:
     """Signals that the residual is drawn against."""
     return [name.removeprefix("residual-") for name in figures if name.startswith("residual-")]
 
@@ -113,7 +113,7 @@ def by_kind(faults: list[dict[str, Any]]) -> list[tuple[dict[str, Any], list[str
     return list(found.values())
 
 
-def _entry_paths(pattern: str, entries: list[Any]) -> list[str]:
+def entry_paths(pattern: str, entries: list[Any]) -> list[str]:
     """Where the same number of every entry stands in the content.
 
     Examples
@@ -138,7 +138,7 @@ def listed_orders(rows: list[dict[str, Any]]) -> list[int]:
     return sorted({i for i, row in enumerate(rows) if row["retained"]} | set(others[:_OTHERS]))
 
 
-def _gain_paths(findings: list[dict[str, Any]]) -> list[str]:
+def gain_paths(findings: list[dict[str, Any]]) -> list[str]:
     """Where what is left after each finding stands."""
     every = enumerate(findings)
     return [f"diagnosis.findings.{i}.gain.rms_after_arcsec" for i, f in every if f["gain"]]
