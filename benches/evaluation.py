@@ -34,7 +34,7 @@ def show(title: str, rows: list[EvaluationRow], base: str, ratio: str) -> None:
 
 
 def latencies(seconds: float, save: str | None) -> None:
-    step = evaluation.harmonics(evaluation.ORDERS["17 orders"]).compensator()
+    step = evaluation.evaluated_model(evaluation.ORDERS["17 orders"]).compensator()
     kept = {}
     for rate in (1e3, 1e4):
         for name, function in (("empty", float), ("step", step)):
@@ -86,17 +86,17 @@ def main() -> None:
     parser.add_argument("--plot", metavar="FILE")
     args = parser.parse_args()
     print(f"python {platform.python_version()}, numpy {np.__version__}, {platform.machine()}")
-    path = evaluation.harmonics([1])._series.path
+    path = evaluation.evaluated_model([1])._series.path
     print(f"default path {path}, {args.samples} samples")
 
-    batches = evaluation.batches(args.samples, args.rounds)
+    batches = evaluation.evaluate_batches(args.samples, args.rounds)
     show("Batches, ns per sample", batches, "copy float64", "x copy of float64")
-    peers, missing = evaluation.peer_batches(args.samples, args.peer_rounds)
+    peers, missing = evaluation.evaluate_peers(args.samples, args.peer_rounds)
     show("Peers, 17 orders, ns per sample", peers, "trueangle", "x trueangle")
     for name in missing:
         print(f"  {name:38s} not installed")
-    show("37 samples, ns per call", evaluation.small(), "error", "x error")
-    show("One sample, ns per call with its loop", evaluation.single(), "step", "x step")
+    show("37 samples, ns per call", evaluation.evaluate_small(), "error", "x error")
+    show("One sample, ns per call with its loop", evaluation.evaluate_single(), "step", "x step")
     if args.plot is not None:
         plot([*batches, *peers], args.plot)
     if args.latency > 0.0:

@@ -16,7 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from trueangle import _core
-from trueangle.cli.benchmarks.fit import Case, FitRow, design, measure, peers, readings
+from trueangle.cli.benchmarks.fit import (
+    Case,
+    FitRow,
+    fit_columns,
+    fit_peers,
+    fit_readings,
+    measure_fits,
+)
 
 
 def show(rows: list[FitRow]) -> None:
@@ -34,7 +41,7 @@ def show(rows: list[FitRow]) -> None:
 
 def peak_memory(case: Case) -> float:
     """Bytes of resident memory that a fit takes beyond its inputs (Linux)."""
-    theta, error = readings(case)
+    theta, error = fit_readings(case)
     runs = [(theta, theta + error, None)]
     orders = [list(range(1, case.highest + 1))]
     status = Path("/proc/self/status")
@@ -51,9 +58,9 @@ def peak_memory(case: Case) -> float:
 
 def accuracy(arc_deg: float, highest: int, samples: int = 20_000) -> str:
     """Coefficients against least squares refined in 80-bit arithmetic."""
-    theta, error = readings(Case(samples, highest, arc_deg))
+    theta, error = fit_readings(Case(samples, highest, arc_deg))
     indicated = theta + error
-    rows = design(theta, highest)
+    rows = fit_columns(theta, highest)
     wide = theta.astype(np.longdouble)
     exact = [np.ones_like(wide)]
     for k in range(1, highest + 1):
@@ -88,19 +95,19 @@ def main() -> None:
     parser.add_argument("--large", action="store_true", help="ten million readings as well")
     large = parser.parse_args().large
     print(platform.processor() or platform.machine(), "numpy", np.__version__)
-    missing = peers()[1]
+    missing = fit_peers()[1]
     if missing:
         print("not installed:", ", ".join(missing))
 
     fast = ["numpy.linalg.lstsq", "finufft + Toeplitz"]
-    show(measure(Case(37, 5), 500, threads=(1,)))
-    show(measure(Case(10_000, 17), 15, threads=(1,)))
-    show(measure(Case(1_000_000, 17), 5, only=fast, methods=("qr",)))
+    show(measure_fits(Case(37, 5), 500, threads=(1,)))
+    show(measure_fits(Case(10_000, 17), 15, threads=(1,)))
+    show(measure_fits(Case(1_000_000, 17), 5, only=fast, methods=("qr",)))
     if large:
-        show(measure(Case(10_000_000, 17), 5, only=fast[1:]))
-        show(measure(Case(10_000_000, 17, counts=1 << 16), 5, only=[], methods=("moments",)))
-        show(measure(Case(10_000_000, 512), 5, only=fast[1:]))
-        show(measure(Case(10_000_000, 8, 180.0), 5, only=[], methods=("moments", "qr")))
+        show(measure_fits(Case(10_000_000, 17), 5, only=fast[1:]))
+        show(measure_fits(Case(10_000_000, 17, counts=1 << 16), 5, only=[], methods=("moments",)))
+        show(measure_fits(Case(10_000_000, 512), 5, only=fast[1:]))
+        show(measure_fits(Case(10_000_000, 8, 180.0), 5, only=[], methods=("moments", "qr")))
 
     print("\npeak memory beyond the inputs")
     for case in (Case(1_000_000, 17), Case(3_000_000, 17), Case(1_000_000, 512)):

@@ -26,7 +26,7 @@ from trueangle.effects.blindspots import blind_spots
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.planning import Limits
-from trueangle.planning.hypotheses import of_size
+from trueangle.planning.questions import effect_of_size
 from trueangle.rehearsal.trial import trial_outcome
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, simulate
 
@@ -116,7 +116,7 @@ def plain_changes() -> Iterator[dict[str, Any]]:
 
 def can_be(cause: str, rich: Signals) -> bool:
     """Whether readings of these runs can have this cause."""
-    return of_size(cause, SIZE, rich, SIM.surroundings) is not None
+    return effect_of_size(cause, SIZE, rich, SIM.surroundings) is not None
 
 
 def hidden(cause: str) -> Effect | None:
@@ -134,7 +134,7 @@ def hidden(cause: str) -> Effect | None:
         )
         for k, run in enumerate(SIM.runs)
     ]
-    return of_size(cause, SIZE, signals_of(varied), SIM.surroundings)
+    return effect_of_size(cause, SIZE, signals_of(varied), SIM.surroundings)
 
 
 def needed(designs: Designs, truth: Effect, cause: str, seeds: int, alone: bool = False) -> float:

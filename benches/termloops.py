@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 from trueangle import terms
 from trueangle.cli.benchmarks.compiled import FLAGS
-from trueangle.cli.benchmarks.evaluation import harmonics
+from trueangle.cli.benchmarks.evaluation import evaluated_model
 
 TURN = 360.0
-SERIES = harmonics(range(1, 18), TURN).shafts[0]
+SERIES = evaluated_model(range(1, 18), TURN).shafts[0]
 LINES = {"orders": (1, 2, 50), "cosine": (1e-4, 2e-5, 1e-5), "sine": (0.0, 0.0, 0.0)}
 BROKEN = {**LINES, "orders": (1, 2, 50.5)}
 

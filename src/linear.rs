@@ -4,6 +4,7 @@
 //! have made: [`rank_limit`] is the one limit. What is left out gets nothing, so that solution and
 //! covariance are those of the pseudo-inverse in scaled columns.
 
+mod axes;
 mod beside;
 mod blocks;
 mod bump;

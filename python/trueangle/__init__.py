@@ -123,7 +123,7 @@ _PUBLIC = {
 #: Modules that are reached as attributes, likewise imported at first use.
 _MODULES = {"errors": "errors", "plots": "plots", "terms": "model.terms"}
 
-renamed.install()
+renamed.install_former_names()
 
 __all__ = ["__version__", *sorted([*_PUBLIC, *_MODULES])]
 

@@ -277,7 +277,7 @@ class Whitener:
 
 @final
 class LagCorrelation:
-    """Correlation between neighbours within runs, after wander is taken out.
+    """Correlation between neighbours within runs, after drift is taken out.
 
     At least 0, and 0 below 0.05 or within four standard errors of it, so that white noise stays
     exactly white.

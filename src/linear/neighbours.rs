@@ -1,4 +1,4 @@
-//! Correlation between neighbours within runs, after what wanders is taken out.
+//! Correlation between neighbours within runs, after what drifts is taken out.
 
 use std::f64::consts::PI;
 
@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVectorView};
 
 use crate::interrupt;
 
-/// Half periods per run that count as wander and not as correlation of the noise.
-const WANDER_TERMS: usize = 8;
+/// Half periods per run that count as drift and not as correlation of the noise.
+const DRIFT_TERMS: usize = 8;
 
 /// Correlation between neighbours below which the noise counts as white, and the most it can be.
 const WHITE_BELOW: f64 = 0.05;
@@ -16,21 +16,21 @@ const MOST: f64 = 0.98;
 /// Standard errors of a correlation of zero up to which the noise counts as white.
 const ERRORS: f64 = 4.0;
 
-/// Runs whose neighbours are looked at: the mean of each and its wander are taken out.
+/// Runs whose neighbours are looked at: the mean of each and its drift are taken out.
 #[derive(Clone, Debug)]
 pub struct Neighbours {
-    /// First reading of every run that is long enough, and its mean and wander at right angles.
+    /// First reading of every run that is long enough, and its mean and drift at right angles.
     runs: Vec<(usize, DMatrix<f64>)>,
 }
 
 impl Neighbours {
     /// Of runs whose clock increases.
     pub fn new(clock: &[f64], bounds: &[(usize, usize)]) -> Self {
-        let long = bounds.iter().filter(|run| run.1 - run.0 > 2 * WANDER_TERMS);
+        let long = bounds.iter().filter(|run| run.1 - run.0 > 2 * DRIFT_TERMS);
         let basis = |&(start, stop): &(usize, usize)| {
             interrupt::point();
             let (clock, span) = (&clock[start..stop], clock[stop - 1] - clock[start]);
-            let wander = DMatrix::from_fn(clock.len(), WANDER_TERMS + 1, |i, k| {
+            let drift = DMatrix::from_fn(clock.len(), DRIFT_TERMS + 1, |i, k| {
                 let part = if span > 0.0 {
                     (clock[i] - clock[0]) / span
                 } else {
@@ -38,7 +38,7 @@ impl Neighbours {
                 };
                 (PI * part * k as f64).cos()
             });
-            (start, wander.qr().q())
+            (start, drift.qr().q())
         };
         Self {
             runs: long.map(basis).collect(),
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wander_is_no_correlation_and_neighbours_that_are_alike_are() {
+    fn drift_is_no_correlation_and_neighbours_that_are_alike_are() {
         let n = 400;
         let clock: Vec<f64> = (0..n).map(|i| 2.0 * f64::from(i)).collect();
         let neighbours = Neighbours::new(&clock, &[(0, 10), (10, 400)]);

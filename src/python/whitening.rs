@@ -225,7 +225,7 @@ impl PyWhitener {
     }
 }
 
-/// Correlation between neighbours within runs, after wander is taken out.
+/// Correlation between neighbours within runs, after drift is taken out.
 #[pyclass(name = "LagCorrelation", module = "trueangle._core", frozen)]
 pub struct PyLagCorrelation {
     pub(super) core: Neighbours,

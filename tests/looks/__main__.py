@@ -9,13 +9,17 @@ import sys
 from pathlib import Path
 
 from pages import pages
-from terminal import COLUMNS, furnish, scenes, shown
+from scenes import furnish, scenes
 
 ROOT = Path(__file__).resolve().parents[2]
+COLUMNS = 80
 
 
 def main(folder):
     """Write everything; the number of things that are too wide."""
+    sys.path.append(str(ROOT / "tests" / "python"))
+    from transcripts.terminal import ran
+
     desk = folder / "desk"
     desk.mkdir(parents=True, exist_ok=True)
     furnish(desk)
@@ -23,9 +27,10 @@ def main(folder):
     for command, lines in scenes().items():
         text = ""
         for line in lines:
-            status, told = shown(line, desk)
-            text += f"$ trueangle {line}\n{told}\n"
-            wide += [f"{command}: {row}" for row in told.splitlines() if len(row) > COLUMNS]
+            status, *told = ran(line.split(), desk, COLUMNS)
+            text += f"$ trueangle {line}\n{''.join(told)}\n"
+            rows = "".join(told).splitlines()
+            wide += [f"{command}: {row}" for row in rows if len(row) > COLUMNS]
             if status:
                 wide.append(f"{line}: exit status {status}")
         (folder / f"{command}.txt").write_text(text, encoding="utf-8")

@@ -41,7 +41,7 @@ DEFAULT_TIME = deadline.LEAST
 deadline.LEAST = PATIENCE * DEFAULT_TIME
 
 
-class Counted(deadline.Pace):
+class Counted(deadline.Deadline):
     """A pace at which every question whether time is up takes as long."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -50,7 +50,7 @@ class Counted(deadline.Pace):
         super().__init__(*args, **kwargs)
 
 
-deadline.Pace = Counted  # type: ignore[misc]
+deadline.Deadline = Counted  # type: ignore[misc]
 
 
 @pytest.fixture

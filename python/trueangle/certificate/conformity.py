@@ -1,4 +1,4 @@
-"""Statements of conformity: a limit, a decision rule, its guard band, and the risk that is left."""
+"""Specifications and statements of conformity: a limit, a decision rule, the risk that is left."""
 
 from __future__ import annotations
 

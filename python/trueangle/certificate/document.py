@@ -17,9 +17,9 @@ from ..fitting.summary import fit_error_unit
 from ..runs.provenance import provenance
 from ..runs.run import CalibrationRun, as_runs
 from ..support.angles import ARCSEC_PER_TURN
+from ..support.argumentkinds import told_kinds
 from ..support.display_units import ErrorsIn
-from ..support.kinds import told_kinds
-from ..support.plainresult import finite
+from ..support.plainresult import finite_or_none
 from .budget import LEVEL, Budget, Contribution
 from .conformity import conformity
 from .identity import ENTRIES, Identity, load_identity
@@ -224,7 +224,7 @@ def _valued(fit: FitResult, angles: NDArray[np.float64], who: Identity) -> dict[
             "angle_deg": float(angle),
             "error_arcsec": float(error),
             "standard_arcsec": budget.standard,
-            "degrees_of_freedom": finite(budget.degrees_of_freedom),
+            "degrees_of_freedom": finite_or_none(budget.degrees_of_freedom),
             "coverage_factor": budget.coverage_factor,
             "expanded_arcsec": budget.expanded,
         }
@@ -267,13 +267,13 @@ def _budget(budget: Budget, angle_deg: float) -> dict[str, Any]:
                 "distribution": item.distribution,
                 "standard_arcsec": item.standard,
                 "sensitivity": item.sensitivity,
-                "degrees_of_freedom": finite(item.degrees_of_freedom),
+                "degrees_of_freedom": finite_or_none(item.degrees_of_freedom),
                 "share_percent": share,
             }
             for item, share in zip(budget.contributions, budget.shares(), strict=True)
         ],
         "standard_arcsec": budget.standard,
-        "degrees_of_freedom": finite(budget.degrees_of_freedom),
+        "degrees_of_freedom": finite_or_none(budget.degrees_of_freedom),
         "coverage_factor": budget.coverage_factor,
         "expanded_arcsec": budget.expanded,
     }

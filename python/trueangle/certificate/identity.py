@@ -13,8 +13,8 @@ from typing import Any, Final
 
 from ..errors import ArgumentError, FileError
 from ..support.angles import ARCSEC_PER_DEG
+from ..support.argumentkinds import told_kinds
 from ..support.files import read_whole
-from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice, did_you_mean
 from .budget import DISTRIBUTIONS, Contribution
 from .conformity import RULES, Specification
@@ -130,7 +130,7 @@ def load_identity(path: str | PathLike[str]) -> Identity:
     except ValueError:  # whole numbers of thousands of digits
         raise FileError(path, "holds a number or date that cannot be read") from None
     try:
-        found = identity_from(table)
+        found = _identity_from(table)
         if found.logo is None:
             return found
         logo = Path(path).parent / found.logo
@@ -144,7 +144,7 @@ def load_identity(path: str | PathLike[str]) -> Identity:
         raise FileError(path, str(reason)) from None
 
 
-def identity_from(table: Mapping[str, Any]) -> Identity:
+def _identity_from(table: Mapping[str, Any]) -> Identity:
     """Identity of a decoded file.
 
     Raises

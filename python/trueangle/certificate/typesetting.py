@@ -17,7 +17,7 @@ from ..errors import MissingExtraError
 from ..plots import palette
 from ..plots.canvas import described, new_axes, new_figure, turn_axis
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.display_units import ErrorsIn, error_unit, significant, sine_of_rms
+from ..support.display_units import ErrorsIn, error_unit, significant_digits, sine_of_rms
 from ..support.files import CERTIFICATE, check_output, external_output, read_whole
 from .language import certificate_texts, note_in
 
@@ -157,6 +157,7 @@ def certified_errors(
     return described(
         ax,
         f"Error at {len(positions)} positions with expanded uncertainty, from "
-        f"{significant(float(error.min()))} to {significant(float(error.max()))} {unit.name}, "
-        f"U at most {significant(float(expanded.max()), 2)} {unit.name}.",
+        f"{significant_digits(float(error.min()))} to {significant_digits(float(error.max()))} "
+        f"{unit.name}, "
+        f"U at most {significant_digits(float(expanded.max()), 2)} {unit.name}.",
     )

@@ -1,4 +1,4 @@
-"""Errors at nominal positions: what a fit says, what it leaves; readings as a model leaves them."""
+"""Errors at nominal positions: what a fit says and leaves, reversal; runs that were corrected."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..errors import ArgumentError
 from ..estimation.reference import design_matrix
 from ..model.file import load_model
 from ..model.model import HarmonicModel
-from ..plots.curves import seen_span
+from ..plots.curves import fitted_degrees
 from ..runs.aliasing import distinct_positions
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
@@ -81,7 +81,7 @@ def nominal_positions(fit: FitResult, count: int | None = None) -> Array:
         read = distinct_positions(fit.runs)
         if 2 <= len(read) <= POSITIONS:
             return read.turns * 360.0
-    low, high = seen_span(fit.model)
+    low, high = fitted_degrees(fit.model)
     pitch = 360.0 / (count or POSITIONS)
     first = int(np.ceil(low / pitch - 1e-9))
     last = (

@@ -15,7 +15,7 @@ from typing import NoReturn, Protocol
 
 from .._core import __version__
 from ..errors import ArgumentError, TrueAngleError, shortened
-from ..support.layout import wrapped
+from ..support.layout import wrapped_lines
 from .parser import Parser
 from .paths import check_paths
 from .terminal import (
@@ -91,7 +91,7 @@ def build_parser(words: Container[str] = COMMANDS, commands: Iterable[str] = COM
         subparser = subparsers.add_parser(
             name,
             help=command.HELP,
-            description="\n".join(wrapped(command.HELP)),
+            description="\n".join(wrapped_lines(command.HELP)),
             epilog=f"example:\n  {command.EXAMPLE}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )

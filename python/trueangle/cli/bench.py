@@ -68,16 +68,16 @@ def run(args: argparse.Namespace) -> int:
         raise ArgumentError(
             f"--samples and --rounds must be 1 or more, got {args.samples} and {args.rounds}"
         )
-    peers, missing = evaluation.peer_batches(min(args.samples, 100_000), args.rounds)
+    peers, missing = evaluation.evaluate_peers(min(args.samples, 100_000), args.rounds)
     parts = {
-        "batches": evaluation.batches(args.samples, args.rounds),
+        "batches": evaluation.evaluate_batches(args.samples, args.rounds),
         "peers": peers,
-        "calls_of_37_samples": evaluation.small(rounds=20 * args.rounds),
-        "single_samples": evaluation.single(rounds=20 * args.rounds),
+        "calls_of_37_samples": evaluation.evaluate_small(rounds=20 * args.rounds),
+        "single_samples": evaluation.evaluate_single(rounds=20 * args.rounds),
     }
-    fits = fit.quick(min(args.samples, 100_000), args.rounds)
-    missing = sorted({*missing, *fit.peers()[1]})
-    path = evaluation.harmonics([1])._series.path
+    fits = fit.quick_fits(min(args.samples, 100_000), args.rounds)
+    missing = sorted({*missing, *fit.fit_peers()[1]})
+    path = evaluation.evaluated_model([1])._series.path
     if args.json:
         medians = {
             part: {row.name: row.nanoseconds for row in rows} for part, rows in parts.items()
@@ -119,14 +119,14 @@ def _scaling(args: argparse.Namespace) -> int:
             f"from 1, got {args.largest:g}, {args.rounds} and {args.workers}"
         )
     size = int(args.largest)
-    grown = scaling.by_readings(size, args.rounds)
+    grown = scaling.scaling_by_readings(size, args.rounds)
     # Orders far fewer than readings: the moments take these, and they tell all orders.
     some = min(size, scaling.READINGS)
-    orders = scaling.by_orders(args.rounds, some // 64, some)
-    shared = scaling.by_workers(workers, size) if workers else []
-    shared += scaling.by_units(size // _READINGS_TO_A_UNIT)
-    shared += scaling.by_windows(some, args.rounds)
-    costs = scaling.costs(grown)
+    orders = scaling.scaling_by_orders(args.rounds, some // 64, some)
+    shared = scaling.scaling_by_workers(workers, size) if workers else []
+    shared += scaling.scaling_by_units(size // _READINGS_TO_A_UNIT)
+    shared += scaling.scaling_by_windows(some, args.rounds)
+    costs = scaling.work_costs(grown)
     if args.plot is not None:
         _draw(args.plot, grown, costs)
     if args.json:

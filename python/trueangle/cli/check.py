@@ -9,7 +9,7 @@ from ..errors import FileError
 from ..support.plainresult import json_text
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, robot_messages
-from .signal_options import add_signals, reading
+from .signal_options import add_signals, reading_options
 
 if TYPE_CHECKING:
     from .robots import JointAsked
@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     if asked is not None:
         return _robot(*asked, args)
     try:
-        found = check(args.files, **reading(args))
+        found = check(args.files, **reading_options(args))
     except FileError as error:
         _tell_columns(error, args)
         raise
@@ -64,9 +64,9 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     from ..runs.files import read_runs
 
     def work(joint: JointAsked) -> Any:
-        found = check(joint.args.files, **reading(joint.args))
+        found = check(joint.args.files, **reading_options(joint.args))
         try:
-            runs = read_runs(joint.args.files, **reading(joint.args))
+            runs = read_runs(joint.args.files, **reading_options(joint.args))
         except FileError:  # the check says what is wrong
             runs = None
         return found, checked_rank(joint.name, found, runs)

@@ -63,7 +63,7 @@ def _corrected(seed: int) -> str:
             "A joint's encoder is wrong by the same pattern in every turn. Measured once",
             "   against a reference, the pattern can be taken off from then on:",
             "",
-            *letter_chart(place, {"o": read, "*": corrected}, "arcsec"),
+            *_letter_chart(place, {"o": read, "*": corrected}, "arcsec"),
             "   o error as read, * error corrected, over one turn of the output in degrees",
             "",
             f"   peak-to-peak  {before:6.2f} -> {after:5.2f} arcsec, "
@@ -145,7 +145,7 @@ _ROWS: Final = 11
 _COLUMNS: Final = 61
 
 
-def letter_chart(place: NDArray[Any], errors: Mapping[str, NDArray[Any]], unit: str) -> list[str]:
+def _letter_chart(place: NDArray[Any], errors: Mapping[str, NDArray[Any]], unit: str) -> list[str]:
     """Errors over a turn of 0 to 360 deg, each set by its letter; later ones lie on top.
 
     Examples

@@ -21,7 +21,7 @@ from .options import (
 )
 from .paths import Input, Output
 from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
-from .signal_options import reading, signals_by_joint
+from .signal_options import reading_options, signals_by_joint
 from .values import declared_shafts, seconds
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the diagnosis."""
     from ..diagnosis import diagnose
-    from .run_lists import read_checked
+    from .run_lists import read_checked_runs
 
     if args.model is not None and args.corrected_model is None:
         raise ArgumentError(
@@ -139,13 +139,13 @@ def run(args: argparse.Namespace) -> int:
         model = load_model(args.model)
     own = [entry for entry in args.signal or () if entry[0] == "simulated"]
     args.signal = [entry for entry in args.signal or () if entry[0] != "simulated"]
-    runs = read_checked(args)
+    runs = read_checked_runs(args)
     simulated = None
     if args.simulated is not None:
         from ..runs.joining import minus_simulated
 
         columns = (signals_by_joint(own, single=False) or {}).get("simulated")
-        given = {**reading(args), "signals": columns}
+        given = {**reading_options(args), "signals": columns}
         simulated = minus_simulated(runs, args.simulated, by=args.simulated_by, **given)
     with ending_early() as interruption:
         result = diagnose(
@@ -179,7 +179,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     """Diagnose every joint against its simulation, or an empty one of its gear."""
     from ..diagnosis import diagnose
     from ..reports.robot import diagnosed_rank, plain_ranking, ranked
-    from .run_lists import read_checked
+    from .run_lists import read_checked_runs
 
     single = (args.simulated, args.extend, args.extend_into, args.model, args.plan)
     if any(given is not None for given in single):
@@ -190,7 +190,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
 
     def work(joint: JointAsked) -> Diagnosis:
         simulation = _believed(joint.args, empty=True)
-        runs = read_checked(joint.args)
+        runs = read_checked_runs(joint.args)
         return diagnose(runs, simulation, within=args.within, progress=args.progress)
 
     found, _ = each_joint(joints, work)

@@ -100,9 +100,9 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     runs: dict[str, Any] = {}
 
     def work(joint: JointAsked) -> Any:
-        from .run_lists import read_selected
+        from .run_lists import read_selected_runs
 
-        runs[joint.name] = read_selected(joint.args)
+        runs[joint.name] = read_selected_runs(joint.args)
         return _in_memory(joint.args, runs[joint.name])
 
     fits, failed = each_joint(joints, work)
@@ -130,9 +130,9 @@ def _fitted(args: argparse.Namespace) -> FitResult:
         return fit_logs(
             args.runs, orders, loss=args.loss, checksums=args.checksums, **log_options(args)
         )
-    from .run_lists import read_selected
+    from .run_lists import read_selected_runs
 
-    return _in_memory(args, read_selected(args))
+    return _in_memory(args, read_selected_runs(args))
 
 
 def _in_memory(args: argparse.Namespace, runs: list[CalibrationRun]) -> FitResult:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..support.files import FLEET
 from .options import add_errors_in, add_joint, errors_in
 from .paths import Input, Output
-from .signal_options import reading
+from .signal_options import reading_options
 from .values import declared_shafts, orders_by_shaft
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def requested_fleet(args: argparse.Namespace, **limits: Any) -> Fleet:
         fixed_member=args.fixed_member,
         shafts=shafts,
         **limits,
-        **reading(args),
+        **reading_options(args),
     )
 
 

@@ -6,7 +6,8 @@ import argparse
 
 from ..support.angles import zero_text
 from ..support.display_units import error_unit
-from ..support.plainresult import counted, json_text
+from ..support.layout import counted
+from ..support.plainresult import json_text
 from .export import add_target_options, target_options
 from .options import add_errors_in, add_model_output, errors_in
 from .paths import Input

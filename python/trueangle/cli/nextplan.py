@@ -66,14 +66,14 @@ def run_after(args: argparse.Namespace) -> int:
     from ..planning.limits import load_limits
     from ..rehearsal.after import SEEDS, WITHIN, plan_after
     from ..simulation import load_simulation
-    from .run_lists import read_checked
+    from .run_lists import read_checked_runs
 
     if args.simulation is None:
         raise ArgumentError("--after needs what is believed: add --simulation FILE")
     refuse_given(args, OTHERS, "does not go with --after; leave one of them out")
     args.runs = args.after
     plan = plan_after(
-        read_checked(args),
+        read_checked_runs(args),
         load_simulation(args.simulation),
         between=args.between,
         limits=None if args.limits is None else load_limits(args.limits),

@@ -6,7 +6,7 @@ import argparse
 from typing import Any, Final
 
 from ..errors import ArgumentError
-from .signal_options import reading
+from .signal_options import reading_options
 from .terminal import own_interrupts
 from .values import declared_shafts
 
@@ -76,10 +76,10 @@ def _is_large(args: argparse.Namespace) -> bool:
     paths = matched_paths(args.runs)
     if not all(path.is_file() or path.is_dir() for path in paths):
         return False  # a pipe is read once
-    from ..logs.sources import hold_at_most
+    from ..logs.sources import logs_hold_at_most
 
     found = [path for path, _ in find_logs(paths)]
-    return not hold_at_most(found, _READINGS, args.topic)
+    return not logs_hold_at_most(found, _READINGS, args.topic)
 
 
 def log_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def log_options(args: argparse.Namespace) -> dict[str, Any]:
         "fixed_member": args.fixed_member,
         "argument": args.argument,
         "covariance": args.covariance,
-        **reading(args),
+        **reading_options(args),
         "shafts": declared_shafts(args.shaft),
         "scheduler": args.scheduler,
         "progress": args.progress,

@@ -22,7 +22,7 @@ from .robots import add_robot, each_joint, joints_asked
 from .values import declared_shafts, parse_orders
 
 if TYPE_CHECKING:
-    from ..fitting.orders.table import OrderSelection
+    from ..fitting.orders.result import OrderSelection
     from .robots import JointAsked
 
 HELP = "say which orders of the angle error are real, and what they may be"
@@ -79,7 +79,7 @@ def _of_joint(joint: JointAsked) -> OrderSelection:
 def _in_memory(args: argparse.Namespace) -> OrderSelection:
     from ..fitting.orders.select import select_orders
     from ..fitting.robust import without_spikes
-    from .run_lists import read_selected
+    from .run_lists import read_selected_runs
 
     reference = (
         ()
@@ -87,7 +87,7 @@ def _in_memory(args: argparse.Namespace) -> OrderSelection:
         else parse_orders(args.reference_orders, "--reference-orders")
     )
     return select_orders(
-        [without_spikes(run) for run in read_selected(args)],
+        [without_spikes(run) for run in read_selected_runs(args)],
         None if args.orders is None else parse_orders(args.orders),
         args.gear_ratio,
         args.fixed_member,

@@ -1,4 +1,4 @@
-"""Arguments that name files: marked by their type, checked before a command begins."""
+"""Arguments that name inputs and outputs: marked by their type, checked before a command begins."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from ..errors import ArgumentError
-from ..support.files import Kind, check_input, check_output, same_file
+from ..support.files import FileKind, check_input, check_output, same_file
 
 
 class Input(str):
@@ -38,10 +38,10 @@ class ModelInput(Input):
 class Output(str):
     """A file that a command writes: ``type=Output.of(KIND)`` of an argument."""
 
-    kind: Kind | None = None
+    kind: FileKind | None = None
 
     @classmethod
-    def of(cls, kind: Kind | None) -> Callable[[str], Output]:
+    def of(cls, kind: FileKind | None) -> Callable[[str], Output]:
         """What argparse calls with the text of an argument."""
 
         def made(text: str) -> Output:

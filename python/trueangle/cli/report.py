@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
-from ..support.deadline import with_pace
+from ..support.deadline import with_deadline
 from ..support.files import PDF, REPORT
 from ..support.plainresult import json_text
 from .options import (
@@ -156,16 +156,16 @@ def _fleet(args: argparse.Namespace) -> int:
 def _made(args: argparse.Namespace, path: str | None, title: str | None = None) -> Any:
     """The report or certificate that is asked for, written to ``path``."""
     from ..reports import report
-    from .run_lists import read_checked
+    from .run_lists import read_checked_runs
 
-    runs = read_checked(args)
+    runs = read_checked_runs(args)
     simulation = None
     if args.simulation is not None:
         from ..simulation import load_simulation
 
         simulation = load_simulation(args.simulation)
     known = declared_shafts(args.shaft) if simulation is None else simulation.joint.shafts
-    with with_pace(style=args.progress):
+    with with_deadline(style=args.progress):
         return report(
             runs,
             path,

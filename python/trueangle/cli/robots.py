@@ -33,11 +33,11 @@ class JointAsked:
     @property
     def signals(self) -> dict[str, Any]:
         """Columns by role that a correction reads, as a robot's file keeps them."""
-        from ..support.signals import is_at_run_time
+        from ..support.signals import is_run_time_signal
 
         read = ("indicated", "time")
         entries = [e for e in self.args.signal or () if e[0] is None]
-        own = [e for e in entries if e[1] in read or is_at_run_time(e[1])]
+        own = [e for e in entries if e[1] in read or is_run_time_signal(e[1])]
         return signals_by_joint(own) or {}
 
 
@@ -151,11 +151,11 @@ def each_joint(
     ArgumentError
         The one of a joint, with its name before it.
     """
-    from ..runs.readings import read_once
+    from ..runs.readings import reading_files_once
 
     found: dict[str, T] = {}
     failed: dict[str, TrueAngleError] = {}
-    with read_once():
+    with reading_files_once():
         for joint in joints:
             try:
                 found[joint.name] = work(joint)

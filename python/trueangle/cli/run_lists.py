@@ -10,12 +10,12 @@ from ..errors import ArgumentError
 from ..runs.files import read_runs
 from ..runs.run import CalibrationRun
 from ..support.suggestions import did_you_mean, listed_names
-from .signal_options import reading
+from .signal_options import reading_options
 
-__all__ = ["listed_names", "read_selected"]
+__all__ = ["listed_names", "read_selected_runs"]
 
 
-def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
+def read_selected_runs(args: argparse.Namespace) -> list[CalibrationRun]:
     """Runs of a command's files, those of ``--run`` only where labels or patterns are given.
 
     Raises
@@ -23,7 +23,7 @@ def read_selected(args: argparse.Namespace) -> list[CalibrationRun]:
     ArgumentError
         A label that no run has; names those there are.
     """
-    runs = read_checked(args)
+    runs = read_checked_runs(args)
     labels: list[str] = args.run or []
     if not labels:
         return runs
@@ -49,12 +49,12 @@ def _is_meant(name: str, label: str) -> bool:
     return name == label or fnmatchcase(name, label)
 
 
-def read_checked(args: argparse.Namespace) -> list[CalibrationRun]:
+def read_checked_runs(args: argparse.Namespace) -> list[CalibrationRun]:
     """Runs of the files; faults of the data are told on stderr, in the words of ``check``."""
     from ..runs.checks.check import data_faults
     from ..runs.checks.record import records_of
 
-    runs = read_runs(args.runs, **reading(args))
+    runs = read_runs(args.runs, **reading_options(args))
     for fault in data_faults(records_of(runs)):
         print(f"trueangle: warning: {fault}", file=sys.stderr)
     return runs

@@ -11,7 +11,7 @@ from ..support.plainresult import json_text
 from .options import add_errors_in, add_model_output, errors_in
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, save_models
-from .signal_options import add_signals, reading
+from .signal_options import add_signals, reading_options
 from .values import parse_orders
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def _calibrated(args: argparse.Namespace) -> SelfCalibration:
         fit_ratio=args.fit_ratio,
         ripple=ripple if ripple in ("auto", "none") else _whole(ripple, "--ripple"),
         head_angles=None if args.head_angles is None else _numbers(args.head_angles),
-        **reading(args),
+        **reading_options(args),
     )
 
 

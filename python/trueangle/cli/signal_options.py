@@ -124,7 +124,7 @@ def signals_by_joint(
     return found or None
 
 
-def reading(args: argparse.Namespace) -> dict[str, Any]:
+def reading_options(args: argparse.Namespace) -> dict[str, Any]:
     """Keywords of `trueangle.read_runs` from the options of a command."""
     return {
         "counts_per_turn": args.counts_per_turn,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from ..support.plainresult import counted, json_text
+from ..support.layout import counted
+from ..support.plainresult import json_text
 from .options import add_runs_output
 from .paths import Input
 

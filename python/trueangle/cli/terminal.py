@@ -1,4 +1,4 @@
-"""The terminal: text that never steers it, colours where it has them, signals that end the work."""
+"""The terminal: plain streams that nothing steers, colours where it has them, ending by signals."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ENDINGS: Final = ("SIGTERM", "SIGHUP")
 _LAID_OUT: Final = {ord("\t"): None, ord("\n"): None}
 
 
-def printable(text: str) -> str:
+def printable_text(text: str) -> str:
     r"""``text`` with control characters written as escapes.
 
     Examples
@@ -47,8 +47,8 @@ def _escaped(found: re.Match[str]) -> str:
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
 
 
-class Plain:
-    """A stream for text that passes on `printable` text only.
+class PlainStream:
+    """A stream for text that passes on `printable_text` text only.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Plain:
 
     def write(self, text: str) -> int:
         """Write; signs that the stream's encoding lacks become escapes."""
-        shown = printable(self._wording(text))
+        shown = printable_text(self._wording(text))
         if self._coloured:
             shown = coloured_text(shown)
         with self._named():
@@ -111,14 +111,16 @@ class Plain:
 
 @contextlib.contextmanager
 def plain_streams(wording: Callable[[str], str] = str) -> Iterator[None]:
-    """Let everything that is printed pass `Plain`, in the words of a command."""
+    """Let everything that is printed pass `PlainStream`, in the words of a command."""
     # A process started without them (pythonw, closed descriptors) has None.
     out, err = sys.stdout, sys.stderr
     with contextlib.ExitStack() as stack:
         if out is not None:
-            stack.enter_context(contextlib.redirect_stdout(Plain(out, wording=wording)))
+            stack.enter_context(contextlib.redirect_stdout(PlainStream(out, wording=wording)))
         if err is not None:
-            stack.enter_context(contextlib.redirect_stderr(Plain(err, "standard error", wording)))
+            stack.enter_context(
+                contextlib.redirect_stderr(PlainStream(err, "standard error", wording))
+            )
         yield
 
 

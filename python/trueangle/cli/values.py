@@ -99,7 +99,7 @@ def parse_orders(text: str, option: str = "--orders") -> tuple[float, ...]:
     >>> parse_orders("1-4,8,7.3")
     (1, 2, 3, 4, 7.3, 8)
     """
-    from ..joint.shafts import counted_orders  # takes numpy, which a help does without
+    from ..joint.shafts import limited_orders  # takes numpy, which a help does without
 
     found: list[float] = []
     for part in text.split(","):
@@ -109,7 +109,7 @@ def parse_orders(text: str, option: str = "--orders") -> tuple[float, ...]:
                 low, high = int(first), int(last)
                 if low > high:
                     raise ValueError
-                found += counted_orders(range(low, high + 1), f"{option} {part.strip()}")
+                found += limited_orders(range(low, high + 1), f"{option} {part.strip()}")
             else:
                 found.append(float(first))
         except ArgumentError:
@@ -122,7 +122,7 @@ def parse_orders(text: str, option: str = "--orders") -> tuple[float, ...]:
     if not all(0.0 < k < 1e6 for k in found):
         raise ArgumentError(f"{option} must be positive and below a million, got {text!r}")
     whole = (int(k) if float(k).is_integer() else k for k in sorted(set(found)))
-    return tuple(counted_orders(whole, f"{option} {text!r:.60}"))
+    return tuple(limited_orders(whole, f"{option} {text!r:.60}"))
 
 
 def orders_by_shaft(

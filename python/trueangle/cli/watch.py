@@ -16,7 +16,7 @@ from .paths import Input, Output
 from .pictures import save_picture
 from .robotmodel import joint_asked, refuse_joint
 from .robots import add_robot, joints_asked
-from .signal_options import add_signals, reading
+from .signal_options import add_signals, reading_options
 from .values import turns
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def _batches(
 ) -> Iterator[ReadingBatch]:
     from ..model.batches import read_batches, read_lines
 
-    options: Any = reading(args)
+    options: Any = reading_options(args)
     options["signals"] = {**columns, **(options["signals"] or {})} or None
     if args.log == "-":
         return read_lines(sys.stdin, model, options)

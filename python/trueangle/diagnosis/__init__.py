@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from .diagnose import diagnose
 from .finding import Finding
-from .findings import Diagnosis
+from .result import Diagnosis
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]

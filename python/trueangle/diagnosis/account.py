@@ -1,4 +1,4 @@
-"""Account of readings: the causes chosen, against the simulation or nearly it."""
+"""Account of readings: data prepared, and causes chosen, against the simulation or nearly it."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.effect import ScatterFinding
 from ..effects.scatter import NEW_SCATTER
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array
-from ..support.deadline import pace
-from .believed import corrected_effects
-from .delay import Delay, error_before, find_delay
-from .exchange import exchanged
-from .gearedlines import GearedLines, Ratio
-from .gearratio import aligned, find_ratio, near_ratio
+from ..support.deadline import current_deadline
+from .delay import Delay, error_before_delay, find_delay
+from .exchange import exchanged_causes
+from .gearedlines import GearedLines, GearedLinesRatio
+from .gearratio import find_ratio, near_ratio, signals_at_ratio
 from .identifiability import blind_spots, in_common_form
+from .judgedbeliefs import effects_as_measured
 from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
-from .remainder import unexplained_after
-from .rounding import beyond_rounding, tells_no_more, unrounded
-from .selection import select
+from .remainder import unexplained_remainder
+from .rounding import account_beyond_rounding, is_rounding_only, unrounded
+from .selection import select_causes
 from .unnamed import is_named
 
 #: Readings used at most: beyond, one of every so many in a row is drawn at random.
@@ -50,11 +50,11 @@ class CauseSelection:
     start: Regression
     chosen: Regression
     scatter: list[ScatterFinding]
-    spots: list[Blindness]
+    spots: list[Ambiguity]
 
 
 @dataclass(frozen=True)
-class Seen:
+class PreparedData:
     """Readings as they are held against a simulation.
 
     Attributes
@@ -74,7 +74,7 @@ class Seen:
     """
 
     sim: Simulation
-    ratio: Ratio | None
+    ratio: GearedLinesRatio | None
     delay: Delay | None
     every: Signals
     signals: Signals
@@ -87,16 +87,16 @@ class Seen:
         every: Signals,
         error: Array,
         sim: Simulation,
-        ratio: Ratio | None = None,
+        ratio: GearedLinesRatio | None = None,
         delay: Delay | None = None,
-    ) -> Seen:
+    ) -> PreparedData:
         """With another ratio, or as the simulation states it; as they were a time before."""
         if ratio is not None:
             sim = ratio.simulation
-            every = aligned(sim, every, error)
+            every = signals_at_ratio(sim, every, error)
         then = every
         if delay is not None:
-            then, error = error_before(every, error, delay.seconds)
+            then, error = error_before_delay(every, error, delay.seconds)
         rows = _directed(every)
         rows = rows[_subsample(rows.size)]
         if rows.size == len(every):
@@ -118,7 +118,7 @@ class Account:
         The readings as they are, without any cause.
     """
 
-    seen: Seen
+    seen: PreparedData
     choice: CauseSelection
     believed: Simulation
     first: Regression
@@ -141,16 +141,18 @@ def account_of(every: Signals, error: Array, sim: Simulation) -> Account:
     """
     geared = GearedLines.of(sim, every, error)
     ratio = None if geared is None else find_ratio(geared)
-    account = _believed(Seen.of(every, error, sim, ratio))
+    account = _believed(PreparedData.of(every, error, sim, ratio))
     near = None if geared is None or ratio else near_ratio(geared)
-    if near is not None and not pace().over:
-        seen = Seen.of(every, error, sim, near)
+    if near is not None and not current_deadline().over:
+        seen = PreparedData.of(every, error, sim, near)
         if _helps(seen, account.choice.chosen):
             account = _better(account, _believed(seen), NEW_CAUSE)
-    delay = None if pace().over else find_delay(account.seen.every, error, account.seen.sim)
-    if delay is None or pace().over:
+    delay = (
+        None if current_deadline().over else find_delay(account.seen.every, error, account.seen.sim)
+    )
+    if delay is None or current_deadline().over:
         return account
-    other = _believed(Seen.of(every, error, sim, account.seen.ratio, delay))
+    other = _believed(PreparedData.of(every, error, sim, account.seen.ratio, delay))
     return _better(account, other, NEW_CAUSE + account.choice.chosen.log_n)
 
 
@@ -162,19 +164,19 @@ def _better(account: Account, other: Account, price: float) -> Account:
     return account
 
 
-def _helps(seen: Seen, chosen: Regression) -> bool:
+def _helps(seen: PreparedData, chosen: Regression) -> bool:
     """Whether another ratio helps, alone or beside what was chosen; a whole account is slower."""
     start = _start(seen, seen.sim)
     hopes = (start, start.with_terms(chosen.terms))
     return min(map(total_penalty, hopes)) < total_penalty(chosen)
 
 
-def _believed(seen: Seen) -> Account:
+def _believed(seen: PreparedData) -> Account:
     """The account, and the simulation with the effects it claims as the readings show them."""
     choice, believed = _chosen(seen, seen.sim), seen.sim
     # Twice each: what one was taken for is only known once the others are right.
     for _ in range(2 * len(seen.sim.effects)):
-        others = [] if pace().over else _corrections(choice, believed, seen.sim)
+        others = [] if current_deadline().over else _corrections(choice, believed, seen.sim)
         tried = [(_chosen(seen, other), other) for other in others]
         best = min(tried, key=lambda each: total_penalty(each[0].chosen), default=None)
         if best is None or total_penalty(best[0].chosen) >= total_penalty(choice.chosen):
@@ -191,11 +193,11 @@ def _corrections(
     Another size of what is believed comes before further causes that make up for it.
     """
     settled = [choice.chosen, choice.start] if choice.chosen.terms else [choice.start]
-    found = (corrected_effects(each, believed, stated, choice.spots) for each in settled)
+    found = (effects_as_measured(each, believed, stated, choice.spots) for each in settled)
     return [other for other in found if other is not None]
 
 
-def _start(seen: Seen, sim: Simulation) -> Regression:
+def _start(seen: PreparedData, sim: Simulation) -> Regression:
     """The readings against a simulation, without any cause.
 
     A delay stays free beside all else: what follows the direction, say, is judged jointly with it.
@@ -205,23 +207,25 @@ def _start(seen: Seen, sim: Simulation) -> Regression:
     return Regression.of(seen.signals, error, sim.surroundings, beside=beside)
 
 
-def _chosen(seen: Seen, sim: Simulation) -> CauseSelection:
+def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:
     """Choose the causes by which readings differ from a simulation."""
     start = _start(seen, sim)
     # What is always free is no blind spot.
     spots = blind_spots(start if seen.delay is None else _start(replace(seen, delay=None), sim))
-    chosen = start if tells_no_more(start) else beyond_rounding(start, select(start))
+    chosen = (
+        start if is_rounding_only(start) else account_beyond_rounding(start, select_causes(start))
+    )
     scatter: list[ScatterFinding] = []
-    if pace().over:
+    if current_deadline().over:
         return CauseSelection(start, chosen, scatter, spots)  # what is left is no scatter yet
     uneven = _uneven(start, chosen)
     if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit_of_scatter(start, chosen):
         scatter.append(uneven)
         start = start.weighted(uneven.weights)
-        chosen = select(start, chosen.terms)
-    if not all(map(is_named, chosen.terms)) and not unexplained_after(chosen).found:
-        chosen = select(start, unnamed=False)
-    chosen = beyond_rounding(start, in_common_form(exchanged(chosen), spots))
+        chosen = select_causes(start, chosen.terms)
+    if not all(map(is_named, chosen.terms)) and not unexplained_remainder(chosen).found:
+        chosen = select_causes(start, unnamed=False)
+    chosen = account_beyond_rounding(start, in_common_form(exchanged_causes(chosen), spots))
     scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
     return CauseSelection(start, chosen, scatter, spots)
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, normal_tail
-from ..support.plainresult import Shown
+from ..support.plainresult import ShownResult
 
 #: Chance with which a right belief of many is refuted.
 LEVEL = 1e-4
@@ -36,7 +36,7 @@ SAME_PHASE = 20.0
 
 
 @dataclass(frozen=True)
-class Belief(Shown):
+class Belief(ShownResult):
     """One claim of the simulation, judged.
 
     Attributes

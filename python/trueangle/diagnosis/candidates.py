@@ -6,12 +6,18 @@ from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 from ..effects import Effect
-from ..estimation.cache import Proposal
+from ..estimation.cache import CachedProposal
 from ..estimation.regression import Extension, Regression
-from ..support.deadline import pace
-from .forms import told_from_forms
-from .penalty import before_forms, left_by_forms, misfit, penalty_of, total_penalty
-from .unnamed import effect_of
+from ..support.deadline import current_deadline
+from .formerrors import told_from_form_errors
+from .penalty import (
+    deviance_before_forms,
+    deviance_of_form_errors,
+    form_misfit,
+    penalty_of,
+    total_penalty,
+)
+from .unnamed import effect_or_unnamed
 
 #: An extension, what it extends, and its net BIC gain.
 Candidate: TypeAlias = tuple[Extension, Regression, float]
@@ -20,14 +26,14 @@ Candidate: TypeAlias = tuple[Extension, Regression, float]
 AFTER_CHOICE = 0.7
 
 
-def propose(effect: type[Effect], regression: Regression) -> Extension | None:
+def propose_candidates(effect: type[Effect], regression: Regression) -> Extension | None:
     """What a cause proposes; nothing where a wider one that contains it is chosen already."""
-    if any(effect in effect_of(term.cause).contains for term in regression.terms):
+    if any(effect in effect_or_unnamed(term.cause).contains for term in regression.terms):
         return None
     return effect.propose(regression)
 
 
-def extensions(
+def candidate_extensions(
     regression: Regression,
     causes: Sequence[str],
     least: Callable[[list[Candidate]], float] | None = None,
@@ -42,7 +48,7 @@ def extensions(
     """
     found: list[Candidate] = []
     places: list[int] = []
-    at = pace()
+    at = current_deadline()
     beside = f" beside {len(regression.terms)}" if regression.terms else ""
     gains = {extension.cause: extension.bic_gain for extension, _, _ in before}
     for tried, cause in enumerate(sorted(causes, key=lambda cause: -gains.get(cause, 0.0))):
@@ -50,7 +56,7 @@ def extensions(
         at.at(f"trying causes{beside}", tried, len(causes), then)
         if at.over:
             break
-        contained = {special.kind for special in effect_of(cause).contains}
+        contained = {special.kind for special in effect_or_unnamed(cause).contains}
         if any(term.cause in contained for term in regression.terms):
             start = regression.with_terms(t for t in regression.terms if t.cause not in contained)
             penalty = total_penalty(start) - total_penalty(regression)
@@ -58,7 +64,7 @@ def extensions(
             start, penalty = regression, 0.0
         # Alone every cause is searched as far as it can be: that is reported.
         wanted = max(least(found) + penalty, 0.0) if start.terms and least is not None else 0.0
-        extension = proposed_above(start, cause, wanted)
+        extension = candidates_above(start, cause, wanted)
         if at.over:
             break  # a search that was cut short says nothing of its cause
         if extension is not None:
@@ -68,7 +74,7 @@ def extensions(
     return [found[k] for k in sorted(range(len(found)), key=places.__getitem__)]
 
 
-def proposed_above(regression: Regression, cause: str, least: float = 0.0) -> Extension | None:
+def candidates_above(regression: Regression, cause: str, least: float = 0.0) -> Extension | None:
     """What a cause proposes, searched only as far as candidates above ``least`` ask for.
 
     None where the time is up and it has not been searched yet.
@@ -78,16 +84,18 @@ def proposed_above(regression: Regression, cause: str, least: float = 0.0) -> Ex
     )
     key = (cause, beside)
     kept = regression.cache.proposed(key, least)
-    if kept is None and pace().over:
+    if kept is None and current_deadline().over:
         return None
     if kept is None:
-        kept = Proposal(propose(effect_of(cause), regression.with_least(least)), least)
-        if not pace().over:
+        kept = CachedProposal(
+            propose_candidates(effect_or_unnamed(cause), regression.with_least(least)), least
+        )
+        if not current_deadline().over:
             regression.cache.propose(key, kept)
     return kept.extension
 
 
-class Scores:
+class CandidateScores:
     """Scores of candidates of one step, and the best one of them."""
 
     def __init__(self) -> None:
@@ -98,18 +106,20 @@ class Scores:
     def score(self, candidate: Candidate) -> float:
         """Net gain less what a cause costs beyond its parameters."""
         extension, start, gain = candidate
-        explained = before_forms(start) - start.deviance
-        if not effect_of(extension.cause).has_exact_form:
+        explained = deviance_before_forms(start) - start.deviance
+        if not effect_or_unnamed(extension.cause).has_exact_form:
             explained += extension.deviance
-        after = penalty_of([*start.terms, extension], left_by_forms(explained, start.n))
-        paid: float = start.cache.of_fit("penalty", lambda: penalty_of(start.terms, misfit(start)))
+        after = penalty_of([*start.terms, extension], deviance_of_form_errors(explained, start.n))
+        paid: float = start.cache.of_fit(
+            "penalty", lambda: penalty_of(start.terms, form_misfit(start))
+        )
         return gain - (after - paid)
 
     def told_score(self, candidate: Candidate) -> float:
         """Score once what bends of the causes found explain as well is taken off."""
         extension, start, _ = candidate
         if id(extension) not in self.told:
-            less = extension.deviance - told_from_forms(start, extension).deviance
+            less = extension.deviance - told_from_form_errors(start, extension).deviance
             self.told[id(extension)] = less
         return self.score(candidate) - self.told[id(extension)]
 

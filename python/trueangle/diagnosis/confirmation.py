@@ -13,13 +13,13 @@ from ..effects.non_integer_order import NonIntegerOrder
 from ..estimation.regression import Regression
 from ..joint.pattern import line_columns
 from ..support.arrays import Array
-from ..support.display_units import brief
+from ..support.display_units import brief_number
 from ..support.quantiles import quantile
-from .forms import FORM
+from .formerrors import FORM
 from .gain import Gain
 from .goodness import FREE_PATH, Unexplained
 from .goodness.periodogram import order_test, time_test
-from .penalty import NEW_CAUSE, cause_terms
+from .penalty import NEW_CAUSE, regression_without
 from .remainder import free_paths, remainder_of
 from .runzeros import CHANCE, chance_between_runs
 from .selection import is_flexible
@@ -43,7 +43,7 @@ ENOUGH_RUNS = 4
 RESAMPLES, LOWER = 1000, 0.025
 
 
-def status_of(
+def confirmation_status(
     cause: str,
     gain: Gain | None,
     regression: Regression | None,
@@ -73,13 +73,13 @@ def status_of(
         is_seen = drift > 0.0 and _is_seen_without_a_name(regression, group)
         if not is_seen and drift > _size(regression, group):
             return NOT_CONFIRMED, (
-                f"the drift of {brief(drift)} arcsec rms, which is larger, may leave it"
+                f"the drift of {brief_number(drift)} arcsec rms, which is larger, may leave it"
             )
     beside = unexplained.beside_path
     if beside and regression is not None and group:
         if not takes_up and _size(regression, group) < beside:
             return NOT_CONFIRMED, (
-                f"{brief(beside)} arcsec rms are unexplained, of which this may be a part"
+                f"{brief_number(beside)} arcsec rms are unexplained, of which this may be a part"
             )
         follows = _follows(regression, group)
         if follows:
@@ -153,7 +153,7 @@ def _is_whole(regression: Regression, group: Sequence[int], order: float) -> boo
     whole = float(round(order))
     if whole < 1.0 or abs(order - whole) > NEAR:
         return False
-    rest = cause_terms(regression, list(group), settled=True)
+    rest = regression_without(regression, list(group), settled=True)
     theta = regression.signals.theta
     found, own = (
         rest.propose_run_effect(NonIntegerOrder.kind, {"order": m}, line_columns(theta, m))
@@ -197,7 +197,7 @@ def _of_scatter(cause: str) -> bool:
 
 def _explains_runs(regression: Regression, group: Sequence[int]) -> bool:
     """The likelihood of the runs one by one is better with it: bootstrap over runs."""
-    without = cause_terms(regression, list(group), settled=True)
+    without = regression_without(regression, list(group), settled=True)
     gains = _by_run(regression) - _by_run(without)
     if gains.size < ENOUGH_RUNS:
         return True

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..errors import ArgumentError, NoModelError
 from ..model.model import HarmonicModel
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.kinds import of_type
+from ..support.argumentkinds import of_type
 from ..support.plainresult import PlainResult
 from .correction import extend_model
 from .finding import Finding
@@ -31,7 +31,7 @@ class Correctable(PlainResult):
         findings: list[Finding]
         extended: Simulation
         noise: float
-        not_identifiable: list[Blindness]
+        not_identifiable: list[Ambiguity]
         runs: Sequence[CalibrationRun]
         simulated: MeasuredMinusSimulated | None
 

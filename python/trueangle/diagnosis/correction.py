@@ -15,8 +15,8 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..runs.run import CalibrationRun, as_runs
 from ..simulation.simulation import EFFECT
-from ..support.kinds import of_type
-from ..support.signals import coupled_with
+from ..support.argumentkinds import of_type
+from ..support.signals import coupled_joint
 
 if TYPE_CHECKING:
     from ..fitting.argument import AnyArgument
@@ -112,7 +112,7 @@ def _coupled(run: CalibrationRun) -> dict[str, Any]:
     return {
         name: np.unwrap(values, period=run.period)
         for name, values in run.signals.items()
-        if coupled_with(name)
+        if coupled_joint(name)
     }
 
 
@@ -183,7 +183,7 @@ def extend_model(
 def _ranges(runs: Sequence[CalibrationRun]) -> tuple[tuple[str, float, float], ...]:
     """Each signal of the runs with its lowest and highest value."""
     ranges = []
-    others = dict.fromkeys(name for run in runs for name in run.signals if coupled_with(name))
+    others = dict.fromkeys(name for run in runs for name in run.signals if coupled_joint(name))
     for name in ("velocity", "temperature", "torque", "current", *others):
         columns = [run.speed if name == "velocity" else run.signal(name) for run in runs]
         values = [column[np.isfinite(column)] for column in columns if column is not None]

@@ -19,22 +19,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..effects.latency import Latency
-from ..estimation.estimate import quantity
 from ..estimation.extension import Extension
 from ..estimation.factor import orthonormal_basis
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
-from ..joint.earlier import earlier
+from ..joint.earlier import earlier_signals
 from ..joint.pattern import ARCSEC_PER_RAD, Pattern, lines_columns
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array, distinct
-from .confirmation import status_of
+from .confirmation import confirmation_status
 from .finding import Finding
 from .gain import measure_delay_gain
 from .goodness import Unexplained
 from .penalty import NEW_CAUSE
-from .unnamed import effect_of
+from .unnamed import effect_or_unnamed
 
 #: Orders of the output that are free beside the delay, where the travel resolves them.
 ORDERS = 32
@@ -76,9 +76,9 @@ class Delay:
         return np.asarray(-(then.turns_per_s * ARCSEC_PER_TURN * (1.0 + slope))[:, None])
 
 
-def error_before(signals: Signals, error: Array, delay_s: float) -> tuple[Signals, Array]:
+def error_before_delay(signals: Signals, error: Array, delay_s: float) -> tuple[Signals, Array]:
     """Signals and error (arcsec) at the angle of a time before each reading."""
-    then = earlier(signals, delay_s)
+    then = earlier_signals(signals, delay_s)
     return then, error + (signals.theta - then.theta) * ARCSEC_PER_RAD
 
 
@@ -95,7 +95,7 @@ def find_delay(signals: Signals, error: Array, sim: Simulation) -> Delay | None:
     longest = LONGEST * min(float(np.ptp(signals.time[a:b])) for a, b in signals.run_bounds())
     delay, linear = 0.0, np.inf
     for step in range(STEPS):
-        then, moved = error_before(signals, error, delay)
+        then, moved = error_before_delay(signals, error, delay)
         y = (moved - sim.predict(then))[rows]
         then = then.take(rows)
         change, std, left, unmoved, pattern = _newton(then, y, orders, sim)
@@ -151,7 +151,7 @@ def _newton(
 def _at_the_time(regression: Regression, plain: Regression) -> Iterator[Extension]:
     """The terms of a delayed account as they are without the delay."""
     for term, coefficients in regression.fitted():
-        effect = effect_of(term.cause)
+        effect = effect_or_unnamed(term.cause)
         if coefficients.size and effect.transfers:
             columns = effect.columns(plain.signals, regression.around, term.shape)
             yield replace(term, columns=columns)
@@ -179,5 +179,5 @@ def delay_finding(
     }
     gain = measure_delay_gain(without, chosen) if with_gain else None
     parameters = {"delay_s": quantity(seconds, std)}
-    told = status_of(Latency.kind, gain, None, (), unexplained)
+    told = confirmation_status(Latency.kind, gain, None, (), unexplained)
     return Finding(Latency.kind, parameters, weight, gain, [], [Latency(seconds)], *told)

@@ -10,32 +10,32 @@ import numpy as np
 from ..effects import EFFECTS
 from ..effects.wrong_gear_ratio import WrongGearRatio
 from ..errors import ArgumentError
-from ..estimation.estimate import quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.signals import join_runs
 from ..runs.checks.check import data_faults
 from ..runs.checks.record import records_of
 from ..runs.files import runs_of
 from ..runs.run import CalibrationRun
-from ..runs.source import Reading
+from ..runs.source import ReadingOptions
 from ..simulation.simulation import SIMULATION, Simulation
+from ..support.argumentkinds import of_type, told_kinds
 from ..support.blas import one_blas_thread
-from ..support.deadline import Pace, pace, with_pace
-from ..support.kinds import of_type, told_kinds
+from ..support.deadline import Deadline, current_deadline, with_deadline
 from .account import MOST_READINGS, account_of
-from .believed import judged_beliefs
-from .candidates import proposed_above
+from .candidates import candidates_above
 from .delay import delay_finding
 from .discrepancy import discrepancy_of, unfolded_error
-from .drive import torque_account
+from .drive import diagnose_drive
 from .finding import Finding
-from .findings import Diagnosis
+from .findings import findings_of, reconsidered_findings, scatter_doubt, scatter_finding
 from .gates import many_causes
-from .gearedlines import Ratio
+from .gearedlines import GearedLinesRatio
 from .goodness import Unexplained, goodness_of_fit
-from .named import findings_of, reconsidered_findings, scatter_doubt, scatter_finding
-from .penalty import cause_terms
-from .remainder import leftover_of, unexplained_after
+from .judgedbeliefs import judged_beliefs
+from .penalty import regression_without
+from .remainder import leftover_of, unexplained_remainder
+from .result import Diagnosis
 from .rounding import rounding_of
 from .wrongplace import misplaced_beliefs
 
@@ -61,7 +61,7 @@ def diagnose(
     gain: bool = True,
     within: float | None = None,
     progress: str = "none",
-    **reading: Unpack[Reading],
+    **reading: Unpack[ReadingOptions],
 ) -> Diagnosis:
     """Name the physical causes that a simulation of the joint lacks.
 
@@ -143,13 +143,13 @@ def diagnose(
         log = simulated if is_joined else minus_simulated(measured, simulated)
     elif sim is None:
         raise ArgumentError("nothing is believed: give a simulation, or a log as `simulated=`")
-    with with_pace(within, progress) as at, at.bounded(_used(measured)), one_blas_thread():
+    with with_deadline(within, progress) as at, at.bounded(_used(measured)), one_blas_thread():
         stated = Simulation() if sim is None else sim
         found = _diagnosis(measured, log, stated, gain)
         if log is None or not found.complete:
             return found
         joint = Simulation(stated.joint)
-        torque = torque_account(
+        torque = diagnose_drive(
             log, measured, lambda runs, drive: _diagnosis(runs, drive, joint, gain)
         )
         return replace(found, torque=torque)
@@ -161,7 +161,7 @@ def _diagnosis(
     stated: Simulation,
     gain: bool,
 ) -> Diagnosis:
-    at = pace()
+    at = current_deadline()
     found = measured if log is None else log.runs
     every = join_runs(found)
     if len(every) < LEAST_READINGS:
@@ -174,14 +174,14 @@ def _diagnosis(
     seen = account.seen
     sim, every, signals, rows = seen.sim, seen.every, seen.signals, seen.rows
     chosen = account.choice.chosen
-    rest = unexplained_after(chosen, sim.sigma_arcsec or None)
+    rest = unexplained_remainder(chosen, sim.sigma_arcsec or None)
     first = account.first
     with at.part(FOR_FINDINGS):
         findings, spots, doubtful = findings_of(chosen, account.choice.spots, gain, rest)
     if doubtful and not rest.found and not at.cut:
         # What is not confirmed explains nothing; the others may well without it.
-        others = cause_terms(chosen, doubtful, settled=True)
-        rest = unexplained_after(others, sim.sigma_arcsec or None)
+        others = regression_without(chosen, doubtful, settled=True)
+        rest = unexplained_remainder(others, sim.sigma_arcsec or None)
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
@@ -237,7 +237,7 @@ def _used(runs: list[CalibrationRun]) -> int:
     return min(sum(map(len, runs)), MOST_READINGS)
 
 
-def _incomplete(at: Pace, gain: bool) -> str:
+def _incomplete(at: Deadline, gain: bool) -> str:
     """That the account was ended, while what, and what that means."""
     means = "causes may be missing or stand for others"
     if gain:
@@ -245,7 +245,7 @@ def _incomplete(at: Pace, gain: bool) -> str:
     return f"INCOMPLETE: {at.why} while {at.cut}; {means}"
 
 
-def _ratio_finding(ratio: Ratio) -> Finding:
+def _ratio_finding(ratio: GearedLinesRatio) -> Finding:
     """All lines of the geared shafts at another ratio, as one cause."""
     parameters = {
         "gear_ratio": quantity(ratio.gear_ratio, ratio.std),
@@ -261,7 +261,7 @@ def _structure(start: Regression) -> dict[str, float]:
     before = start.left_within_runs
     alone = {}
     for cause in EFFECTS:
-        extension = proposed_above(start, cause)
+        extension = candidates_above(start, cause)
         if extension is not None and extension.bic_gain > 0.0:
             after = start.with_terms([extension], 0.0).left_within_runs
             alone[cause] = 1.0 - float(np.sum(after**2) / max(float(np.sum(before**2)), 1e-300))

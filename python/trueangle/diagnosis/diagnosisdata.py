@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..estimation.regression import ROUNDING
 from ..joint.signals import join_runs
 from ..runs.checks import DataFault
 from ..simulation.measured import design_of
 from ..simulation.simulation import Simulation
-from ..support.plainresult import counted, json_text
+from ..support.layout import counted
+from ..support.plainresult import json_text
 from .beliefs import Belief
 from .correctable import Correctable
 from .discrepancy import Discrepancy
@@ -36,7 +37,7 @@ class DiagnosisData(Correctable):
     structure: dict[str, float]
     noise: float
     findings: list[Finding]
-    not_identifiable: list[Blindness]
+    not_identifiable: list[Ambiguity]
     extended: Simulation
     gain: dict[str, float]
     readings: int
@@ -148,7 +149,7 @@ class DiagnosisData(Correctable):
         )
         return replace(self.extended, effects=tuple(kept))
 
-    def _between(self, causes: tuple[str, ...]) -> tuple[Simulation, list[Blindness]]:
+    def _between(self, causes: tuple[str, ...]) -> tuple[Simulation, list[Ambiguity]]:
         """What is believed without these causes, and the question which of them it is."""
         for spot in self.not_identifiable:
             if spot.supported and set(causes) <= set(spot.causes):
@@ -157,7 +158,7 @@ class DiagnosisData(Correctable):
         known = {cause: effects for cause, effects in known.items() if effects}
         taken = [effect for effects in known.values() for effect in effects]
         kept = tuple(effect for effect in self.extended.effects if effect not in taken)
-        asked = Blindness(causes, "", "", bool(known), hypotheses=known)
+        asked = Ambiguity(causes, "", "", bool(known), hypotheses=known)
         return replace(self.extended, effects=kept), [asked]
 
     def to_dict(self, extended_simulation: str | None = None) -> dict[str, Any]:

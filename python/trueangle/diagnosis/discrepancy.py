@@ -11,11 +11,11 @@ from ..joint.signals import Signals
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
 from ..support.arrays import Array
-from ..support.plainresult import Shown
+from ..support.plainresult import ShownResult
 
 
 @dataclass(frozen=True)
-class Discrepancy(Shown):
+class Discrepancy(ShownResult):
     """Measured minus simulated, about the common zero, arcsec.
 
     Attributes

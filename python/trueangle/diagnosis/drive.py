@@ -22,11 +22,11 @@ from ..effects.direction_dependent_pattern import DirectionalPattern
 from ..effects.latency import Latency
 from ..effects.missing_order import MissingOrder
 from ..effects.presliding_hysteresis import PreslidingHysteresis
-from ..estimation.estimate import Quantity, quantity
+from ..estimation.quantity import Quantity, quantity
 from ..runs.run import CalibrationRun
 from .finding import Finding
-from .findings import Diagnosis
-from .torque import TorqueAccount, TorqueFinding, number_of
+from .result import Diagnosis
+from .torque import TorqueAccount, TorqueFinding, number_of_quantity
 
 if TYPE_CHECKING:
     from ..runs.joining import MeasuredMinusSimulated
@@ -48,7 +48,7 @@ _EFFECTS: Final = {
 }
 
 
-def torque_account(
+def diagnose_drive(
     joined: MeasuredMinusSimulated,
     measured: Sequence[CalibrationRun],
     diagnosed: Callable[[list[CalibrationRun], MeasuredMinusSimulated], Diagnosis],
@@ -124,7 +124,7 @@ def _finding(finding: Finding, one: float) -> TorqueFinding:
         parameters = {
             "order": given["output_order"],
             "torque_Nm": _scaled(given["amplitude_arcsec"], one),
-            "phase_deg": quantity((number_of(phase) + 180.0) % 360.0, phase.std),
+            "phase_deg": quantity((number_of_quantity(phase) + 180.0) % 360.0, phase.std),
         }
     elif effect == "dry_friction":
         parameters = {"torque_Nm": _scaled(given["half_width_arcsec"], one)}

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from ..effects import EFFECTS
 from ..estimation.regression import Regression
-from ..support.deadline import pace
-from .candidates import Scores, extensions
+from ..support.deadline import current_deadline
+from .candidates import CandidateScores, candidate_extensions
 from .overlap import finding_overlaps
-from .penalty import cause_terms, finding_groups, total_penalty
-from .selection import is_flexible, regrown
+from .penalty import finding_groups, regression_without, total_penalty
+from .selection import is_flexible, select_again
 from .unnamed import is_named
 
 #: Exchanges at most, and findings up to which others are tried in the place of each: of more, which
@@ -28,7 +28,7 @@ MOST_PAIRS, OVERLAP = 6, 0.5
 BETTER = 2.0
 
 
-def exchanged(regression: Regression) -> Regression:
+def exchanged_causes(regression: Regression) -> Regression:
     """The account of which no cause is better left out, or replaced by another one.
 
     Parameters
@@ -42,7 +42,7 @@ def exchanged(regression: Regression) -> Regression:
         every finding, and these are kept for that.
     """
     for _ in range(MOST_EXCHANGES):
-        better = None if pace().over else _better(regression)
+        better = None if current_deadline().over else _better(regression)
         if better is None:
             break
         regression = better
@@ -61,10 +61,10 @@ def _better_pair(regression: Regression) -> Regression | None:
     pairs = [pair for pair in finding_overlaps(regression, groups) if pair[2] > OVERLAP]
     specific = [name for name, effect in EFFECTS.items() if not is_flexible(effect)]
     for i, j, _ in sorted(pairs, key=lambda pair: -pair[2]):
-        if pace().over:
+        if current_deadline().over:
             return None
-        tried = regrown(cause_terms(regression, [*groups[i], *groups[j]]), specific)
-        if total_penalty(tried) < limit and not pace().over:
+        tried = select_again(regression_without(regression, [*groups[i], *groups[j]]), specific)
+        if total_penalty(tried) < limit and not current_deadline().over:
             return tried
     return None
 
@@ -74,7 +74,7 @@ def _better(regression: Regression) -> Regression | None:
     groups = [g for g in finding_groups(regression.terms) if is_named(regression.terms[g[0]])]
     groups.sort(key=lambda group: sum(regression.terms[k].bic_gain for k in group))
     for group in groups:
-        rest = cause_terms(regression, group)
+        rest = regression_without(regression, group)
         if total_penalty(rest) < limit:
             return rest
         if len(groups) > LOOKED_AT:
@@ -84,9 +84,9 @@ def _better(regression: Regression) -> Regression | None:
         others = [
             name for name, effect in EFFECTS.items() if not (name == own or is_flexible(effect))
         ]
-        scores = Scores()
-        best = scores.best(extensions(rest, others, scores.least))
-        if best is None or pace().over:
+        scores = CandidateScores()
+        best = scores.best(candidate_extensions(rest, others, scores.least))
+        if best is None or current_deadline().over:
             continue
         extension, start, _ = best[1]
         tried = start.with_terms([*start.terms, extension])

@@ -1,4 +1,4 @@
-"""One cause that the readings support, and its words."""
+"""One cause that the readings support, its quantities with their units, and its words."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..effects import EFFECTS, Effect
-from ..estimation.estimate import Parameters, Quantity
-from ..support.display_units import ErrorUnit, error_unit, significant, sine_of_rms
-from ..support.layout import wrapped
-from ..support.plainresult import Shown
+from ..estimation.quantity import Parameters, Quantity
+from ..support.display_units import ErrorUnit, error_unit, significant_digits, sine_of_rms
+from ..support.layout import wrapped_lines
+from ..support.plainresult import ShownResult
 from .confirmation import CONFIRMED
 from .gain import Gain
 from .levels import LevelGain
@@ -59,7 +59,7 @@ _PLACES = {
 
 
 @dataclass(frozen=True)
-class Finding(Shown):
+class Finding(ShownResult):
     """One cause that the readings support.
 
     Attributes
@@ -141,14 +141,14 @@ def finding_lines(number: str, finding: Finding, unit: ErrorUnit) -> list[str]:
     lines = [number + finding.cause]
     if not finding.confirmed:
         lines[0] += f" (NOT CONFIRMED: {unit.spoken(finding.reason)})"
-        lines = wrapped(lines[0], 3)
-    lines += wrapped(finding.sentence, 3, first=3)
+        lines = wrapped_lines(lines[0], 3)
+    lines += wrapped_lines(finding.sentence, 3, first=3)
     for name, entry in finding.parameters.items():
-        lines += wrapped(": ".join(named_quantity(name, entry, unit)), 7, first=5)
+        lines += wrapped_lines(": ".join(named_quantity(name, entry, unit)), 7, first=5)
     text = f"Evidence: BIC better by {finding.evidence['bic_gain']:.1f} than without it"
     if finding.rivals:
         text += "; in its place " + ", ".join(_rival(*rival) for rival in finding.rivals)
-    lines += wrapped(text + ".", 5, first=3)
+    lines += wrapped_lines(text + ".", 5, first=3)
     gain = finding.gain
     if gain is not None:
         text = (
@@ -166,9 +166,9 @@ def finding_lines(number: str, finding: Finding, unit: ErrorUnit) -> list[str]:
             text += f" (control: {gain.control_share:.2f} with {control})"
         if gain.note:
             text += f"; {gain.note}"
-        lines += wrapped(text + ".", 5, first=3)
+        lines += wrapped_lines(text + ".", 5, first=3)
         if gain.by_level is not None:
-            lines += wrapped(_by_level(gain.by_level, unit), 5, first=3)
+            lines += wrapped_lines(_by_level(gain.by_level, unit), 5, first=3)
     return lines
 
 
@@ -192,7 +192,7 @@ def _by_level(gain: LevelGain, unit: ErrorUnit) -> str:
     )
 
 
-def unit_of(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
+def parameter_unit(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
     """What a parameter is called in ``unit``, and the unit that it is shown in."""
     # The amplitudes of several lines, whose name says no unit.
     name = "amplitudes_arcsec" if name == "amplitudes" else name
@@ -202,7 +202,7 @@ def unit_of(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
 
 def named_quantity(name: str, entry: Quantity, unit: ErrorUnit) -> tuple[str, str]:
     """Name and value of a parameter, an error in ``unit``."""
-    shown, of = unit_of(name, unit)
+    shown, of = parameter_unit(name, unit)
     value, std = entry.value, entry.std
     if isinstance(value, list):
         text = ", ".join(_number(item, of) for item in value[:12])
@@ -238,7 +238,7 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
         sizes = [float(x) for x in numbers if isinstance(x, int | float)]
         if not sizes or len(sizes) < len(numbers):
             continue
-        shown = [significant(factor * x, 4) if word else unit.number(x) for x in sizes[:4]]
+        shown = [significant_digits(factor * x, 4) if word else unit.number(x) for x in sizes[:4]]
         more = " ..." if len(sizes) > len(shown) else ""
         return f"{name} ({', '.join(shown)}{more} {word or unit.name})"
     return name

@@ -12,11 +12,18 @@ from numpy.typing import NDArray
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array
-from ..support.deadline import pace
-from ..support.plainresult import Shown
-from .holdout import Law, held_out, numbers, rebuilt, reducible_share, residual_at
+from ..support.deadline import current_deadline
+from ..support.plainresult import ShownResult
+from .holdout import (
+    HoldOutModel,
+    error_numbers,
+    held_out_residuals,
+    rebuilt_term,
+    reducible_share,
+    residual_at_held_out,
+)
 from .levels import LEAST_SHARE, LevelGain, gains_by_level
-from .unnamed import effect_of
+from .unnamed import effect_or_unnamed
 
 Rows = NDArray[np.bool_]
 
@@ -29,7 +36,7 @@ _SEED = 0
 
 
 @dataclass(frozen=True)
-class Gain(Shown):
+class Gain(ShownResult):
     """What a finding gains on held-out runs.
 
     Attributes
@@ -92,16 +99,16 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
     unit, what = _units(regression)
     count = int(unit.max()) + 1
     folds = rng.permutation(count) % min(FOLDS, count)
-    own_zero = any(effect_of(term.cause).draws_zeros for term in regression.terms)
+    own_zero = any(effect_or_unnamed(term.cause).draws_zeros for term in regression.terms)
     left = np.zeros((len(groups) + 1, regression.n))
     parts = int(folds.max()) + 1
-    at = pace()
+    at = current_deadline()
     for fold in range(parts):
         at.at("holding out parts", fold, parts)
         if at.over:
             return None
         test = folds[unit] == fold
-        for k, values in enumerate(held_out(regression, groups, test, own_zero)):
+        for k, values in enumerate(held_out_residuals(regression, groups, test, own_zero)):
             left[k, test] = values
     if at.over:
         return None
@@ -111,7 +118,7 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
     for k, group in enumerate(groups):
         cause = regression.terms[group[0]].cause
         before, after = left[k + 1][clean], left[0][clean]
-        transfers = effect_of(cause).transfers
+        transfers = effect_or_unnamed(cause).transfers
         share = interval = control = None
         if transfers:
             share, interval = reducible_share(before, after, unit[clean], regression.variance, rng)
@@ -120,8 +127,8 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
             Gain(
                 f"{what} ({parts} parts)"
                 + (", zero of each held-out run taken from itself" if own_zero else ""),
-                numbers(before),
-                numbers(after),
+                error_numbers(before),
+                error_numbers(after),
                 share,
                 interval,
                 control,
@@ -142,17 +149,19 @@ def measure_delay_gain(without: Regression, delayed: Regression) -> Gain:
     unit, what = _units(delayed)
     folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
     parts = int(folds.max()) + 1
-    own_zero = any(effect_of(term.cause).draws_zeros for term in delayed.terms)
+    own_zero = any(effect_or_unnamed(term.cause).draws_zeros for term in delayed.terms)
     before, after = np.zeros(delayed.n), np.zeros(delayed.n)
     for fold in range(parts):
         test = folds[unit] == fold
         for values, regression in ((before, without), (after, delayed)):
-            values[test] = held_out(regression, (), test, own_zero, search=False)[0]
+            values[test] = held_out_residuals(regression, (), test, own_zero, search=False)[0]
     clean = ~delayed.outlying
     before, after = before[clean], after[clean]
     share, interval = reducible_share(before, after, unit[clean], delayed.variance, rng)
     holdout = f"{what} ({parts} parts)"
-    return Gain(holdout, numbers(before), numbers(after), share, interval, None, _note(share))
+    return Gain(
+        holdout, error_numbers(before), error_numbers(after), share, interval, None, _note(share)
+    )
 
 
 def measure_belief_gains(
@@ -169,14 +178,16 @@ def measure_belief_gains(
     rng = np.random.default_rng(_SEED)
     unit, what = _units(regression)
     folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
-    own_zero = any(effect_of(term.cause).draws_zeros for term in regression.terms)
+    own_zero = any(effect_or_unnamed(term.cause).draws_zeros for term in regression.terms)
     count = len(columns) + len(changes)
     before, after = np.zeros((count, regression.n)), np.zeros((count, regression.n))
     for fold in range(int(folds.max()) + 1):
         test = folds[unit] == fold
-        fitted = regression.of_rows(~test).with_terms(rebuilt(t, ~test) for t in regression.terms)
-        left = residual_at(
-            Law.of(fitted),
+        fitted = regression.of_rows(~test).with_terms(
+            rebuilt_term(t, ~test) for t in regression.terms
+        )
+        left = residual_at_held_out(
+            HoldOutModel.of(fitted),
             regression.signals.take(test),
             regression.base[test],
             regression.residual[test],
@@ -195,7 +206,15 @@ def measure_belief_gains(
         share, interval = reducible_share(was, is_now, unit[clean], regression.variance, rng)
         holdout = f"{what} ({int(folds.max()) + 1} parts)"
         gains.append(
-            Gain(holdout, numbers(was), numbers(is_now), share, interval, None, _note(share))
+            Gain(
+                holdout,
+                error_numbers(was),
+                error_numbers(is_now),
+                share,
+                interval,
+                None,
+                _note(share),
+            )
         )
     return gains
 
@@ -238,10 +257,12 @@ def _control(
     least = 1e-3 * regression.variance
     shares = []
     for _ in range(SHUFFLES):
-        signals = _shuffled(regression.signals, effect_of(cause).factor, unit, rng)
+        signals = _shuffled(regression.signals, effect_or_unnamed(cause).factor, unit, rng)
         columns = np.hstack(
             [
-                effect_of(cause).columns(signals, regression.around, regression.terms[k].shape)
+                effect_or_unnamed(cause).columns(
+                    signals, regression.around, regression.terms[k].shape
+                )
                 for k in group
             ]
         )

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.presliding_hysteresis import PreslidingHysteresis
 from ..effects.scale_error import ScaleError
 from ..estimation.regression import Regression
@@ -21,7 +21,7 @@ from .confirmation import NOT_CONFIRMED
 from .finding import Finding
 from .levels import UNITS
 from .overlap import finding_overlaps
-from .penalty import cause_terms
+from .penalty import regression_without
 
 #: Standard errors by which the size of a cause must differ from zero.
 TOLD = 2.0
@@ -51,7 +51,7 @@ FOLLOWED = {
 }
 
 
-def not_carried(finding: Finding) -> str:
+def _not_carried(finding: Finding) -> str:
     """A law that does not carry over to a level of its factor that was left out.
 
     Nothing is gained there for certain, or more is left than taken: another law.
@@ -68,7 +68,7 @@ def not_carried(finding: Finding) -> str:
     )
 
 
-def not_told_from_zero(finding: Finding) -> str:
+def _not_told_from_zero(finding: Finding) -> str:
     """A size within two standard errors of zero."""
     effect = EFFECTS[finding.cause]
     name = effect.size_name
@@ -91,7 +91,7 @@ def not_told_from_zero(finding: Finding) -> str:
     return f"its {name} is {z:.1f} standard errors from zero"
 
 
-def against_friction(finding: Finding) -> str:
+def _against_friction(finding: Finding) -> str:
     """A wind-up of friction that leads where friction holds back."""
     size = finding.parameters.get(PreslidingHysteresis.size_name)
     if finding.cause != PreslidingHysteresis.kind or size is None:
@@ -101,7 +101,7 @@ def against_friction(finding: Finding) -> str:
     return ""
 
 
-def not_in_every_part(regression: Regression, finding: Finding) -> str:
+def _not_in_every_part(regression: Regression, finding: Finding) -> str:
     """A ramp whose slope over the rest of its travel does not carry over to a part of it.
 
     A ratio is wrong at every angle alike. What rises for a while and then stays (a wide hysteresis,
@@ -113,7 +113,7 @@ def not_in_every_part(regression: Regression, finding: Finding) -> str:
     column = regression.terms[k].columns[:, 0]
     edges = [quantile(column, k / PARTS) for k in range(PARTS + 1)]
     parts = np.column_stack([np.clip(column, *pair) for pair in itertools.pairwise(edges)])
-    rest = cause_terms(regression, [k], settled=True)
+    rest = regression_without(regression, [k], settled=True)
     own, excited = rest.projected(parts)
     if not excited.all():
         return ""
@@ -135,7 +135,7 @@ def not_in_every_part(regression: Regression, finding: Finding) -> str:
 
 
 #: Every gate, in the order in which reasons are given.
-GATES: tuple[Callable[[Finding], str], ...] = (not_carried, not_told_from_zero, against_friction)
+GATES: tuple[Callable[[Finding], str], ...] = (_not_carried, _not_told_from_zero, _against_friction)
 
 #: Levels of a factor, as one of them is called.
 _NOUNS = {"velocity": "speed", "temperature": "temperature", "torque": "load", "mount": "mount"}
@@ -144,22 +144,22 @@ assert _NOUNS.keys() == UNITS.keys()
 
 def gated_findings(
     regression: Regression, findings: Sequence[Finding]
-) -> tuple[list[Finding], list[Blindness], set[int]]:
+) -> tuple[list[Finding], list[Ambiguity], set[int]]:
     """Findings as the gates leave them, the pairs that are not told apart, and their terms."""
     found = []
     for finding in findings:
         reason = ""
         if finding.confirmed:
             reason = next((r for gate in GATES if (r := gate(finding))), "")
-            reason = reason or not_in_every_part(regression, finding)
+            reason = reason or _not_in_every_part(regression, finding)
         found.append(replace(finding, status=NOT_CONFIRMED, reason=reason) if reason else finding)
-    spots: list[Blindness] = []
+    spots: list[Ambiguity] = []
     shared: set[int] = set()
     for i, j, correlation in alike_columns(regression, found):
         shared.update(found[i].group, found[j].group)
         causes = (found[i].cause, found[j].cause)
         because = f"in these runs they are one column (correlation {correlation:.3f})"
-        spots.append(Blindness(causes, because, EFFECTS[causes[0]].measure, supported=True))
+        spots.append(Ambiguity(causes, because, EFFECTS[causes[0]].measure, supported=True))
         for k, other in ((i, causes[1]), (j, causes[0])):
             reason = f"{because.removeprefix('in these runs they are ')} with {other}"
             found[k] = replace(found[k], status=NOT_CONFIRMED, reason=f"it is {reason}")

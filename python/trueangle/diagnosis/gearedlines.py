@@ -48,7 +48,7 @@ MOST_READINGS = 6_000
 
 
 @dataclass(frozen=True)
-class Ratio:
+class GearedLinesRatio:
     """A gear ratio that the readings show in place of the believed one.
 
     Attributes
@@ -202,7 +202,7 @@ class GearedLines:
         )
         # Ratios are made of teeth: a whole or half number that explains as much is meant.
         limit = -left * (1.0 + PLAIN / max(self.y.size, 1))
-        for denominator in plain_denominators():
+        for denominator in gear_denominators():
             plain = round(best * denominator) / denominator
             if abs(plain - best) < width and self.left(plain, common) < limit:
                 return plain
@@ -235,12 +235,14 @@ class GearedLines:
         extra = 2.0 * len(self.lines) * (len(self.bounds) - 1)
         return bool(self.y.size * more < extra + STEADY * np.sqrt(2.0 * extra))
 
-    def at(self, ratio: float, common: bool) -> Ratio:
+    def at(self, ratio: float, common: bool) -> GearedLinesRatio:
         """What is known of a ratio, by phases common to all runs or not."""
         believed = self.sim.joint.gear_ratio
         sim = replace(self.sim, joint=replace(self.sim.joint, gear_ratio=ratio))
         _, std = self._departure(ratio, common)
-        return Ratio(ratio, std, believed, self.together(ratio), self.together(believed), sim)
+        return GearedLinesRatio(
+            ratio, std, believed, self.together(ratio), self.together(believed), sim
+        )
 
     def _parts(self, common: bool) -> tuple[tuple[int, int], ...]:
         return ((0, self.y.size),) if common else self.bounds
@@ -261,6 +263,6 @@ class GearedLines:
         return np.asarray(values - np.repeat(means, sizes, axis=-1).T)
 
 
-def plain_denominators() -> Iterator[int]:
+def gear_denominators() -> Iterator[int]:
     """Of ratios as gears have them."""
     yield from (1, 2, 3, 4, 5, 10)

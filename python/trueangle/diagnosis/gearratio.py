@@ -16,7 +16,7 @@ from ..joint.pattern import Pattern
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array
-from .gearedlines import GearedLines, Ratio, plain_denominators
+from .gearedlines import GearedLines, GearedLinesRatio, gear_denominators
 
 #: Share of the believed lines up to which they are missing at the believed ratio, and share of
 #: their power that must be found at another one for that to be the ratio: where less is found,
@@ -37,7 +37,7 @@ MOST_TURNS = 64
 ANOTHER_TURN = 9.0
 
 
-def find_ratio(geared: GearedLines) -> Ratio | None:
+def find_ratio(geared: GearedLines) -> GearedLinesRatio | None:
     """The gear ratio at which the believed lines are, where they are not at the believed one.
 
     None where the believed lines are where they should be, or nowhere.
@@ -53,7 +53,7 @@ def find_ratio(geared: GearedLines) -> Ratio | None:
     return found if found.found >= FOUND else None
 
 
-def near_ratio(geared: GearedLines) -> Ratio | None:
+def near_ratio(geared: GearedLines) -> GearedLinesRatio | None:
     """A ratio near the believed one at which the geared lines stay in step, to be tried.
 
     None where they stay in step at the believed ratio, or are not there.
@@ -71,7 +71,7 @@ def near_ratio(geared: GearedLines) -> Ratio | None:
     return found if abs(found.gear_ratio - believed) > OUT_OF_STEP * found.std else None
 
 
-def aligned(sim: Simulation, signals: Signals, error: Array) -> Signals:
+def signals_at_ratio(sim: Simulation, signals: Signals, error: Array) -> Signals:
     """Signals whose runs start in the turn in which the geared lines have the believed phase.
 
     Where the ratio is not a whole number the lines come back after several turns of the output
@@ -96,6 +96,6 @@ def aligned(sim: Simulation, signals: Signals, error: Array) -> Signals:
 
 def _turns_until_back(ratio: float) -> int:
     """Turns of the output after which the geared lines are back in phase, or nearly so."""
-    plain = (q for q in plain_denominators() if abs(ratio * q % 1.0) < 1e-9)
+    plain = (q for q in gear_denominators() if abs(ratio * q % 1.0) < 1e-9)
     away = abs(ratio - round(ratio))
     return next(plain, min(round(1.0 / away), MOST_TURNS) if away > 0.0 else 1)

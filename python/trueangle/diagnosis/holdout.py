@@ -1,4 +1,4 @@
-"""Readings held out: what a model fitted to the others leaves of them."""
+"""Readings held out: what a model of the others leaves of them in numbers; the reducible share."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from ..estimation.regression import Extension, Regression
 from ..estimation.whitening import RunEffect
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.arrays import Array
-from ..support.deadline import pace
+from ..support.deadline import current_deadline
 from ..support.quantiles import quantile
-from .unnamed import effect_of
+from .unnamed import effect_or_unnamed
 
 Rows = NDArray[np.bool_]
 
@@ -29,7 +29,7 @@ ABOVE_NOISE = 3.0
 SEARCHED = 4
 
 
-def held_out(
+def held_out_residuals(
     regression: Regression,
     groups: Sequence[Sequence[int]],
     test: Rows,
@@ -41,23 +41,23 @@ def held_out(
     ``search`` repeats the searches (orders, lengths, places) without those readings.
     """
     train = regression.of_rows(~test)
-    terms = [rebuilt(term, ~test) for term in regression.terms]
+    terms = [rebuilt_term(term, ~test) for term in regression.terms]
     full = train.with_terms(terms)
     for group in groups[: SEARCHED if search else 0]:
-        if pace().over:
+        if current_deadline().over:
             break
         cause = regression.terms[group[0]].cause
-        if effect_of(cause).located and effect_of(cause).transfers:
+        if effect_or_unnamed(cause).located and effect_or_unnamed(cause).transfers:
             full = _searched_again(full, group)
     signals, residual = regression.signals.take(test), regression.residual[test]
-    laws = [Law.of(full), *(_law_without(full, group) for group in groups)]
+    laws = [HoldOutModel.of(full), *(_law_without(full, group) for group in groups)]
     columns: dict[Extension, Array] = {}
     base = regression.base[test]
-    return [residual_at(law, signals, base, residual, own_zero, columns) for law in laws]
+    return [residual_at_held_out(law, signals, base, residual, own_zero, columns) for law in laws]
 
 
 @dataclass(frozen=True)
-class Law:
+class HoldOutModel:
     """What a fit says of readings that it has not seen.
 
     Attributes
@@ -71,30 +71,30 @@ class Law:
 
     base: Array
     terms: list[tuple[Extension, Array]]
-    around: Surroundings
+    around: JointPattern
 
     @classmethod
-    def of(cls, fitted: Regression) -> Law:
+    def of(cls, fitted: Regression) -> HoldOutModel:
         """That of a fit as it is."""
         base = fitted.coefficients[: fitted.base.shape[1]]
         return cls(base, fitted.fitted(), fitted.around)
 
 
-def _law_without(full: Regression, group: Sequence[int]) -> Law:
+def _law_without(full: Regression, group: Sequence[int]) -> HoldOutModel:
     """That of the other terms alone, fitted to the same readings."""
     kept = [k for k in range(len(full.terms)) if k not in group]
     effects = sum(term.run_effect is not None for term in full.terms)
     settles = effects > 1 or any(full.terms[k].run_effect is not None for k in group)
     if settles or full.rank < full.design.shape[1]:
         # Run effects that are left find another size, columns that are alike another share.
-        return Law.of(full.with_terms(full.terms[k] for k in kept))
+        return HoldOutModel.of(full.with_terms(full.terms[k] for k in kept))
     coefficients = full.coefficients_without(group)
     terms = [(full.terms[k], coefficients[full.place(k)]) for k in kept]
     base = coefficients[: full.base.shape[1]]
-    return Law(base, terms, full.surroundings(terms))
+    return HoldOutModel(base, terms, full.surroundings(terms))
 
 
-def rebuilt(term: Extension, rows: Rows) -> Extension:
+def rebuilt_term(term: Extension, rows: Rows) -> Extension:
     """A term at some of the readings."""
     effect = term.run_effect
     if effect is not None:
@@ -109,20 +109,20 @@ def _searched_again(full: Regression, group: Sequence[int]) -> Regression:
     cause = terms[group[0]].cause
     found: list[Extension] = []
     for _ in group:
-        extension = effect_of(cause).propose(full.with_terms([*kept, *found]))
+        extension = effect_or_unnamed(cause).propose(full.with_terms([*kept, *found]))
         if extension is None or extension.cause != cause:
             return full
         found.append(extension)
     pairs = zip(group, found, strict=True)
-    if effect_of(cause).of_motion and all(terms[k].shape == one.shape for k, one in pairs):
+    if effect_or_unnamed(cause).of_motion and all(terms[k].shape == one.shape for k, one in pairs):
         return full  # the same columns again
     for k, extension in zip(group, found, strict=True):
         terms[k] = extension
     return full.with_terms(terms)
 
 
-def residual_at(
-    law: Law,
+def residual_at_held_out(
+    law: HoldOutModel,
     signals: Signals,
     base: Array,
     residual: Array,
@@ -137,7 +137,7 @@ def residual_at(
     columns = {} if columns is None else columns
     left = residual - base @ law.base
     for term, coefficients in law.terms:
-        effect = effect_of(term.cause)
+        effect = effect_or_unnamed(term.cause)
         if not (coefficients.size and effect.transfers):
             continue
         if term not in columns or not effect.of_motion:
@@ -177,7 +177,7 @@ def reducible_share(
     return float(of(np.ones((1, count.size)))[0]), (low, high)
 
 
-def numbers(e: Array) -> tuple[float, float, float]:
+def error_numbers(e: Array) -> tuple[float, float, float]:
     """rms, peak-to-peak and max abs."""
     return (
         float(np.sqrt(np.mean(e**2))),

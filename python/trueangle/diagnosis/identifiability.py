@@ -1,4 +1,4 @@
-"""Which causes this design of runs can tell apart, worked out before naming any."""
+"""Which causes this design of runs can tell apart, and which origins stay open, before any name."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
-from ..effects.blindspots import blind_spots, place_among
+from ..effects.ambiguity import Ambiguity
+from ..effects.blindspots import blind_spot_place, blind_spots
 from ..estimation.regression import Extension, Regression
-from .candidates import propose
-from .penalty import cause_terms, finding_groups
-from .unnamed import effect_of
+from .candidates import propose_candidates
+from .penalty import finding_groups, regression_without
+from .unnamed import effect_or_unnamed
 
 __all__ = [
-    "Blindness",
+    "Ambiguity",
+    "ambiguity_of_cause",
     "blind_spots",
-    "doubts_about",
     "in_common_form",
     "open_origins",
     "with_open_origins",
@@ -26,30 +26,30 @@ __all__ = [
 DOUBTS = ("grid", "mount", "torque", "velocity")
 
 
-def doubts_about(
-    extension: Extension, regression: Regression, spots: Sequence[Blindness]
-) -> Blindness | None:
+def ambiguity_of_cause(
+    extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+) -> Ambiguity | None:
     """The reason not to name a supported cause, or None.
 
     Where all that it may be have one form, and it is that, only its origin is open
     (`open_origins`): what is seen has a size, and is named.
     """
     cause = extension.cause
-    if effect_of(cause).is_doubted:
+    if effect_or_unnamed(cause).is_doubted:
         for spot in spots:
             # What is seen of a crossing is none of a delay.
             may_be_told = spot.common or "turns_first" in extension.shape
             if spot.hides(cause) and not (
-                may_be_told and effect_of(cause).told(extension, regression)
+                may_be_told and effect_or_unnamed(cause).told(extension, regression)
             ):
                 return spot
     found = [doubt for doubt in _doubts(extension, regression, spots) if doubt.common != cause]
-    return min(found, key=lambda spot: place_among(DOUBTS, spot), default=None)
+    return min(found, key=lambda spot: blind_spot_place(DOUBTS, spot), default=None)
 
 
 def open_origins(
-    extension: Extension, regression: Regression, spots: Sequence[Blindness]
-) -> list[Blindness]:
+    extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+) -> list[Ambiguity]:
     """What else may make an error of this form, in the order of `DOUBTS`."""
     cause = extension.cause
     shared = (spot for spot in spots if spot.common == cause and cause in spot.causes)
@@ -58,15 +58,15 @@ def open_origins(
     for doubt in _doubts(extension, regression, spots):
         if doubt.common == cause and doubt not in found:
             found.append(doubt)
-    return sorted(found, key=lambda spot: place_among(DOUBTS, spot))
+    return sorted(found, key=lambda spot: blind_spot_place(DOUBTS, spot))
 
 
 def with_open_origins(
-    spots: Sequence[Blindness], origins: Sequence[Blindness], evidence: float
-) -> list[Blindness]:
+    spots: Sequence[Ambiguity], origins: Sequence[Ambiguity], evidence: float
+) -> list[Ambiguity]:
     """Blind spots, and those by which only the origin of what is named is open."""
 
-    def is_told(spot: Blindness) -> bool:
+    def is_told(spot: Ambiguity) -> bool:
         return any(set(spot.causes) <= set(of.causes) for of in origins)
 
     kept = [spot for spot in spots if not is_told(spot)]
@@ -74,13 +74,13 @@ def with_open_origins(
 
 
 def _doubts(
-    extension: Extension, regression: Regression, spots: Sequence[Blindness]
-) -> Iterator[Blindness]:
+    extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+) -> Iterator[Ambiguity]:
     doubts = (effect.doubt(extension, regression, spots) for effect in EFFECTS.values())
     yield from (doubt for doubt in doubts if doubt is not None)
 
 
-def in_common_form(regression: Regression, spots: Sequence[Blindness]) -> Regression:
+def in_common_form(regression: Regression, spots: Sequence[Ambiguity]) -> Regression:
     """The regression with the common form in place of causes that are not told apart.
 
     A reversal error may be play or a spring, a ramp the ratio's or a clock's: which of them is
@@ -88,11 +88,11 @@ def in_common_form(regression: Regression, spots: Sequence[Blindness]) -> Regres
     """
     for cause in [regression.terms[g[0]].cause for g in finding_groups(regression.terms)]:
         group = [k for k, term in enumerate(regression.terms) if term.cause == cause]
-        spot = doubts_about(regression.terms[group[0]], regression, spots) if group else None
+        spot = ambiguity_of_cause(regression.terms[group[0]], regression, spots) if group else None
         if spot is None or not spot.common or spot.common == cause:
             continue
-        rest = cause_terms(regression, group, settled=True)
-        common = propose(EFFECTS[spot.common], rest)
+        rest = regression_without(regression, group, settled=True)
+        common = propose_candidates(EFFECTS[spot.common], rest)
         if common is not None and common.bic_gain > 0.0:
             regression = rest.with_terms([*rest.terms, common])
     return regression

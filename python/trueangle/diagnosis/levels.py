@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array, distinct
-from ..support.deadline import pace
-from .holdout import held_out, numbers, rebuilt, reducible_share
-from .unnamed import effect_of
+from ..support.deadline import current_deadline
+from .holdout import error_numbers, held_out_residuals, rebuilt_term, reducible_share
+from .unnamed import effect_or_unnamed
 
 Rows = NDArray[np.bool_]
 
@@ -93,7 +93,7 @@ class LevelGain:
         }
 
 
-def run_levels(signals: Signals, factor: str) -> tuple[NDArray[np.int64], list[float]] | None:
+def levels_of_runs(signals: Signals, factor: str) -> tuple[NDArray[np.int64], list[float]] | None:
     """Level of every reading (that of its run) and the mean value of every level, ascending.
 
     None where the factor has no levels, was not recorded or did not change from run to run.
@@ -155,15 +155,15 @@ def gains_by_level(
     Of a factor whose levels were not all asked when the time was up, nothing is said.
     """
     found: dict[int, LevelGain] = {}
-    at = pace()
+    at = current_deadline()
     for factor in UNITS:
         causes = [regression.terms[group[0]].cause for group in groups]
         concerned = [
             k
             for k, cause in enumerate(causes)
-            if effect_of(cause).factor == factor and effect_of(cause).transfers
+            if effect_or_unnamed(cause).factor == factor and effect_or_unnamed(cause).transfers
         ]
-        split = run_levels(regression.signals, factor) if concerned else None
+        split = levels_of_runs(regression.signals, factor) if concerned else None
         if split is None:
             continue
         level, values = split
@@ -178,7 +178,7 @@ def gains_by_level(
             if not able:
                 continue
             # Two mounts do not tell which way a mount counts: what all tell is kept.
-            after, *before = held_out(
+            after, *before = held_out_residuals(
                 regression, [groups[k] for k in able], test, own_zero, search=factor != "mount"
             )
             for k, values_before in zip(able, before, strict=True):
@@ -198,8 +198,8 @@ def gains_by_level(
                 UNITS[factor],
                 values,
                 held,
-                numbers(before_k[used])[0],
-                numbers(after_k[used])[0],
+                error_numbers(before_k[used])[0],
+                error_numbers(after_k[used])[0],
                 share,
                 interval,
                 _reach(values, held),
@@ -227,7 +227,7 @@ def _is_tested_by(regression: Regression, group: Sequence[int], test: Rows) -> b
     there it shows.
     """
     train = regression.of_rows(~test)
-    terms = [rebuilt(term, ~test) for term in regression.terms]
+    terms = [rebuilt_term(term, ~test) for term in regression.terms]
     rest = train.with_terms(t for k, t in enumerate(terms) if k not in group)
     columns = np.hstack([terms[k].columns for k in group])
     own = rest.whiten(columns)

@@ -1,4 +1,4 @@
-"""What a cause must bring, and what is lost without one."""
+"""Penalties of groups of causes, the misfit of their forms, the deviance lost without them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from ..effects.missing_order import MissingOrder
 from ..estimation.regression import Extension, Regression
-from .forms import FORM
-from .unnamed import effect_of
+from .formerrors import FORM
+from .unnamed import effect_or_unnamed
 
 #: Evidence (in units of BIC) that a new cause must bring beyond its penalty: 6 is what
 #: Kass and Raftery call strong, odds of 20 to 1.
@@ -18,21 +18,23 @@ NEW_CAUSE = 6.0
 
 def total_penalty(regression: Regression) -> float:
     """BIC with the penalty of every cause: lower is better."""
-    return regression.bic + penalty_of(regression.terms, misfit(regression))
+    return regression.bic + penalty_of(regression.terms, form_misfit(regression))
 
 
-def misfit(regression: Regression) -> float:
+def form_misfit(regression: Regression) -> float:
     """Deviance that the causes found may leave because their forms are not exact.
 
     A step of the zero has no form that could be inexact, however far apart zeros are, and neither
     has a share that counts of teeth make: what such terms explain is not counted.
     """
-    return left_by_forms(before_forms(regression) - regression.deviance, regression.n)
+    return deviance_of_form_errors(
+        deviance_before_forms(regression) - regression.deviance, regression.n
+    )
 
 
-def before_forms(regression: Regression) -> float:
+def deviance_before_forms(regression: Regression) -> float:
     """Deviance before any cause with a form was added."""
-    effects = [(term, effect_of(term.cause)) for term in regression.terms]
+    effects = [(term, effect_or_unnamed(term.cause)) for term in regression.terms]
     formless = [term for term, e in effects if e.draws_zeros or e.has_exact_form]
     if not formless:
         return float(regression.start)
@@ -42,26 +44,26 @@ def before_forms(regression: Regression) -> float:
     return min(float(regression.start), found)
 
 
-def exact_terms(regression: Regression) -> list[Extension]:
+def _exact_terms(regression: Regression) -> list[Extension]:
     """Terms whose forms leave nothing of them."""
-    return [term for term in regression.terms if effect_of(term.cause).has_exact_form]
+    return [term for term in regression.terms if effect_or_unnamed(term.cause).has_exact_form]
 
 
 def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
-    """As `misfit`, by how much smaller the readings' scatter has become.
+    """As `form_misfit`, by how much smaller the readings' scatter has become.
 
     Correlated noise takes up a part of what is not yet explained, and hides it from a likelihood.
     """
-    exact = exact_terms(chosen)
+    exact = _exact_terms(chosen)
     before, after = (
         float(np.var(one.left_within_runs))
         for one in (start.with_terms(exact) if exact else start, chosen)
     )
     ratio = before / max(after, 1e-300)
-    return left_by_forms(chosen.n * float(np.log(max(ratio, 1.0))), chosen.n)
+    return deviance_of_form_errors(chosen.n * float(np.log(max(ratio, 1.0))), chosen.n)
 
 
-def left_by_forms(deviance: float, readings: int) -> float:
+def deviance_of_form_errors(deviance: float, readings: int) -> float:
     """Deviance of a share of the energy that a deviance stands for.
 
     n readings of noise 1 with an error of energy n E give a deviance of
@@ -75,7 +77,7 @@ def penalty_of(terms: Sequence[Extension], left: float) -> float:
     """Of causes beyond that of their parameters; their forms may leave ``left``."""
     # A line of a declared shaft is expected, and stands where it was said to stand.
     declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
-    effects = [effect_of(term.cause) for term in terms]
+    effects = [effect_or_unnamed(term.cause) for term in terms]
     separate = [effect for effect in effects if effect.is_separate]
     # As many findings as `finding_groups` makes.
     causes = len(separate) + len({*effects} - {*separate}) - declared
@@ -89,7 +91,7 @@ def finding_groups(terms: Sequence[Extension]) -> list[list[int]]:
     groups: list[list[int]] = []
     place: dict[str, int] = {}
     for k, term in enumerate(terms):
-        if effect_of(term.cause).is_separate or term.cause not in place:
+        if effect_or_unnamed(term.cause).is_separate or term.cause not in place:
             place[term.cause] = len(groups)
             groups.append([k])
         else:
@@ -97,26 +99,30 @@ def finding_groups(terms: Sequence[Extension]) -> list[list[int]]:
     return groups
 
 
-def cause_terms(regression: Regression, group: Sequence[int], settled: bool = False) -> Regression:
+def regression_without(
+    regression: Regression, group: Sequence[int], settled: bool = False
+) -> Regression:
     """Without the terms ``group``; ``settled`` keeps the correlation of the noise."""
     terms = [t for k, t in enumerate(regression.terms) if k not in group]
     return regression.with_terms(terms, regression.whiten.rho if settled else None)
 
 
-def net_loss(regression: Regression, group: Sequence[int]) -> float:
+def net_deviance_lost(regression: Regression, group: Sequence[int]) -> float:
     """Deviance that dropping the terms ``group`` would cost, less the penalties it would save."""
     terms = regression.terms
-    left = misfit(regression)
+    left = form_misfit(regression)
     kept = [term for k, term in enumerate(terms) if k not in group]
     own = sum(terms[k].parameters * terms[k].log_n + 2.0 * terms[k].log_grid for k in group)
-    return lost(regression, group) - own - (penalty_of(terms, left) - penalty_of(kept, left))
+    return (
+        deviance_lost(regression, group) - own - (penalty_of(terms, left) - penalty_of(kept, left))
+    )
 
 
-def lost(regression: Regression, group: Sequence[int]) -> float:
+def deviance_lost(regression: Regression, group: Sequence[int]) -> float:
     """Deviance that the terms ``group`` save beside all the others (Wald, or without them)."""
     if any(regression.terms[k].run_effect is not None for k in group):
         without: float = regression.cache.of_fit(
-            ("lost", *group), lambda: cause_terms(regression, group).deviance
+            ("lost", *group), lambda: regression_without(regression, group).deviance
         )
         return without - regression.deviance
     columns = np.concatenate([regression.place(k) for k in group])

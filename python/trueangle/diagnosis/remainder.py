@@ -1,4 +1,4 @@
-"""What an account leaves of the readings, as goodness of fit asks for it."""
+"""The remainder of an account, as goodness of fit asks for it: what is left, free paths in time."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from ..estimation.cache import Cache
 from ..estimation.regression import Regression
-from ..estimation.stretches import about_level, short_stretches
+from ..estimation.segments import less_local_level, short_segments
 from ..estimation.whitening import Whitener
 from ..joint.signals import Signals
 from ..support.arrays import Array
-from ..support.display_units import brief
+from ..support.display_units import brief_number
 from ..support.distributions import chi_squared_tail
 from .goodness import FREE_PATH, Evidence, Leftover, Unexplained, goodness_of_fit
 from .rounding import unrounded
-from .unnamed import effect_of, is_named
+from .unnamed import effect_or_unnamed, is_named
 
 
 def leftover_of(signals: Signals, residual: Array, cache: Cache) -> Leftover:
@@ -56,7 +56,7 @@ def free_paths(regression: Regression) -> list[int]:
     return [
         k
         for k, term in enumerate(regression.terms)
-        if is_named(term) and effect_of(term.cause).describes_noise(term)
+        if is_named(term) and effect_or_unnamed(term.cause).describes_noise(term)
     ]
 
 
@@ -73,8 +73,8 @@ def path_evidence(regression: Regression) -> Evidence | None:
         "free path in time",
         deviance,
         0.5 * chi_squared_tail(deviance, 1.0),
-        f"what is left follows {FREE_PATH}, {brief(rms)} arcsec rms and new in every run: noise "
-        "that drifts, or something bound to time that has no name",
+        f"what is left follows {FREE_PATH}, {brief_number(rms)} arcsec rms and new in every run: "
+        "noise that drifts, or something bound to time that has no name",
         rms=rms,
         looks_like=FREE_PATH,
     )
@@ -107,13 +107,13 @@ def remainder_of(
     left = left - noise.run_part(left)
     kept = left[~regression.outlying]
     if regression.outlying.any() and kept.size:
-        glitches = short_stretches(regression.outlying, regression.bounds)
-        left[glitches] -= about_level(left, regression.bounds)[glitches]
+        glitches = short_segments(regression.outlying, regression.bounds)
+        left[glitches] -= less_local_level(left, regression.bounds)[glitches]
         left = np.clip(left, float(kept.min()), float(kept.max()))
     return leftover_of(regression.signals, left * regression.root_weights, regression.cache)
 
 
-def unexplained_after(regression: Regression, sigma: float | None = None) -> Unexplained:
+def unexplained_remainder(regression: Regression, sigma: float | None = None) -> Unexplained:
     """Goodness of fit of what a regression leaves, up to the orders that it looks for."""
     regression = unrounded(regression)
     path = path_evidence(regression)

@@ -14,23 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..estimation.factor import orthonormal_basis
-from ..estimation.readings import is_good_part
 from ..estimation.regression import Extension, Regression
-from ..estimation.rounded import Rounded, fit_rounded
+from ..estimation.rounded import Rounded, fit_rounded, is_rounding_visible
 from ..estimation.whitening import RunEffect
 from ..support.arrays import Array
 from .penalty import NEW_CAUSE, finding_groups
-from .unnamed import effect_of, is_named
+from .unnamed import effect_or_unnamed, is_named
 
 
 def rounding_of(regression: Regression) -> float:
     """Standard deviation of the rounding where it is a good part of what is left, else 0."""
     readings, left = regression.readings, regression.variance
-    is_part = is_good_part(readings.rounding**2, left, readings.scatter**2)
+    is_part = is_rounding_visible(readings.rounding**2, left, readings.scatter**2)
     return readings.rounding if is_part and not regression.is_explained else 0.0
 
 
-def beyond_rounding(start: Regression, chosen: Regression) -> Regression:
+def account_beyond_rounding(start: Regression, chosen: Regression) -> Regression:
     """The account with those of its causes that the rounding of the readings does not make.
 
     Parameters
@@ -70,7 +69,7 @@ def beyond_rounding(start: Regression, chosen: Regression) -> Regression:
 
 
 def _is_path(term: Extension) -> bool:
-    return is_named(term) and effect_of(term.cause).describes_noise(term)
+    return is_named(term) and effect_or_unnamed(term.cause).describes_noise(term)
 
 
 def _gain_of_path(regression: Regression, path: Extension, drawn: RunEffect) -> float:
@@ -78,7 +77,7 @@ def _gain_of_path(regression: Regression, path: Extension, drawn: RunEffect) -> 
     return regression.propose_run_effect(*asked).bic_gain
 
 
-def tells_no_more(regression: Regression) -> bool:
+def is_rounding_only(regression: Regression) -> bool:
     """Every reading is what was fitted, rounded."""
     if not rounding_of(regression):
         return False

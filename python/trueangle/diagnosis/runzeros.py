@@ -13,11 +13,11 @@ from ..effects import EFFECTS
 from ..estimation.regression import Regression
 from ..support.arrays import Array
 from ..support.distributions import f_tail
-from .candidates import propose
+from .candidates import propose_candidates
 from .goodness import Unexplained
 from .goodness.zeros import ZEROS
-from .penalty import NEW_CAUSE, cause_terms
-from .selection import on_runs
+from .penalty import NEW_CAUSE, regression_without
+from .selection import acts_on_runs
 
 #: Chance above which what unexplained zeros scatter by may as well have made a cause.
 CHANCE = 0.01
@@ -38,11 +38,11 @@ def chance_between_runs(
     own = np.hstack([regression.terms[k].columns for k in group])
     runs = _numbered(regression)
     zeros = (runs[:, None] == np.arange(1, int(runs.max()) + 1)).astype(np.float64)
-    rest = cause_terms(regression, group, settled=True)
+    rest = regression_without(regression, group, settled=True)
     within, _ = rest.jointly_with(zeros).gain(own)
     if within > NEW_CAUSE + own.shape[1] * float(np.log(regression.n)):
         return 0.0
-    laws = (propose(EFFECTS[cause], rest) for cause in on_runs())
+    laws = (propose_candidates(EFFECTS[cause], rest) for cause in acts_on_runs())
     tried = sum(law is not None and law.bic_gain > NEW_CAUSE for law in laws)
     return min(1.0, scatter_chance(regression, group) * max(tried, 1))
 

@@ -1,4 +1,4 @@
-"""Choose the causes: forward by evidence, flexible ones last, then backward."""
+"""Select the causes: forward by evidence, flexible ones last, then backward."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from ..effects.local_defect import LocalDefect
 from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
 from ..estimation.regression import BEYOND_SHOWN, Extension, Regression
-from ..support.deadline import pace
-from .candidates import Candidate, Scores, extensions, propose
-from .forms import beside_bends, share_beside
+from ..support.deadline import current_deadline
+from .candidates import Candidate, CandidateScores, candidate_extensions, propose_candidates
+from .formerrors import beside_form_errors, share_beside_form_errors
 from .goodness import estimate_noise
 from .penalty import (
     NEW_CAUSE,
-    cause_terms,
+    deviance_lost,
     finding_groups,
-    lost,
-    misfit,
-    net_loss,
+    form_misfit,
+    net_deviance_lost,
     penalty_of,
+    regression_without,
     total_penalty,
 )
 from .remainder import remainder_of
-from .unnamed import UNNAMED, effect_of, is_named
+from .unnamed import UNNAMED, effect_or_unnamed, is_named
 
 #: Terms at most.
 MOST_TERMS = 14
@@ -51,7 +51,7 @@ WITHIN, MOST_CORRELATED = 2, 0.999
 RISING = 4.0
 
 
-def on_runs() -> list[str]:
+def acts_on_runs() -> list[str]:
     """Specific causes that act on whole runs: direction, speed, load, temperature, mount."""
     return [cause for cause, effect in EFFECTS.items() if effect.acts_on_runs]
 
@@ -61,7 +61,7 @@ def is_flexible(effect: type[Effect]) -> bool:
     return effect.flexible_below == ALWAYS
 
 
-def select(
+def select_causes(
     regression: Regression, known: Sequence[Extension] = (), unnamed: bool = True
 ) -> Regression:
     """The regression with the causes that its readings support, priced by the noise found.
@@ -83,7 +83,7 @@ def select(
         noisy = _under_its_noise(direct)
         regression = regression.with_terms((), noisy.whiten.rho)
         direct = min(noisy, _pruned(_forward(regression, list(EFFECTS))), key=total_penalty)
-    if pace().over:
+    if current_deadline().over:
         return direct
     direct = _with_lines_for_bumps(direct)
     if not (unnamed and _doubtful(direct)):
@@ -94,7 +94,7 @@ def select(
     # The other paths take long: the first of them tells whether they stand a chance.
     chosen = direct
     if not ahead:
-        settled = _forward(regression, on_runs(), total_penalty(direct))
+        settled = _forward(regression, acts_on_runs(), total_penalty(direct))
         specific_first = _pruned(_forward(settled, list(EFFECTS)))
         chosen = min(direct, specific_first, key=total_penalty)
     if total_penalty(opened) > total_penalty(chosen) - DECISIVE:
@@ -102,7 +102,7 @@ def select(
     return _priced_with_noise(min(chosen, opened, key=total_penalty))
 
 
-def regrown(regression: Regression, causes: Sequence[str]) -> Regression:
+def select_again(regression: Regression, causes: Sequence[str]) -> Regression:
     """With the best of some causes beside the terms, without what they make superfluous."""
     return _pruned(_forward(regression, causes))
 
@@ -110,26 +110,26 @@ def regrown(regression: Regression, causes: Sequence[str]) -> Regression:
 def _specific_first(regression: Regression) -> list[Regression]:
     """Over a part of a turn: the choice by a path that takes flexible causes last; else none.
 
-    A bump stands for several lines there, and a wander, whose search takes longest, for most else.
+    A bump stands for several lines there, and a drift, whose search takes longest, for most else.
     """
     if regression.signals.run_turns().max() >= LocalDefect.flexible_below:
         return []
     specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
     start = _beside_repeats(regression)
     if start is regression:
-        start = _forward(regression, on_runs())
+        start = _forward(regression, acts_on_runs())
     return [_in_form(_pruned(_forward(_forward(start, specific), list(EFFECTS))))]
 
 
 def _in_form(regression: Regression) -> Regression:
     """With the forms that causes of whole runs have beside all that was chosen since."""
     for term in regression.terms:
-        effect = effect_of(term.cause)
+        effect = effect_or_unnamed(term.cause)
         alone = sum(other.cause == term.cause for other in regression.terms) == 1
         if not (effect.acts_on_runs and alone):
             continue
         rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
-        again = propose(effect, rest)
+        again = propose_candidates(effect, rest)
         if again is not None and again.shape != term.shape:
             other = rest.with_terms([*rest.terms, again])
             regression = min(regression, other, key=total_penalty)
@@ -141,23 +141,23 @@ def _beside_repeats(regression: Regression) -> Regression:
     beyond = regression.without_repeats()
     if beyond is regression:
         return regression
-    settled = _forward(_forward(beyond, on_runs()), (ZeroSlip.kind,))
+    settled = _forward(_forward(beyond, acts_on_runs()), (ZeroSlip.kind,))
     return regression.with_terms(settled.terms)
 
 
 def _doubtful(regression: Regression) -> bool:
     """Flexible causes, or many: what an effect without a name is taken for."""
     terms = regression.terms
-    flexible = any(is_flexible(effect_of(term.cause)) for term in terms)
+    flexible = any(is_flexible(effect_or_unnamed(term.cause)) for term in terms)
     return flexible or len(finding_groups(terms)) >= MANY
 
 
 def _priced_with_noise(regression: Regression) -> Regression:
     """Causes that the noise's own correlation does not pay for are dropped.
 
-    It is estimated beside a flexible pattern; what selection took for it, with wander taken
+    It is estimated beside a flexible pattern; what selection took for it, with drift taken
     out, is too low for noise that is correlated over many readings, and run means then look
-    significant. A wander in time competes with correlation alone.
+    significant. A drift in time competes with correlation alone.
     """
     return _without_misfits(_under_its_noise(regression))
 
@@ -186,7 +186,7 @@ def _under_its_noise(regression: Regression) -> Regression:
 
 def _takes_up(term: Extension) -> bool:
     """It follows what correlated noise does: drawn anew in every run, or flexible."""
-    return term.run_effect is not None or is_flexible(effect_of(term.cause))
+    return term.run_effect is not None or is_flexible(effect_or_unnamed(term.cause))
 
 
 def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
@@ -199,22 +199,22 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     angle, or with the lines of shafts that the joint declares). All are pruned
     backward; the best by BIC is kept.
     """
-    if pace().over:
+    if current_deadline().over:
         return direct
     # What a flexible one was dropped from since was chosen beside it, too.
     grown = _forward(regression, list(EFFECTS))
     found = {term.cause for term in (*direct.terms, *grown.terms)}
     # Over a part of a turn a bump, too, can stand for several lines at once: lines first.
     travel = regression.signals.run_turns().max()
-    if not any(travel < effect_of(cause).flexible_below for cause in found):
+    if not any(travel < effect_or_unnamed(cause).flexible_below for cause in found):
         return direct
     specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
     goal = total_penalty(direct)
-    starts = [_forward(regression, on_runs(), goal)]
+    starts = [_forward(regression, acts_on_runs(), goal)]
     settled = _beside_repeats(regression)
     if settled is not regression:
         starts.append(settled)
-    elif any(is_flexible(effect_of(cause)) for cause in found):
+    elif any(is_flexible(effect_or_unnamed(cause)) for cause in found):
         slip = ZeroSlip.propose(regression)
         if slip is not None and slip.bic_gain > NEW_CAUSE:
             starts.append(regression.with_terms([slip]))
@@ -223,7 +223,7 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
         starts.append(declared)
     paths = [_pruned(_forward(_forward(s, specific, goal), list(EFFECTS))) for s in starts]
     if declared is not regression:
-        # Beside the declared lines what wanders is a wander, not what else bends as slowly.
+        # Beside the declared lines what drifts is a drift, not what else bends as slowly.
         flexible = [cause for cause, effect in EFFECTS.items() if is_flexible(effect)]
         paths.append(_pruned(_forward(_forward(declared, flexible), list(EFFECTS))))
     return _made_specific(min([direct, *paths], key=total_penalty))
@@ -247,7 +247,7 @@ def _with_lines_for_bumps(regression: Regression) -> Regression:
 
 
 def _with_declared_lines(regression: Regression) -> Regression:
-    """With the lines of the shafts that the joint declares, before a wander may take them.
+    """With the lines of the shafts that the joint declares, before a drift may take them.
 
     What a random walk is fitted beside it leaves alone; those without evidence are pruned.
     """
@@ -265,8 +265,8 @@ def _made_specific(regression: Regression) -> Regression:
     What the form of a law leaves, the flexible one takes up in its place: this counts in the
     evidence, and no allowance for it is charged beside.
     """
-    for term in [t for t in regression.terms if is_flexible(effect_of(t.cause))]:
-        left = misfit(regression)
+    for term in [t for t in regression.terms if is_flexible(effect_or_unnamed(t.cause))]:
+        left = form_misfit(regression)
 
         def price(account: Regression, left: float = left) -> float:
             return account.bic + penalty_of(account.terms, left)
@@ -274,7 +274,7 @@ def _made_specific(regression: Regression) -> Regression:
         rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
         tried = [
             start.with_terms([*start.terms, extension])
-            for extension, start, gain in extensions(rest, on_runs())
+            for extension, start, gain in candidate_extensions(rest, acts_on_runs())
             if price(rest) - gain < price(regression)
         ]
         best = min(tried, key=price, default=regression)
@@ -301,11 +301,11 @@ def _forward(regression: Regression, causes: Sequence[str], goal: float = np.inf
 def _grown(regression: Regression, causes: Sequence[str], goal: float) -> Regression:
     found: list[Candidate] = []
     while len(regression.terms) < MOST_TERMS and not regression.is_explained:
-        scores = Scores()
-        found = extensions(regression, causes, scores.least, found)
+        scores = CandidateScores()
+        found = candidate_extensions(regression, causes, scores.least, found)
         best = scores.best(found)
         # A step that was not finished chose among some only: it chose nothing.
-        if best is None or pace().over:
+        if best is None or current_deadline().over:
             return regression
         score, (extension, start, _) = best
         reach = RISING * (MOST_TERMS - len(regression.terms)) * score
@@ -320,37 +320,40 @@ def _without_misfits(regression: Regression) -> Regression:
 
     They may have been chosen when the others were not known, or not in their form.
     """
-    while not pace().over:
+    while not current_deadline().over:
         groups = finding_groups(regression.terms)
         if len(groups) < 2:
             return regression
         told = []
         for group in groups:
-            rest = cause_terms(regression, group, settled=True)
-            beside = beside_bends(rest, {regression.terms[group[0]].cause})
+            rest = regression_without(regression, group, settled=True)
+            beside = beside_form_errors(rest, {regression.terms[group[0]].cause})
             if beside is not rest:
-                saved = lost(regression, group)
-                share = share_beside(rest, beside, [regression.terms[k] for k in group])
-                told.append((net_loss(regression, group) - (1.0 - share) * saved, group))
+                saved = deviance_lost(regression, group)
+                share = share_beside_form_errors(rest, beside, [regression.terms[k] for k in group])
+                told.append((net_deviance_lost(regression, group) - (1.0 - share) * saved, group))
         if not told or min(told)[0] > 0.0:
             return regression
-        regression = _pruned(cause_terms(regression, min(told)[1]))
+        regression = _pruned(regression_without(regression, min(told)[1]))
     return regression
 
 
 def _pruned(regression: Regression) -> Regression:
     """Without the terms that the others have made superfluous."""
-    while regression.terms and not pace().over:
+    while regression.terms and not current_deadline().over:
         # Terms larger than all that the readings show only take each other off again.
         beyond = [[k] for k in range(len(regression.terms)) if _is_beyond_shown(regression, k)]
-        least = min(beyond or _droppable(regression), key=lambda g: net_loss(regression, g))
-        without = cause_terms(regression, least)
+        least = min(
+            beyond or _droppable(regression), key=lambda g: net_deviance_lost(regression, g)
+        )
+        without = regression_without(regression, least)
         if not beyond and total_penalty(without) > total_penalty(regression):
             break
         regression = without
     regression = _plainest(regression)
     terms = [
-        replace(term, deviance=lost(regression, [k])) for k, term in enumerate(regression.terms)
+        replace(term, deviance=deviance_lost(regression, [k]))
+        for k, term in enumerate(regression.terms)
     ]
     return regression.with_evidence(terms)
 
@@ -371,9 +374,11 @@ def _plainest(regression: Regression) -> Regression:
 
     What was chosen since may have explained what once spoke for the wider one.
     """
-    for cause in {term.cause for term in regression.terms if effect_of(term.cause).contains}:
+    for cause in {
+        term.cause for term in regression.terms if effect_or_unnamed(term.cause).contains
+    }:
         rest = regression.with_terms(term for term in regression.terms if term.cause != cause)
-        plain = _forward(rest, [special.kind for special in effect_of(cause).contains])
+        plain = _forward(rest, [special.kind for special in effect_or_unnamed(cause).contains])
         if total_penalty(plain) < total_penalty(regression):
             regression = plain
     return regression

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
+from ..effects.missing_order import MissingOrder
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
 from ..support.layout import laid_out
-from ..support.layout import wrapped as _wrapped
+from ..support.layout import wrapped_lines as _wrapped
 from .beliefs import Belief
 from .diagnosisdata import DiagnosisData
-from .finding import brief_finding, finding_lines, named_quantity, unit_of
+from .finding import brief_finding, finding_lines, named_quantity, parameter_unit
 from .goodness.evidence import Evidence
 from .goodness.scatter import AGAINST_STATED
-from .untold import ambiguity_entries
 
 #: Share by which the noise must differ from what the simulation states to be told first.
 MATERIAL = 0.1
+
+#: What adds an entry to a text: how far its further lines are set in, and the first one.
+Entry = tuple[str, int, int]
 
 
 def diagnosis_summary(
@@ -30,7 +33,7 @@ def diagnosis_summary(
     unit = error_unit(errors_in, sine_of_rms(d.rms))
     n = unit.number
     lines = [
-        *diagnosis_headline(diagnosis, unit),
+        *_headline(diagnosis, unit),
         *_wrapped(diagnosis.simulated.summary() if diagnosis.simulated else "", 0),
         f"Measured minus simulated: rms {unit.text(d.rms)}, peak-to-peak "
         f"{n(d.peak_to_peak)}, max abs {n(d.max_abs)} ({diagnosis.readings} readings).",
@@ -66,7 +69,7 @@ def diagnosis_summary(
         lines.append("")
         for text in diagnosis.torque.lines():
             lines += _wrapped(text, 2)
-    open_still = [*ambiguity_entries(diagnosis, verbose, lambda spot: _if_it_is(spot, unit))]
+    open_still = [*_ambiguity_entries(diagnosis, verbose, lambda spot: _if_it_is(spot, unit))]
     if diagnosis.next_runs is not None and diagnosis.next_runs.runs:
         lines += ["", *diagnosis.next_runs.summary().splitlines()]
     lines += [""] if open_still else []
@@ -75,7 +78,7 @@ def diagnosis_summary(
     return laid_out(lines)
 
 
-def _if_it_is(spot: Blindness, unit: ErrorUnit) -> Iterator[str]:
+def _if_it_is(spot: Ambiguity, unit: ErrorUnit) -> Iterator[str]:
     """What each of the causes in question would amount to."""
     for cause, parameters in spot.estimates.items():
         known = {name: q for name, q in parameters.items() if q.value is not None}
@@ -83,7 +86,7 @@ def _if_it_is(spot: Blindness, unit: ErrorUnit) -> Iterator[str]:
         yield f"If {cause}: {shown}."
 
 
-def diagnosis_headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
+def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
     """What a reader must know first: faults, what is not understood, what is seen or wrong."""
     lines: list[str] = []
     for note in diagnosis.notes:
@@ -135,7 +138,7 @@ def _is_material(item: Evidence) -> bool:
     return item.test != AGAINST_STATED or abs(item.statistic - 1.0) > MATERIAL
 
 
-def _seen(spot: Blindness, unit: ErrorUnit) -> str:
+def _seen(spot: Ambiguity, unit: ErrorUnit) -> str:
     """Causes of which one is seen, each with the size that it would have."""
     sizes = []
     for cause in spot.causes:
@@ -158,7 +161,7 @@ def _belief(belief: Belief, unit: ErrorUnit) -> str:
         f"{shown.replace('_', ' ')} {' +- '.join(of.pair(measured[name], std[name]))}, "
         f"believed {of.number(value)}"
         for name, value in believed.items()
-        for shown, of in [unit_of(name, unit)]
+        for shown, of in [parameter_unit(name, unit)]
     ]
     text += "; ".join(parts)
     gain = belief.gain
@@ -169,3 +172,54 @@ def _belief(belief: Belief, unit: ErrorUnit) -> str:
 
 def _chance(p: float) -> str:
     return "below 1e-12" if p < 1e-12 else f"{p:.1g}"
+
+
+def _ambiguity_matters(spot: Ambiguity, diagnosis: DiagnosisData) -> bool:
+    """Something is seen, or one of the causes is believed or found beside it."""
+    asked = {effect.kind for effect in diagnosis.extended.effects}
+    asked |= {belief.what for belief in diagnosis.beliefs}
+    asked |= {finding.cause for finding in diagnosis.findings}
+    # A line beside it is no reason to speak of all that may make one.
+    return spot.supported or bool(set(spot.causes) & (asked - {MissingOrder.kind}))
+
+
+def _ambiguity_entries(
+    diagnosis: DiagnosisData, verbose: bool, sizes: Callable[[Ambiguity], Iterator[str]]
+) -> Iterator[Entry]:
+    """Entries on what cannot be told, what is seen first.
+
+    What was not asked, and is not seen either, is named in one line, but where ``verbose``.
+    ``sizes`` gives what each cause of a blind spot would amount to.
+    """
+    plan = diagnosis.next_runs
+    planned = {entry.causes for entry in (plan.between if plan and plan.runs else ()) if entry.told}
+    spots = sorted(diagnosis.not_identifiable, key=lambda spot: not spot.supported)
+    shown = [spot for spot in spots if verbose or _ambiguity_matters(spot, diagnosis)]
+    if shown:
+        yield "What these readings cannot tell:", 0, 0
+    for spot in shown:
+        how = "" if spot.causes in planned and not verbose else f" To find out: {spot.measure}."
+        yield f"- {_head(spot)}: {spot.because}.{how}", 2, 0
+        for text in sizes(spot):
+            yield text, 6, 4
+    named = {finding.cause for finding in diagnosis.findings}
+    others = (cause for spot in spots if spot not in shown for cause in spot.causes)
+    rest = [cause for cause in others if cause not in named]
+    if rest:
+        names = ", ".join(dict.fromkeys(rest))
+        again = " either" if shown else ""
+        yield (
+            f"Not seen, and could not be in such runs{again}: {names} (why: `verbose=True`).",
+            2,
+            0,
+        )
+
+
+def _head(spot: Ambiguity) -> str:
+    names = ", ".join(spot.causes)
+    if not spot.supported:
+        return names
+    if spot.common:
+        others = ", ".join(cause for cause in spot.causes if cause != spot.common)
+        return f"whether {spot.common} is due to {others}"
+    return f"{names} ({'one of them' if len(spot.causes) > 1 else 'something'} is seen)"

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ..estimation.estimate import Parameters, Quantity
-from ..support.plainresult import Shown
+from ..estimation.quantity import Parameters, Quantity
+from ..support.plainresult import ShownResult
 
 #: What parameters are called, and their units.
 _TOLD: Final = {
@@ -18,7 +18,7 @@ _TOLD: Final = {
 
 
 @dataclass(frozen=True)
-class TorqueFinding(Shown):
+class TorqueFinding(ShownResult):
     """What the drive's torque holds beyond the simulator's.
 
     Attributes
@@ -64,7 +64,7 @@ class TorqueFinding(Shown):
 
 
 @dataclass(frozen=True)
-class TorqueAccount(Shown):
+class TorqueAccount(ShownResult):
     """What the torque of a simulated drive lacks.
 
     Attributes
@@ -91,7 +91,7 @@ class TorqueAccount(Shown):
         for finding in self.findings:
             if finding.confirmed and finding.effect == "torque_ripple":
                 order, torque, phase = (
-                    number_of(finding.parameters[name])
+                    number_of_quantity(finding.parameters[name])
                     for name in ("order", "torque_Nm", "phase_deg")
                 )
                 if order >= 1.0 and order.is_integer():
@@ -108,7 +108,7 @@ class TorqueAccount(Shown):
         ):
             for finding in self.findings:
                 if finding.confirmed and finding.effect == effect:
-                    value = number_of(finding.parameters[parameter])
+                    value = number_of_quantity(finding.parameters[parameter])
                     parts.append(f"{value:+.4g} to its {attribute}")
         return f"add {' and '.join(parts)}" if parts else ""
 
@@ -146,7 +146,7 @@ class TorqueAccount(Shown):
         }
 
 
-def number_of(given: Quantity) -> float:
+def number_of_quantity(given: Quantity) -> float:
     """A quantity that is one number."""
     assert isinstance(given.value, float | int)
     return float(given.value)

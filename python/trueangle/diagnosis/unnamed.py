@@ -1,4 +1,4 @@
-"""Structure without a name: it competes with the causes, so that they do not take it up.
+"""Structure without a name, in lines and modulators: it competes with the causes that have one.
 
 A discrepancy that is allowed to be unexplained (Kennedy and O'Hagan 2001). Three kinds are
 offered: a pattern of the angle times something that was measured (direction, speed, load,
@@ -13,10 +13,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..effects import EFFECTS, Effect
-from ..effects.time_periodic import WANDER, TimePeriodic
+from ..effects.time_periodic import FREQUENCY_DRIFT, TimePeriodic
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from .goodness.periodogram import periodogram
@@ -123,7 +123,7 @@ class UnnamedPattern(Effect):
         return best
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         """The modulator times cosine and sine of every order."""
         g = modulator(signals, shape["by"], shape["mean"], shape["spread"])
         if g is None:
@@ -192,7 +192,7 @@ UnnamedLine.kind = UNNAMED_LINE
 UNNAMED: dict[str, type[Effect]] = {UNNAMED_PATTERN: UnnamedPattern, UNNAMED_LINE: UnnamedLine}
 
 
-def effect_of(cause: str) -> type[Effect]:
+def effect_or_unnamed(cause: str) -> type[Effect]:
     """The effect of a cause, or the structure without a name."""
     return EFFECTS[cause] if cause in EFFECTS else UNNAMED[cause]
 
@@ -208,8 +208,10 @@ def is_line_in_time(term: Extension) -> bool:
 
 
 def is_line_of(term: Extension, frequency: float) -> bool:
-    """The term is a line in time whose frequencies wander about as far as this one."""
+    """The term is a line in time whose frequencies drift about as far as this one."""
     if not is_line_in_time(term):
         return False
     own = np.asarray(term.shape["frequency_hz"], dtype=np.float64)
-    return bool(own.min() * (1.0 - WANDER) <= frequency <= own.max() * (1.0 + WANDER))
+    return bool(
+        own.min() * (1.0 - FREQUENCY_DRIFT) <= frequency <= own.max() * (1.0 + FREQUENCY_DRIFT)
+    )

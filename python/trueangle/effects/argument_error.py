@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .effect import Effect
 from .missing_order import MissingOrder
@@ -55,14 +55,14 @@ class ArgumentShift(Effect):
     }
     changes_lines: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         pattern = around.pattern
         change = pattern.indicated_value(signals.theta) - pattern.value(signals.theta)
         return np.asarray(-self.coefficient * change)
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         if around.pattern.orders.size == 0:
             return None
@@ -91,7 +91,7 @@ class ArgumentShift(Effect):
         return {"coefficient": quantity(coefficient, std)}, [ArgumentShift(float(coefficient))]
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         """Column whose coefficient is c."""
         pattern = around.pattern
         change = pattern.indicated_value(signals.theta) - pattern.value(signals.theta)

@@ -8,15 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_sum
+from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec, line_values
+from ..model.term import Term, line_values
 from ..model.terms.travel import BacklashTerm
-from ..support.angles import ARCSEC_PER_DEG
-from .blindness import Blindness
+from ..support.angles import ARCSEC_PER_DEG, from_arcsec
+from .ambiguity import Ambiguity
 from .effect import Effect
 from .search import Array, Fitted
 
@@ -67,7 +67,7 @@ class Backlash(Effect):
     measure: ClassVar[str] = "approach every position from both directions, within each run"
     acts_on_runs: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         width = self.half_width_arcsec + line_sum(signals.theta, self.lines)
         shape = {
             "turns_first": self.turns_first,
@@ -112,7 +112,7 @@ class Backlash(Effect):
         return replace(best, log_grid=float(np.log(3.0)))
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         first, width = shape.get("turns_first", ""), shape.get("half_width_arcsec", 0.0)
         if first == "reference" and width > 0.0:
             return signals.play(width / ARCSEC_PER_DEG, shape.get("start_state", 1.0))[:, None]
@@ -145,7 +145,7 @@ class Backlash(Effect):
         return parameters, [Backlash(float(width), turns_first=first, start_state=start)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         if not goes_both_ways(regression.signals):
             yield cls.blind(ONE_WAY)
 

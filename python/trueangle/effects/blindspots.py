@@ -1,9 +1,9 @@
-"""Which causes a design of runs can tell apart; the readings are not looked at."""
+"""`blind_spots`: which causes a design of runs can tell apart, the readings not looked at."""
 
 from __future__ import annotations
 
 from ..estimation.regression import Regression
-from .blindness import Blindness
+from .ambiguity import Ambiguity
 from .effect import EFFECTS
 
 #: Factors of a design in the order in which their blind spots are told.
@@ -22,14 +22,14 @@ FACTORS = (
 )
 
 
-def blind_spots(regression: Regression) -> list[Blindness]:
+def blind_spots(regression: Regression) -> list[Ambiguity]:
     """What the design of the runs cannot tell; the readings are not looked at."""
-    found: list[Blindness] = []
+    found: list[Ambiguity] = []
     for effect in EFFECTS.values():
         found += effect.blind_spots(regression, found)
-    return sorted(found, key=lambda spot: place_among(FACTORS, spot))
+    return sorted(found, key=lambda spot: blind_spot_place(FACTORS, spot))
 
 
-def place_among(factors: tuple[str, ...], spot: Blindness) -> int:
+def blind_spot_place(factors: tuple[str, ...], spot: Ambiguity) -> int:
     """Where the factor of a blind spot stands among others; behind all where it does not."""
     return factors.index(spot.factor) if spot.factor in factors else len(factors)

@@ -8,17 +8,17 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.joint import Joint
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import ChannelSkewTerm
 from ..support.angles import ARCSEC_PER_DEG
-from .blindness import OWN_POWER, Blindness, share_left
-from .drawing import phase
+from .ambiguity import OWN_POWER, Ambiguity, share_left
+from .drawing import drawn_phase
 from .effect import Effect
 from .filter_lag import FilterLag
 from .latency import UNTIMED, Latency
@@ -67,19 +67,19 @@ class ChannelSkew(Effect):
         "two speeds or both directions, at angles dense enough for twice the sensor's order"
     )
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         line = np.sin(self.order * signals.theta + np.radians(self.phase_deg))
         half = 0.5 * self.delay_s * ARCSEC_PER_DEG * 360.0 * signals.turns_per_s
         return np.asarray(half * (1.0 + line))
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         joint = around.joint
         side = "motor" if joint.encoder_side == "motor" and "motor" in joint.shafts else "output"
         order = joint.output_order(side, 2.0 * joint.pole_pairs)
-        return cls(size, order, phase(rng))
+        return cls(size, order, drawn_phase(rng))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
@@ -101,7 +101,7 @@ class ChannelSkew(Effect):
         return best if best.bic_gain > 0.0 else None
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         """Column whose coefficient is the delay; without a phase the pair of the line alone."""
         half = 0.5 * ARCSEC_PER_DEG * 360.0 * signals.turns_per_s[:, None]
         line = line_columns(signals.theta, sensor_order(around.joint))
@@ -132,7 +132,7 @@ class ChannelSkew(Effect):
         return parameters, [ChannelSkew(float(delay), order, phase)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.velocity is None:
             yield cls.blind(UNTIMED)

@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from .blindness import OWN_OF_VELOCITY, Blindness, share_left
+from .ambiguity import OWN_OF_VELOCITY, Ambiguity, share_left
 from .drift_within_run import DriftWithinRun
 from .effect import Effect
 from .latency import UNTIMED, Latency
@@ -58,7 +58,7 @@ class ClockDrift(Effect):
         "it lies between two records, not in the joint: put both on one clock"
     )
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return self.ppm * self.columns(signals, around, {})[:, 0]
 
     @classmethod
@@ -69,7 +69,7 @@ class ClockDrift(Effect):
         return regression.propose(cls.kind, {}, cls.columns(signals, regression.around, {}))
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         speed = signals.turns_per_s * 360.0
         return np.asarray((ARCSEC_PER_PPM * speed * signals.clock)[:, None])
 
@@ -81,7 +81,7 @@ class ClockDrift(Effect):
         return {"ppm": quantity(ppm, float(np.sqrt(covariance[0, 0])))}, [ClockDrift(float(ppm))]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.velocity is None or signals.time is None:
             yield cls.blind(UNTIMED)

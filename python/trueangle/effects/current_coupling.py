@@ -8,13 +8,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_sum
+from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec, line_values
+from ..model.term import Term, line_values
 from ..model.terms.load import CurrentCouplingTerm
-from .blindness import OWN_OF_VELOCITY, Blindness, share_left
+from ..support.angles import from_arcsec
+from .ambiguity import OWN_OF_VELOCITY, Ambiguity, share_left
 from .effect import Effect
 from .factor import FactorEffect
 from .load_dependent_gear_error import LoadDependentGearError
@@ -56,7 +57,7 @@ class CurrentCoupling(FactorEffect):
     acts_on_runs: ClassVar[bool] = True
     changes_lines: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         if signals.current is None:
             return np.zeros(len(signals))
         per_ampere = self.arcsec_per_A + line_sum(signals.theta, self.lines_per_A)
@@ -101,7 +102,7 @@ class CurrentCoupling(FactorEffect):
         return parameters, [effect]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.current is None or not signals.current.any():
             yield cls.blind("no current of the motor was recorded")

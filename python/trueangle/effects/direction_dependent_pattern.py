@@ -9,16 +9,16 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.travel import DirectionalPatternTerm
+from .ambiguity import Ambiguity
 from .backlash import ONE_WAY, Backlash, goes_both_ways
-from .blindness import Blindness
-from .drawing import phase
+from .drawing import drawn_phase
 from .effect import Effect
 from .latency import Latency
 from .presliding_hysteresis import PreslidingHysteresis
@@ -80,15 +80,15 @@ class DirectionalPattern(Effect):
         """``(order, arcsec, phase_deg)`` of every line."""
         return tuple(zip(self.orders, self.amplitudes_arcsec, self.phases_deg, strict=True))
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return np.asarray(signals.direction * line_sum(signals.theta, self.lines))
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         order = float(rng.integers(1, 5))
-        return cls((order,), (size,), (phase(rng),))
+        return cls((order,), (size,), (drawn_phase(rng),))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
@@ -105,7 +105,7 @@ class DirectionalPattern(Effect):
         return best_shape(cls, regression, shapes, log_grids)
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         return signals.direction[:, None] * line_columns(signals.theta, shape["order"])
 
     @classmethod
@@ -122,7 +122,7 @@ class DirectionalPattern(Effect):
         return parameters, [DirectionalPattern(orders, amplitudes, phases)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         if not goes_both_ways(regression.signals):
             yield cls.blind(ONE_WAY)
 

@@ -1,4 +1,4 @@
-"""Ramps and wander in time, new in every run."""
+"""Ramps and drift in time, new in every run."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 
 import trueangle._core as _core
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..estimation.whitening import wander_basis
-from ..joint.pattern import Surroundings
+from ..estimation.whitening import drift_basis
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from ..support.plainresult import counted
-from .backlash import Backlash
-from .blindness import (
+from ..support.layout import counted
+from .ambiguity import (
     OWN_OF_VELOCITY,
     RUNS_PER_LEVEL,
-    Blindness,
+    Ambiguity,
     share_left,
 )
+from .backlash import Backlash
 from .effect import ALWAYS, Effect
 from .latency import Latency
 from .missing_order import MissingOrder
@@ -36,13 +36,13 @@ from .search import (
 from .thermal_drift import ThermalDrift
 from .zero_slip import ZeroSlip
 
-#: Half periods over one run that make up a wander: at first, and at most.
-WANDER_TERMS, MOST_TERMS = 24, 96
+#: Half periods over one run that make up a drift: at first, and at most.
+DRIFT_TERMS, MOST_TERMS = 24, 96
 
 #: Power of the last of them, in variances of one reading, from which on more are needed.
 SEEN = 0.5
 
-#: Evidence of a wander beside a ramp from which on it is more than one: "very strong" on the scale
+#: Evidence of a drift beside a ramp from which on it is more than one: "very strong" on the scale
 #: of Kass and Raftery.
 TOLD = 10.0
 
@@ -109,7 +109,7 @@ class DriftWithinRun(Effect):
         "no signal shows the drift; log the temperature and look for its part"
     )
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         out = np.zeros(len(signals))
         for start, stop in signals.run_bounds():
             clock = signals.clock[start:stop]
@@ -122,7 +122,7 @@ class DriftWithinRun(Effect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         # A free path is no cause, and is not to be found as one.
         return cls(arcsec_per_s=size)
@@ -142,7 +142,7 @@ class DriftWithinRun(Effect):
         if best.bic_gain <= regression.least:
             return best
         # An error that comes back at the same place on the next pass in that direction is
-        # no wander in time, nor is a new zero.
+        # no drift in time, nor is a new zero.
         beyond = regression.without_repeats(by_direction=True)
         if beyond is regression:
             return best
@@ -157,7 +157,7 @@ class DriftWithinRun(Effect):
         """With as many half periods as are above the noise: where they end, an edge is left.
 
         Asked under white noise, as correlated noise stands for what is finer; of one run under
-        the noise found, for there a wander that is taken too fine takes the lines of the place.
+        the noise found, for there a drift that is taken too fine takes the lines of the place.
         """
         form, terms = best.shape["form"], int(best.shape["terms"])
         if best.bic_gain <= 0.0 or form not in FREE:
@@ -176,7 +176,7 @@ class DriftWithinRun(Effect):
         return best if terms == best.shape["terms"] else cls._proposal(regression, form, terms)
 
     @classmethod
-    def _proposal(cls, regression: Regression, form: str, terms: int = WANDER_TERMS) -> Extension:
+    def _proposal(cls, regression: Regression, form: str, terms: int = DRIFT_TERMS) -> Extension:
         columns = regression.cache.of_motion(
             f"{form} {terms}",
             None,
@@ -226,7 +226,7 @@ class DriftWithinRun(Effect):
             return np.asarray(np.sqrt(2.0) * cosines / (np.pi * k))
         if form == "flicker":
             cosines = cosines - 1.0
-        return np.asarray(cosines / np.sqrt(k * np.log(WANDER_TERMS)))
+        return np.asarray(cosines / np.sqrt(k * np.log(DRIFT_TERMS)))
 
     @classmethod
     def report(
@@ -249,7 +249,7 @@ class DriftWithinRun(Effect):
         return parameters, [effect]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         clocks = (signals.clock[a:b] for a, b in regression.bounds)
         clock = np.concatenate([c / max(float(np.ptp(c)), 1e-300) for c in clocks])
@@ -264,7 +264,7 @@ class DriftWithinRun(Effect):
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
-        """Whether it wanders: beside a ramp in angle, which a ramp in time is, too."""
+        """Whether it drifts: beside a ramp in angle, which a ramp in time is, too."""
         assert extension.run_effect is not None
         others = [term for term in regression.terms if term.cause != cls.kind]
         rest = regression.with_terms(others, regression.whiten.rho)
@@ -276,9 +276,9 @@ class DriftWithinRun(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
-        """A wander in time may be an error of reversal: few runs that reverse once."""
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
+        """A drift in time may be an error of reversal: few runs that reverse once."""
         signals = regression.signals
         if (
             extension.cause != cls.kind
@@ -288,8 +288,8 @@ class DriftWithinRun(Effect):
             return None
         left = power = 0.0
         for start, stop in regression.bounds:
-            wander = wander_basis(signals.clock[start:stop])
-            q, _ = np.linalg.qr(np.column_stack([np.ones(stop - start), wander]))
+            drift = drift_basis(signals.clock[start:stop])
+            q, _ = np.linalg.qr(np.column_stack([np.ones(stop - start), drift]))
             direction = signals.direction[start:stop]
             power += float(np.sum((direction - direction.mean()) ** 2))
             left += float(np.sum((direction - q @ (q.T @ direction)) ** 2))

@@ -1,4 +1,4 @@
-"""What every effect is: parameters, a signal, a search for it, and how it is corrected."""
+"""What every effect is: parameters, a signal, a search and its finding, how it is corrected."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term
-from .bends import departure_columns
-from .blindness import Blindness
-from .parameters import Tabled
+from .ambiguity import Ambiguity
+from .departures import departure_columns
+from .parameters import TabledParameters
 from .search import Array, Fitted
 
 #: Every effect by its kind, in the order in which they are tried: a class joins by being
@@ -29,7 +29,7 @@ EFFECTS: dict[str, type[Effect]] = {}
 ALWAYS = math.inf
 
 
-class Effect(Tabled):
+class Effect(TabledParameters):
     """Base of the effects; each is a frozen dataclass whose fields are its parameters.
 
     A class with a ``kind`` joins the vocabulary by being defined. What it must say is its
@@ -121,17 +121,17 @@ class Effect(Tabled):
 
     # -- simulate ------------------------------------------------------------------
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         """The effect's error at every reading, arcsec; random where its nature is random."""
         raise NotImplementedError
 
-    def expected(self, signals: Signals, around: Surroundings) -> Array:
+    def expected(self, signals: Signals, around: JointPattern) -> Array:
         """The part of `signal` that can be predicted: zeros for random effects."""
         if not self.transfers:
             return np.zeros(len(signals))
         return self.signal(signals, around, np.random.default_rng(0))
 
-    def noise_factor(self, signals: Signals, around: Surroundings) -> Array | None:
+    def noise_factor(self, signals: Signals, around: JointPattern) -> Array | None:
         """Factor on the standard deviation of the noise, or None."""
         return None
 
@@ -143,7 +143,7 @@ class Effect(Tabled):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         """One of this size with all else drawn at random, to be hidden in readings of ``signals``.
 
@@ -153,7 +153,7 @@ class Effect(Tabled):
         return cls(size)  # type: ignore[call-arg]
 
     @classmethod
-    def alike(cls, other: Effect, around: Surroundings) -> Self | None:
+    def alike(cls, other: Effect, around: JointPattern) -> Self | None:
         """The same error from this cause, where one design cannot tell it from ``other``."""
         return None
 
@@ -170,7 +170,7 @@ class Effect(Tabled):
         return None
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         """Regressors of ``shape`` at other readings, shape (n, p); none of a random effect."""
         return np.zeros((len(signals), 0))
 
@@ -178,7 +178,7 @@ class Effect(Tabled):
     def bends(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
         """Columns by which the error of this cause's ``terms`` may depart from its form.
 
-        By its factor (`trueangle.effects.bends`); of one that has an exact form none.
+        By its factor (`trueangle.effects.departures`); of one that has an exact form none.
         """
         signal = sum((t.columns @ c for t, c in terms if c.size), np.zeros(len(signals)))
         return departure_columns(signals, cls.factor, np.asarray(signal))
@@ -194,7 +194,7 @@ class Effect(Tabled):
         raise NotImplementedError
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         """What the design of the runs cannot tell of it; the readings are not looked at.
 
         ``found`` are those of the effects before it in the list.
@@ -203,8 +203,8 @@ class Effect(Tabled):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         """Why this effect may be behind what another (or it) explains, or None."""
         return None
 
@@ -217,7 +217,7 @@ class Effect(Tabled):
     def told(cls, extension: Extension, regression: Regression) -> bool:
         """Whether the readings show what the design alone does not promise to tell.
 
-        Asked of a blind spot whose causes have a common form (`Blindness`).
+        Asked of a blind spot whose causes have a common form (`Ambiguity`).
         """
         return False
 
@@ -237,7 +237,7 @@ class Effect(Tabled):
         first: bool = True,
         factor: str | None = None,
         common: type[Effect] | None = None,
-    ) -> Blindness:
+    ) -> Ambiguity:
         """Blind spot of this effect, or of it and ``others`` which it is taken for.
 
         ``first=False`` names the others before it; ``factor`` is what in the design is at
@@ -249,7 +249,7 @@ class Effect(Tabled):
             measure = telling_apart(effects[0], effects[1]) or effects[0].measure
         causes = tuple(effect.kind for effect in effects)
         shared = "" if common is None else common.kind
-        return Blindness(causes, because, measure, factor=factor or cls.factor, common=shared)
+        return Ambiguity(causes, because, measure, factor=factor or cls.factor, common=shared)
 
     # -- correct -------------------------------------------------------------------
 

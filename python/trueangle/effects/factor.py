@@ -9,7 +9,7 @@ import numpy as np
 
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from .effect import Effect
 from .search import Array, Fitted, line_parameters
@@ -46,7 +46,7 @@ class FactorEffect(Effect):
         return best_shape(cls, regression, shapes, log_grids)
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         scale = cls.scale(signals, shape.get("kind", "signed"))
         assert scale is not None
         if shape["what"] == "zero":

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Pattern, Surroundings
+from ..joint.pattern import JointPattern, Pattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import FilterLagTerm
 from ..support.quantiles import quantile
-from .blindness import Blindness
+from .ambiguity import Ambiguity
 from .effect import Effect
 from .latency import UNTIMED, Latency
 from .missing_order import MissingOrder
@@ -90,16 +90,16 @@ class FilterLag(Effect):
     located: ClassVar[bool] = True
     changes_lines: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         pattern = around.pattern
         seen = pattern.passed(
-            signals.theta, signals.turns_per_s, lambda f: low_pass(f, self.cutoff_hz, self.damping)
+            signals.theta, signals.turns_per_s, lambda f: _low_pass(f, self.cutoff_hz, self.damping)
         )
         return np.asarray(seen - pattern.value(signals.theta))
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         return None if around.pattern.orders.size == 0 else cls(size)
 
@@ -182,7 +182,7 @@ class FilterLag(Effect):
         return best
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         waves = _waves(around.pattern, signals.theta)
         frequency = around.pattern.orders * signals.turns_per_s[:, None]
         return _lagged(waves, frequency, **shape)[:, None]
@@ -211,7 +211,7 @@ class FilterLag(Effect):
         return parameters, [FilterLag(equivalent, damping)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.velocity is None:
             yield cls.blind(UNTIMED)
@@ -228,8 +228,8 @@ class FilterLag(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != MissingOrder.kind:
             return None
         order = float(extension.shape["output_order"])
@@ -244,7 +244,7 @@ class FilterLag(Effect):
         return (FilterLagTerm(self.cutoff_hz, self.damping),)
 
 
-def low_pass(frequency: Array, cutoff: float, damping: float | None) -> NDArray[np.complex128]:
+def _low_pass(frequency: Array, cutoff: float, damping: float | None) -> NDArray[np.complex128]:
     """Gain of a low-pass of first or second order at a signed frequency, both in Hz."""
     if damping is None:
         return np.asarray(1.0 / (1.0 + 1j * (frequency / cutoff)))

@@ -8,10 +8,10 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.projection import EXCITED
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .effect import Effect, ScatterFinding
 from .outliers import Outliers
@@ -63,10 +63,10 @@ class HeteroscedasticNoise(Effect):
     weighs: ClassVar[bool] = True
     not_at_run_time: ClassVar[str] = "scatter has no value to subtract, only a weight"
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return np.zeros(len(signals))
 
-    def noise_factor(self, signals: Signals, around: Surroundings) -> Array | None:
+    def noise_factor(self, signals: Signals, around: JointPattern) -> Array | None:
         log_variance = self.cosine * np.cos(self.order * signals.theta)
         log_variance += self.sine * np.sin(self.order * signals.theta)
         log_variance += self.per_deg_s * np.abs(signals.turns_per_s * 360.0)
@@ -76,7 +76,7 @@ class HeteroscedasticNoise(Effect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         angle = float(rng.uniform(0.0, 2.0 * np.pi))
         return cls(size * float(np.cos(angle)), size * float(np.sin(angle)))

@@ -8,15 +8,15 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.place import JointCouplingTerm
 from ..support.angles import ARCSEC_PER_DEG
-from .blindness import OWN_POWER, Blindness, share_left
+from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .effect import Effect
 from .scale_error import ScaleError
 from .search import Array, Fitted
@@ -62,7 +62,7 @@ class JointCoupling(_OfOthers):
     has_exact_form: ClassVar[bool] = True
     is_separate: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         angle = signals.coupled.get(self.joint)
         if angle is None:
             return np.zeros(len(signals))
@@ -70,7 +70,7 @@ class JointCoupling(_OfOthers):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         moved = [joint for joint, angle in signals.coupled.items() if np.ptp(angle) > 0.0]
         return cls(str(rng.choice(moved)), size) if moved else None
@@ -84,7 +84,7 @@ class JointCoupling(_OfOthers):
         return best_shape(cls, regression, shapes, [grid] * len(shapes))
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         return ARCSEC_PER_DEG * signals.coupled[shape["joint"]][:, None]
 
     @classmethod
@@ -103,7 +103,7 @@ class JointCoupling(_OfOthers):
         return parameters, found
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         for because in filter(None, _hidden(regression).values()):
             yield cls.blind(because)
 

@@ -8,17 +8,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.earlier import earlier
-from ..joint.pattern import Surroundings
+from ..joint.earlier import earlier_signals
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import LatencyTerm
 from ..support.angles import ARCSEC_PER_DEG
+from .ambiguity import OWN_OF_VELOCITY, OWN_POWER, Ambiguity, share_left
 from .backlash import Backlash
-from .blindness import OWN_OF_VELOCITY, OWN_POWER, Blindness, share_left
 from .effect import Effect
 from .search import Array, Fitted
 
@@ -58,8 +58,8 @@ class Latency(Effect):
     confused_with: ClassVar[Mapping[type[Effect], str]] = {Backlash: TWO_SPEEDS}
     acts_on_runs: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
-        then = earlier(signals, self.delay_s).theta
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
+        then = earlier_signals(signals, self.delay_s).theta
         pattern = around.pattern
         ramp = np.degrees(then - signals.theta) * ARCSEC_PER_DEG
         return np.asarray(ramp + pattern.value(then) - pattern.value(signals.theta))
@@ -82,7 +82,7 @@ class Latency(Effect):
         return {"delay_s": quantity(delay, std)}, [Latency(float(delay))]
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         """Column whose coefficient is tau, arcsec per second, to first order in tau."""
         speed = signals.turns_per_s * (360.0 * ARCSEC_PER_DEG)
         return np.asarray(
@@ -90,7 +90,7 @@ class Latency(Effect):
         )
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.velocity is None:
             yield cls.blind(UNTIMED)

@@ -8,15 +8,15 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.load import LoadDependentGearErrorTerm
-from .blindness import OWN_OF_VELOCITY, OWN_POWER, Blindness, share_left
-from .drawing import carrier_order, free_line, phase
+from .ambiguity import OWN_OF_VELOCITY, OWN_POWER, Ambiguity, share_left
+from .drawing import drawn_carrier, drawn_free_line, drawn_phase
 from .effect import Effect
 from .factor import FactorEffect
 from .missing_order import MissingOrder
@@ -59,7 +59,7 @@ class LoadDependentGearError(FactorEffect):
     }
     changes_lines: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         torque = torque_of(signals)
         if self.torque == "absolute":
             torque = np.abs(torque)
@@ -67,12 +67,12 @@ class LoadDependentGearError(FactorEffect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
-        order = carrier_order(around, rng)
+        order = drawn_carrier(around, rng)
         if order is None:
-            _, _, order = free_line(around, rng)
-        return cls(((order, size, phase(rng)),))
+            _, _, order = drawn_free_line(around, rng)
+        return cls(((order, size, drawn_phase(rng)),))
 
     @classmethod
     def scale(cls, signals: Signals, kind: str) -> Array | None:
@@ -127,7 +127,7 @@ class LoadDependentGearError(FactorEffect):
         return parameters, effects
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.temperature is not None and signals.torque is not None:
             warm = (signals.temperature - signals.temperature.mean())[:, None]
@@ -168,8 +168,8 @@ class LoadDependentGearError(FactorEffect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != MissingOrder.kind or unloaded(regression.signals):
             return None
         if is_gear_order(regression.belief, float(extension.shape["output_order"])):

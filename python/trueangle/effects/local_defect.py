@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec
+from ..model.term import Term
 from ..model.terms.place import LocalDefectTerm
-from ..support.deadline import pace
+from ..support.angles import from_arcsec
+from ..support.deadline import current_deadline
+from .ambiguity import Ambiguity
 from .argument_error import ArgumentShift
-from .blindness import Blindness
-from .drawing import visited_place
 from .effect import Effect
 from .missing_order import MissingOrder
 from .search import Array, Fitted, tangent_covariance
@@ -90,7 +90,7 @@ class LocalDefect(Effect):
     is_separate: ClassVar[bool] = True
     flexible_below: ClassVar[float] = WHOLE_TURN
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         phase = self._degrees(signals, around, self.shaft)
         return self.height_arcsec * self.bump(phase, self.place_deg, self.width_deg)
 
@@ -107,9 +107,10 @@ class LocalDefect(Effect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
-        return cls(visited_place(signals, rng), float(rng.uniform(3.0, 8.0)), size)
+        place = float(np.mod(signals.degrees[int(rng.integers(len(signals)))], 360.0))
+        return cls(place, float(rng.uniform(3.0, 8.0)), size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
@@ -124,7 +125,7 @@ class LocalDefect(Effect):
                 continue  # the readings are too few a turn of it to show a place
             reached: list[tuple[float, float]] = []
             for score, place, width in cls._search(regression, shaft, cycles, e):
-                if pace().over:
+                if current_deadline().over:
                     return best
                 # From within a bump that was found the way leads there.
                 if any(abs((place - c + 180.0) % 360.0 - 180.0) < w for c, w in reached):
@@ -200,7 +201,7 @@ class LocalDefect(Effect):
         Clipped at so many standard deviations it has a flat top, and looks wide.
         """
         for _ in range(UNCLIPPED):
-            if pace().over:
+            if current_deadline().over:
                 return shape
             columns = cls.columns(regression.signals, regression.around, shape)
             if not regression.outlying[columns[:, 0] > ON_BUMP].any():
@@ -229,12 +230,12 @@ class LocalDefect(Effect):
         )
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         phase = cls._degrees(signals, around, shape["shaft"])
         return cls.bump(phase, shape["place_deg"], shape["width_deg"])[:, None]
 
     @staticmethod
-    def _degrees(signals: Signals, around: Surroundings, shaft: str) -> Array:
+    def _degrees(signals: Signals, around: JointPattern, shaft: str) -> Array:
         """Angles of a shaft."""
         return np.degrees(signals.theta * around.joint.output_order(shaft, 1))
 
@@ -257,7 +258,7 @@ class LocalDefect(Effect):
         return parameters, [LocalDefect(place, width, float(height), shape["shaft"])]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         grid = regression.signals.grid
         if grid is None or grid.positions > 2.0 * regression.lines.orders.max():
             return
@@ -306,7 +307,7 @@ def _circular(x: Waves, window: Waves) -> Array:
     return np.asarray(np.fft.irfft(x * window, PLACES))
 
 
-def _gear_lines(around: Surroundings) -> list[float]:
+def _gear_lines(around: JointPattern) -> list[float]:
     joint = around.joint
     lines = {joint.output_order(shaft, k) for shaft, k in joint.gear_orders()}
     if "wave_generator" in joint.shafts:

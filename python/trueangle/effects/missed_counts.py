@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .effect import ALWAYS, Effect
 from .search import (
@@ -61,13 +61,13 @@ class MissedCounts(Effect):
         "a step is distinguished from a motion only afterwards, in the log"
     )
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         after = (signals.run == self.run) & (signals.row >= self.row)
         return np.asarray(self.step_arcsec * after)
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         bounds = signals.run_bounds()
         run = int(rng.integers(len(bounds)))
@@ -119,7 +119,7 @@ class MissedCounts(Effect):
         return best_extension
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         after = (signals.run == shape["run"]) & (signals.row >= shape["row"])
         return np.asarray(after.astype(np.float64)[:, None])
 

@@ -8,15 +8,15 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
-from .blindness import (
-    Blindness,
+from .ambiguity import (
+    Ambiguity,
 )
-from .drawing import free_line, phase
+from .drawing import drawn_free_line, drawn_phase
 from .effect import Effect
 from .scale_error import ScaleError
 from .search import (
@@ -72,16 +72,16 @@ class MissingOrder(Effect):
     of_motion: ClassVar[bool] = True
     is_doubted: ClassVar[bool] = False
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         order = around.joint.output_order(self.shaft, self.order)
         return line_sum(signals.theta, ((order, self.amplitude_arcsec, self.phase_deg),))
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
-        shaft, order, _ = free_line(around, rng)
-        return cls(shaft, order, size, phase(rng))
+        shaft, order, _ = drawn_free_line(around, rng)
+        return cls(shaft, order, size, drawn_phase(rng))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
@@ -129,7 +129,7 @@ class MissingOrder(Effect):
         )
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         return line_columns(signals.theta, shape["output_order"])
 
     @classmethod
@@ -160,8 +160,8 @@ class MissingOrder(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != cls.kind:
             return None
         order = float(extension.shape["output_order"])
@@ -188,7 +188,7 @@ class MissingOrder(Effect):
         return None
 
     @classmethod
-    def also_from(cls, other: type[Effect], spot: Blindness) -> Blindness:
+    def also_from(cls, other: type[Effect], spot: Ambiguity) -> Ambiguity:
         """That ``other`` may make a line for the reason of ``spot``: a line it is in any case."""
         return replace(spot, causes=(cls.kind, other.kind), common=cls.kind)
 

@@ -8,24 +8,24 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns, lines_columns
+from ..joint.pattern import JointPattern, line_columns, lines_columns
 from ..joint.signals import Signals
-from ..support.deadline import pace
-from .blindness import (
-    Blindness,
+from ..support.deadline import current_deadline
+from .ambiguity import (
+    Ambiguity,
 )
-from .drawnline import DrawnLine
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
 from .orderspectrum import OrderSpectrum
+from .randomphase import RandomPhaseLine
 from .search import (
     Array,
     Fitted,
-    grid_doubt,
+    grid_ambiguity,
 )
 
 #: Trial orders per resolution cell (one order over the turns of a run).
@@ -86,13 +86,13 @@ class NonIntegerOrder(Effect):
     flexible_below: ClassVar[float] = ALWAYS
     not_at_run_time: ClassVar[str] = "its phase is new in every run"
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         phase = rng.uniform(0.0, 2.0 * np.pi, signals.runs)[signals.run]
         return np.asarray(self.amplitude_arcsec * np.sin(self.order * signals.theta + phase))
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         return cls(float(rng.integers(5, 40)) + float(rng.uniform(0.3, 0.7)), size)
 
@@ -112,7 +112,7 @@ class NonIntegerOrder(Effect):
             return None
         peaks = np.flatnonzero((net[1:-1] >= net[:-2]) & (net[1:-1] >= net[2:])) + 1
         for k in peaks[np.argsort(net[peaks])[::-1][:PEAKS]]:
-            if pace().over:
+            if current_deadline().over:
                 return best
             extension = cls._at(regression, float(orders[k]), float(penalty[k]))
             if best is None or extension.bic_gain > best.bic_gain:
@@ -199,9 +199,9 @@ class NonIntegerOrder(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
-        return grid_doubt(regression, spots) if extension.cause == cls.kind else None
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
+        return grid_ambiguity(regression, spots) if extension.cause == cls.kind else None
 
     @classmethod
     def report(
@@ -210,7 +210,7 @@ class NonIntegerOrder(Effect):
         extension = terms[0][0]
         theta = regression.signals.theta
         waves = line_columns(theta, extension.shape["order"])
-        line = DrawnLine(regression, cls.kind, waves)
+        line = RandomPhaseLine(regression, cls.kind, waves)
         amplitude, amplitude_std = line.amplitude()
         order_std = line.place_std(theta)
         parameters = {
@@ -223,6 +223,6 @@ class NonIntegerOrder(Effect):
         return parameters, [NonIntegerOrder(extension.shape["order"], amplitude)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         if regression.signals.runs < 2:
             yield cls.blind("one run: a phase cannot change", MissingOrder)

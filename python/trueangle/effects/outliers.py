@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..estimation.estimate import Parameters, quantity
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..estimation.stretches import MOST_IN_ROW, about_level, stretches, within
-from ..joint.pattern import Surroundings
+from ..estimation.segments import MOST_IN_ROW, flagged_segments, less_local_level, within_segments
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .effect import Effect, ScatterFinding
 from .local_defect import LocalDefect
@@ -95,13 +95,13 @@ class Outliers(Effect):
     }
     not_at_run_time: ClassVar[str] = "a single reading does not tell a fault from a motion"
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         far_off = rng.random(len(signals)) < self.fraction
         return np.asarray(far_off * self.size_arcsec * rng.standard_normal(len(signals)))
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         return cls(float(rng.uniform(0.01, 0.03)), size)
 
@@ -194,7 +194,7 @@ def _beside_neighbours(regression: Regression) -> tuple[Array, float]:
     readings are held against the level about them, and tell nothing of their neighbours.
     """
     left = _unfiltered(regression)
-    away = about_level(left, regression.bounds)
+    away = less_local_level(left, regression.bounds)
     wild = np.abs(away) > WILD * 1.4826 * float(np.median(np.abs(away)))
     rows = _glitches(left, np.flatnonzero(wild), regression.bounds)
     known = left.copy()
@@ -239,16 +239,16 @@ def _glitches(
     A glitch is over within a few readings, and those next to it in its run are far smaller;
     what lasts (a transition at a reversal, a manoeuvre) or fades is an error of the mean.
     """
-    away = np.pad(np.abs(about_level(left, bounds)), 1)
+    away = np.pad(np.abs(less_local_level(left, bounds)), 1)
     ends = np.zeros(left.size + 1, dtype=bool)
     ends[[0, *(stop for _, stop in bounds)]] = True
     flags = _flags(rows, left.size)
-    starts, stops = stretches(flags, bounds)
+    starts, stops = flagged_segments(flags, bounds)
     before = np.where(ends[starts], 0.0, away[starts])
     after = np.where(ends[stops], 0.0, away[stops + 1])
     abrupt = (before < BESIDE * away[starts + 1]) & (after < BESIDE * away[stops])
     abrupt &= stops - starts <= MOST_IN_ROW
-    return np.flatnonzero(within(starts[abrupt], stops[abrupt], left.size))
+    return np.flatnonzero(within_segments(starts[abrupt], stops[abrupt], left.size))
 
 
 def _flags(rows: NDArray[np.int64], n: int) -> NDArray[np.bool_]:
@@ -259,7 +259,7 @@ def _flags(rows: NDArray[np.int64], n: int) -> NDArray[np.bool_]:
 
 def _lengths(regression: Regression, rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """Lengths of the stretches of rows that follow each other."""
-    starts, stops = stretches(_flags(rows, regression.n), regression.bounds)
+    starts, stops = flagged_segments(_flags(rows, regression.n), regression.bounds)
     return stops - starts
 
 

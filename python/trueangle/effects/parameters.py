@@ -12,7 +12,7 @@ from ..errors import ArgumentError
 from ..support.suggestions import did_you_mean
 
 
-class Tabled:
+class TabledParameters:
     """What stands as a table of a simulation file: a dataclass whose fields are its parameters."""
 
     kind: ClassVar[str]

@@ -8,19 +8,20 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec
+from ..model.term import Term
 from ..model.terms.travel import PreslidingHysteresisTerm
+from ..support.angles import from_arcsec
+from .ambiguity import Ambiguity, share_left
 from .backlash import ONE_WAY, Backlash, goes_both_ways
-from .bends import spring_transitions
-from .blindness import Blindness, share_left
+from .departures import spring_transitions
 from .effect import Effect
 from .latency import TWO_SPEEDS, Latency
-from .search import Array, Fitted, golden_maximum, of_one_sign, tangent_covariance
+from .search import Array, Fitted, golden_maximum, is_of_one_sign, tangent_covariance
 
 _AFTER_REVERSAL = (
     "record the first 10 to 30 deg after each reversal in steps of 0.3 deg or less, "
@@ -83,12 +84,12 @@ class PreslidingHysteresis(Effect):
     acts_on_runs: ClassVar[bool] = True
     located: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return self.amplitude_arcsec * signals.presliding(self.length_deg, self.start_state)
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         return cls(size, float(rng.uniform(2.0, 6.0)))
 
@@ -139,7 +140,7 @@ class PreslidingHysteresis(Effect):
         if apart:
             further.append(extension)
         further.sort(key=lambda p: -p.bic_gain)
-        alike = (p for p in further if p.bic_gain > 0.0 and of_one_sign(regression, p))
+        alike = (p for p in further if p.bic_gain > 0.0 and is_of_one_sign(regression, p))
         return next(alike, None)
 
     @classmethod
@@ -149,7 +150,7 @@ class PreslidingHysteresis(Effect):
         return regression.propose(cls.kind, shape, columns)
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         if shape["length_deg"] == 0.0:
             return signals.direction[:, None]
         return signals.presliding(shape["length_deg"], shape["start_state"])[:, None]
@@ -210,7 +211,7 @@ class PreslidingHysteresis(Effect):
         return float(np.sqrt(covariance[:n, :n].sum())), length_std
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.velocity is None and bool(np.ptp(signals.direction) > 0.0):
             yield cls.blind(

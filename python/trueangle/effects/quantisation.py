@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import quantity
-from ..estimation.readings import is_good_part
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..estimation.rounded import is_rounding_visible
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.angles import ARCSEC_PER_DEG
 from .effect import Effect, ScatterFinding
@@ -45,7 +45,7 @@ class Quantisation(Effect):
     rounds: ClassVar[bool] = True
     not_at_run_time: ClassVar[str] = "what was rounded away is not in the reading"
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         # Rounding follows the noise (`written`): beside enough of it its mean is zero.
         return np.zeros(len(signals))
 
@@ -57,7 +57,7 @@ class Quantisation(Effect):
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
         step = regression.signals.count
         variance, rounding = regression.variance, step**2 / 12.0
-        if regression.is_explained or not is_good_part(rounding, variance, variance):
+        if regression.is_explained or not is_rounding_visible(rounding, variance, variance):
             return None
         # Of n readings each falls on the lattice by a chance of its tolerance.
         gain = 2.0 * regression.n * float(np.log(10.0)) - regression.log_n

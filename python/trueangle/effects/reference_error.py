@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
-from .blindness import Blindness
-from .drawing import phase
+from .ambiguity import Ambiguity
+from .drawing import drawn_phase
 from .effect import Effect
 from .missing_order import MissingOrder
 from .search import Array, Fitted, is_gear_order, line_parameters
@@ -67,7 +67,7 @@ class ReferenceLines(Effect):
         if not len(self.orders) == len(self.amplitudes_arcsec) == len(self.phases_deg):
             raise ArgumentError("orders, amplitudes_arcsec and phases_deg must be equally long")
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         lines = tuple(zip(self.orders, self.amplitudes_arcsec, self.phases_deg, strict=True))
         return line_sum(self.angle(signals, self.mount_sign), lines)
 
@@ -80,13 +80,13 @@ class ReferenceLines(Effect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         order = float(rng.integers(1, 5))
-        return cls((order,), (size,), (phase(rng),))
+        return cls((order,), (size,), (drawn_phase(rng),))
 
     @classmethod
-    def alike(cls, other: Effect, around: Surroundings) -> Self | None:
+    def alike(cls, other: Effect, around: JointPattern) -> Self | None:
         if not isinstance(other, MissingOrder):
             return None
         order = around.joint.output_order(other.shaft, other.order)
@@ -108,7 +108,7 @@ class ReferenceLines(Effect):
         )
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         both = line_columns(ReferenceLines.angle(signals, shape["mount_sign"]), shape["order"])
         seen = both.any(axis=0)
         return both[:, seen] if seen.any() else both
@@ -149,7 +149,7 @@ class ReferenceLines(Effect):
         return parameters, effects
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         mount = regression.signals.mount
         if mount is None:
             yield cls.blind("the mount of the reference was not recorded")
@@ -163,8 +163,8 @@ class ReferenceLines(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != MissingOrder.kind or regression.signals.mount is None:
             return None
         order = float(extension.shape["output_order"])

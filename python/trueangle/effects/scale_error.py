@@ -9,10 +9,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import ARCSEC_PER_RAD, Surroundings
+from ..joint.pattern import ARCSEC_PER_RAD, JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.place import ScaleErrorTerm
@@ -44,7 +44,7 @@ class ScaleError(Effect):
     measure: ClassVar[str] = "turn several turns in both directions"
     acts_on_runs: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return self.relative_error * ARCSEC_PER_RAD * signals.theta
 
     @classmethod
@@ -65,7 +65,7 @@ class ScaleError(Effect):
         return max(extensions, key=lambda p: p.bic_gain)
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         angle = signals.theta
         if shape["from"] == "start":
             angle = angle.copy()

@@ -1,4 +1,4 @@
-"""What causes of the scatter have in common."""
+"""What causes of the scatter share: standardised residuals and their clipped squares."""
 
 from __future__ import annotations
 

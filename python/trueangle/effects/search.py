@@ -1,4 +1,4 @@
-"""What searches have in common: lines from pairs, one peak, doubts, joint covariances."""
+"""What searches share: known orders, lines from pairs, golden maxima, signs, joint covariances."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
-from .blindness import Blindness
+from ..joint.pattern import JointPattern
+from .ambiguity import Ambiguity
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def golden_maximum(
     return (c, fc) if fc > fd else (d, fd)
 
 
-def of_one_sign(regression: Regression, extension: Extension) -> bool:
+def is_of_one_sign(regression: Regression, extension: Extension) -> bool:
     """With this term all elements of its cause have one sign, as springs have.
 
     Elements of unlike signs would only be a difference of two that are alike.
@@ -69,7 +69,7 @@ def of_one_sign(regression: Regression, extension: Extension) -> bool:
     return min(elements) * max(elements) > 0.0
 
 
-def known_orders(around: Surroundings) -> list[float]:
+def known_orders(around: JointPattern) -> list[float]:
     """Orders of the pattern and those that gears and encoders are known to have."""
     joint = around.joint
     orders = {float(m) for m in around.pattern.orders}
@@ -77,13 +77,13 @@ def known_orders(around: Surroundings) -> list[float]:
     return sorted(orders)
 
 
-def is_gear_order(around: Surroundings, order: float) -> bool:
+def is_gear_order(around: JointPattern, order: float) -> bool:
     """An order of the motor or the wave generator."""
     named = around.joint.name_order(order)
     return named is not None and named[0] != "output"
 
 
-def grid_doubt(regression: Regression, spots: Sequence[Blindness]) -> Blindness | None:
+def grid_ambiguity(regression: Regression, spots: Sequence[Ambiguity]) -> Ambiguity | None:
     """On a grid of positions: lines behind aliases, which change from run to run as noise does."""
     if regression.signals.grid is None:
         return None

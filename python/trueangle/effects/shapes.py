@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..estimation.batch import Blocks
+from ..estimation.blocks import Blocks
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from .effect import Effect

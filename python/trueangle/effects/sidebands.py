@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
-from .blindness import Blindness
-from .drawing import carrier_order, phase
+from .ambiguity import Ambiguity
+from .drawing import drawn_carrier, drawn_phase
 from .effect import Effect
 from .missing_order import FREE_ANGLES, MissingOrder
 from .search import Array, Fitted, known_orders, line_parameters
@@ -66,18 +66,18 @@ class Sidebands(Effect):
         if not len(self.offsets) == len(self.amplitudes_arcsec) == len(self.phases_deg):
             raise ArgumentError("offsets, amplitudes_arcsec and phases_deg must be equally long")
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         lines = zip(self.offsets, self.amplitudes_arcsec, self.phases_deg, strict=True)
         return line_sum(signals.theta, tuple((self.carrier + o, a, p) for o, a, p in lines))
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
-        carrier = carrier_order(around, rng)
+        carrier = drawn_carrier(around, rng)
         if carrier is None:
             return None
-        return cls(carrier, (-1.0, 1.0), (size, size), (phase(rng), phase(rng)))
+        return cls(carrier, (-1.0, 1.0), (size, size), (drawn_phase(rng), drawn_phase(rng)))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
@@ -115,7 +115,7 @@ class Sidebands(Effect):
         return None
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         theta, carrier, k = signals.theta, shape["carrier"], shape["offset"]
         if shape["form"] in _SEEN:
             lines = [line_columns(theta, carrier + s * k) for s in _SEEN[shape["form"]]]
@@ -139,14 +139,14 @@ class Sidebands(Effect):
         return np.hstack(columns)
 
     @staticmethod
-    def _carrier(around: Surroundings, carrier: float) -> tuple[float, float]:
+    def _carrier(around: JointPattern, carrier: float) -> tuple[float, float]:
         pattern = around.pattern
         k = int(np.argmin(np.abs(pattern.orders - carrier)))
         return float(pattern.cosine[k]), float(pattern.sine[k])
 
     @classmethod
     def _bands(
-        cls, around: Surroundings, extension: Extension, coefficients: Array, covariance: Array
+        cls, around: JointPattern, extension: Extension, coefficients: Array, covariance: Array
     ) -> tuple[Array, Array]:
         """Cosine and sine of the lines that are seen and their covariance."""
         shape = extension.shape
@@ -187,8 +187,8 @@ class Sidebands(Effect):
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != cls.kind:
             return None
         carrier, k = extension.shape["carrier"], extension.shape["offset"]
@@ -197,7 +197,7 @@ class Sidebands(Effect):
             return None
         because = f"{', '.join(shared)} as well as a sideband of order {carrier:g}"
         causes = (cls.kind, MissingOrder.kind)
-        return Blindness(causes, because, TURNED, factor="angle", common=cls.kind)
+        return Ambiguity(causes, because, TURNED, factor="angle", common=cls.kind)
 
     def to_lines(self) -> Sequence[tuple[str, float]]:
         return tuple(("output", self.carrier + offset) for offset in self.offsets)

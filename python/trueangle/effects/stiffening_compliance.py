@@ -8,17 +8,17 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec
+from ..model.term import Term
 from ..model.terms.load import StiffeningComplianceTerm
+from ..support.angles import from_arcsec
 from ..support.arrays import distinct
-from .bends import columns_beyond
-from .blindness import OWN_POWER, Blindness, share_left
-from .drawing import largest_signal
+from .ambiguity import OWN_POWER, Ambiguity, share_left
+from .departures import departure_beyond
 from .effect import Effect
 from .search import Array, Fitted, golden_maximum, tangent_covariance
 from .shapes import best_shape
@@ -73,7 +73,7 @@ class StiffeningCompliance(Effect):
     acts_on_runs: ClassVar[bool] = True
     located: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         torque = self.moment(signals, self.gravity_deg)
         return np.asarray(
             self.arcsec_per_Nm * torque
@@ -96,10 +96,12 @@ class StiffeningCompliance(Effect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         # What is taken off at the largest load is a quarter of the linear part there.
-        return cls(4.0 * size * largest_signal(signals.torque) ** 2, -size)
+        torque = signals.torque
+        largest = 0.0 if torque is None else float(np.abs(torque).max(initial=0.0))
+        return cls(4.0 * size * largest**2, -size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
@@ -164,7 +166,7 @@ class StiffeningCompliance(Effect):
         return float(-np.degrees(np.arctan2(a, b)))
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         moment = StiffeningCompliance.moment(signals, shape["gravity_deg"])
         if "power" in shape:
             second = moment**3
@@ -179,7 +181,7 @@ class StiffeningCompliance(Effect):
             moment = cls.moment(signals, term.shape["gravity_deg"])
             top = float(np.abs(moment).max())
             knees = [cls.beyond(moment, share * top) for share in KNEES]
-            columns.append(columns_beyond(np.column_stack([*knees, moment**3]), term.columns))
+            columns.append(departure_beyond(np.column_stack([*knees, moment**3]), term.columns))
         return np.hstack(columns)
 
     @classmethod
@@ -223,7 +225,7 @@ class StiffeningCompliance(Effect):
         return np.column_stack(columns) if columns else np.zeros((len(signals), 0))
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         because = unloaded(regression.signals)
         if because:
             yield cls.blind(because)

@@ -8,14 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_sum
+from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec, line_values
+from ..model.term import Term, line_values
 from ..model.terms.place import ThermalDriftTerm
+from ..support.angles import from_arcsec
+from .ambiguity import LEAST_KELVIN, Ambiguity
 from .backlash import Backlash
-from .blindness import LEAST_KELVIN, Blindness
 from .effect import Effect
 from .factor import FactorEffect
 from .search import Array, Fitted, known_orders
@@ -66,7 +67,7 @@ class ThermalDrift(FactorEffect):
     acts_on_runs: ClassVar[bool] = True
     changes_lines: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         if signals.temperature is None:
             return np.zeros(len(signals))
         per_kelvin = self.zero_arcsec_per_K + line_sum(signals.theta, self.lines_per_K)
@@ -118,7 +119,7 @@ class ThermalDrift(FactorEffect):
         return parameters, [effect]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         temperature = regression.signals.temperature
         if temperature is None:
             yield cls.blind("no temperature was recorded")

@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..support.quantiles import quantile
-from .blindness import Blindness
+from .ambiguity import Ambiguity
 from .drawing import reading_rate
-from .drawnline import DrawnLine
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
 from .missing_order import MissingOrder
 from .non_integer_order import NonIntegerOrder
+from .randomphase import RandomPhaseLine
 from .search import Array, Fitted, golden_maximum
 
 #: Trial frequencies per resolution cell (one over the length of a run), and at most.
@@ -38,7 +38,7 @@ BINS = 8
 LEAST_CYCLES = 3.0
 
 #: Share of its frequency by which a line may differ from run to run (a converter's clock).
-WANDER = 0.015
+FREQUENCY_DRIFT = 0.015
 
 #: Readings that a run must have to be searched.
 LEAST_READINGS = 16
@@ -89,14 +89,14 @@ class TimePeriodic(Effect):
     flexible_below: ClassVar[float] = ALWAYS
     not_at_run_time: ClassVar[str] = "its phase is new in every run; shield or filter its source"
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         phase = rng.uniform(0.0, 2.0 * np.pi, signals.runs)[signals.run]
         turn = 2.0 * np.pi * self.frequency_hz * signals.clock
         return np.asarray(self.amplitude_arcsec * np.sin(turn + phase))
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         if signals.time is None:
             return None
@@ -113,7 +113,7 @@ class TimePeriodic(Effect):
         # No frequency of its own in every run can bring more.
         if regression.is_dominated(float(p.max(axis=0).sum()), 1, np.log(frequencies.size)):
             return None
-        tried = [_fixed(frequencies, p, sizes), _wandering(frequencies, p)]
+        tried = [_fixed(frequencies, p, sizes), _drifting(frequencies, p)]
         step = float(frequencies[1] - frequencies[0])
         best: Extension | None = None
         refined: dict[tuple[float, ...], list[float]] = {}
@@ -153,7 +153,9 @@ class TimePeriodic(Effect):
         if speed == 0.0:
             return False
         order = float(np.median(found.shape["frequency_hz"])) / speed
-        near = max(UNRESOLVED / max(float(np.median(signals.run_turns())), 1e-9), WANDER * order)
+        near = max(
+            UNRESOLVED / max(float(np.median(signals.run_turns())), 1e-9), FREQUENCY_DRIFT * order
+        )
         orders = regression.lines.orders
         known = np.concatenate([orders, regression.around.pattern.orders])
         share = 0.5 + 1.0 / signals.runs
@@ -170,7 +172,7 @@ class TimePeriodic(Effect):
         frequencies = np.array(extension.shape["frequency_hz"])
         frequency = float(np.median(frequencies))
         waves = cls.waves(regression.signals, extension.shape["frequency_hz"])
-        line = DrawnLine(regression, cls.kind, waves)
+        line = RandomPhaseLine(regression, cls.kind, waves)
         amplitude, amplitude_std = line.amplitude()
         std = line.place_std(2.0 * np.pi * regression.signals.clock)
         if std is not None:
@@ -184,15 +186,15 @@ class TimePeriodic(Effect):
         return parameters, [TimePeriodic(frequency, amplitude)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         if signals.time is None:
             yield cls.blind("no time stamps were recorded")
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
         if extension.cause != cls.kind or regression.signals.velocity is None:
             return None
         speed = np.abs(regression.signals.turns_per_s)
@@ -254,13 +256,15 @@ def _fixed(frequencies: Array, p: Array, sizes: Array) -> tuple[NDArray[np.int64
     return np.full(sizes.size, k), float(best[k]), log_grid
 
 
-def _wandering(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, float]:
+def _drifting(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, float]:
     """Places of a frequency that differs a little from run to run."""
     nowhere = np.zeros(p.shape[1], dtype=np.int64)
-    bands = np.log(frequencies[-1] / frequencies[0]) / WANDER
-    count = max(int(np.ceil(bands * WANDER / np.log1p(WANDER))) - 1, 0)
-    middles = float(frequencies[0]) * (1.0 + WANDER) ** np.arange(1, count + 1)
-    low, high = np.searchsorted(frequencies, np.outer([1.0 - WANDER, 1.0 + WANDER], middles))
+    bands = np.log(frequencies[-1] / frequencies[0]) / FREQUENCY_DRIFT
+    count = max(int(np.ceil(bands * FREQUENCY_DRIFT / np.log1p(FREQUENCY_DRIFT))) - 1, 0)
+    middles = float(frequencies[0]) * (1.0 + FREQUENCY_DRIFT) ** np.arange(1, count + 1)
+    low, high = np.searchsorted(
+        frequencies, np.outer([1.0 - FREQUENCY_DRIFT, 1.0 + FREQUENCY_DRIFT], middles)
+    )
     wide = high - low > OVERSAMPLING
     low, high = low[wide], high[wide]
     if not low.size:

@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import quantity
 from ..estimation.linear import NormalEquations
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.angles import ARCSEC_PER_DEG
 from .effect import Effect, ScatterFinding
@@ -51,7 +51,7 @@ class TimestampJitter(Effect):
     weighs: ClassVar[bool] = True
     not_at_run_time: ClassVar[str] = "scatter has no value to subtract: trigger both at once"
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         speed = ARCSEC_PER_DEG * 360.0 * signals.turns_per_s
         return np.asarray(speed * self.sigma_s * rng.standard_normal(len(signals)))
 

@@ -10,16 +10,16 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
+from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .backlash import Backlash
-from .blindness import OWN_POWER, Blindness, share_left
 from .direction_dependent_pattern import DirectionalPattern
 from .effect import Effect
-from .search import Array, Fitted, golden_maximum, of_one_sign, tangent_covariance
+from .search import Array, Fitted, golden_maximum, is_of_one_sign, tangent_covariance
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
 #: Torque in which the loop builds up, in shares of the largest torque: those searched.
@@ -80,12 +80,12 @@ class TorqueHysteresis(Effect):
         "a corrector follows the history of travel, not that of the torque"
     )
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return self.half_width_arcsec * self.loop(signals, self.span_Nm)
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         span = 0.0 if signals.torque is None else float(np.ptp(signals.torque))
         return cls(size, float(rng.uniform(0.1, 0.3)) * span) if span > 0.0 else None
@@ -123,10 +123,10 @@ class TorqueHysteresis(Effect):
         shape = {"span_Nm": span}
         columns = cls.columns(regression.signals, regression.around, shape)
         extension = regression.propose(cls.kind, shape, columns, parameters=2)
-        return extension if of_one_sign(regression, extension) else None
+        return extension if is_of_one_sign(regression, extension) else None
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         return cls.loop(signals, shape["span_Nm"])[:, None]
 
     @classmethod
@@ -162,7 +162,7 @@ class TorqueHysteresis(Effect):
         ]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
         because = unloaded(signals)
         if because:

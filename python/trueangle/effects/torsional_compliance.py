@@ -8,13 +8,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
-from ..model.term import Term, from_arcsec, line_values
+from ..model.term import Term, line_values
 from ..model.terms.load import TorsionalComplianceTerm
-from .blindness import OWN_POWER, Blindness, share_left
+from ..support.angles import from_arcsec
+from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .effect import Effect
 from .factor import FactorEffect
 from .search import Array, Fitted
@@ -46,7 +47,7 @@ class TorsionalCompliance(FactorEffect):
     measure: ClassVar[str] = "repeat the runs at a second, known load (or with the arm off)"
     acts_on_runs: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         torque = torque_of(signals)
         return np.asarray(
             torque * (self.arcsec_per_Nm + line_sum(signals.theta, self.lines_per_Nm))
@@ -83,7 +84,7 @@ class TorsionalCompliance(FactorEffect):
         return parameters, [effect]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         because = unloaded(regression.signals)
         if because:
             yield cls.blind(because)

@@ -8,20 +8,20 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings, line_columns, line_sum
+from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.motion import VaryingLineTerm
-from .blindness import Blindness
+from .ambiguity import Ambiguity
 from .channel_skew import ChannelSkew, sensor_order
-from .drawing import carrier_order, free_line, phase
+from .drawing import drawn_carrier, drawn_free_line, drawn_phase
 from .effect import ALWAYS, Effect
 from .filter_lag import FilterLag
 from .load_dependent_gear_error import LoadDependentGearError
-from .search import Array, Fitted, grid_doubt, is_gear_order, line_parameters
+from .search import Array, Fitted, grid_ambiguity, is_gear_order, line_parameters
 from .shapes import best_shape
 
 #: Lines at most, and the price of a broad cause: one of so many beside every narrow one.
@@ -71,7 +71,7 @@ class VaryingLine(Effect):
     changes_lines: ClassVar[bool] = True
     located: ClassVar[bool] = True
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         scale = _scale(signals, self.follows)
         if scale is None:
             return np.zeros(len(signals))
@@ -81,12 +81,12 @@ class VaryingLine(Effect):
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
-        order = carrier_order(around, rng)
+        order = drawn_carrier(around, rng)
         if order is None:
-            _, _, order = free_line(around, rng)
-        return cls(order, "speed", size, phase(rng))
+            _, _, order = drawn_free_line(around, rng)
+        return cls(order, "speed", size, drawn_phase(rng))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
@@ -117,16 +117,16 @@ class VaryingLine(Effect):
         return replace(best, deviance=min(best.deviance, beyond))
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         scale = _scale(signals, shape["follows"])
         assert scale is not None
         return scale[:, None] * line_columns(signals.theta, shape["order"])
 
     @classmethod
     def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Blindness]
-    ) -> Blindness | None:
-        return grid_doubt(regression, spots) if extension.cause == cls.kind else None
+        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
+    ) -> Ambiguity | None:
+        return grid_ambiguity(regression, spots) if extension.cause == cls.kind else None
 
     @classmethod
     def report(

@@ -8,14 +8,14 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.joint import Joint
-from ..joint.pattern import Pattern, Surroundings, line_columns
+from ..joint.pattern import JointPattern, Pattern, line_columns
 from ..joint.shafts import shaft_cycles
 from ..joint.signals import Signals
-from .drawing import carrier_order
+from .drawing import drawn_carrier
 from .effect import Effect
 from .missing_order import MissingOrder
 from .search import Array, Fitted
@@ -67,17 +67,17 @@ class WrongGearRatio(Effect):
     def __post_init__(self) -> None:
         shaft_cycles(self.gear_ratio, "none")  # refuses what is no ratio
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         orders = _moved(around.joint, around.pattern, self.gear_ratio)
         pattern = Pattern(np.array(orders), around.pattern.cosine, around.pattern.sine)
         return pattern.value(signals.theta) - around.pattern.value(signals.theta)
 
     @classmethod
     def drawn(
-        cls, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         ratio = around.joint.gear_ratio
-        if ratio == 1.0 or carrier_order(around, rng) is None:
+        if ratio == 1.0 or drawn_carrier(around, rng) is None:
             return None
         return cls(ratio + size * float(rng.choice([-1.0, 1.0])))
 
@@ -115,7 +115,7 @@ class WrongGearRatio(Effect):
         return float(((change + believed) ** 2).sum()) > ABSENT * float((believed**2).sum())
 
     @classmethod
-    def columns(cls, signals: Signals, around: Surroundings, shape: dict[str, Any]) -> Array:
+    def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         return np.hstack([line_columns(signals.theta, m) for m in shape["orders"]])
 
     @classmethod

@@ -8,16 +8,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..estimation.estimate import Parameters, quantity
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from .backlash import Backlash, goes_both_ways
-from .blindness import (
+from .ambiguity import (
     RUNS_PER_LEVEL,
-    Blindness,
+    Ambiguity,
 )
+from .backlash import Backlash, goes_both_ways
 from .effect import ALWAYS, Effect
 from .latency import Latency
 from .missed_counts import MissedCounts
@@ -68,7 +68,7 @@ class ZeroSlip(Effect):
         "the zero of a run is not known before the run is referenced: set it anew"
     )
 
-    def signal(self, signals: Signals, around: Surroundings, rng: np.random.Generator) -> Array:
+    def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return self.standard_deviation_arcsec * rng.standard_normal(signals.runs)[signals.run]
 
     @classmethod
@@ -88,7 +88,7 @@ class ZeroSlip(Effect):
         return {"standard_deviation_arcsec": quantity(size, std)}, [ZeroSlip(size)]
 
     @classmethod
-    def blind_spots(cls, regression: Regression, found: Sequence[Blindness]) -> Iterator[Blindness]:
+    def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals, bounds = regression.signals, regression.bounds
         if goes_both_ways(signals):
             of_run = [float(np.mean(signals.direction[a:b])) for a, b in bounds]

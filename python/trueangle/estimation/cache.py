@@ -16,7 +16,7 @@ MOST_KEPT = 2**22
 ProposalKey: TypeAlias = "tuple[str, tuple[tuple[str, str], ...]]"
 
 
-class Proposal(NamedTuple):
+class CachedProposal(NamedTuple):
     """What a cause proposed beside some terms, searched no further than ``least`` asked for."""
 
     extension: Extension | None
@@ -33,7 +33,7 @@ class Cache:
     def __init__(
         self,
         motion: dict[str, tuple[object, Any]] | None = None,
-        proposals: dict[ProposalKey, Proposal] | None = None,
+        proposals: dict[ProposalKey, CachedProposal] | None = None,
         fits: dict[object, tuple[Any, int]] | None = None,
     ) -> None:
         self._motion = {} if motion is None else motion
@@ -71,12 +71,12 @@ class Cache:
         found: T = kept[0]
         return found
 
-    def proposed(self, key: ProposalKey, least: float) -> Proposal | None:
+    def proposed(self, key: ProposalKey, least: float) -> CachedProposal | None:
         """A proposal that was searched at least as far as ``least`` asks for."""
         kept = self._proposals.get(key)
         return kept if kept is not None and kept.least <= least else None
 
-    def propose(self, key: ProposalKey, proposal: Proposal) -> Proposal:
+    def propose(self, key: ProposalKey, proposal: CachedProposal) -> CachedProposal:
         """Keep a proposal."""
         self._proposals[key] = proposal
         return proposal

@@ -1,4 +1,4 @@
-"""A candidate extension of the regression, with its evidence."""
+"""A candidate extension of the regression, with its evidence and penalty."""
 
 from __future__ import annotations
 

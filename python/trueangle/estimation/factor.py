@@ -1,4 +1,4 @@
-"""Columns at right angles, and systems of a band of diagonals."""
+"""Orthonormal bases of columns, and Cholesky factors of matrices of a few diagonals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Linear models by the one solver of the core: least squares from rows, or from their sums.
+"""Linear least squares by the core's one solver: rows, normal equations, groups, clusters.
 
 Columns are scaled to unit length. Directions of which less is left than rounding makes are left
 out, ``32 n ε`` of the greatest singular value (of rows) or eigenvalue (of sums) of
@@ -48,7 +48,7 @@ def least_squares(design: Array, target: Array, weights: Array | None = None) ->
     return found.coefficients.reshape(-1, *target.shape[1:])
 
 
-def unexplained(design: Array, target: Array, weights: Array | None = None) -> Array:
+def linear_residual(design: Array, target: Array, weights: Array | None = None) -> Array:
     """What `least_squares` leaves of the target, reading by reading."""
     return np.asarray(target - design @ least_squares(design, target, weights))
 
@@ -188,14 +188,16 @@ def left_out(groups: Sequence[NormalEquations], ridge: float = 0.0) -> tuple[Arr
     return _core.left_out(*_stacked(groups), squares, ridge)
 
 
-class Robust(NamedTuple):
+class ClusterCovariance(NamedTuple):
     """Covariance of the coefficients and the degrees of freedom of each one's variance."""
 
     covariance: Array
     freedom: Array
 
 
-def cluster_covariance(clusters: Sequence[NormalEquations], penalty: float = 0.0) -> Robust:
+def cluster_covariance(
+    clusters: Sequence[NormalEquations], penalty: float = 0.0
+) -> ClusterCovariance:
     """CR2 covariance with Bell and McCaffrey's degrees of freedom.
 
     With ``X̃_r`` the regressors of cluster r about their run's mean, ``e`` the
@@ -231,7 +233,7 @@ def cluster_covariance(clusters: Sequence[NormalEquations], penalty: float = 0.0
     >>> bool((found.freedom > 7.0).all() and (found.freedom < 9.5).all())
     True
     """
-    return Robust(*_core.cluster_covariance(*_stacked(clusters), penalty))
+    return ClusterCovariance(*_core.cluster_covariance(*_stacked(clusters), penalty))
 
 
 def scatter_statistic(clusters: Sequence[NormalEquations], variance: float) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..joint.joint import Joint
-from .batch import Products
+from .blocks import BlockProducts
 
 #: Orders searched at least, and at most: bounds memory and the penalty of the search.
 LEAST_ORDERS, MOST_ORDERS = 128, 1024
@@ -69,9 +69,9 @@ class LineBasis:
         return self.columns()
 
     @cached_property
-    def products(self) -> Products:
+    def products(self) -> BlockProducts:
         """Sums of cos^2, sin^2 and cos sin of every order under any noise."""
-        return Products(self.values, 2)
+        return BlockProducts(self.values, 2)
 
     def take(self, rows: NDArray[np.bool_]) -> LineBasis:
         """The basis of some of the readings."""

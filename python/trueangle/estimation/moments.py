@@ -14,8 +14,8 @@ import trueangle._core as _core
 from ..errors import ArgumentError
 from ..joint.shafts import ShaftOrders, resolve_orders
 from ..model.model import Argument
-from ..support.kinds import told_kinds
-from ..support.plainresult import Shown
+from ..support.argumentkinds import told_kinds
+from ..support.plainresult import ShownResult
 from .forgetting import Forgetting
 from .momentsfit import MomentsFit, Spectrum
 from .runsums import RunSums
@@ -26,7 +26,7 @@ _Orders = Iterable[float] | Mapping[str, Iterable[float]]
 
 
 @told_kinds
-class Moments(Shown):
+class Moments(ShownResult):
     """Sums over readings, taken in one pass, from which any of the orders can be fitted.
 
     The normal equations of

@@ -13,7 +13,7 @@ import trueangle._core as _core
 
 from ..joint.shafts import Shaft, ShaftOrders
 from ..model.model import Argument, HarmonicModel
-from ..support.plainresult import Shown
+from ..support.plainresult import ShownResult
 
 
 class Spectrum(NamedTuple):
@@ -38,7 +38,7 @@ class Spectrum(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MomentsFit(Shown):
+class MomentsFit(ShownResult):
     """What `Moments.solve` found; angles in the unit of the moments' period."""
 
     shafts: tuple[Shaft, ...]

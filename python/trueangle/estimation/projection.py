@@ -13,7 +13,7 @@ import trueangle._core as _core
 
 from ..joint.pattern import VANISHES
 from ..support.arrays import Array
-from .batch import Blocks, Products
+from .blocks import BlockProducts, Blocks
 from .whitening import Whitener
 
 #: Arcsec below which what is left is the rounding of angles (1e-12 of a turn).
@@ -191,7 +191,7 @@ class Projection:
             found[where] = self.as_deviances(np.where(excited, saved, 0.0))
         return found
 
-    def pair_gains(self, pairs: Products) -> Array:
+    def pair_gains(self, pairs: BlockProducts) -> Array:
         """`block_gains` of cosines and sines side by side, in single precision."""
         before = pairs.under(self.whiten)
         cosines, sines, mixed = before[:, 0, 0], before[:, 1, 1], before[:, 0, 1]

@@ -8,11 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint.pattern import Surroundings, line_columns
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from .extension import penalty_of_parameter
 from .lines import LineBasis
+from .rounded import MOST_SHARE
 from .whitening import LagCorrelation
 
 #: What does not depend on the errors.
@@ -20,18 +21,6 @@ OF_MOTION = ("bounds", "base", "correlation", "root_weights", "log_n", "log_runs
 
 #: Runs from which they, and not the readings, are what informs on a variance between runs.
 ENOUGH_RUNS = 8
-
-#: Share of what is left from which on the rounding of the readings is a part that matters.
-LEAST_SHARE = 0.2
-
-#: Times the variance that is there which the rounding of a sensor may have: on few positions it
-#: errs by other numbers than on all, but on none that does not scatter.
-MOST_SHARE = 2.0
-
-
-def is_good_part(rounding: float, left: float, scatter: float) -> bool:
-    """A variance of rounding is a good part of that left, and no more than the readings' may be."""
-    return LEAST_SHARE * left < rounding < MOST_SHARE * scatter
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +43,7 @@ class Readings:
 
     signals: Signals
     residual: Array
-    belief: Surroundings
+    belief: JointPattern
     lines: LineBasis
     weights: Array | None = None
     beside: Array | None = None

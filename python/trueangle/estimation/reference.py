@@ -1,4 +1,4 @@
-"""The slow truth in plain numpy: evaluation, correction and least squares.
+"""The slow truth in plain numpy: error and slope, correction and least-squares fit.
 
 Every function here does the obvious thing with one sine and one cosine per order and
 the whole design matrix in memory. Tests hold the compiled core against it, benchmarks
@@ -96,7 +96,7 @@ def correct(model: HarmonicModel, indicated: ArrayLike) -> Array:
     return theta
 
 
-class ReferenceFit(NamedTuple):
+class _ReferenceFit(NamedTuple):
     """What `fit` returns, in the unit of the runs."""
 
     coefficients: Array
@@ -113,7 +113,7 @@ def fit(
     runs: CalibrationRun | Iterable[CalibrationRun],
     shafts: Sequence[tuple[float, Sequence[int]]],
     argument: str = "reference",
-) -> ReferenceFit:
+) -> _ReferenceFit:
     """Least squares by `numpy.linalg.lstsq` with one column of ones per run.
 
     Parameters
@@ -138,7 +138,7 @@ def fit(
     variance = float((w * residuals) @ (w * residuals)) / freedom if freedom > 0 else math.nan
     gram = (design * w[:, None]).T @ (design * w[:, None])
     harmonics = design.shape[1] - len(found)
-    return ReferenceFit(
+    return _ReferenceFit(
         solution[:harmonics],
         solution[harmonics:],
         variance * np.linalg.inv(gram)[:harmonics, :harmonics],

@@ -9,7 +9,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from .cache import Cache
@@ -18,7 +18,7 @@ from .lines import LineBasis
 from .projection import ROUNDING
 from .readings import Readings
 from .repeats import repeated_part
-from .solution import Solution, values_of
+from .solution import Solution, fields_of_solution
 from .whitening import RunEffect
 
 __all__ = ["BEYOND_SHOWN", "ROUNDING", "Extension", "Regression"]
@@ -56,7 +56,7 @@ class Regression(Solution):
         cls,
         signals: Signals,
         residual: Array,
-        belief: Surroundings,
+        belief: JointPattern,
         weights: Array | None = None,
         lines: LineBasis | None = None,
         rho: float | None = None,
@@ -77,7 +77,7 @@ class Regression(Solution):
         """The regression of readings without terms, of noise of this correlation if given."""
         solution = Solution.solve(readings, rho=rho, before=before)
         cache = Cache() if cache is None else cache
-        return cls(**values_of(solution, Solution), start=solution.deviance, cache=cache)
+        return cls(**fields_of_solution(solution, Solution), start=solution.deviance, cache=cache)
 
     # -- other regressions -------------------------------------------------------
 

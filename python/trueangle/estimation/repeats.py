@@ -1,4 +1,4 @@
-"""What comes back at the same angle in another pass: no noise and no wander in time."""
+"""What comes back at the same angle in another pass: no noise and no drift in time."""
 
 from __future__ import annotations
 

@@ -25,6 +25,13 @@ import trueangle._core as _core
 
 from ..support.arrays import Array
 
+#: Share of what is left from which on the rounding of the readings is a part that matters.
+LEAST_SHARE = 0.2
+
+#: Times the variance that is there which the rounding of a sensor may have: on few positions it
+#: errs by other numbers than on all, but on none that does not scatter.
+MOST_SHARE = 2.0
+
 #: Standard deviation of the noise, in steps, below which readings tell of none: only one in a
 #: dozen is then within two of them of the border of its step.
 LEAST_NOISE = 0.03
@@ -119,3 +126,8 @@ def fit_rounded(
             break
         fitted = fitted + change
     return Rounded(fitted, left, step, sigma, log_likelihood, within)
+
+
+def is_rounding_visible(rounding: float, left: float, scatter: float) -> bool:
+    """A variance of rounding is a good part of that left, and no more than the readings' may be."""
+    return LEAST_SHARE * left < rounding < MOST_SHARE * scatter

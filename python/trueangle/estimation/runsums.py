@@ -20,7 +20,7 @@ from .momentsfit import Spectrum
 _PATIENCE = 0.05
 
 
-class Exclusive:
+class _Exclusive:
     """One thread at a time; the others wait, unless nobody can ever be done.
 
     A process that is forked while another of its threads is at it inherits sums that are
@@ -71,7 +71,7 @@ class RunSums:
         self.period = period
         self._shafts = shafts
         self._runs: dict[Hashable, _core.Moments] = {}
-        self._turn = Exclusive()
+        self._turn = _Exclusive()
         self._new()  # a wrong period or shaft is named here, not at the first update
 
     def _new(self) -> _core.Moments:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..joint.pattern import Pattern, Surroundings
+from ..joint.pattern import JointPattern, Pattern
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from .extension import Extension
@@ -122,7 +122,7 @@ class Solution(Projection):
 
     def with_solution(self, solution: Solution, **changes: Any) -> Self:
         """Another solution with what else this one holds."""
-        return replace(self, **values_of(solution, Solution), **changes)
+        return replace(self, **fields_of_solution(solution, Solution), **changes)
 
     # -- of the readings ---------------------------------------------------------
 
@@ -137,7 +137,7 @@ class Solution(Projection):
         return self.readings.residual
 
     @property
-    def belief(self) -> Surroundings:
+    def belief(self) -> JointPattern:
         """What the simulation believes of the joint."""
         return self.readings.belief
 
@@ -186,7 +186,7 @@ class Solution(Projection):
         return float(np.sum(self.left_within_runs[clean] ** 2)) / freedom
 
     @cached_property
-    def around(self) -> Surroundings:
+    def around(self) -> JointPattern:
         """The joint, with the believed pattern and the missing orders among the terms."""
         return self.surroundings(self.fitted())
 
@@ -279,7 +279,7 @@ class Solution(Projection):
             readings.correlation,
         )
 
-    def surroundings(self, fitted: Sequence[tuple[Extension, Array]]) -> Surroundings:
+    def surroundings(self, fitted: Sequence[tuple[Extension, Array]]) -> JointPattern:
         """The joint, with the believed pattern and the missing orders among the terms.
 
         Not with the fitted corrections: an effect on the pattern (a filter) would be
@@ -294,10 +294,10 @@ class Solution(Projection):
                 pairs.append((coefficients[0], coefficients[1]))
         array = np.array(pairs, dtype=np.float64).reshape(-1, 2)
         pattern = Pattern(np.array(orders, dtype=np.float64), array[:, 0], array[:, 1])
-        return Surroundings(self.belief.joint, pattern)
+        return JointPattern(self.belief.joint, pattern)
 
 
-def values_of(solution: Projection, of: type[Projection]) -> dict[str, Any]:
+def fields_of_solution(solution: Projection, of: type[Projection]) -> dict[str, Any]:
     """Fields of a class of results, as they stand in one."""
     return {field.name: getattr(solution, field.name) for field in fields(of)}
 
@@ -307,7 +307,7 @@ def _grown(blocks: tuple[Array, ...], before: Solution | None) -> Array:
     design = np.empty((len(blocks[0]), sum(block.shape[1] for block in blocks)), order="F")
     same, at = 0, 0
     if before is not None:
-        same = in_common(before.blocks, blocks)
+        same = common_blocks(before.blocks, blocks)
         at = sum(block.shape[1] for block in blocks[:same])
         if at == design.shape[1] == before.design.shape[1]:
             return before.design
@@ -318,7 +318,7 @@ def _grown(blocks: tuple[Array, ...], before: Solution | None) -> Array:
     return design
 
 
-def in_common(one: Sequence[Array], other: Sequence[Array]) -> int:
+def common_blocks(one: Sequence[Array], other: Sequence[Array]) -> int:
     """How many blocks, the same arrays, two sequences begin with."""
     same = 0
     while same < min(len(one), len(other)) and one[same] is other[same]:

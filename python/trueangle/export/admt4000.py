@@ -15,9 +15,9 @@ from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance, TableRecord
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
-from ..support.files import Kind, Source, sha256_of
+from ..support.files import FileKind, InputFile, sha256_of
 from .pattern import TurnPattern
-from .reading import failed
+from .reading import table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: Order: address of magnitude and phase on page 2, bits of the magnitude.
@@ -37,7 +37,7 @@ class Admt4000(Target):
 
     name = "admt4000"
     what = "the harmonic registers of an ADMT4000"
-    kind: ClassVar[Kind] = Kind("register values of an ADMT4000", (".txt",))
+    kind: ClassVar[FileKind] = FileKind("register values of an ADMT4000", (".txt",))
     sign = "subtract"
     unknown = (
         "format checked, device not: sign and phase are those of the maker's own tool, and no "
@@ -118,7 +118,9 @@ class Admt4000(Target):
             if found is not None:
                 codes.setdefault(int(found[1]), {})[found[2]] = int(found[4], 16)
         if not codes or any(set(code) != {"MAG", "PH"} for code in codes.values()):
-            raise failed(path, "lines such as 'H1MAG 0x15 0x123' and 'H1PH 0x16 0x045' are wanted")
+            raise table_error(
+                path, "lines such as 'H1MAG 0x15 0x123' and 'H1PH 0x16 0x045' are wanted"
+            )
         orders = sorted(codes)
         sizes, phases = [], []
         for order in orders:
@@ -150,7 +152,7 @@ class Admt4000(Target):
                 note="read from registers of an ADMT4000, whose argument is the indicated angle",
                 table=TableRecord(self.name, self.argument, 0.0, 0.0),
             ),
-            provenance=Provenance((Source(path, sha256_of(path)),)),
+            provenance=Provenance((InputFile(path, sha256_of(path)),)),
         )
 
 

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..support.files import Kind
+from ..support.files import FileKind
 from .chain import Chain, source_identifier
-from .codetext import code_parts, filled, float_literal, rows
+from .codetext import code_parts, filled_code, float_literal, number_rows
 from .cstep import c_step
 from .portable import PortableTarget, self_test, table_lines
 from .runtimeterms import RunTimeTerms
@@ -24,7 +24,7 @@ class CHeader(PortableTarget):
 
     name = "c"
     what = "a C99 header with tables and one inline function per shaft"
-    kind: ClassVar[Kind] = Kind("a C header", (".h", ".hpp"))
+    kind: ClassVar[FileKind] = FileKind("a C header", (".h", ".hpp"))
 
     def write(self, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
         """The header."""
@@ -45,14 +45,14 @@ class CHeader(PortableTarget):
         if terms is not None:
             whole = chain.whole and terms.whole
             step = c_step(terms, chain.zero, chain.at_indicated, whole)
-            parts.append(filled(step, n=name))
+            parts.append(filled_code(step, n=name))
         parts.append(_self_test(name, chain))
         parts.append(f"#endif /* {guard} */\n")
         return "\n".join(parts)
 
 
 def _part(part: str, **values: object) -> str:
-    return filled(code_parts("header.c")[part], **values)
+    return filled_code(code_parts("header.c")[part], **values)
 
 
 def _comment(name: str, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
@@ -105,7 +105,7 @@ def _table(name: str, table: Table) -> str:
         name=name,
         type=kind,
         count=len(flat),
-        rows=rows(flat),
+        rows=number_rows(flat),
         cycles=f"{table.cycles:g}",
     )
 

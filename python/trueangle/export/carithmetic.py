@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .codetext import code_parts, filled, float_literal
+from .codetext import code_parts, filled_code, float_literal
 from .table import TURN
 
 
 @dataclass(frozen=True)
-class Arithmetic:
+class CArithmetic:
     """What angles and errors are.
 
     Attributes
@@ -39,7 +39,7 @@ class Arithmetic:
     def part(self, name: str, **values: object) -> str:
         """A part of ``code/step.c``: its own, or the one of both."""
         parts = code_parts("step.c")
-        return filled(parts.get(f"{self.name} {name}") or parts[name], **values)
+        return filled_code(parts.get(f"{self.name} {name}") or parts[name], **values)
 
     def number(self, value: float) -> str:
         """A constant of the type ``real``."""
@@ -54,7 +54,7 @@ class Arithmetic:
         return f"INT64_C({whole})" if whole >= 0 else f"(-INT64_C({-whole}))"
 
 
-FIXED = Arithmetic("fixed", "int64_t", "float", "f", "off <= 1 && off >= -1", TURN)
-DOUBLE = Arithmetic(
+FIXED = CArithmetic("fixed", "int64_t", "float", "f", "off <= 1 && off >= -1", TURN)
+DOUBLE = CArithmetic(
     "double", "double", "double", "", "fabs(off) <= 1e-13 + 4e-16 * fabs(goal)", 1.0, "_from"
 )

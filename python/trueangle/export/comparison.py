@@ -13,11 +13,11 @@ from ..errors import ArgumentError
 from ..model.file import load_model
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN, zero_text
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
-from ..support.kinds import told_kinds
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult
 from .equality import FALSE_ALARMS, Equality, pattern_equality
 from .pattern import TurnPattern
 

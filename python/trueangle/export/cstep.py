@@ -10,9 +10,9 @@ import re
 
 from ..model import forms
 from ..model.forms import Form
-from .carithmetic import FIXED, Arithmetic
-from .codetext import filled, rows
-from .runtimeterms import RunTimeTerms, Waves
+from .carithmetic import FIXED, CArithmetic
+from .codetext import filled_code, number_rows
+from .runtimeterms import RunTimeTerms, RunTimeWaves
 from .table import TURN, ratio_of_cycles
 
 _UNITS = {
@@ -34,7 +34,9 @@ def c_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -> s
     bumps = [form for form in terms.smooth if isinstance(form, forms.Bump)]
     if at_indicated and bumps:
         # The table holds them at its own angle: what is searched is what they were taken off.
-        sums = [line for form in bumps for line in _form(form, Waves((), (), ()), "", FIXED)[1]]
+        sums = [
+            line for form in bumps for line in _form(form, RunTimeWaves((), (), ()), "", FIXED)[1]
+        ]
         parts.append(_function("@n@_bumps", ("@angle@ x",), sums))
         start += " + @n@_angle(@n@_bumps(@n@_pattern(reading)))"
     late = ""
@@ -43,10 +45,10 @@ def c_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -> s
     parts.append(FIXED.part("step unwrapped", start=start, late=late))
     if whole:
         parts.append(FIXED.part("step"))
-    return filled("\n".join(parts), angle=FIXED.angle, real=FIXED.real)
+    return filled_code("\n".join(parts), angle=FIXED.angle, real=FIXED.real)
 
 
-def c_state(terms: RunTimeTerms, arithmetic: Arithmetic) -> str:
+def c_state(terms: RunTimeTerms, arithmetic: CArithmetic) -> str:
     """Types of the state and of the signals."""
     fields = ["uint8_t none;"]
     if terms.travels:
@@ -61,11 +63,11 @@ def c_state(terms: RunTimeTerms, arithmetic: Arithmetic) -> str:
         arithmetic.part("state", fields="\n".join(fields)),
         arithmetic.part("signals", fields="\n".join(signals or ["uint8_t none;"])),
     ]
-    return filled("\n".join(parts), angle=arithmetic.angle, real=arithmetic.real)
+    return filled_code("\n".join(parts), angle=arithmetic.angle, real=arithmetic.real)
 
 
 def c_search(
-    terms: RunTimeTerms, arithmetic: Arithmetic, zero: float, at_indicated: bool, pattern: str
+    terms: RunTimeTerms, arithmetic: CArithmetic, zero: float, at_indicated: bool, pattern: str
 ) -> str:
     """Errors of the terms, the search of the angle behind a reading, and travel.
 
@@ -115,11 +117,11 @@ def c_search(
     )
     parts.append(find)
     parts += _travel(terms, arithmetic, zero)
-    text = filled("\n".join(parts), angle=arithmetic.angle, real=arithmetic.real)
+    text = filled_code("\n".join(parts), angle=arithmetic.angle, real=arithmetic.real)
     return text if arithmetic is FIXED else _FLOAT.sub(r"\1", text)
 
 
-def _springs(terms: RunTimeTerms, arithmetic: Arithmetic) -> str:
+def _springs(terms: RunTimeTerms, arithmetic: CArithmetic) -> str:
     """Error of the springs on a stretch, and the stretch that begins."""
     number = arithmetic.number
     wound = [
@@ -135,7 +137,7 @@ def _springs(terms: RunTimeTerms, arithmetic: Arithmetic) -> str:
     return arithmetic.part("springs", wound="\n".join(wound), begun="\n".join(begun))
 
 
-def _travel(terms: RunTimeTerms, arithmetic: Arithmetic, zero: float) -> list[str]:
+def _travel(terms: RunTimeTerms, arithmetic: CArithmetic, zero: float) -> list[str]:
     """Moving on, and the angle that the encoder saw at a reading, which moves the state on."""
     part, spring = arithmetic.part, bool(terms.springs)
     seen = part("seen")
@@ -168,13 +170,13 @@ def _function(name: str, arguments: tuple[str, ...], sums: list[str]) -> str:
     )
 
 
-def wave_tables(name: str, waves: Waves, arithmetic: Arithmetic, rated: bool) -> str:
+def wave_tables(name: str, waves: RunTimeWaves, arithmetic: CArithmetic, rated: bool) -> str:
     """Orders, phases and sizes as constants; ``rated`` orders as floats as well."""
     fixed = arithmetic is FIXED
 
     def array(kind: str, ending: str, values: list[str], memory: str = " TRUEANGLE_TABLE") -> str:
         size = f"{name}_{ending}[{len(values)}]{memory if fixed else ''}"
-        return f"static const {kind} {size} = {{\n{rows(values, 6)}\n}};\n"
+        return f"static const {kind} {size} = {{\n{number_rows(values, 6)}\n}};\n"
 
     numbers = [list(map(arithmetic.number, line)) for line in waves]
     sizes = array("@real@", "sizes", numbers[1])
@@ -189,13 +191,13 @@ def wave_tables(name: str, waves: Waves, arithmetic: Arithmetic, rated: bool) ->
     return orders + phases + sizes + (array("@real@", "rates", numbers[0]) if rated else "")
 
 
-def _waves_call(name: str, waves: Waves, arithmetic: Arithmetic) -> str:
+def _waves_call(name: str, waves: RunTimeWaves, arithmetic: CArithmetic) -> str:
     function = "@n@_waves" if waves.whole or arithmetic is not FIXED else "@n@_ratios"
     return f"{function}(x, {name}_orders, {name}_phases, {name}_sizes, {len(waves.orders)})"
 
 
 def _form(
-    form: Form, waves: Waves, name: str, arithmetic: Arithmetic
+    form: Form, waves: RunTimeWaves, name: str, arithmetic: CArithmetic
 ) -> tuple[list[str], list[str]]:
     """Statements that add to the level, and to the error at ``x``."""
     number, fixed = arithmetic.number, arithmetic is FIXED
@@ -241,7 +243,7 @@ def _form(
 
 
 def _filter(
-    frequency: float, damping: float | None, waves: Waves, name: str, arithmetic: Arithmetic
+    frequency: float, damping: float | None, waves: RunTimeWaves, name: str, arithmetic: CArithmetic
 ) -> list[str]:
     if not waves.orders:
         return []

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.files import Kind
+from ..support.files import FileKind
 from .knots import linear_knots
 from .pattern import TurnPattern
 from .proof import Correction, Places, enough_bits
-from .reading import failed, sampled_model
+from .reading import sampled_model, table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: Distance of two printed numbers, in degrees: 9 decimals.
@@ -30,7 +30,7 @@ class CsvTable(Target):
 
     name = "csv"
     what = "lines of indicated_deg,correction_deg to interpolate between"
-    kind: ClassVar[Kind] = Kind("a table of corrections (CSV)", (".csv",))
+    kind: ClassVar[FileKind] = FileKind("a table of corrections (CSV)", (".csv",))
     sign = "subtract"
     tried = (36, 45, 60, 72, 90, 120, 180, 240, 360, 720, 1440, 3600, 7200, 36000)
     options = {
@@ -72,23 +72,25 @@ class CsvTable(Target):
         try:
             rows = list(csv.reader(text.splitlines()))
         except csv.Error as cause:
-            raise failed(path, f"is no table: {cause}") from cause
+            raise table_error(path, f"is no table: {cause}") from cause
         if not rows or [cell.strip() for cell in rows[0]] != ["indicated_deg", "correction_deg"]:
-            raise failed(path, "the header of such a table is indicated_deg,correction_deg", 1)
+            raise table_error(path, "the header of such a table is indicated_deg,correction_deg", 1)
         numbers = []
         for i, row in enumerate(rows[1:], 2):
             try:
                 place, value = map(float, row)
             except ValueError:
-                raise failed(path, f"two numbers are needed, got {','.join(row)!r}", i) from None
+                raise table_error(
+                    path, f"two numbers are needed, got {','.join(row)!r}", i
+                ) from None
             if not (math.isfinite(place) and math.isfinite(value)):
-                raise failed(path, f"finite numbers are needed, got {','.join(row)!r}", i)
+                raise table_error(path, f"finite numbers are needed, got {','.join(row)!r}", i)
             numbers.append((place, value))
         table = np.array(numbers)
         if len(table) < 5 or not np.allclose(
             table[:, 0], np.arange(len(table)) * 360.0 / (len(table) - 1), atol=1e-6
         ):
-            raise failed(path, "lines must stand at equal distances from 0 to 360 degrees")
+            raise table_error(path, "lines must stand at equal distances from 0 to 360 degrees")
         values = table[:-1, 1]
         return sampled_model(
             values / 360.0, path, self, _interpolated(values), step=_LAST_DIGIT / 360.0

@@ -14,10 +14,10 @@ from .._core import __version__
 from ..errors import ArgumentError, FileError, NotInvertibleError, TrueAngleError
 from ..model.file import load_model
 from ..model.model import HarmonicModel
-from ..model.text import model_text
+from ..model.writing import model_text
+from ..support.argumentkinds import told_kinds
 from ..support.display_units import error_unit
 from ..support.files import check_output, read_whole, written_atomically
-from ..support.kinds import told_kinds
 from .exported import HEADER_DIGITS, Exported
 from .leftout import run_time_bound, term_sizes
 from .pattern import TurnPattern

@@ -21,11 +21,11 @@ from ..errors import ArgumentError
 from ..model.file import embedded_model
 from ..model.model import HarmonicModel
 from ..model.term import Term
-from ..model.text import model_text
-from ..support.files import Kind
+from ..model.writing import model_text
+from ..support.files import FileKind
 from .fmufiles import (
     IDENTIFIER,
-    Variable,
+    FmuVariable,
     build_description,
     fmi_functions,
     fmu_source,
@@ -34,8 +34,8 @@ from .fmufiles import (
 )
 from .pattern import TurnPattern
 from .proof import Proof
-from .reading import failed
-from .runtimeterms import is_own
+from .reading import table_error
+from .runtimeterms import is_own_signal
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: The model that a unit was made of, and its most bytes.
@@ -57,7 +57,7 @@ class Fmu(Target):
 
     name = "fmu"
     what = "a functional mock-up unit (FMI), sensor or correction, for simulators"
-    kind: ClassVar[Kind] = Kind("a functional mock-up unit", (".fmu",))
+    kind: ClassVar[FileKind] = FileKind("a functional mock-up unit", (".fmu",))
     sign = "subtract"
     arithmetic_known = False
     options = {
@@ -74,13 +74,13 @@ class Fmu(Target):
         return "add" if options["variant"] == "sensor" else "subtract"
 
     def holds(self, term: Term) -> bool:
-        return is_own(term)
+        return is_own_signal(term)
 
     def how(self, proof: Proof) -> str:
         return "the model's own series and terms in double precision"
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        model = pattern.source.replace(terms=tuple(filter(is_own, pattern.source.terms)))
+        model = pattern.source.replace(terms=tuple(filter(is_own_signal, pattern.source.terms)))
         sensor = options["variant"] == "sensor"
         noise_std = options["noise_std"]
         if noise_std and not sensor:
@@ -126,7 +126,7 @@ class Fmu(Target):
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         if not text:
-            raise failed(path, f"holds no {_MODEL}: no functional mock-up unit of trueangle")
+            raise table_error(path, f"holds no {_MODEL}: no functional mock-up unit of trueangle")
         return embedded_model(text, path)
 
 
@@ -137,7 +137,7 @@ def _token(text: str) -> str:
 
 def _source(
     model: HarmonicModel,
-    variables: Sequence[Variable],
+    variables: Sequence[FmuVariable],
     sensor: bool,
     fmi: str,
     header: CommentBlock,
@@ -152,7 +152,7 @@ def _source(
 
 
 def _packed(
-    model: HarmonicModel, variables: Sequence[Variable], sensor: bool, fmi: str, source: str
+    model: HarmonicModel, variables: Sequence[FmuVariable], sensor: bool, fmi: str, source: str
 ) -> bytes:
     """The archive: description, source and, where there is a compiler, the library."""
     token = source[source.index('strcmp(token, "') + 15 :].partition('"')[0]

@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 from ..model.model import HarmonicModel
 from .carithmetic import DOUBLE
-from .codetext import code_file, code_parts, filled
+from .codetext import code_file, code_parts, filled_code
 from .cstep import c_search, c_state, wave_tables
 from .runtimeterms import RunTimeTerms
 
@@ -20,7 +20,7 @@ IDENTIFIER = "trueangle_model"
 _LEFT = 1e-17
 
 
-class Variable(NamedTuple):
+class FmuVariable(NamedTuple):
     """One variable; its place in the list is its value reference."""
 
     name: str
@@ -32,7 +32,7 @@ class Variable(NamedTuple):
     description: str
 
 
-def variables_of(model: HarmonicModel, sensor: bool, noise_std: float = 0.0) -> list[Variable]:
+def variables_of(model: HarmonicModel, sensor: bool, noise_std: float = 0.0) -> list[FmuVariable]:
     """The time, inputs, parameters and the output last."""
     true = "true angle of the joint"
     said = "angle that its encoder indicates"
@@ -59,10 +59,12 @@ def variables_of(model: HarmonicModel, sensor: bool, noise_std: float = 0.0) -> 
             ("seed", "parameter", "fixed", "", 1.0, "of the noise"),
         ]
     rows.append((last[0], "output", "continuous", "rad", 0.0, last[1]))
-    return [Variable(name, i, *rest) for i, (name, *rest) in enumerate(rows)]  # type: ignore[arg-type]
+    return [FmuVariable(name, i, *rest) for i, (name, *rest) in enumerate(rows)]  # type: ignore[arg-type]
 
 
-def fmu_source(model: HarmonicModel, variables: Sequence[Variable], sensor: bool, head: str) -> str:
+def fmu_source(
+    model: HarmonicModel, variables: Sequence[FmuVariable], sensor: bool, head: str
+) -> str:
     """What the unit's library is compiled from, but for the functions of FMI."""
     terms = RunTimeTerms.of(model, model.terms, "auto")
     at_indicated = model.argument == "indicated"
@@ -94,16 +96,16 @@ def fmu_source(model: HarmonicModel, variables: Sequence[Variable], sensor: bool
         signals="\n".join(signals) or "\n",
     )
     text = "\n".join([*core, instance, ""])
-    return f"{head}\n{_part('includes')}\n" + filled(text, n="m")
+    return f"{head}\n{_part('includes')}\n" + filled_code(text, n="m")
 
 
 def fmi_functions(fmi: str, token: str) -> str:
     """All functions that version 2 or 3 of the standard wants of a library."""
-    return f"{_part('created')}\n{filled(code_file(f'fmi{fmi}.c'), token=token)}"
+    return f"{_part('created')}\n{filled_code(code_file(f'fmi{fmi}.c'), token=token)}"
 
 
 def _part(name: str, **values: object) -> str:
-    return filled(code_parts("fmu.c")[name], **values)
+    return filled_code(code_parts("fmu.c")[name], **values)
 
 
 def _pattern(terms: RunTimeTerms, zero: str) -> str:
@@ -144,12 +146,12 @@ def _sense(terms: RunTimeTerms, zero: str, at_indicated: bool) -> str:
 
 
 def model_description(
-    variables: Sequence[Variable], fmi: str, sensor: bool, token: str, about: str, tool: str
+    variables: Sequence[FmuVariable], fmi: str, sensor: bool, token: str, about: str, tool: str
 ) -> str:
     """modelDescription.xml of FMI 3.0 or 2.0."""
     # Of version 2 the time is no variable, and unknowns are counted from 1.
     listed = variables if fmi == "3" else variables[1:]
-    return filled(
+    return filled_code(
         code_file(f"fmi{fmi}.xml"),
         identifier=IDENTIFIER,
         name=quoteattr(f"trueangle {'sensor' if sensor else 'correction'}"),
@@ -163,10 +165,10 @@ def model_description(
 
 def build_description() -> str:
     """sources/buildDescription.xml of FMI 3.0."""
-    return filled(code_file("fmibuild.xml"), identifier=IDENTIFIER)
+    return filled_code(code_file("fmibuild.xml"), identifier=IDENTIFIER)
 
 
-def _element(v: Variable, fmi: str) -> str:
+def _element(v: FmuVariable, fmi: str) -> str:
     """One variable of modelDescription.xml."""
     start = "" if v.causality in ("independent", "output") else f' start="{v.start!r}"'
     unit = f' unit="{v.unit}"' if v.unit else ""

@@ -19,11 +19,11 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
-from ..support.files import Kind, read_whole
+from ..support.files import FileKind, read_whole
 from .knots import linear_knots, rounded_knots
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import ReadTable, failed, function_model
+from .reading import ReadTable, function_model, table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: Counts to a turn, and knots that Klipper solves.
@@ -41,7 +41,7 @@ class Klipper(Target):
 
     name = "klipper"
     what = 'the calibrate list of an [angle] section; needs `existing="printer.cfg"`'
-    kind: ClassVar[Kind] = Kind("a section of a printer.cfg", (".cfg", ".txt"))
+    kind: ClassVar[FileKind] = FileKind("a section of a printer.cfg", (".cfg", ".txt"))
     sign = "absolute"
     files = ("existing",)
     unknown = (
@@ -192,16 +192,16 @@ def _list_of(text: str, path: str, section: str | None) -> tuple[str, Array]:
     chosen = {n: v for n, v in found.items() if section is None or n == section}
     if len(chosen) != 1:
         have = ", ".join(f"[{n}]" for n in found) or "none"
-        raise failed(
+        raise table_error(
             path, f"one section with a calibrate list is wanted, {have} there; give `section=`"
         )
     ((name, (at, cells)),) = chosen.items()
     try:
         readings = np.array([float(cell) for cell in cells.split(",") if cell.strip()])
     except ValueError:
-        raise failed(path, "calibrate holds something that is not a number", at) from None
+        raise table_error(path, "calibrate holds something that is not a number", at) from None
     if len(readings) < KNOTS or not np.all((readings >= 0.0) & (readings < TURN)):
-        raise failed(
+        raise table_error(
             path, f"calibrate must hold one reading from 0 to 65536 per full step, got "
             f"{len(readings)} numbers", at
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What a table leaves out of its model, and how large that is at the joint."""
+"""What a table leaves out of its model: terms, their sizes and ranges, bounds at run time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.terms import LocalDefect
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.signals import coupled_with
+from ..support.signals import coupled_joint
 from .pattern import TurnPattern
 from .runtimeterms import RunTimeTerms
 
@@ -78,7 +78,7 @@ def run_time_bound(
 def _row(pattern: TurnPattern, term: Term) -> dict[str, Any]:
     ranges = ranges_of(pattern, term)
     words = [
-        f"{_range(*values)} " + (_UNITS.get(name) or f"deg of joint {coupled_with(name)}")
+        f"{_range(*values)} " + (_UNITS.get(name) or f"deg of joint {coupled_joint(name)}")
         for name, values in ranges.items()
     ]
     return {
@@ -98,10 +98,10 @@ def ranges_of(pattern: TurnPattern, term: Term) -> dict[str, tuple[float, float]
     known = {name: (low, high) for name, low, high in fit.signals} if fit else {}
     needed = set(term.needs) | ({"velocity"} & {getattr(term, "follows", "")})
     found = {}
-    for name in (*_UNITS, *sorted(filter(coupled_with, needed))):
+    for name in (*_UNITS, *sorted(filter(coupled_joint, needed))):
         if name not in needed:
             continue
-        is_angle = name == "velocity" or coupled_with(name)
+        is_angle = name == "velocity" or coupled_joint(name)
         turn = 360.0 / pattern.period if is_angle else 1.0
         middle = float(getattr(term, "reference_C", 0.0)) if name == "temperature" else 0.0
         low, high = known.get(name, ((middle - 1.0) / turn, (middle + 1.0) / turn))
@@ -121,7 +121,7 @@ def _size(pattern: TurnPattern, term: Term, ranges: Mapping[str, tuple[float, fl
     for direction, values in product((1.0, -1.0), product(*ends)):
         signals = dict(zip(ranges, values, strict=True))
         for name in signals:
-            if name == "velocity" or coupled_with(name):
+            if name == "velocity" or coupled_joint(name):
                 signals[name] *= pattern.period / 360.0
         reading = direction * cells
         with warnings.catch_warnings():  # a size is looked for beyond the travel as well

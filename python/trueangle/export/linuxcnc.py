@@ -10,12 +10,12 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
-from ..support.files import Kind
-from .oneturn import line_floor
+from ..support.files import FileKind
+from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
-from .reading import failed
-from .setpoint import ENDS, NOMINAL_DECIMALS, POSITIONS, Travel, axis_steepness
+from .reading import table_error
+from .setpoint import ENDS, NOMINAL_DECIMALS, POSITIONS, SetpointTravel, axis_steepness
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
@@ -30,7 +30,9 @@ class LinuxCnc(Target):
 
     name = "linuxcnc"
     what = "a COMP_FILE of a rotary joint, forward and reverse"
-    kind: ClassVar[Kind] = Kind("a compensation file of LinuxCNC", (".comp", ".txt", ".dat"))
+    kind: ClassVar[FileKind] = FileKind(
+        "a compensation file of LinuxCNC", (".comp", ".txt", ".dat")
+    )
     sign = "add"
     argument = "reference"
     tried = (12, 18, 24, 36, 48, 60, 72, 90, 120, 180, 240)
@@ -47,7 +49,7 @@ class LinuxCnc(Target):
     }
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        travel = Travel.of(pattern, self.name, options, MOST)
+        travel = SetpointTravel.of(pattern, self.name, options, MOST)
         # The motor is told position + trim: the trim is the error.
         forward, reverse = (
             np.round(values * 360.0, _DECIMALS) for values in (travel.forward, travel.reverse)
@@ -70,7 +72,7 @@ class LinuxCnc(Target):
             entries=len(forward),
             bytes=24 * len(forward),
             part=travel.part(pattern, forward / 360.0, reverse / 360.0),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=pattern.zero * 360.0,
             bits=enough_bits(options["bits"], len(forward)),
             lost=lambda: travel.lost(pattern),
@@ -94,7 +96,7 @@ class LinuxCnc(Target):
             except ValueError:
                 rest = [part.strip() for part in text.split("\n")[number - 1 :]]
                 if any(part and part[0] not in "#;" for part in rest):
-                    raise failed(
+                    raise table_error(
                         path,
                         f"three numbers are wanted, got {line.strip()[:40]!r}: LinuxCNC stops "
                         "reading here",
@@ -102,11 +104,11 @@ class LinuxCnc(Target):
                     ) from None
                 break
             if rows and triplet[0] <= rows[-1][0]:
-                raise failed(path, "nominal positions must increase", number)
+                raise table_error(path, "nominal positions must increase", number)
             rows.append(triplet)
             decimals = max(decimals, *(len(word.partition(".")[2]) for word in words[:3]))
         if not 4 <= len(rows) <= MOST:
-            raise failed(path, f"{len(rows)} lines: LinuxCNC takes 4 to {MOST} here")
+            raise table_error(path, f"{len(rows)} lines: LinuxCNC takes 4 to {MOST} here")
         table = np.array(rows)
         if options["type"] == "0":
             table[:, 1:] = table[:, :1] - table[:, 1:]

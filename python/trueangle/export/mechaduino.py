@@ -12,12 +12,11 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
-from ..support.files import Kind, read_whole
-from .codetext import rows
-from .oneturn import longest_array
+from ..support.files import FileKind, read_whole
+from .codetext import longest_array, number_rows
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import failed, sampled_model
+from .reading import sampled_model, table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 ENTRIES = 16384
@@ -31,7 +30,7 @@ class Mechaduino(Target):
 
     name = "mechaduino"
     what = "the lookup array of Mechaduino's Parameters.cpp"
-    kind: ClassVar[Kind] = Kind("a C++ source for Mechaduino", (".h", ".cpp", ".ino"))
+    kind: ClassVar[FileKind] = FileKind("a C++ source for Mechaduino", (".h", ".cpp", ".ino"))
     sign = "absolute"
     files = ("existing",)
     options = {
@@ -62,7 +61,7 @@ class Mechaduino(Target):
         def text(header: CommentBlock) -> str:
             own = "Corrected angle in degrees of every count of the encoder, the indicated angle."
             lines = header.comment("// ", own)
-            body = rows([f"{value:.{_DECIMALS}f}" for value in table], lead="")
+            body = number_rows([f"{value:.{_DECIMALS}f}" for value in table], lead="")
             return "\n".join(
                 [*lines, f"const PROGMEM float lookup[{ENTRIES}] = {{", body, "};", ""]
             )
@@ -105,7 +104,7 @@ def _device(table: Array) -> Correction:
 def _lookup(text: str, path: str) -> tuple[Array, int]:
     table, line, decimals = longest_array(text, path, Mechaduino.name)
     if len(table) != ENTRIES or np.any((table < 0.0) | (table > 360.0)):
-        raise failed(
+        raise table_error(
             path, f"lookup must hold {ENTRIES} angles from 0 to 360, got {len(table)} numbers", line
         )
     return table, decimals

@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from ..model.model import HarmonicModel
-from ..support.files import Kind
-from .codetext import rows
+from ..support.files import FileKind
+from .codetext import number_rows
 from .pattern import TurnPattern
-from .reading import failed
+from .reading import table_error
 from .target import CommentBlock, Made, Option
 from .tinymovr import Tinymovr, Whole
 
@@ -27,7 +27,7 @@ class MiniCheetah(Tinymovr):
 
     name = "minicheetah"
     what = "the offset_lut of a Mini Cheetah motor controller"
-    kind: ClassVar[Kind] = Kind("a C source for the motor controller", (".h", ".c"))
+    kind: ClassVar[FileKind] = FileKind("a C source for the motor controller", (".h", ".c"))
     unknown = (
         "the firmware's own calibration fills the table and keeps it in words 6 to 133 of its "
         "settings in flash; where the table is changed otherwise, the electrical zero is found anew"
@@ -44,12 +44,12 @@ class MiniCheetah(Tinymovr):
             "reading; entry k stands at the reading 512 k."
         )
         lines = header.comment("// ", own)
-        values = rows([str(int(value)) for value in table])
+        values = number_rows([str(int(value)) for value in table])
         return "\n".join([*lines, f"int offset_lut[{_ENTRIES}] = {{", values, "};", ""])
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         model = super().read(text, path, {"bits": _BITS})
         entries = 0 if model.fit is None else model.fit.samples
         if entries != _ENTRIES:
-            raise failed(path, f"holds {entries} numbers: offset_lut has {_ENTRIES}")
+            raise table_error(path, f"holds {entries} numbers: offset_lut has {_ENTRIES}")
         return model

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
-from ..support.files import Kind
+from ..support.files import FileKind
 from .knots import rounded_knots
-from .oneturn import line_floor, one_turn_knots
+from .oneturn import one_turn_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import failed, sampled_model
+from .reading import sampled_model, table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 ENTRIES = 256
@@ -35,7 +35,7 @@ class Moteus(Target):
 
     name = "moteus"
     what = "conf set lines of a position source's compensation table"
-    kind: ClassVar[Kind] = Kind("a configuration of moteus", (".cfg", ".txt", ".conf"))
+    kind: ClassVar[FileKind] = FileKind("a configuration of moteus", (".cfg", ".txt", ".conf"))
     sign = "add"
     unknown = (
         "firmware 0x0109 or later is wanted (before, 32 floats without a scale). On the source "
@@ -70,7 +70,7 @@ class Moteus(Target):
             part=TablePart.at_readings(
                 pattern, *_device(table, scale, options["bits"]), zero=pattern.zero
             ),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=pattern.zero * 360.0,
             notes=(
                 "the reading is that of the source with its offset and sign applied, in its own "
@@ -91,16 +91,18 @@ class Moteus(Target):
                 if not np.isfinite(value):
                     raise ValueError
             except ValueError:
-                raise failed(path, f"{found[4]!r} is not a number", number) from None
+                raise table_error(path, f"{found[4]!r} is not a number", number) from None
             if found[3]:
                 scale = value
             elif int(found[2]) >= ENTRIES or abs(value) > 128 or value != int(value):
-                raise failed(path, f"{line.strip()!r} is not an entry of a table of int8", number)
+                raise table_error(
+                    path, f"{line.strip()!r} is not an entry of a table of int8", number
+                )
             else:
                 table[int(found[2])] = value
                 seen += 1
         if seen != ENTRIES:
-            raise failed(
+            raise table_error(
                 path,
                 f"{seen} of {ENTRIES} lines of motor_position.sources.{source}."
                 "compensation_table are there; write them by moteus_tool --dump-config",

@@ -13,11 +13,11 @@ from ..errors import ArgumentError
 from ..model.file import embedded_model
 from ..model.model import HarmonicModel
 from ..model.term import Term
-from ..model.text import model_text
-from ..support.files import Kind
+from ..model.writing import model_text
+from ..support.files import FileKind
 from .pattern import TurnPattern
 from .proof import Proof
-from .reading import failed
+from .reading import table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: Of the text element that holds the model of a joint, before the joint's name.
@@ -34,7 +34,7 @@ class MuJoCo(Target):
 
     name = "mujoco"
     what = "a fragment of MJCF: the sensor's model, friction, damping and torque ripple of a joint"
-    kind: ClassVar[Kind] = Kind("a fragment of MJCF (XML)", (".xml", ".mjcf"))
+    kind: ClassVar[FileKind] = FileKind("a fragment of MJCF (XML)", (".xml", ".mjcf"))
     sign = "add"
     argument = "reference"
     arithmetic_known = False
@@ -127,7 +127,7 @@ class MuJoCo(Target):
         try:
             root = ElementTree.fromstring(text)
         except ElementTree.ParseError as error:
-            raise failed(path, f"is not XML: {error}", error.position[0]) from None
+            raise table_error(path, f"is not XML: {error}", error.position[0]) from None
         found = {
             str(element.get("name"))[len(TEXT_NAME) :]: str(element.get("data"))
             for element in root.iter("text")
@@ -137,7 +137,7 @@ class MuJoCo(Target):
         if len(found) == 1 and joint not in found:
             joint = next(iter(found))
         if joint not in found:
-            raise failed(
+            raise table_error(
                 path, f"holds no model of joint {joint!r}; it has {', '.join(found) or 'none'}"
             )
         return embedded_model(found[joint], path)

@@ -10,12 +10,12 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
-from ..support.files import Kind
-from .oneturn import line_floor
+from ..support.files import FileKind
+from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
-from .reading import ReadTable, failed, function_model
-from .setpoint import Travel
+from .reading import ReadTable, function_model, table_error
+from .setpoint import SetpointTravel
 from .table import TURN
 from .target import CommentBlock, Made, Option, Target
 
@@ -36,7 +36,7 @@ class Pmac(Target):
 
     name = "pmac"
     what = "the leadscrew compensation table of a PMAC motor"
-    kind: ClassVar[Kind] = Kind("commands for PMAC", (".pmc", ".cfg"))
+    kind: ClassVar[FileKind] = FileKind("commands for PMAC", (".pmc", ".cfg"))
     sign = "add"
     argument = "reference"
     unknown = (
@@ -79,7 +79,7 @@ class Pmac(Target):
         whole_turn = {"entries": entries, "start": 0.0, "stop": 360.0}
         # One column for both directions: what follows the direction is left out.
         pattern = TurnPattern(pattern.model)
-        travel = Travel.of(pattern, self.name, whole_turn, _MOST + 1, divided=counts)
+        travel = SetpointTravel.of(pattern, self.name, whole_turn, _MOST + 1, divided=counts)
         # The correction at zero is zero by definition: what it is there is left to the zero.
         first = float(travel.forward[0])
         values = np.rint((travel.forward - first) * counts * SIXTEENTHS).astype(np.int64)
@@ -110,7 +110,7 @@ class Pmac(Target):
             entries=entries,
             bytes=3 * entries,
             part=travel.part(pattern, printed, printed),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=(pattern.zero + first) * 360.0,
             bits=enough_bits(options["bits"], entries),
             lost=lambda: travel.lost(pattern),
@@ -124,18 +124,18 @@ class Pmac(Target):
         plain = "\n".join(line.partition(";")[0] for line in text.split("\n"))
         found = _DEFINE.search(plain)
         if found is None:
-            raise failed(path, f"no DEFINE COMP: no table of {self.name}")
+            raise table_error(path, f"no DEFINE COMP: no table of {self.name}")
         count, span = int(found[1]), int(found[2])
         line = plain.count("\n", 0, found.start()) + 1
         words = plain[found.end() :].split()
         try:
             values = np.array([int(word) for word in words[:count]])
         except ValueError as error:
-            raise failed(path, f"entries are whole numbers: {error}", line) from None
+            raise table_error(path, f"entries are whole numbers: {error}", line) from None
         if not 4 <= count <= _MOST or len(values) != count or not 1 <= span <= _LARGEST:
-            raise failed(path, f"DEFINE COMP {count},{span} with {len(values)} entries", line)
+            raise table_error(path, f"DEFINE COMP {count},{span} with {len(values)} entries", line)
         if np.max(np.abs(values)) > _LARGEST:
-            raise failed(path, f"an entry is beyond {_LARGEST}: no table of {self.name}", line)
+            raise table_error(path, f"an entry is beyond {_LARGEST}: no table of {self.name}", line)
         counts = options["counts_per_turn"] or span
         turned = np.append(values[-1], values) / (SIXTEENTHS * counts)
         places = np.arange(count + 1) / count

@@ -18,7 +18,7 @@ from ..support.arrays import Array
 from .chain import Chain, make_chain, source_identifier
 from .pattern import TurnPattern
 from .proof import lost_orders
-from .runtimeterms import DIRECTIONS, RunTimeTerms, is_own
+from .runtimeterms import DIRECTIONS, RunTimeTerms, is_own_signal
 from .table import METHODS, NUMBERS, TURN, Table
 from .target import CommentBlock, Made, Option, TablePart, Target
 
@@ -109,14 +109,14 @@ class PortableTarget(Target):
         raise NotImplementedError
 
     def holds(self, term: Term) -> bool:
-        return is_own(term)
+        return is_own_signal(term)
 
     def at_run_time(self, pattern: TurnPattern, options: Mapping[str, Any]) -> RunTimeTerms | None:
-        terms = tuple(filter(is_own, pattern.left_out))
+        terms = tuple(filter(is_own_signal, pattern.left_out))
         if not terms:
             return None
         if pattern.model.argument == "indicated":
-            terms = tuple(filter(is_own, pattern.source.terms))
+            terms = tuple(filter(is_own_signal, pattern.source.terms))
         return RunTimeTerms.of(pattern.source, terms, options["direction"])
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:

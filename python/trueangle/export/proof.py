@@ -1,4 +1,4 @@
-"""How far a table is from its model: every input evaluated in the target's arithmetic."""
+"""How far a table is from its model: every input in the target's arithmetic, enough bits of it."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance, TableRecord
 from ..support.arrays import Array
-from ..support.files import Source, sha256_of
+from ..support.files import InputFile, sha256_of
 from .chain import Chain
 from .inversion import inverse_rising
 from .proof import Correction
@@ -66,7 +66,7 @@ class ReadTable(NamedTuple):
     forward: bool = False
 
 
-def failed(path: str, problem: str, line: int | None = None) -> FileError:
+def table_error(path: str, problem: str, line: int | None = None) -> FileError:
     """The error of a file that is not what its target reads."""
     return FileError(path, problem, line=line)
 
@@ -119,7 +119,7 @@ def function_model(
         return _model(tables, path, target, device, zero, at_indicated, *more)
     except NotInvertibleError:
         if len(tables) > 1 or tables[0].forward or at_indicated:
-            raise failed(path, "the tables are too steep to be corrected by") from None
+            raise table_error(path, "the tables are too steep to be corrected by") from None
     return _model(tables, path, target, device, zero, True, *more)
 
 
@@ -141,7 +141,7 @@ def _model(
         try:
             cosine, sine, mean = _harmonics(table, at_indicated)
         except NotInvertibleError as error:
-            raise failed(path, f"is not a correction: {error}") from None
+            raise table_error(path, f"is not a correction: {error}") from None
         constant += mean
         sigma = table.step / math.sqrt(12.0)
         std = sigma * math.sqrt(2.0 / table.entries)
@@ -168,7 +168,7 @@ def _model(
         period=360.0,
         argument="indicated" if at_indicated else "reference",
         covariance=np.diag(variances) * 360.0**2,
-        provenance=Provenance((Source(path, sha256_of(path)),)),
+        provenance=Provenance((InputFile(path, sha256_of(path)),)),
         terms=terms,
     )
     rms, largest = _arithmetic(model.replace(terms=()), target, device, turns, travel)
@@ -237,7 +237,7 @@ def portable_model(text: str, path: str, target: Target) -> HarmonicModel:
     found = list(_TABLE.finditer(flowing))
     zero = _ZERO.search(flowing)
     if not found or zero is None:
-        raise failed(path, "no export of trueangle: its comment names no table")
+        raise table_error(path, "no export of trueangle: its comment names no table")
     at_indicated = "all tables at the same" in flowing
     # Before turns were counted, the zero was written modulo one.
     whole = int(zero[1]) if int(zero[1]) < 1 << 31 else int(zero[1]) - (1 << 32)
@@ -258,7 +258,7 @@ def portable_model(text: str, path: str, target: Target) -> HarmonicModel:
             if len(knots) != wide * (entries + 1):
                 raise ValueError
         except (TypeError, ValueError, OverflowError):
-            raise failed(
+            raise table_error(
                 path, f"the table of shaft {shaft} does not hold {wide * (entries + 1)} numbers"
             ) from None
         table = Table(

@@ -23,7 +23,7 @@ from ..model.forms import Form
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.terms import LocalDefect
-from ..support.signals import coupled_with
+from ..support.signals import coupled_joint
 
 #: What tells the direction of travel.
 DIRECTIONS = ("auto", "angle", "velocity", "signal")
@@ -34,7 +34,7 @@ _UNITS = 4.0
 _OF_THE_SUM = 2.0**-20
 
 
-class Waves(NamedTuple):
+class RunTimeWaves(NamedTuple):
     """Lines ``C sin(2 pi (m x + phase))`` of output orders m, all in turns."""
 
     orders: tuple[float, ...]
@@ -42,7 +42,7 @@ class Waves(NamedTuple):
     phases: tuple[float, ...]
 
     @classmethod
-    def of(cls, lines: Sequence[tuple[float, float, float]]) -> Waves:
+    def of(cls, lines: Sequence[tuple[float, float, float]]) -> RunTimeWaves:
         """Of ``(order, cosine, sine)``."""
         found = [
             (m, math.hypot(a, b), math.atan2(a, b) / (2.0 * math.pi) % 1.0)
@@ -63,9 +63,9 @@ class Waves(NamedTuple):
         return 2.0 * math.pi * sum(abs(m) * c for m, c in pairs)
 
 
-def is_own(term: Term) -> bool:
+def is_own_signal(term: Term) -> bool:
     """Whether the joint's own signals tell it: a program of one has no angles of others."""
-    return not any(coupled_with(name) for name in term.needs)
+    return not any(coupled_joint(name) for name in term.needs)
 
 
 @dataclass(frozen=True)
@@ -99,11 +99,11 @@ class RunTimeTerms:
     way: str
     delay: float
     play: float
-    places: Waves
+    places: RunTimeWaves
     springs: tuple[forms.Friction, ...]
     smooth: tuple[Form, ...]
-    waves: tuple[Waves, ...]
-    series: Waves
+    waves: tuple[RunTimeWaves, ...]
+    series: RunTimeWaves
 
     @classmethod
     def of(cls, model: HarmonicModel, terms: Sequence[Term], direction: str) -> RunTimeTerms:
@@ -135,7 +135,7 @@ class RunTimeTerms:
                 case _:
                     turned, summed = _in_turns(form, period, lines)
                     smooth.append(turned)
-                    waves.append(Waves.of(summed))
+                    waves.append(RunTimeWaves.of(summed))
         needs = {signal for term in terms for signal in term.needs}
         travels = any(term.follows_travel for term in terms)
         way = _way(direction, needs, travels)
@@ -149,8 +149,8 @@ class RunTimeTerms:
         ]
         kinds = tuple(term.kind for term in terms if not isinstance(term, LocalDefect))
         return cls(
-            kinds, tuple(signals), way, delay, play, Waves.of(places), tuple(springs),
-            tuple(smooth), tuple(waves), Waves.of(lines),
+            kinds, tuple(signals), way, delay, play, RunTimeWaves.of(places), tuple(springs),
+            tuple(smooth), tuple(waves), RunTimeWaves.of(lines),
         )  # fmt: skip
 
     @property

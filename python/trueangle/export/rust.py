@@ -9,9 +9,9 @@ import numpy as np
 
 import trueangle._core as _core
 
-from ..support.files import Kind
+from ..support.files import FileKind
 from .chain import Chain, source_identifier
-from .codetext import code_parts, filled, float_literal, rows
+from .codetext import code_parts, filled_code, float_literal, number_rows
 from .portable import PortableTarget, self_test, table_lines
 from .runtimeterms import RunTimeTerms
 from .ruststep import rust_step
@@ -26,7 +26,7 @@ class RustModule(PortableTarget):
 
     name = "rust"
     what = "a Rust module without std, tables and one function per shaft"
-    kind: ClassVar[Kind] = Kind("a Rust module", (".rs",))
+    kind: ClassVar[FileKind] = FileKind("a Rust module", (".rs",))
 
     def write(self, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
         """The module."""
@@ -57,7 +57,7 @@ def _comment(chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> 
 
 
 def _part(part: str, **values: object) -> str:
-    return filled(code_parts("module.rs")[part], **values)
+    return filled_code(code_parts("module.rs")[part], **values)
 
 
 def _table(table: Table) -> str:
@@ -75,7 +75,7 @@ def _table(table: Table) -> str:
         knots=knots,
         element=kind if values.ndim == 1 else f"[{kind}; 2]",
         count=len(values),
-        rows=rows([_element(v, table.number) for v in values], 8 if values.ndim == 1 else 4),
+        rows=number_rows([_element(v, table.number) for v in values], 8 if values.ndim == 1 else 4),
         name=name,
         cycles=f"{table.cycles:g}",
         call=call,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ..model import forms
 from ..model.forms import Form
-from .codetext import code_parts, filled, float_literal
-from .runtimeterms import RunTimeTerms, Waves
+from .codetext import code_parts, filled_code, float_literal
+from .runtimeterms import RunTimeTerms, RunTimeWaves
 from .table import TURN, ratio_of_cycles
 
 _DOCS = {
@@ -57,7 +57,7 @@ def rust_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -
     start = "pattern(reading)" if at_indicated else "reading"
     if at_indicated and bumps:
         # The table holds them at its own angle: what is searched is what they were taken off.
-        sums = [line for form in bumps for line in _form(form, Waves((), (), ()), "")[1]]
+        sums = [line for form in bumps for line in _form(form, RunTimeWaves((), (), ()), "")[1]]
         parts.append(_function("bumps", ["x: i64"], sums))
         start += " + to_angle(bumps(pattern(reading)))"
     late = f" + to_angle(signals.velocity * {_number(terms.delay)})" if terms.delay else ""
@@ -68,7 +68,7 @@ def rust_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -
 
 
 def _part(part: str, **values: object) -> str:
-    return filled(code_parts("step.rs")[part], **values)
+    return filled_code(code_parts("step.rs")[part], **values)
 
 
 def _number(value: float) -> str:
@@ -95,7 +95,7 @@ def _fields(fields: list[str]) -> str:
     return "{\n" + "".join(f"    {field},\n" for field in fields) + "}" if fields else "{}"
 
 
-def _lines(name: str, waves: Waves) -> str:
+def _lines(name: str, waves: RunTimeWaves) -> str:
     rows = []
     for m, c, phase in zip(waves.orders, waves.amplitudes, waves.phases, strict=True):
         turns, fraction = ratio_of_cycles(m)
@@ -113,7 +113,7 @@ def _function(name: str, arguments: list[str], sums: list[str]) -> str:
     return _part("sum", name=name, arguments=marked, sums=used)
 
 
-def _form(form: Form, waves: Waves, name: str) -> tuple[list[str], list[str]]:
+def _form(form: Form, waves: RunTimeWaves, name: str) -> tuple[list[str], list[str]]:
     """Statements that add to the level, and to the error at ``x``."""
     match form:
         case forms.Scaled():

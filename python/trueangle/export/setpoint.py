@@ -42,7 +42,7 @@ _GRID = 1 << 18
 
 
 @dataclass(frozen=True)
-class Travel:
+class SetpointTravel:
     """Nominal positions over the travel of an axis, and the errors there, in turns.
 
     Attributes
@@ -76,7 +76,7 @@ class Travel:
         most: int,
         function: Function | None = None,
         divided: int = 0,
-    ) -> Travel:
+    ) -> SetpointTravel:
         """Knots over the travel that is asked for, else over what the model was fitted on.
 
         They are of the error at the true angle, for each direction, or of a ``function``. Where
@@ -88,7 +88,7 @@ class Travel:
             More entries than the target takes, too few for the orders, no travel.
         """
         entries = options["entries"]
-        ends = zip(("start", "stop"), calibrated_travel(pattern), strict=True)
+        ends = zip(("start", "stop"), _calibrated_travel(pattern), strict=True)
         start, stop = (end if options[key] is None else options[key] for key, end in ends)
         if not stop > start:
             raise ArgumentError(f"stop must be above `start=`, got {start:g} to {stop:g} deg")
@@ -173,7 +173,7 @@ def _moved(error: Function, first: float) -> Function:
     return lambda x: error(x + first)
 
 
-def calibrated_travel(pattern: TurnPattern) -> tuple[float, float]:
+def _calibrated_travel(pattern: TurnPattern) -> tuple[float, float]:
     """Degrees over which the model holds: its span, or one turn."""
     span = pattern.source.partial_span
     if span is None:
@@ -216,7 +216,7 @@ def _directed(pattern: TurnPattern, direction: int) -> tuple[Array, Array]:
     return np.append(grid, 1.0), np.append(values, values[0] + 1.0)
 
 
-def axis_steepness(travel: Travel) -> tuple[float, float]:
+def axis_steepness(travel: SetpointTravel) -> tuple[float, float]:
     """Largest slope (deg per deg) and its change per degree: what an axis must follow."""
     h = 360.0 / travel.entries
     slopes = [np.diff(values) * 360.0 / h for values in (travel.forward, travel.reverse)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..model.model import HarmonicModel
 from ..support.arrays import Array
-from .reading import ReadTable, failed, function_model
+from .reading import ReadTable, function_model, table_error
 from .table import TURN
 from .target import Target
 
@@ -52,7 +52,9 @@ def travel_model(
     pattern = (ahead + back) / 2.0
     places, values = nominal, pattern
     if len(nominal) < 4:
-        raise failed(path, f"holds {len(nominal)} points over {travel:.6g} deg: four are needed")
+        raise table_error(
+            path, f"holds {len(nominal)} points over {travel:.6g} deg: four are needed"
+        )
     if partial:
         places, values = _closed(nominal, pattern, spacing)
     elif travel < 360.0:  # the last line is not given again

@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..model.model import HarmonicModel
-from ..support.files import Kind
-from .oneturn import line_floor
+from ..support.files import FileKind
+from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
-from .reading import failed
-from .setpoint import ENDS, POSITIONS, Travel
+from .reading import table_error
+from .setpoint import ENDS, POSITIONS, SetpointTravel
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
@@ -32,7 +32,9 @@ class Siemens840d(Target):
 
     name = "siemens840d"
     what = "the $AA_ENC_COMP table of a rotary axis of a SINUMERIK"
-    kind: ClassVar[Kind] = Kind("a compensation file of SINUMERIK", (".ini", ".mpf", ".spf"))
+    kind: ClassVar[FileKind] = FileKind(
+        "a compensation file of SINUMERIK", (".ini", ".mpf", ".spf")
+    )
     sign = "add"
     tried = (36, 45, 60, 72, 90, 120, 144, 180, 240, 360, 480, 720, 1440)
     unknown = (
@@ -48,7 +50,7 @@ class Siemens840d(Target):
     }
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        travel = Travel.of(pattern, self.name, options, MOST, pattern.correction)
+        travel = SetpointTravel.of(pattern, self.name, options, MOST, pattern.correction)
         # The value is added to the actual position, and the correction is subtracted.
         values = np.round(-travel.forward * 360.0, _DECIMALS) + 0.0
         whole = math.isclose(travel.stop - travel.start, 360.0)
@@ -88,7 +90,7 @@ class Siemens840d(Target):
             entries=len(values),
             bytes=8 * len(values),
             part=travel.at_readings(pattern, -values / 360.0),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=pattern.zero * 360.0,
             bits=enough_bits(options["bits"], len(values)),
             lost=lambda: travel.lost(pattern),
@@ -114,15 +116,17 @@ class Siemens840d(Target):
                 if setting[3] == (axis or setting[3]):
                     settings[setting[1]] = float(setting[4])
             elif plain.startswith("$AA_ENC_COMP"):
-                raise failed(path, f"{line.strip()[:50]!r} is not a value of $AA_ENC_COMP", number)
+                raise table_error(
+                    path, f"{line.strip()[:50]!r} is not a value of $AA_ENC_COMP", number
+                )
         missing = [key for key in ("STEP", "MIN", "MAX") if key not in settings]
         if not points or missing:
             what = f"$AA_ENC_COMP_{missing[0]}" if missing else "$AA_ENC_COMP"
-            raise failed(path, f"no table of {self.name}: {what} is missing")
+            raise table_error(path, f"no table of {self.name}: {what} is missing")
         step = settings["STEP"]
         count = round((settings["MAX"] - settings["MIN"]) / step) + 1 if step > 0.0 else 0
         if not 4 <= count <= MOST or any(i not in points for i in range(count)):
-            raise failed(
+            raise table_error(
                 path, f"STEP, MIN and MAX are of {count} points, and {len(points)} are there"
             )
         nominal = settings["MIN"] + step * np.arange(count)

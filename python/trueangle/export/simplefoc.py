@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.files import Kind
-from .codetext import rows
+from ..support.files import FileKind
+from .codetext import longest_array, number_rows
 from .knots import rounded_knots
-from .oneturn import line_floor, longest_array, one_turn_knots, without_mean
+from .oneturn import one_turn_knots, rounding_floor, without_mean
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import failed, sampled_model
+from .reading import sampled_model, table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 Single = NDArray[np.float32]
@@ -47,7 +47,9 @@ class SimpleFoc(Target):
 
     name = "simplefoc"
     what = "the calibrationLut array of SimpleFOC's CalibratedSensor"
-    kind: ClassVar[Kind] = Kind("a C++ source for SimpleFOC", (".h", ".cpp", ".hpp", ".ino"))
+    kind: ClassVar[FileKind] = FileKind(
+        "a C++ source for SimpleFOC", (".h", ".cpp", ".hpp", ".ino")
+    )
     sign = "subtract"
     unknown = (
         "the electrical zero and the sensor's direction belong to the motor: let initFOC() find "
@@ -95,7 +97,7 @@ class SimpleFoc(Target):
             part=TablePart.at_readings(
                 pattern, *_device(variant, table), zero=zero_deg / 360.0, resolution=3.0 * 2.0**-24
             ),
-            floor_arcsec=line_floor(step)
+            floor_arcsec=rounding_floor(step)
             if variant == "minus-u16"
             else step / math.sqrt(12.0) * ARCSEC_PER_TURN,
             zero_deg=zero_deg,
@@ -138,7 +140,7 @@ class SimpleFoc(Target):
         lines += [
             f"const int n_lut = {len(table)};",
             f"{kind} {array}[{'n_lut + 1' if guard else 'n_lut'}] = {{",
-            rows(values),
+            number_rows(values),
             "};",
         ]
         if guard:
@@ -157,11 +159,13 @@ class SimpleFoc(Target):
         declared = re.search(r"\bn_lut\s*=\s*(\d+)", text)
         entries = int(declared[1]) if declared else len(numbers)
         if len(numbers) not in (entries, entries + 1):
-            raise failed(path, f"n_lut is {entries}, the table has {len(numbers)} numbers", line)
+            raise table_error(
+                path, f"n_lut is {entries}, the table has {len(numbers)} numbers", line
+            )
         numbers = numbers[:entries]
         whole = bool(np.all(numbers == np.rint(numbers)) and np.ptp(numbers) > 1.0)
         if whole != (variant == "minus-u16"):
-            raise failed(
+            raise table_error(
                 path,
                 f"these are {'whole numbers' if whole else 'radians'}, and variant {variant} is "
                 f"asked for; give `variant={'minus-u16' if whole else 'minus-float'!r}`"

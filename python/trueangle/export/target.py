@@ -1,4 +1,4 @@
-"""What a target is: a format that some firmware reads, and its own arithmetic."""
+"""What a target is: options, a comment and tables that some firmware reads, its own arithmetic."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..support.arrays import Array
-from ..support.files import Kind
+from ..support.files import FileKind
 from ..support.suggestions import check_choice, did_you_mean
 from .pattern import TurnPattern, of_direction
 from .proof import Correction, Proof
@@ -59,7 +59,7 @@ class CommentBlock:
     def comment(self, lead: str, *own: str) -> list[str]:
         """Lines of a file's comment: the difference first, ``own`` words on the table, the rest."""
         parts = [self.difference, *own, *self.source, *(f"Note: {note}." for note in self.notes)]
-        return [line for part in parts for line in comment_lines(98, part, lead)]
+        return [line for part in parts for line in _comment_lines(98, part, lead)]
 
 
 class TablePart(NamedTuple):
@@ -155,7 +155,7 @@ class Target(ABC):
 
     name: ClassVar[str]
     what: ClassVar[str]
-    kind: ClassVar[Kind]
+    kind: ClassVar[FileKind]
     sign: ClassVar[str]
     argument: ClassVar[str] = "indicated"
     unknown: ClassVar[str] = ""
@@ -259,7 +259,7 @@ def _checked(name: str, option: Option, value: Any) -> Any:
     return converted
 
 
-def comment_lines(width: int, text: str, lead: str) -> list[str]:
+def _comment_lines(width: int, text: str, lead: str) -> list[str]:
     """``text`` broken into comment lines of at most ``width`` characters.
 
     Nothing in it ends the comment or takes the next line into it.

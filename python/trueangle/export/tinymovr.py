@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
-from ..support.files import Kind
-from .codetext import rows
+from ..support.files import FileKind
+from .codetext import longest_array, number_rows
 from .knots import rounded_knots
-from .oneturn import line_floor, longest_array, one_turn_knots
+from .oneturn import one_turn_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import failed, sampled_model
+from .reading import sampled_model, table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 Whole = NDArray[np.int64]
@@ -27,7 +27,7 @@ class Tinymovr(Target):
 
     name = "tinymovr"
     what = "the rec_table of a Tinymovr sensor"
-    kind: ClassVar[Kind] = Kind("a C source for Tinymovr", (".h", ".c"))
+    kind: ClassVar[FileKind] = FileKind("a C source for Tinymovr", (".h", ".c"))
     sign = "add"
     unknown = (
         "no command that writes rec_table from outside is known: the firmware fills it by its own "
@@ -63,7 +63,7 @@ class Tinymovr(Target):
             bytes=4 * entries,
             part=TablePart.at_readings(pattern, _device(table, bits), zero=pattern.zero),
             # Whole ticks: of the entries, and of what is between them.
-            floor_arcsec=line_floor(1.0 / ticks) * 2.5**0.5,
+            floor_arcsec=rounding_floor(1.0 / ticks) * 2.5**0.5,
             zero_deg=pattern.zero * 360.0,
             bits=bits,
         )
@@ -74,7 +74,7 @@ class Tinymovr(Target):
             f"rec_table for a sensor of {bits} bits and ECN_SIZE {len(table)}: ticks that are "
             "added at the indicated angle."
         )
-        values = rows([str(int(value)) for value in table])
+        values = number_rows([str(int(value)) for value in table])
         return "\n".join(
             [
                 *header.comment("// ", own),
@@ -89,7 +89,7 @@ class Tinymovr(Target):
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         table, line, _ = longest_array(text, path, self.name)
         if len(table) & (len(table) - 1) or np.any(table != np.rint(table)):
-            raise failed(path, "the table holds whole ticks, a power of two of them", line)
+            raise table_error(path, "the table holds whole ticks, a power of two of them", line)
         ticks = 1 << options["bits"]
         device = _device(table.astype(np.int64), options["bits"])
         return sampled_model(-table / ticks, path, self, device, step=1.0 / ticks)

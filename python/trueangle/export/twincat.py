@@ -14,12 +14,12 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
-from ..support.files import Kind
-from .oneturn import line_floor
+from ..support.files import FileKind
+from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
-from .reading import failed
-from .setpoint import ENDS, POSITIONS, Travel
+from .reading import table_error
+from .setpoint import ENDS, POSITIONS, SetpointTravel
 from .setpointreading import travel_model
 from .target import CommentBlock, Made, Option, Target
 
@@ -38,7 +38,7 @@ class TwinCat(Target):
 
     name = "twincat"
     what = "the leadscrew compensation of a TwinCAT CNC axis, or points for an NC axis"
-    kind: ClassVar[Kind] = Kind("a compensation list of TwinCAT", (".lis", ".txt", ".csv"))
+    kind: ClassVar[FileKind] = FileKind("a compensation list of TwinCAT", (".lis", ".txt", ".csv"))
     sign = "subtract"
     argument = "reference"
     tried = (36, 45, 60, 72, 90, 120, 144, 180, 240, 360, 480, 720, 900, 1200, 1440)
@@ -60,11 +60,11 @@ class TwinCat(Target):
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         cnc = options["variant"] == "cnc"
         most, divided = (MOST, TENTHS) if cnc else (100_000, 0)
-        travel = Travel.of(pattern, self.name, options, most, divided=divided)
+        travel = SetpointTravel.of(pattern, self.name, options, most, divided=divided)
         made = self._cnc(pattern, travel) if cnc else self._nc(pattern, travel)
         return replace(made, bits=enough_bits(options["bits"], made.entries))
 
-    def _cnc(self, pattern: TurnPattern, travel: Travel) -> Made:
+    def _cnc(self, pattern: TurnPattern, travel: SetpointTravel) -> Made:
         if TENTHS % travel.entries:
             raise ArgumentError(
                 f"`entries={travel.entries}` a turn are no whole number of 0.0001 deg apart: use "
@@ -98,13 +98,13 @@ class TwinCat(Target):
             entries=len(values[0]),
             bytes=8 * len(values[0]),
             part=travel.part(pattern, *(-v / TENTHS for v in values)),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=pattern.zero * 360.0,
             lost=lambda: travel.lost(pattern),
             notes=("switch it on by lr_param.ssfk 1 of the axis",),
         )
 
-    def _nc(self, pattern: TurnPattern, travel: Travel) -> Made:
+    def _nc(self, pattern: TurnPattern, travel: SetpointTravel) -> Made:
         columns = [np.round(v * 360.0, _DECIMALS) for v in (travel.forward, travel.reverse)]
 
         def text(header: CommentBlock) -> str:
@@ -121,7 +121,7 @@ class TwinCat(Target):
             entries=len(travel.nominal),
             bytes=16 * len(travel.nominal),
             part=travel.part(pattern, *(v / 360.0 for v in columns)),
-            floor_arcsec=line_floor(step),
+            floor_arcsec=rounding_floor(step),
             zero_deg=pattern.zero * 360.0,
             lost=lambda: travel.lost(pattern),
             notes=(
@@ -143,10 +143,12 @@ def _cnc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
         found = _LINE.match(line)
         if found is None:
             if line.strip().startswith("kw.ssfk."):
-                raise failed(path, f"{line.strip()[:50]!r} is not a whole number of a key", number)
+                raise table_error(
+                    path, f"{line.strip()[:50]!r} is not a whole number of a key", number
+                )
             continue
         if len(found[4]) > _DIGITS:
-            raise failed(path, f"{found[4][:_DIGITS]}... is no number of a key", number)
+            raise table_error(path, f"{found[4][:_DIGITS]}... is no number of a key", number)
         if found[2] is None:
             settings[found[1]] = int(found[4])
         else:
@@ -157,15 +159,19 @@ def _cnc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     points = columns.get("setpoint", {})
     interval = settings.get("interval", 0)
     if count < 4 or any(set(c) != set(range(count)) for c in (pos, neg)):
-        raise failed(path, f"kw_nr_max is {count}, but pos has {len(pos)} and neg {len(neg)} lines")
+        raise table_error(
+            path, f"kw_nr_max is {count}, but pos has {len(pos)} and neg {len(neg)} lines"
+        )
     if interval:
         nominal = settings.get("kw_startpos", 0) + interval * np.arange(count)
     elif set(points) == set(range(count)):
         nominal = np.array([points[i] for i in range(count)])
     else:
-        raise failed(path, "interval is 0 or missing, and not every table entry has a setpoint")
+        raise table_error(
+            path, "interval is 0 or missing, and not every table entry has a setpoint"
+        )
     if np.any(np.diff(nominal) <= 0):
-        raise failed(path, "positions must increase")
+        raise table_error(path, "positions must increase")
     values = [[-column[i] for i in range(count)] for column in (pos, neg)]
     return np.array([nominal, *values]).T / 1e4
 
@@ -180,10 +186,12 @@ def _nc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
             if len(values) not in (2, 3) or not all(map(math.isfinite, values)):
                 raise ValueError
         except ValueError:
-            raise failed(path, f"Position,Compensation is wanted, got {row!r}", number) from None
+            raise table_error(
+                path, f"Position,Compensation is wanted, got {row!r}", number
+            ) from None
         if rows and values[0] <= rows[-1][0]:
-            raise failed(path, "positions must increase", number)
+            raise table_error(path, "positions must increase", number)
         rows.append((*values, values[-1])[:3])
     if len(rows) < 4:
-        raise failed(path, f"holds {len(rows)} points: no table of {TwinCat.name}")
+        raise table_error(path, f"holds {len(rows)} points: no table of {TwinCat.name}")
     return np.array(rows)

@@ -94,7 +94,7 @@ def choose_argument(
     )
 
 
-def at_indicated(run: CalibrationRun) -> CalibrationRun:
+def run_at_indicated(run: CalibrationRun) -> CalibrationRun:
     """The run with its own reading as the angle, and the same errors."""
     return replace(run, reference=run.indicated, indicated=run.indicated + run.centred_error)
 

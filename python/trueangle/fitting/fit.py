@@ -7,32 +7,32 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 from ..errors import ArgumentError, NoOrderError, UnlikeRunsWarning
-from ..joint.shafts import counted_orders, resolve_orders
+from ..joint.shafts import limited_orders, resolve_orders
 from ..model.model import Argument
 from ..model.validity import check_invertible
 from ..runs.files import runs_of
 from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
-from ..runs.source import Reading
+from ..runs.source import ReadingOptions
 from ..runs.travel import CONDITION, travelled_span, without_drift
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument, ArgumentChoice, choose_argument
 from .problem import Problem
 from .result import FitResult
 from .robust import (
     Loss,
-    breakdown_sentence,
     fit_robustly,
     fit_without_outliers,
-    unsettled_sentence,
+    robust_breakdown_sentence,
+    unsettled_weights_sentence,
     without_spikes,
 )
 from .uncertainty import CovarianceKind, check_covariance
 
 if TYPE_CHECKING:
-    from .orders.table import OrderSelection
-    from .summed import Summed
+    from .orders.result import OrderSelection
+    from .summed import SummedReadings
 
 #: Rounding of angles around a whole turn, in parts of a turn: smaller deviations are
 #: never taken for outliers.
@@ -56,7 +56,7 @@ def fit(
     method: str | None = None,
     threads: int | None = None,
     prior: Any = None,
-    **reading: Unpack[Reading],
+    **reading: Unpack[ReadingOptions],
 ) -> FitResult:
     """Fit a harmonic model to one run or several.
 
@@ -211,7 +211,7 @@ def fitted_to(
     reference_orders: Iterable[float] = (),
     method: str | None = None,
     threads: int | None = None,
-    summed: Summed | None = None,
+    summed: SummedReadings | None = None,
     evidence: OrderSelection | None = None,
 ) -> FitResult:
     """As `fit`; with ``summed`` of all readings of which the runs are some.
@@ -229,10 +229,12 @@ def fitted_to(
         orders = evidence.by_shaft
     elif orders is None or isinstance(orders, str):
         if beside.wanted:
-            from .nuisance import likely_orders, take_out
+            from .nuisance import orders_beside_nuisance, take_out_nuisance
 
-            likely = likely_orders(found, gear_ratio, fixed_member, shafts)
-            found, _ = take_out(given, beside.kinds, likely, _angle(argument), beside.reference)
+            likely = orders_beside_nuisance(found, gear_ratio, fixed_member, shafts)
+            found, _ = take_out_nuisance(
+                given, beside.kinds, likely, _angle(argument), beside.reference
+            )
         sought = {
             "gear_ratio": gear_ratio,
             "fixed_member": fixed_member,
@@ -245,10 +247,10 @@ def fitted_to(
     wanted = resolve_orders(orders, gear_ratio, fixed_member, shafts)
     taken = None
     if beside.wanted:
-        from .nuisance import likely_orders, take_out_beside
+        from .nuisance import orders_beside_nuisance, take_out_nuisance_beside
 
-        likely = likely_orders(given, gear_ratio, fixed_member, shafts)
-        found, taken = take_out_beside(
+        likely = orders_beside_nuisance(given, gear_ratio, fixed_member, shafts)
+        found, taken = take_out_nuisance_beside(
             given, beside.kinds, wanted, likely, _angle(argument), beside.reference
         )
     if selection is not None:
@@ -282,27 +284,27 @@ def fitted_to(
             ridge = choose_ridge(problem, weighted.weights or problem.base)
     fitted = weighted.fitted
     if selection is not None:
-        from .transfer import check_later_stretch
+        from .transfer import check_later_segment
 
-        check_later_stretch(problem, weighted.weights or problem.base)
+        check_later_segment(problem, weighted.weights or problem.base)
     if ridge > 0.0:
         fitted = problem.penalised(fitted, weighted.weights or problem.base, ridge)
     if problem.argument == "reference":
         check_invertible(fitted.series.slope_bound)
     joint = (gear_ratio, fixed_member)
-    remarks = [note for note in (choice.note, breakdown_sentence(problem, weighted)) if note]
+    remarks = [note for note in (choice.note, robust_breakdown_sentence(problem, weighted)) if note]
     if taken is not None:
         remarks += taken.sentences(problem.period)
     if len(found) > 1:
-        from .likeness import run_names, unlike_runs, unlike_sentence
+        from .unlikeruns import run_names, unlike_runs, unlike_runs_sentence
 
         unlike = unlike_runs(problem, fitted)
         if unlike:
             names = run_names(found)
-            remarks.append(unlike_sentence([names[i] for i in unlike], len(found)))
+            remarks.append(unlike_runs_sentence([names[i] for i in unlike], len(found)))
             warnings.warn(remarks[-1], UnlikeRunsWarning, stacklevel=4)
     if weighted.unsettled:
-        remarks.append(unsettled_sentence(weighted))
+        remarks.append(unsettled_weights_sentence(weighted))
     if summed is not None:
         remarks.append(summed.note)
     return FitResult(
@@ -337,7 +339,7 @@ _NOTHING = _Beside((), ())
 
 
 def _beside(nuisance: str | Iterable[str], reference_orders: Iterable[float]) -> _Beside:
-    lines = tuple(map(float, counted_orders(reference_orders, "reference_orders")))
+    lines = tuple(map(float, limited_orders(reference_orders, "reference_orders")))
     if nuisance == "none":
         return _Beside((), lines) if lines else _NOTHING
     from .nuisance import asked_nuisance
@@ -354,16 +356,16 @@ def _selected(
     orders: str | None,
     loss: Loss,
     sought: dict[str, Any],
-    summed: Summed | None,
+    summed: SummedReadings | None,
 ) -> tuple[OrderSelection, Mapping[str, Iterable[float]]]:
     """Orders with evidence, from readings without spikes."""
     if orders not in (None, "auto"):
         raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
-    from .orders.choice import selected_of
+    from .orders.choice import selected_orders
 
     if loss != "linear":
         runs = [without_spikes(run) for run in runs]
-    selection = selected_of(runs, **sought, summed=summed)
+    selection = selected_orders(runs, **sought, summed=summed)
     if not selection.orders:
         raise NoOrderError(f"no order is supported by the data: {selection.reason}")
     return selection, selection.by_shaft

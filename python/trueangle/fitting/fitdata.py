@@ -14,17 +14,17 @@ from ..runs.run import CalibrationRun
 from ..runs.travel import Span
 from ..support.arrays import Array
 from ..support.plainresult import PlainResult
-from .problem import Fitted, Problem
-from .repeated import beside_repeated
-from .robust import Weighted
+from .problem import Problem, SolvedProblem
+from .repeated import covariance_with_repeats
+from .robust import RobustFit
 from .uncertainty import CovarianceKind, Uncertainty, coefficient_uncertainty
 
 if TYPE_CHECKING:
     from ..estimation.moments import Moments
     from .nuisance import Nuisance
-    from .orders.table import OrderSelection
+    from .orders.result import OrderSelection
     from .prior import Posterior
-    from .summed import Summed
+    from .summed import SummedReadings
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,8 +32,8 @@ class FitData(PlainResult):
     """What a `FitResult` holds."""
 
     problem: Problem
-    fitted: Fitted
-    weighted: Weighted
+    fitted: SolvedProblem
+    weighted: RobustFit
     loss: str
     ridge: float
     span: Span
@@ -83,7 +83,7 @@ class FitData(PlainResult):
         return tuple(self.problem.runs)
 
     @property
-    def _summed(self) -> Summed | None:
+    def _summed(self) -> SummedReadings | None:
         return self.problem.summed
 
     @property
@@ -140,7 +140,7 @@ class FitData(PlainResult):
         found = coefficient_uncertainty(
             self.problem, self.fitted, weights, self.ridge, self.covariance_asked
         )
-        found = beside_repeated(
+        found = covariance_with_repeats(
             found, self.problem, self.fitted, weights, self.ridge, self.covariance_asked
         )
         if self.nuisance is None or not self.nuisance.inflation:

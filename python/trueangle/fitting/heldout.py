@@ -1,4 +1,4 @@
-"""What a fit gains on readings that took no part in it: one run left out at a time."""
+"""What a fit gains on readings that took no part in it: runs or folds of them left out in turn."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..support.arrays import Array
-from ..support.plainresult import Shown
-from ..support.renamed import attribute
+from ..support.plainresult import ShownResult
+from ..support.renamed import renamed_attribute
 from .robust import Loss
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class HeldOutRun:
 
 
 @dataclass(frozen=True, eq=False)
-class HeldOut(Shown):
+class HeldOut(ShownResult):
     """Gain on held-out runs.
 
     Attributes
@@ -214,4 +214,4 @@ def _rms(parts: Sequence[Array]) -> float:
 
 def __getattr__(name: str) -> Any:
     # `hold_out_extended` moved to the diagnosis, which this room does not import.
-    return attribute(__name__, "trueangle.diagnosis.heldout", name)
+    return renamed_attribute(__name__, "trueangle.diagnosis.heldout", name)

@@ -21,10 +21,10 @@ from .fitdata import FitData
 from .rounding import COUNTED
 
 if TYPE_CHECKING:
-    from .orders.table import OrderSelection
+    from .orders.result import OrderSelection
 
 
-def build_model(fit: FittedCoefficients) -> HarmonicModel:
+def _build_model(fit: FittedCoefficients) -> HarmonicModel:
     """The fitted series with its covariance, record and provenance."""
     problem, solution = fit.problem, fit.fitted.solution
     covariance, condition = fit.uncertainty.covariance, solution.condition_number
@@ -44,7 +44,7 @@ def build_model(fit: FittedCoefficients) -> HarmonicModel:
     )
 
 
-def fit_notes(fit: FittedCoefficients) -> Iterable[str]:
+def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
     """What not to trust and why, one sentence each."""
     span, weighted = fit.span, fit.weighted
     if not span.full:
@@ -120,12 +120,12 @@ class FittedCoefficients(FitData):
     @cached_property
     def model(self) -> HarmonicModel:
         """The fitted model, with its covariance and the record of this fit."""
-        return build_model(self)
+        return _build_model(self)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What not to trust and why."""
-        return tuple(fit_notes(self))
+        return tuple(_fit_notes(self))
 
     @cached_property
     def selection(self) -> OrderSelection | None:

@@ -157,7 +157,7 @@ def asked_nuisance(asked: str | Iterable[str]) -> tuple[str, ...] | None:
     return tuple(kind for kind in KINDS if kind in names)
 
 
-def likely_orders(
+def orders_beside_nuisance(
     runs: Sequence[CalibrationRun],
     gear_ratio: float | None,
     fixed_member: str,
@@ -176,7 +176,7 @@ def likely_orders(
     ]
 
 
-def take_out(
+def take_out_nuisance(
     runs: Sequence[CalibrationRun],
     kinds: tuple[str, ...] | None,
     shafts: Sequence[ShaftOrders],
@@ -251,7 +251,7 @@ def _one_amplitude(
     )
 
 
-def take_out_beside(
+def take_out_nuisance_beside(
     runs: Sequence[CalibrationRun],
     kinds: tuple[str, ...] | None,
     wanted: Sequence[ShaftOrders],
@@ -259,19 +259,19 @@ def take_out_beside(
     argument: str,
     reference_orders: Sequence[float] = (),
 ) -> tuple[list[CalibrationRun], Nuisance]:
-    """`take_out` beside the orders wanted, chosen beside the likely ones as well.
+    """`take_out_nuisance` beside the orders wanted, chosen beside the likely ones as well.
 
     What an order that is not in the model leaves is no ramp, though a ramp lowers it.
     """
     if kinds is not None:
-        return take_out(runs, kinds, wanted, argument, reference_orders)
+        return take_out_nuisance(runs, kinds, wanted, argument, reference_orders)
     both = {s.name: s for s in likely}
     for shaft in wanted:
         more = both[shaft.name].orders if shaft.name in both else ()
         both[shaft.name] = shaft._replace(orders=tuple(sorted({*shaft.orders, *more})))
-    _, first = take_out(runs, None, list(both.values()), argument, reference_orders)
+    _, first = take_out_nuisance(runs, None, list(both.values()), argument, reference_orders)
     chosen = tuple(kind for kind in first.kinds if kind in KINDS)
-    cleaned, taken = take_out(runs, chosen, wanted, argument, reference_orders)
+    cleaned, taken = take_out_nuisance(runs, chosen, wanted, argument, reference_orders)
     return cleaned, replace(taken, shares=first.shares, unseparated=first.unseparated)
 
 

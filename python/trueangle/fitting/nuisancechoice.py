@@ -1,4 +1,4 @@
-"""Choosing nuisances by the error of stretches held out, and fitting them beside a pattern."""
+"""Choosing groups of nuisances by the error of folds held out, and fitting them with a pattern."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ..estimation.linear import (
     NormalEquations,
     least_squares,
     left_out,
+    linear_residual,
     pseudo_inverse,
-    unexplained,
 )
 from ..support.arrays import Array
 
@@ -54,7 +54,7 @@ def _held_out(rows: FoldRows, chosen: Sequence[str]) -> Array:
 def _told(rows: FoldRows, chosen: Sequence[str], name: str) -> float:
     """Part of a group's energy that the pattern and the chosen ones leave."""
     columns = rows.groups[name]
-    return float((unexplained(_design(rows, chosen), columns) ** 2).sum() / (columns**2).sum())
+    return float((linear_residual(_design(rows, chosen), columns) ** 2).sum() / (columns**2).sum())
 
 
 def choose_nuisance_groups(

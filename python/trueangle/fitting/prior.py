@@ -1,4 +1,4 @@
-"""A prior for the coefficients of a unit, and the fit with it: what others of its design are like.
+"""A prior for the coefficients of a unit, and the posterior: what others of its design are like.
 
 With ``b ~ N(μ, T)`` and readings of noise s the coefficients are normal about
 
@@ -30,8 +30,8 @@ from ..support.angles import circular_mean, unit_name, wrap
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument
-from .problem import Fitted, PlainSolution, Problem
-from .robust import WILD, Loss, Weighted
+from .problem import PlainSolution, Problem, SolvedProblem
+from .robust import WILD, Loss, RobustFit
 
 #: Rounds in which what is set aside settles, and the noise: each takes off a part of what is left.
 _ROUNDS: Final = 20
@@ -141,7 +141,7 @@ def fleet_prior(given: Any, period: float) -> Prior:
     return found
 
 
-def posterior(problem: Problem, prior: Prior, loss: str) -> tuple[Weighted, Posterior]:
+def posterior(problem: Problem, prior: Prior, loss: str) -> tuple[RobustFit, Posterior]:
     """The fit under a prior; readings more than 8 deviations off set aside but with ``"linear"``.
 
     Raises
@@ -177,12 +177,12 @@ def posterior(problem: Problem, prior: Prior, loss: str) -> tuple[Weighted, Post
         if w is not None
     )
     every = [b if w is None else w for w, b in zip(weights, given, strict=True)]
-    return Weighted(found, every if wild else None, wild), taken
+    return RobustFit(found, every if wild else None, wild), taken
 
 
 def _solved(
     problem: Problem, prior: Prior, weights: Sequence[Array | None]
-) -> tuple[Fitted, Posterior]:
+) -> tuple[SolvedProblem, Posterior]:
     products = [problem.products(weights, i, 1)[0] for i in range(len(problem.runs))]
     means = np.array([part[0] / part[0, 0] for part in products])
     sums = total([NormalEquations.of_products(part) for part in products])
@@ -246,7 +246,7 @@ def _solved(
     shares = 1.0 - np.clip(taken, 0.0, 1.0).reshape(-1, 2).mean(axis=1)
     worth = min(prior.freedom, prior.noise_freedom + freedom)
     known = Posterior(tuple(shares.tolist()), max(worth, 1.0), prior.units, math.sqrt(noise))
-    return Fitted(solution, offsets, problem.shafts, problem.period), known
+    return SolvedProblem(solution, offsets, problem.shafts, problem.period), known
 
 
 def fitted_with_prior(
@@ -256,7 +256,7 @@ def fitted_with_prior(
     argument: AnyArgument,
     loss: Loss,
     asked: Mapping[str, Any],
-) -> tuple[Problem, Weighted, Posterior]:
+) -> tuple[Problem, RobustFit, Posterior]:
     """See `trueangle.fit` with ``prior``."""
     for name, value in asked.items():
         if not (value is None or value == _USUAL[name]):

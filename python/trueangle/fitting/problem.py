@@ -20,7 +20,7 @@ from ..support.arrays import Array
 from ..support.suggestions import check_choice
 
 if TYPE_CHECKING:
-    from .summed import Summed
+    from .summed import SummedReadings
 
 _Look = TypeVar("_Look")
 
@@ -48,7 +48,7 @@ class PlainSolution(NamedTuple):
     residual_bound: float = math.inf
 
 
-class Fitted:
+class SolvedProblem:
     """A solution and the series it stands for."""
 
     def __init__(
@@ -88,7 +88,7 @@ class Fitted:
 
     def __reduce__(self) -> tuple[Any, ...]:
         values = PlainSolution(*(getattr(self.solution, name) for name in PlainSolution._fields))
-        return Fitted, (values, self.offsets, self.shafts, self.period)
+        return SolvedProblem, (values, self.offsets, self.shafts, self.period)
 
     @property
     def amplitude_sum(self) -> float:
@@ -110,6 +110,10 @@ def _series(solution: PlainSolution, shafts: Sequence[ShaftOrders], period: floa
         solution.cosine,
         solution.sine,
     )
+
+
+#: The former name, which `uncertainty` and `correlation` take.
+Fitted = SolvedProblem
 
 
 class Problem:
@@ -148,7 +152,7 @@ class Problem:
         self.design = ([s.cycles_per_turn for s in shafts], [list(s.orders) for s in shafts])
 
     #: Sums of readings too many to keep, of which the runs are some.
-    summed: Summed | None = None
+    summed: SummedReadings | None = None
 
     @property
     def unknowns(self) -> int:
@@ -157,7 +161,7 @@ class Problem:
 
     def solve(
         self, weights: Sequence[Array | None], penalty: float = 0.0, watch: bool = False
-    ) -> Fitted:
+    ) -> SolvedProblem:
         """Least squares under ``weights``, with an optional Tikhonov penalty.
 
         ``penalty`` is relative to the sum of weights, see `trueangle.fitting.ridge.choose_ridge`.
@@ -185,14 +189,16 @@ class Problem:
         if len(rows) < len(self.runs):
             offsets = np.full(len(self.runs), np.nan)
             offsets[used] = solution.offsets
-        return Fitted(solution, offsets, self.shafts, self.period)
+        return SolvedProblem(solution, offsets, self.shafts, self.period)
 
-    def penalised(self, fitted: Fitted, weights: Sequence[Array | None], penalty: float) -> Fitted:
+    def penalised(
+        self, fitted: SolvedProblem, weights: Sequence[Array | None], penalty: float
+    ) -> SolvedProblem:
         """What `solve` gives for the readings of ``fitted`` with a penalty, from its sums alone."""
         solution = fitted.solution.penalised(self._penalties(weights, penalty))
         offsets = fitted.offsets.copy()
         offsets[~np.isnan(offsets)] = solution.offsets
-        return Fitted(solution, offsets, self.shafts, self.period)
+        return SolvedProblem(solution, offsets, self.shafts, self.period)
 
     def _penalties(self, weights: Sequence[Array | None], penalty: float) -> list[float]:
         """Of every coefficient, for one relative to the sum of weights."""
@@ -226,11 +232,11 @@ class Problem:
             found.append(rows.T @ rows)
         return found
 
-    def residuals(self, fitted: Fitted) -> list[Array]:
+    def residuals(self, fitted: SolvedProblem) -> list[Array]:
         """Measured less fitted error of every run, each around its own zero."""
         return [np.concatenate(list(self._blocks(fitted, i))) for i in range(len(self.runs))]
 
-    def scan(self, fitted: Fitted) -> tuple[Array, float]:
+    def scan(self, fitted: SolvedProblem) -> tuple[Array, float]:
         """A sample of the residuals of weight above 0, and a bound of all, from few of them.
 
         The bound is the largest of few readings, else what the solution knows, or infinite.
@@ -244,12 +250,12 @@ class Problem:
         parts = self._each(_core.sample_residuals, fitted, stride)
         return np.concatenate(parts), fitted.solution.residual_bound
 
-    def largest(self, fitted: Fitted) -> float:
+    def largest(self, fitted: SolvedProblem) -> float:
         """The largest of all residuals of weight above 0, signs left away; constant memory."""
         found = self._each(_core.scan_residuals, fitted, self.readings)
         return max(most for _, most in found)
 
-    def _each(self, look: Callable[..., _Look], fitted: Fitted, stride: int) -> list[_Look]:
+    def _each(self, look: Callable[..., _Look], fitted: SolvedProblem, stride: int) -> list[_Look]:
         """What the core sees in the residuals of each run that has a zero."""
         series, constant = fitted.series, fitted.solution.constant
         return [
@@ -258,7 +264,7 @@ class Problem:
             if not math.isnan(offset)
         ]
 
-    def _blocks(self, fitted: Fitted, index: int) -> Iterator[Array]:
+    def _blocks(self, fitted: SolvedProblem, index: int) -> Iterator[Array]:
         """Residuals of one run, piece by piece."""
         run, angles = self.runs[index], self.angles[index]
         offset = fitted.offsets[index] - fitted.solution.constant

@@ -32,7 +32,7 @@ from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 from ..support.distributions import f_tail
 from .correlation import SCATTER
-from .problem import Fitted, Problem
+from .problem import Problem, SolvedProblem
 from .rounding import COUNTED, rounding_variance
 from .uncertainty import CovarianceKind, Uncertainty
 
@@ -61,10 +61,10 @@ class _Repeats(NamedTuple):
     readings: int
 
 
-def beside_repeated(
+def covariance_with_repeats(
     found: Uncertainty,
     problem: Problem,
-    fitted: Fitted,
+    fitted: SolvedProblem,
     weights: Sequence[Array | None],
     penalty: float,
     asked: CovarianceKind,
@@ -112,7 +112,7 @@ def beside_repeated(
 
 def _repeats(
     problem: Problem,
-    fitted: Fitted,
+    fitted: SolvedProblem,
     positions: Positions,
     weights: Sequence[Array | None],
     penalty: float,

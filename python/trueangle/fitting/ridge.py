@@ -1,4 +1,4 @@
-"""The Tikhonov penalty for partial travel, chosen by held-out error, and what it takes.
+"""The Tikhonov penalty for partial travel, chosen by held-out error: its variances and bias.
 
 A ridge answers ``b̂ = (G + λ)⁻¹ X'Wy`` and is off by
 

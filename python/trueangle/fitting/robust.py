@@ -1,4 +1,4 @@
-"""Wild readings: losses of robust fitting, setting readings aside, and where both break down.
+"""Outliers: robust losses, spikes and readings set aside, weights, and where both break down.
 
 A bit flip or a slipped tooth leaves one reading degrees off, and least squares spreads
 it over every coefficient.
@@ -20,10 +20,10 @@ from ..joint.signals import sensor_lattice
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
-from ..support.display_units import brief
+from ..support.display_units import brief_number
 from ..support.quantiles import median, quantile
 from ..support.suggestions import check_choice
-from .problem import Fitted, Problem
+from .problem import Problem, SolvedProblem
 
 Loss: TypeAlias = Literal["auto", "linear", "huber", "tukey"]
 LOSSES: tuple[Loss, ...] = ("auto", "linear", "huber", "tukey")
@@ -81,14 +81,14 @@ _MOST: Final = 0.15
 _BENT: Final = 3.0
 
 
-class Weighted(NamedTuple):
+class RobustFit(NamedTuple):
     """A robust fit: its weights (None where all are as given) and what it ended with.
 
     ``far`` is the share of readings beyond `FAR` robust standard deviations; ``unsettled`` the
     rounds after which weights or outliers still changed, 0 where they settled.
     """
 
-    fitted: Fitted
+    fitted: SolvedProblem
     weights: list[Array] | None
     wild: int
     far: float = 0.0
@@ -100,7 +100,7 @@ def robust_scale(residuals: Array) -> float:
     return MAD_TO_SIGMA * _core.median_magnitude(np.ascontiguousarray(residuals), SAMPLE)
 
 
-def fit_robustly(problem: Problem, loss: Loss, floor: float) -> Weighted:
+def fit_robustly(problem: Problem, loss: Loss, floor: float) -> RobustFit:
     """Fit under a robust loss.
 
     ``"linear"`` keeps the weights given. ``"huber"`` and ``"tukey"`` re-weight until the
@@ -114,7 +114,7 @@ def fit_robustly(problem: Problem, loss: Loss, floor: float) -> Weighted:
     """
     check_choice("loss", loss, LOSSES)
     if loss == "linear":
-        return Weighted(problem.solve(problem.base), None, 0)
+        return RobustFit(problem.solve(problem.base), None, 0)
     if loss == "auto":
         return _set_aside(problem, floor)
     weights, unsettled = _iterate(problem, _huber, problem.base, floor)
@@ -127,19 +127,19 @@ def fit_robustly(problem: Problem, loss: Loss, floor: float) -> Weighted:
     fitted = problem.solve(weights)
     everything = np.concatenate(problem.residuals(fitted))
     far = _share(everything, robust_scale(everything))
-    return Weighted(fitted, weights, wild, far, unsettled)
+    return RobustFit(fitted, weights, wild, far, unsettled)
 
 
-def fit_without_outliers(problem: Problem, outliers: int) -> Weighted:
+def fit_without_outliers(problem: Problem, outliers: int) -> RobustFit:
     """The plain fit of a problem from which so many outliers were set aside before."""
     fitted = problem.solve(problem.base)
     if outliers:
-        return Weighted(fitted, None, outliers, outliers / problem.readings)
+        return RobustFit(fitted, None, outliers, outliers / problem.readings)
     sample, _ = problem.scan(fitted)
-    return Weighted(fitted, None, 0, _share(sample, robust_scale(sample)))
+    return RobustFit(fitted, None, 0, _share(sample, robust_scale(sample)))
 
 
-def unsettled_sentence(weighted: Weighted) -> str:
+def unsettled_weights_sentence(weighted: RobustFit) -> str:
     """That re-weighting was broken off."""
     return (
         f"outliers still changed after {weighted.unsettled} rounds of setting them aside and "
@@ -161,11 +161,11 @@ def _share(residuals: Array, scale: float) -> float:
     return np.count_nonzero(np.abs(residuals) > FAR * scale) / residuals.size
 
 
-def _set_aside(problem: Problem, floor: float) -> Weighted:
+def _set_aside(problem: Problem, floor: float) -> RobustFit:
     fitted = problem.solve(problem.base, watch=True)
     sample, bound = problem.scan(fitted)
     scale = robust_scale(sample)
-    plain = Weighted(fitted, None, 0, _share(sample, scale))
+    plain = RobustFit(fitted, None, 0, _share(sample, scale))
     limit = max(WILD * scale, floor)
     hidden = bound <= limit or problem.largest(fitted) <= limit
     # Many readings far off together widen the scale behind which they hide.
@@ -185,7 +185,7 @@ def _set_aside(problem: Problem, floor: float) -> Weighted:
             for far, b in zip(np.split(wild, edges), problem.base, strict=True)
         ]
         share = np.count_nonzero(wild) / wild.size
-        found = Weighted(problem.solve(weights), weights, int(np.count_nonzero(wild)), share)
+        found = RobustFit(problem.solve(weights), weights, int(np.count_nonzero(wild)), share)
         again = _wild(problem, found.fitted, floor)
         if (again == wild).all():
             break
@@ -226,7 +226,7 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
     return replace(run, weights=np.where(wild, 0.0, _given(run.weights, wild.size)))
 
 
-def _wild(problem: Problem, fitted: Fitted, floor: float) -> NDArray[np.bool_]:
+def _wild(problem: Problem, fitted: SolvedProblem, floor: float) -> NDArray[np.bool_]:
     """Which of all readings, run after run, are wild; those of weight 0 never are."""
     residuals = problem.residuals(fitted)
     everything = np.concatenate(residuals)
@@ -275,7 +275,7 @@ def _tukey(distance: Array) -> Array:
     return np.square(np.maximum(0.0, 1.0 - np.square(distance / TUKEY)))
 
 
-def breakdown_sentence(problem: Problem, weighted: Weighted) -> str:
+def robust_breakdown_sentence(problem: Problem, weighted: RobustFit) -> str:
     """What to tell of a robust fit at the end of its powers; empty where it is not."""
     share, robust = weighted.far, weighted.weights is not None or weighted.wild > 0
     if share <= MANY and not robust:
@@ -296,8 +296,8 @@ def breakdown_sentence(problem: Problem, weighted: Weighted) -> str:
     # A block of readings that the few orders cannot follow widens the scale it is judged by.
     many = ", more than a robust fit holds out against" if robust else ""
     return (
-        f"the residuals are {brief(scale / near)} times what neighbours in angle differ by: the "
-        f"model lacks an effect, or wrong readings stand together{many}; look at the residuals"
+        f"the residuals are {brief_number(scale / near)} times what neighbours in angle differ by: "
+        f"the model lacks an effect, or wrong readings stand together{many}; look at the residuals"
     )
 
 

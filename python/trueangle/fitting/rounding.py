@@ -44,7 +44,7 @@ def rounding_step(runs: Sequence[CalibrationRun], positions: Positions) -> float
     return sensor_lattice(runs, theta)[0] * runs[0].period / ARCSEC_PER_TURN
 
 
-def repeated_variance(step: float, scatter: float) -> float:
+def repeated_rounding_variance(step: float, scatter: float) -> float:
     """Variance of the rounding that repeats at each position, by that of the readings there.
 
     Examples
@@ -68,20 +68,20 @@ def repeated_variance(step: float, scatter: float) -> float:
     return repeated(low)
 
 
-def repeated_over(step: float, repeats: ReadingVariance | None, readings: float) -> float:
+def rounding_over_repeats(step: float, repeats: ReadingVariance | None, readings: float) -> float:
     """``R v(σ)`` of so many readings at each position; 0 without a step or repeated readings."""
     if not step or repeats is None:
         return 0.0
-    return readings * repeated_variance(step, repeats.variance)
+    return readings * repeated_rounding_variance(step, repeats.variance)
 
 
 def rounding_variance(runs: Sequence[CalibrationRun], positions: Positions) -> float:
     """Variance of the rounding that repeats at each of these positions; 0 where none does."""
     from .orders.noise import pure_error
-    from .orders.zerogroups import zero_units
+    from .orders.zerogroups import zero_groups
 
     step = rounding_step(runs, positions)
     if step == 0.0:
         return 0.0
-    units, places = zero_units(runs, True)
-    return repeated_over(step, pure_error(units, positions.of_rows(places)), 1.0)
+    units, places = zero_groups(runs, True)
+    return rounding_over_repeats(step, pure_error(units, positions.of_rows(places)), 1.0)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..support.angles import arcsec, zero_text
-from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, phase_pair, sine_of_rms
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, rounded_phase, sine_of_rms
 from ..support.distributions import student_quantile
 from ..support.layout import laid_out
-from ..support.plainresult import finite
+from ..support.plainresult import finite_or_none
 from .model import FittedCoefficients
 
 
@@ -98,7 +98,7 @@ def _table(fit: FittedCoefficients, shown: ErrorUnit) -> list[str]:
             arcsec(float(model.amplitudes[n]), model.period),
             arcsec(float(amplitude_std[n]), model.period),
         )
-        phase, phase_std_text = phase_pair(
+        phase, phase_std_text = rounded_phase(
             math.degrees(model.phases[n]), math.degrees(phase_std[n])
         )
         lines.append(table.format(shaft.name, shaft.orders[i], size, spread, phase, phase_std_text))
@@ -113,8 +113,8 @@ def plain_fit(found: FittedCoefficients) -> dict[str, Any]:
         "readings": found.readings,
         "missing": found.missing,
         "runs": 0 if record is None else record.runs,
-        "residual_arcsec": finite(arcsec(found.residual_std, period)),
-        "condition_number": finite(found.condition_number),
+        "residual_arcsec": finite_or_none(arcsec(found.residual_std, period)),
+        "condition_number": finite_or_none(found.condition_number),
         "method": found.method,
         "argument": found.model.argument,
         "ridge": found.ridge,
@@ -154,10 +154,10 @@ def _evidence(found: FittedCoefficients) -> list[dict[str, Any]]:
             "shaft": "output",
             "order": row.order,
             "retained": row.retained,
-            "amplitude_arcsec": finite(scale * row.amplitude),
-            "std_arcsec": finite(scale * row.standard_error),
-            "phase_deg": finite(row.phase_deg % 360.0),
-            "holdout_gain": finite(row.holdout_gain),
+            "amplitude_arcsec": finite_or_none(scale * row.amplitude),
+            "std_arcsec": finite_or_none(scale * row.standard_error),
+            "phase_deg": finite_or_none(row.phase_deg % 360.0),
+            "holdout_gain": finite_or_none(row.holdout_gain),
             "reason": row.reason,
         }
         for row in (() if found.selection is None else found.selection.table)
@@ -170,6 +170,6 @@ def _standard_error(found: FittedCoefficients, n: int) -> dict[str, Any]:
         return {"std_arcsec": None, "interval_arcsec": None}
     period = found.model.period
     return {
-        "std_arcsec": finite(arcsec(float(found.amplitude_std[n]), period)),
+        "std_arcsec": finite_or_none(arcsec(float(found.amplitude_std[n]), period)),
         "interval_arcsec": [arcsec(v, period) for v in found.amplitude_interval()[n].tolist()],
     }

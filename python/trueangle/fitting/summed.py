@@ -21,7 +21,7 @@ _WHOLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Summed:
+class SummedReadings:
     """What one pass over readings keeps of them.
 
     Attributes
@@ -51,7 +51,7 @@ class Summed:
 
     def sums(self, orders: Sequence[float]) -> HarmonicSums:
         """Normal equations of orders, run by run, from all readings."""
-        return sums_of_moments(self.moments, orders)
+        return _sums_of_moments(self.moments, orders)
 
     def parts(self, orders: Array, share: float) -> Iterator[NormalEquations]:
         """Normal equations of every run as a share of its readings would have them."""
@@ -71,7 +71,7 @@ class Summed:
         )
 
 
-def sums_of_moments(moments: Moments, orders: Sequence[float]) -> HarmonicSums:
+def _sums_of_moments(moments: Moments, orders: Sequence[float]) -> HarmonicSums:
     """Normal equations of output orders, run by run, each run's mean taken out.
 
     With ``W_m = Σ w e^(imx)``, ``Y_m = Σ w y e^(imx)`` and the mean

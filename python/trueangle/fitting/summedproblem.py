@@ -10,8 +10,8 @@ from ..errors import ArgumentError
 from ..joint.shafts import ShaftOrders
 from ..support.arrays import Array
 from .orders.harmonicsums import HarmonicSums
-from .problem import Fitted, Problem
-from .summed import Summed
+from .problem import Problem, SolvedProblem
+from .summed import SummedReadings
 
 
 class SummedProblem(Problem):
@@ -23,10 +23,10 @@ class SummedProblem(Problem):
         Angles within one turn, of a shaft that comes to another place in every turn.
     """
 
-    summed: Summed
+    summed: SummedReadings
 
     def __init__(
-        self, summed: Summed, shafts: Sequence[ShaftOrders], threads: int | None = None
+        self, summed: SummedReadings, shafts: Sequence[ShaftOrders], threads: int | None = None
     ) -> None:
         super().__init__(summed.runs, shafts, summed.argument, None, threads)
         if any(mine is not given for mine, given in zip(self.runs, summed.runs, strict=True)):
@@ -41,10 +41,10 @@ class SummedProblem(Problem):
 
     def solve(
         self, weights: Sequence[Array | None], penalty: float = 0.0, watch: bool = False
-    ) -> Fitted:
+    ) -> SolvedProblem:
         """Least squares on all readings, whatever the weights of those kept."""
         solution = self.summed.moments.solution(self.shafts)
-        fitted = Fitted(solution, solution.offsets, self.shafts, self.period)
+        fitted = SolvedProblem(solution, solution.offsets, self.shafts, self.period)
         return self.penalised(fitted, weights, penalty) if penalty > 0.0 else fitted
 
     def _weight(self, weights: Sequence[Array | None]) -> float:

@@ -14,12 +14,12 @@ from ..joint.shafts import ShaftOrders
 from ..runs.run import CalibrationRun
 from ..runs.travel import CONDITION, travelled_span
 from ..support.arrays import Array
-from ..support.display_units import brief
+from ..support.display_units import brief_number
 from ..support.distributions import student_quantile
 from .problem import Problem
 
 if TYPE_CHECKING:
-    from .summed import Summed
+    from .summed import SummedReadings
 
 #: Readings looked at, and columns times readings: drawn at random, so that no grid is met.
 _LOOKED_AT: Final = 24_000
@@ -53,7 +53,7 @@ _SHORT: Final = 1.0 / 6.0
 _SURE_LATER: Final = 1.0
 
 
-class RunGains(NamedTuple):
+class _Gains(NamedTuple):
     """What a fit to the other runs does to each.
 
     Attributes
@@ -78,7 +78,7 @@ def check_new_run(
     runs: Sequence[CalibrationRun],
     wanted: Sequence[ShaftOrders],
     argument: str,
-    summed: Summed | None = None,
+    summed: SummedReadings | None = None,
 ) -> None:
     """Raise where orders selected by evidence would not help a further run.
 
@@ -116,8 +116,8 @@ def check_new_run(
     if max(mean, shared) < _ALIKE * shown and mean <= bound * scatter:
         raise NoModelError(
             "no correction can be given: of what the runs show they share "
-            f"{brief(100 * mean / shown)} % (order {listed}), no more than {len(runs)} runs that "
-            "share nothing may by chance; "
+            f"{brief_number(100 * mean / shown)} % (order {listed}), no more than {len(runs)} runs "
+            "that share nothing may by chance; "
             f"{remedy}"
         )
 
@@ -126,8 +126,8 @@ def gains_of_runs(
     runs: Sequence[CalibrationRun],
     orders: Sequence[float],
     argument: str,
-    summed: Summed | None = None,
-) -> RunGains | None:
+    summed: SummedReadings | None = None,
+) -> _Gains | None:
     """Decrease of every run's mean square by a fit to the others, and what noise makes of it.
 
     None where a run alone, or too few readings, cannot say.
@@ -159,7 +159,7 @@ def gains_of_runs(
     alone = np.array([max(0.0, one.squares - _explained(one)) for one in sums])
     shared = float(np.mean((squares - left_out(wholes, _RIDGE)[1]) / sizes))
     noise = float(np.mean(4.0 * alone * power / sizes**3))
-    return RunGains((squares - left) / sizes, noise, float(np.mean(shown)), shared)
+    return _Gains((squares - left) / sizes, noise, float(np.mean(shown)), shared)
 
 
 def _looked_at(
@@ -193,10 +193,10 @@ def _listed(orders: Sequence[float]) -> str:
     return ", ".join(f"{order:g}" for order in orders[:6]) + (" ..." if orders[6:] else "")
 
 
-def check_later_stretch(problem: Problem, weights: Sequence[Array | None]) -> None:
+def check_later_segment(problem: Problem, weights: Sequence[Array | None]) -> None:
     """Raise where orders selected by evidence do not hold from one stretch of a run to the next.
 
-    The mean gain of the stretches (`gains_of_stretches`) must exceed one standard deviation
+    The mean gain of the stretches (`gains_of_segments`) must exceed one standard deviation
     between them. A place passed once says nothing, unless the whole travel is short.
 
     Raises
@@ -204,7 +204,7 @@ def check_later_stretch(problem: Problem, weights: Sequence[Array | None]) -> No
     NoModelError
         What the other stretches say makes them worse, or some of them as much as it helps others.
     """
-    gains = gains_of_stretches(problem, weights)
+    gains = gains_of_segments(problem, weights)
     if gains is None or gains.min() > 0.0 or gains.mean() > _SURE_LATER * gains.std(ddof=1):
         return
     orders = [k * s.cycles_per_turn for s in problem.shafts for k in s.orders]
@@ -218,7 +218,7 @@ def check_later_stretch(problem: Problem, weights: Sequence[Array | None]) -> No
     )
 
 
-def gains_of_stretches(problem: Problem, weights: Sequence[Array | None]) -> Array | None:
+def gains_of_segments(problem: Problem, weights: Sequence[Array | None]) -> Array | None:
     """Decrease of the mean square of each quarter of a run by a fit to the rest of it.
 
     Looked at are readings at places (3 deg) where the rest of the run was as well; all of them

@@ -1,4 +1,4 @@
-"""One calibration of one unit: its coefficients and their covariance, from sums of its runs."""
+"""One calibration of one unit: coefficients of its orders, their covariance, normal equations."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def output_orders(shafts: Sequence[ShaftOrders]) -> Array:
     return np.array([k * shaft.cycles_per_turn for shaft in shafts for k in shaft.orders])
 
 
-def columns_of(angles: Array, orders: Array, period: float) -> Array:
+def order_columns(angles: Array, orders: Array, period: float) -> Array:
     """Cosine and sine of each order in turn, a row an angle."""
     phase = np.outer(angles, orders * (2.0 * math.pi / period))
     found = np.empty((angles.size, 2 * orders.size))
@@ -38,7 +38,7 @@ def normal_matrix(angles: Array, orders: Array, period: float) -> Array:
     """Sums of products of a zero of size 1/sqrt(2) and the columns of each order."""
     found = np.zeros((2 * orders.size + 1, 2 * orders.size + 1))
     for part in _blocks(angles.size):
-        columns = columns_of(angles[part], orders, period)
+        columns = order_columns(angles[part], orders, period)
         columns = np.column_stack([np.full(len(columns), math.sqrt(0.5)), columns])
         found += columns.T @ columns
     return found
@@ -64,12 +64,12 @@ class CalibrationSums:
         share = np.ones(error.size) if run.weights is None else run.weights
         mean = np.zeros(2 * orders.size + 1)
         for part in _blocks(error.size):
-            columns = columns_of(run.reference[part], orders, run.period)
+            columns = order_columns(run.reference[part], orders, run.period)
             mean += share[part] @ np.column_stack([columns, error[part]])
         mean /= max(float(share.sum()), 1e-300)
         products = np.zeros((mean.size, mean.size))
         for part in _blocks(error.size):
-            columns = columns_of(run.reference[part], orders, run.period)
+            columns = order_columns(run.reference[part], orders, run.period)
             centred = np.column_stack([columns, error[part]]) - mean
             centred *= np.sqrt(share[part])[:, None]
             products += centred.T @ centred

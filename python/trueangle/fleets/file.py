@@ -15,14 +15,14 @@ from ..errors import FileError
 from ..fitting.prior import Prior
 from ..joint.shafts import ShaftOrders
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.decoding import Decoder, json_text, read_text
+from ..support.argumentkinds import told_kinds
+from ..support.decoding import Decoder, json_value, read_text
 from ..support.files import RUNS_BYTES
-from ..support.kinds import told_kinds
 from .history import HistoryOrder, HistoryRow
 from .result import BetweenOrder, CommonOrder, Fleet
-from .text import FORMAT, VERSION
 from .tolerance import Tolerance
 from .unit import VERDICTS, FleetUnit, UnitOrder
+from .writing import FORMAT, VERSION
 
 __all__ = ["FORMAT", "load_fleet"]
 
@@ -61,7 +61,7 @@ class _FleetReader(Decoder):
 
     def fleet(self) -> Fleet:
         text = read_text(self.path, RUNS_BYTES, self.kind, "a fleet")
-        content = json_text(self.path, text, self.kind, "a fleet file")
+        content = json_value(self.path, text, self.kind, "a fleet file")
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise self.error(f"'format' must be {FORMAT!r}: this is not a fleet file")
         if content.get("version") != VERSION:

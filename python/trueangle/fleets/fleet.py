@@ -11,7 +11,7 @@ from ..joint.joint import Joint
 from ..joint.shafts import resolve_orders
 from ..runs.files import each_runs
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from ..support.suggestions import check_choice
 from .judgement import judged_fleet
 from .result import Fleet

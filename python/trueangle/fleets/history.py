@@ -1,4 +1,4 @@
-"""Units calibrated again: what moved, whether by a step or slowly, and when the next is due."""
+"""Units calibrated again: what changed, whether by a step or drift, and when the next is due."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..support.arrays import Array
 from ..support.distributions import f_quantile
 from ..support.runlength import chart_limit
 from ..support.times import parsed_time
-from .calibration import Calibration, columns_of
+from .calibration import Calibration, order_columns
 from .charts import ALLOWANCE, LENGTH, charted
-from .outliers import LEVEL, Deviates, deviates, weights_of
+from .outliers import LEVEL, Deviates, deviates, level_by_order
 
 #: Units with a second date from which their changes tell what an ordinary change is.
 _FEWEST: Final = 4
@@ -124,7 +124,7 @@ def changes_of(
     if len(dated) < _FEWEST:
         return []
     values, own, zeros, zero_own = _differences(dated, period)
-    pattern = deviates(values, own, False, 0.5 * LEVEL, weights_of(orders))
+    pattern = deviates(values, own, False, 0.5 * LEVEL, level_by_order(orders))
     # The zero has no mean of its own where every remounting is new: a common one is the fixture's.
     zero = deviates([zeros], [zero_own], aligned=True, level=0.5 * LEVEL)
     limit = f_quantile(1.0 - 0.5 * LEVEL / pattern.chance.size, 2.0, 2.0 * (len(dated) - 1.0)) * 2.0
@@ -250,7 +250,7 @@ def _days(dates: Sequence[str | None]) -> Array:
 
 def drift_bound(change: Array, std: Array, orders: Array, period: float) -> float:
     """That of 95 % of the greatest change over a turn."""
-    places = columns_of(np.linspace(0.0, period, _PLACES, endpoint=False), orders, period)
+    places = order_columns(np.linspace(0.0, period, _PLACES, endpoint=False), orders, period)
     return float((np.abs(places @ change) + _BOUND * np.sqrt(places**2 @ std**2)).max())
 
 

@@ -18,7 +18,7 @@ from .outliers import Deviates
 from .result import BetweenOrder, CommonOrder, Fleet
 from .tolerance import tolerance_of
 from .unit import VERDICTS, FleetUnit, UnitOrder, Verdict
-from .units import FEWEST, SharedPattern, Units, pattern_of
+from .units import FEWEST, SharedPattern, Units, shared_pattern
 
 
 def judged_fleet(
@@ -31,9 +31,9 @@ def judged_fleet(
 ) -> Fleet:
     """Verdicts, and what the fleet is like."""
     n = len(units.last)
-    chosen = pattern_of(units, aligned=False)
+    chosen = shared_pattern(units, aligned=False)
     if n > 2:
-        shared = pattern_of(units, aligned=True)
+        shared = shared_pattern(units, aligned=True)
         both = shared.belong & chosen.belong
         if float((shared.scores - chosen.scores)[both].sum()) > 0.0:
             chosen = shared
@@ -69,7 +69,7 @@ def judged_fleet(
     repeats = _repeatability(units)
     rows = zip(units.orders.tolist(), names, chosen.between, strict=True)
     ranked = sorted(
-        (unit_row(units, u, chosen.deviates, changes, joint) for u in range(n)),
+        (_unit_row(units, u, chosen.deviates, changes, joint) for u in range(n)),
         key=lambda unit: (VERDICTS.index(unit.verdict), unit.p),
     )
     return Fleet(
@@ -131,7 +131,7 @@ def _repeatability(units: Units) -> list[float | None]:
     return [math.sqrt(float(square) / freedom) for square in squares]
 
 
-def unit_row(
+def _unit_row(
     units: Units, u: int, found: Deviates, changes: Mapping[str, Change], joint: Joint
 ) -> FleetUnit:
     """One unit's row."""

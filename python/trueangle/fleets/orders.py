@@ -32,7 +32,7 @@ _LEVEL: Final = 0.01
 _TOLD: Final = 1e-3
 
 
-def candidates(
+def candidate_orders(
     runs: Sequence[CalibrationRun], gear_ratio: float | None, fixed_member: str, shafts: object
 ) -> list[ShaftOrders]:
     """Orders of the output as the readings allow, and the lines that the gear is known to leave."""

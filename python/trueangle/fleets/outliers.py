@@ -63,7 +63,7 @@ class Deviates(NamedTuple):
         return found or [int(np.argmin(rows))]
 
 
-def weights_of(orders: Array) -> Array:
+def level_by_order(orders: Array) -> Array:
     """Shares of the level by order: of damage the most shows in eccentricity, then in tilt.
 
     Examples

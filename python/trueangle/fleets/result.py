@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..fitting.prior import Prior
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted, finite, result_picture
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult, finite_or_none, result_picture
 from .history import HistoryRow
-from .text import save_fleet
 from .tolerance import Tolerance
 from .unit import FleetUnit
+from .writing import save_fleet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -117,7 +117,7 @@ class Fleet(PlainResult):
         """The object that ``trueangle fleet`` prints as JSON; angles in arcsec."""
         scale = arcsec(1.0, self.period)
         tolerance = {
-            key: finite(value) if isinstance(value, float) else value
+            key: finite_or_none(value) if isinstance(value, float) else value
             for key, value in self.tolerance.plain(scale).items()
         }
         return {
@@ -160,7 +160,7 @@ class Fleet(PlainResult):
         errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
             Unit of the errors.
         """
-        return fleet_summary(self, errors_in)
+        return _fleet_summary(self, errors_in)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the fleet as JSON: a prior for further units (`trueangle.load_fleet`).
@@ -197,7 +197,7 @@ class Fleet(PlainResult):
         return f"{counted(self.units, 'unit')}, {odd} not fine, {counted(self.common, 'order')}"
 
 
-def fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
+def _fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
     """See `Fleet.summary`."""
     scale = arcsec(1.0, fleet.period)
     largest = scale * max((unit.peak_to_peak for unit in fleet.units), default=0.0)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..fitting.prior import Prior, fleet_prior
-from ..joint.shafts import counted_orders
+from ..joint.shafts import limited_orders
 from ..planning.arc import COVERAGE
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
@@ -59,7 +59,7 @@ class Spread:
             shaft.cycles_per_turn * order: prior.variance[2 * i : 2 * i + 2] * arcsec**2
             for i, (shaft, order) in enumerate((s, k) for s in prior.shafts for k in s.orders)
         }
-        wanted = tuple(of_order) if orders is None else counted_orders(orders)
+        wanted = tuple(of_order) if orders is None else limited_orders(orders)
         wanted = tuple(float(order) for order in wanted)
         if not wanted or len(set(wanted)) < len(wanted) or min(wanted) <= 0.0:
             raise ArgumentError(f"orders must be positive and each named once, got {wanted!r}")

@@ -14,7 +14,7 @@ from ..runs.follows import check_follows
 from ..runs.run import CalibrationRun
 from ..support.times import local_day
 from .calibration import Calibration, CalibrationSums, output_orders
-from .orders import SAMPLE, candidates, worth_keeping
+from .orders import SAMPLE, candidate_orders, worth_keeping
 
 
 class _Unnamed(NamedTuple):
@@ -118,7 +118,7 @@ class FleetSums:
             together.setdefault(names[unit], []).extend(runs)
         units = list(together.values())[:SAMPLE]
         every = [run for runs in units for run in runs]
-        self.shafts = worth_keeping(units, candidates(every, *self.joint))
+        self.shafts = worth_keeping(units, candidate_orders(every, *self.joint))
         for unit, runs in self._waiting.items():
             for run in runs:
                 self._take(unit, run)

@@ -8,9 +8,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from ..errors import ArgumentError
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, normal_quantile, normal_tail
-from ..support.kinds import told_kinds
 
 #: Nodes of Gauss and Legendre's rule on each of the pieces of an integral.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)

@@ -12,9 +12,9 @@ import numpy as np
 from ..errors import ArgumentError
 from ..planning.arc import check_arc, plan_arc
 from ..planning.tables import place_table, plain_arc_plan
-from ..support.kinds import told_kinds
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted
+from ..support.argumentkinds import told_kinds
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult
 from .spread import MOST, Spread
 
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ..joint.shafts import ShaftOrders
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail
-from .calibration import Calibration, columns_of, output_orders
-from .outliers import Deviates, deviates, weights_of
-from .variance import Between, held_out_score, reml
+from .calibration import Calibration, order_columns, output_orders
+from .outliers import Deviates, deviates, level_by_order
+from .variance import BetweenUnits, held_out_score, reml
 
 #: Units below which none is told to be an outlier: the others are what it is told by.
 FEWEST: Final = 5
@@ -48,7 +48,7 @@ class Units:
         self.own = [np.ascontiguousarray(blocks[:, k]) for k in range(self.orders.size)]
         highest = max(8.0, float(self.orders.max()))
         places = np.linspace(0.0, period, int(_PLACES * highest), endpoint=False)
-        curves = coefficients @ columns_of(places, self.orders, period).T
+        curves = coefficients @ order_columns(places, self.orders, period).T
         self.peak_to_peak = np.ptp(curves, axis=1)
         self.left = np.sqrt([max(one.squares / one.freedom, 0.0) for one, _ in self.last])
 
@@ -63,13 +63,13 @@ class SharedPattern(NamedTuple):
     aligned: bool
     deviates: Deviates
     belong: NDArray[np.bool_]
-    between: list[Between]
+    between: list[BetweenUnits]
     scores: Array
 
 
-def pattern_of(units: Units, aligned: bool) -> SharedPattern:
+def shared_pattern(units: Units, aligned: bool) -> SharedPattern:
     """Outliers, and mean and variance of the others."""
-    found = deviates(units.values, units.own, aligned, shares=weights_of(units.orders))
+    found = deviates(units.values, units.own, aligned, shares=level_by_order(units.orders))
     if len(units.last) < FEWEST:
         found = found._replace(outlying=np.zeros(len(units.last), dtype=bool))
     few = found.outlying.sum() <= max(1.0, FEW * len(units.last))

@@ -17,7 +17,7 @@ _STEPS: Final = 200
 _HALF_MEDIAN: Final = float(np.log(2.0))
 
 
-class Between(NamedTuple):
+class BetweenUnits(NamedTuple):
     """Mean of the units, its covariance, and the variance between units of cosine and sine."""
 
     mean: Array
@@ -37,7 +37,7 @@ def robust_variance(values: Array, own: Array, aligned: bool) -> float:
     return max(float(median(squares)) / (2.0 * _HALF_MEDIAN) - noise, 0.0)
 
 
-def reml(values: Array, own: Array, aligned: bool) -> Between:
+def reml(values: Array, own: Array, aligned: bool) -> BetweenUnits:
     """Mean and variance between units, by restricted maximum likelihood.
 
     ::
@@ -80,7 +80,7 @@ def reml(values: Array, own: Array, aligned: bool) -> Between:
     edge = _score(values, own, aligned, 0.0) if np.linalg.det(own).min() > 0.0 else None
     if edge is not None and edge.likelihood >= best.likelihood:
         tau, best = 0.0, edge
-    return Between(best.mean, best.covariance, tau)
+    return BetweenUnits(best.mean, best.covariance, tau)
 
 
 class _Likelihood(NamedTuple):

@@ -1,4 +1,4 @@
-"""Arrow data: columns as numpy arrays, corrected columns added, checksums of any type."""
+"""Arrow data: names, elements, labels, numpy arrays, corrected columns added, checksums."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def top_names(schema: pa.Schema, names: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(_top(schema, name)[0] for name in names))
 
 
-def taken_column(table: Any, name: str) -> Any:
+def _taken_column(table: Any, name: str) -> Any:
     """A column of a table or record batch, or an element of one of lists.
 
     Raises
@@ -137,9 +137,9 @@ def add_corrected(path: object, table: Any, channels: Sequence[Addition], schema
     """
     columns = list(table.columns)
     for channel in channels:
-        column = taken_column(table, channel.column)
+        column = _taken_column(table, channel.column)
         signals = {
-            signal: arrow_numbers(path, name, taken_column(table, name))
+            signal: arrow_numbers(path, name, _taken_column(table, name))
             for signal, name in channel.signals.items()
         }
         corrected = channel.correct(arrow_numbers(path, channel.column, column), signals)
@@ -258,7 +258,7 @@ def column_batches(path: object, batches: Iterable[Any], wanted: Selection) -> I
     """What is wanted of record batches: numbers as arrays, texts and times asked for as labels."""
     for batch in batches:
         yield {
-            name: _values(path, name, taken_column(batch, name), name in wanted.texts)
+            name: _values(path, name, _taken_column(batch, name), name in wanted.texts)
             for name in wanted.names
         }
 

@@ -1,4 +1,4 @@
-"""What a file holds before it is read, and how much of it may be in memory: one budget for all.
+"""What a file holds before it is read and decoded: extents, sizes, one budget of memory for all.
 
 A packed file says nothing of what it unpacks to: kilobytes stand for gigabytes. It is asked
 before memory is taken, from what the file says of itself, and again while it is read.

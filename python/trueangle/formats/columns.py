@@ -13,10 +13,10 @@ from ..support.roles import (
     BRACKET,
     LABELS,
     TIME_UNITS,
-    Column,
+    RoleColumn,
     Wanted,
+    role_code,
     role_kind,
-    signal_code,
     unit_in_name,
     wanted_unit,
 )
@@ -61,7 +61,7 @@ def signed_name(path: object, header: Sequence[str], name: str) -> tuple[str, bo
     return matching_column(path, header, name[1:] if is_reversed else name), is_reversed
 
 
-def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[str, Column]:
+def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[str, RoleColumn]:
     """The columns of every role that a table has: those asked for, the others by their names.
 
     Raises
@@ -72,7 +72,9 @@ def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[st
     found = {}
     for role, (name, unit) in wanted.items():
         column, is_reversed = signed_name(path, header, name)
-        found[role] = Column(role, column, unit or unit_in_name(column, role), True, is_reversed)
+        found[role] = RoleColumn(
+            role, column, unit or unit_in_name(column, role), True, is_reversed
+        )
     taken = {column.name for column in found.values()}
     heads = {name.partition("_")[0].lower() for name in header if _HEAD.match(name.lower())}
     for role in ("reference", "indicated", "error", *LABELS, *SIGNALS, *sorted(heads)):
@@ -83,8 +85,7 @@ def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[st
         if len(candidates) > 1:
             names = " and ".join(c.name for c in candidates)
             problem = (
-                f"units are mixed: {names}; keep one, or name it with "
-                f"{signal_code(role, unit=None)}"
+                f"units are mixed: {names}; keep one, or name it with {role_code(role, unit=None)}"
             )
             raise FileError(path, problem, line=1, column=candidates[1].name)
         if candidates:
@@ -95,12 +96,12 @@ def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[st
 _HEAD = re.compile(r"head[1-9][0-9]?(_| *[\[(])")
 
 
-def _by_name(header: Sequence[str], role: str) -> list[Column]:
+def _by_name(header: Sequence[str], role: str) -> list[RoleColumn]:
     """Columns whose own name says that they have a role."""
     if role in LABELS:
-        return [Column(role, name, None) for name in header if name == role]
+        return [RoleColumn(role, name, None) for name in header if name == role]
     names = dict(_standard(role))
-    exact = [Column(role, name, names[name]) for name in header if name in names]
+    exact = [RoleColumn(role, name, names[name]) for name in header if name in names]
     if exact:
         # One clock in several units is one clock, and its seconds are taken.
         return exact if role != "time" else [min(exact, key=lambda c: list(names).index(c.name))]
@@ -109,11 +110,11 @@ def _by_name(header: Sequence[str], role: str) -> list[Column]:
     for name in header:
         bracket = BRACKET.match(name)
         if _plain(name) in plain:
-            found.append(Column(role, name, plain[_plain(name)]))
+            found.append(RoleColumn(role, name, plain[_plain(name)]))
         elif bracket is not None and _plain(bracket[1]) == role:
             unit = wanted_unit(bracket[2], role)
             if unit is not None:
-                found.append(Column(role, name, unit))
+                found.append(RoleColumn(role, name, unit))
     return found
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from .._core import thread_count
 from ..errors import FileError
 from .csvheader import LONGEST_LINE, Header
-from .csvrows import BLOCK, QuotedBlock, quoted_blocks, too_long
+from .csvrows import BLOCK, QuotedBlock, line_too_long, quoted_blocks
 from .format import Addition, Batch, Contents, CopyTask, Selection, refuse_corrected
 from .messages import warn_of_messages
 
@@ -165,7 +165,7 @@ def _blocks(file: IO[bytes], header: Header, small: bool = False) -> Iterator[_B
             cut = len(data)
         data, held = data[:cut], data[cut:]
         if len(held) > LONGEST_LINE:
-            raise too_long(header, line)
+            raise line_too_long(header, line)
         if data:
             block = plain_block(data, header, line)
             yield block or QuotedBlock.whole(data, header, line)

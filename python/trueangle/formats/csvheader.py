@@ -1,4 +1,4 @@
-"""What stands before the readings of a text file: preamble, names, units, and its dialect."""
+"""What stands before the readings of a text file: preamble, names, units; how its cells are cut."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Header:
         self.names = self._named(cells, lines[first + 1 : data] if first >= 0 else [])
         self.trailing = self._trailing(lines[data : data + 1])
         self._all_numbers = data < len(lines) and all(
-            number(cell, self.decimal) is not None for cell in self._cells(lines[data].text)
+            cell_number(cell, self.decimal) is not None for cell in self._cells(lines[data].text)
         )
         file.seek(sum(len(line) for line in self.head))
 
@@ -110,7 +110,7 @@ class Header:
         """
         if len(cells) == len(self.names) and (self.place >= 0 or not self._all_numbers):
             return False
-        return all(number(cell.strip(), self.decimal) is None for cell in cells) and any(cells)
+        return all(cell_number(cell.strip(), self.decimal) is None for cell in cells) and any(cells)
 
     def with_names(self, added: Sequence[str]) -> bytes:
         """The lines before the readings with further names."""
@@ -191,10 +191,10 @@ class Header:
                     return self._scope(lines, before, width, i), begin
                 units = i
             return units, begin  # names that look like units are names where nothing else is
-        if len(plain) > 1 and number(lines[plain[1]].text.strip(), ",") is not None:
-            is_bare = number(lines[first].text.strip(), ",") is not None
+        if len(plain) > 1 and cell_number(lines[plain[1]].text.strip(), ",") is not None:
+            is_bare = cell_number(lines[first].text.strip(), ",") is not None
             return (-1, first) if is_bare else (first, self._after_units(lines, first))
-        if len(plain) == 1 and number(lines[first].text.strip(), ",") is not None:
+        if len(plain) == 1 and cell_number(lines[first].text.strip(), ",") is not None:
             return -1, first
         return first, self._after_units(lines, first)
 
@@ -238,7 +238,7 @@ class Header:
         def is_words(cells: list[str], width: int) -> bool:
             blanks = delimiter == " "  # which tell nothing of how many cells were meant
             return (blanks or len(cells) != width) and not any(
-                number(cell, decimal) is not None for cell in cells
+                cell_number(cell, decimal) is not None for cell in cells
             )
 
         good = [len(cells) > 1 and _are_readings(cells, decimal) for _i, cells in looked_at]
@@ -348,7 +348,7 @@ def is_comment(text: str) -> bool:
     return start.startswith("#") or (start.startswith("EOF") and start.rstrip() == "EOF")
 
 
-def number(cell: str, decimal: str) -> float | None:
+def cell_number(cell: str, decimal: str) -> float | None:
     """The number that a cell holds, or None: no underscores, digits of ASCII only."""
     pattern = _POINT if decimal == "." else _COMMA
     if pattern.fullmatch(cell):
@@ -362,13 +362,13 @@ def number(cell: str, decimal: str) -> float | None:
 
 def _are_readings(cells: Sequence[str], decimal: str) -> bool:
     filled = [cell for cell in cells if cell]
-    count = sum(number(cell, decimal) is not None for cell in filled)
+    count = sum(cell_number(cell, decimal) is not None for cell in filled)
     return count > 0 and 2 * count >= len(filled)
 
 
 def _kind(cell: str, decimal: str) -> bool | None:
     """Whether a cell holds a number; None for an empty one."""
-    return number(cell, decimal) is not None if cell else None
+    return cell_number(cell, decimal) is not None if cell else None
 
 
 def _split(data: bytes) -> list[bytes]:

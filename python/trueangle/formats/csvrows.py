@@ -1,4 +1,4 @@
-"""Rows of CSV text with the lines they came from, cut by the standard library."""
+"""Rows of CSV text in quoted blocks with the lines they came from, by the standard library."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .csvheader import LONGEST_LINE, Header, cut_rows, is_comment, number
+from .csvheader import LONGEST_LINE, Header, cell_number, cut_rows, is_comment
 from .format import Labels, row_labels
 
 #: Numbers in lines, all without an exponent.
@@ -73,7 +73,7 @@ class QuotedBlock:
         for i, cell in enumerate(cells):
             if not cell:
                 continue
-            value = number(cell, self.header.decimal)
+            value = cell_number(cell, self.header.decimal)
             if value is None:
                 raise self._refused(i, name, f"a number is needed, got {_shown(cell)}")
             if strict and not np.isfinite(value):
@@ -131,7 +131,7 @@ def _shown(cell: str) -> str:
     return repr(cell) if len(cell) <= 60 else f"{cell[:50]!r} ... of {len(cell)} characters"
 
 
-def too_long(header: Header, line: int) -> FileError:
+def line_too_long(header: Header, line: int) -> FileError:
     """The error of a line that memory must not follow."""
     return FileError(
         header.path, f"is longer than {LONGEST_LINE >> 20} MiB; is this a table?", line=line
@@ -204,7 +204,7 @@ def _lines(data: bytes, file: IO[bytes], header: Header, line: int) -> Iterator[
                 yield parts[-1]
             return
         if len(parts[-1]) > LONGEST_LINE:
-            raise too_long(header, line)
+            raise line_too_long(header, line)
         data = parts[-1] + data
 
 

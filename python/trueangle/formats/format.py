@@ -1,4 +1,4 @@
-"""What a format is: how its files are told, read and copied with columns added."""
+"""What a format is: how its files are told, selected and read, copied with columns and a note."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ..errors import FileError, MessageLinesWarning
-from .csvheader import number
+from .csvheader import cell_number
 from .format import Batch, Contents, CopyTask, Selection, row_labels
 
 #: Degrees a second by which the sky turns.
@@ -215,7 +215,7 @@ def _frame(
 
     def value(name: str, needed: bool = False) -> float:
         cell = given.get(name, "").strip()
-        found = number(cell, ".") if cell else (None if needed else math.nan)
+        found = cell_number(cell, ".") if cell else (None if needed else math.nan)
         if found is None:
             raise FileError(path, f"a number is needed, got {cell[:60]!r}", line=line, column=name)
         return found

@@ -23,7 +23,7 @@ from .checksum import Checksum
 from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, check_lengths, note
 from .hdf5filters import check_filters
-from .hdf5places import Places
+from .hdf5places import Hdf5Places
 from .stored import ROWS
 
 #: Readings taken together: what is read of them stays in the cache of the processor.
@@ -85,7 +85,7 @@ def read(path: Path, wanted: Selection) -> Iterator[Batch]:
         size = next(iter(sets.values())).size if sets else 0
         stretch: RowRange | None = wanted.stretch
         rows = range(size) if stretch is None else stretch.rows(size, sets.values())
-        found = {name: Places.of(data, rows) for name, data in sets.items()}
+        found = {name: Hdf5Places.of(data, rows) for name, data in sets.items()}
         places = {name: data for name, data in found.items() if data is not None}
         if len(places) == len(sets):
             with path.open("rb", buffering=0) as raw:

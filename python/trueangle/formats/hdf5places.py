@@ -19,7 +19,7 @@ from .stored import stored_values
 _LEAST_CHUNK = 1 << 13
 
 
-class Places(NamedTuple):
+class Hdf5Places(NamedTuple):
     """Where the values of a data set lie in the file, which stores them as they are."""
 
     dtype: np.dtype[Any]
@@ -29,7 +29,7 @@ class Places(NamedTuple):
     first: int
 
     @classmethod
-    def of(cls, data: h5py.Dataset, rows: range) -> Places | None:
+    def of(cls, data: h5py.Dataset, rows: range) -> Hdf5Places | None:
         """Those of some rows; None where HDF5 has to look at them.
 
         It has where they are packed, converted, filled in, in other files, in small chunks or

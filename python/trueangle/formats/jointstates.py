@@ -117,7 +117,7 @@ class _LayoutGroup(NamedTuple):
         return part.view(f"{self.layout.order}f8")
 
 
-class Block:
+class JointStateBlock:
     """Some messages one after the other.
 
     Messages are bytes each, or an array of one a row; of ROS 1, else CDR of ROS 2.

@@ -168,7 +168,7 @@ class BagReader(Reader):  # type: ignore[misc]
     }
 
 
-class ChunkWriter(McapWriter):  # type: ignore[misc]
+class _ChunkWriter(McapWriter):  # type: ignore[misc]
     """The MCAP storage of rosbags, with messages written in one step."""
 
     chunk: Any
@@ -254,18 +254,18 @@ def _text(text: str) -> bytes:
 
 
 class ChunkedBagWriter(Writer):  # type: ignore[misc]
-    """The writer of rosbags for bags of ROS 2, with `ChunkWriter`."""
+    """The writer of rosbags for bags of ROS 2, with `_ChunkWriter`."""
 
     STORAGE_PLUGINS: ClassVar[Any] = {
         **Writer.STORAGE_PLUGINS,
-        StoragePlugin.MCAP: ChunkWriter,
+        StoragePlugin.MCAP: _ChunkWriter,
     }
 
     @property
     def write_message(self) -> Callable[[Any, int, bytes], None]:
         """The shortest way to write one: connection, time, data."""
         is_plain = self.compression_mode != CompressionMode.MESSAGE
-        if is_plain and isinstance(self.storage, ChunkWriter):
+        if is_plain and isinstance(self.storage, _ChunkWriter):
             return cast("Callable[[Any, int, bytes], None]", self.storage.write)
         return cast("Callable[[Any, int, bytes], None]", self.write)
 
@@ -275,7 +275,7 @@ class ChunkedBagWriter(Writer):  # type: ignore[misc]
 
     def close(self) -> None:
         """Count what was written by the short way, and close."""
-        if isinstance(self.storage, ChunkWriter):
+        if isinstance(self.storage, _ChunkWriter):
             self.storage.close_chunk()
             self.counts = dict(self.storage.channel_stats)
             self.min_timestamp = self.storage.message_start_time

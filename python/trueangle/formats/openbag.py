@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from ..errors import FileError
 from .damage import damage_told
-from .jointstates import Block
+from .jointstates import JointStateBlock
 from .mcapchunks import BagReader, ChunkReader
 from .mcaprows import RecordRows
 from .rosbagmarks import JOINT_STATE, bag_custom_data, corrected_entries
@@ -53,7 +53,7 @@ class MessageGroup(NamedTuple):
     rows: RecordRows
 
 
-class Bag:
+class OpenBag:
     """An open bag and where its joint states are.
 
     Only the JointState type is needed: its wire format is the same in all releases of ROS 1
@@ -121,11 +121,11 @@ class Bag:
         if block:
             yield block
 
-    def states(self, block: list[Any] | MessageGroup) -> Block:
+    def states(self, block: list[Any] | MessageGroup) -> JointStateBlock:
         """Joint states of a block."""
         if isinstance(block, MessageGroup):
-            return Block(block.rows.messages, self.is_ros1)
-        return Block([data for _connection, _time, data in block], self.is_ros1)
+            return JointStateBlock(block.rows.messages, self.is_ros1)
+        return JointStateBlock([data for _connection, _time, data in block], self.is_ros1)
 
     def columns(self, connections: Sequence[Any]) -> list[str]:
         """Joints of the first messages, with their signals."""
@@ -135,13 +135,13 @@ class Bag:
 
 
 @contextmanager
-def opened_bag(path: Path) -> Iterator[Bag]:
+def opened_bag(path: Path) -> Iterator[OpenBag]:
     """The bag, its errors told with its name."""
     with (
         damage_told(path, "a bag"),
         _Bag1(path) if path.suffix == ".bag" else BagReader(path) as bag,
     ):
-        yield Bag(path, bag)
+        yield OpenBag(path, bag)
 
 
 def _chunked(reader: Any) -> Iterator[ChunkReader]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from .budget import FileExtent
 from .format import Addition, Batch, Contents, CopyTask, Selection
-from .jointstates import Block
+from .jointstates import JointStateBlock
 from .mcaprows import RecordRows
 from .openbag import BLOCK, FIELDS, TIME, MessageGroup, opened_bag
 from .rosbagmarks import made_note, refuse_again
@@ -97,7 +97,7 @@ def copy(task: CopyTask) -> Contents:
                     task.watch(len(rows) if connection.id in outputs else 0, done / total)
                     continue
                 places = [i for i, message in enumerate(block) if message[0].id in outputs]
-                states = Block([block[i][2] for i in places], bag.is_ros1)
+                states = JointStateBlock([block[i][2] for i in places], bag.is_ros1)
                 positions = _corrected(states, channels, joints)
                 changed = dict(zip(places, states.with_positions(positions), strict=True))
                 for i, (connection, time, data) in enumerate(block):
@@ -164,7 +164,7 @@ class _Digest:
         )
 
 
-def _values(states: Block, name: str, joints: Collection[str]) -> NDArray[np.float64]:
+def _values(states: JointStateBlock, name: str, joints: Collection[str]) -> NDArray[np.float64]:
     """A joint's positions, or its velocity or effort; NaN in messages without it."""
     if name == TIME and TIME not in joints:
         return states.times()
@@ -175,7 +175,7 @@ def _values(states: Block, name: str, joints: Collection[str]) -> NDArray[np.flo
 
 
 def _corrected(
-    states: Block, channels: Sequence[Addition], joints: Collection[str]
+    states: JointStateBlock, channels: Sequence[Addition], joints: Collection[str]
 ) -> dict[str, NDArray[np.float64]]:
     """Corrected positions of the joints."""
     positions = {}

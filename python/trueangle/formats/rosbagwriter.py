@@ -16,14 +16,14 @@ from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
 from ..errors import FileError
 from .mcapchunks import ChunkedBagWriter as Writer
 from .mcapchunks import ChunkReader
-from .openbag import Bag
+from .openbag import OpenBag
 from .rosbagmarks import KEY, caller_note
 
 
 class BagWriter:
     """A bag being written beside the one read."""
 
-    def __init__(self, bag: Bag, writer: Any, note: str) -> None:
+    def __init__(self, bag: OpenBag, writer: Any, note: str) -> None:
         self._bag = bag
         self._writer = writer
         self._note = note
@@ -75,7 +75,7 @@ class BagWriter:
 
 
 @contextmanager
-def opened_writer(bag: Bag, target: Path, note: str) -> Iterator[BagWriter]:
+def opened_writer(bag: OpenBag, target: Path, note: str) -> Iterator[BagWriter]:
     """A writer of the kind of ``bag``; ``note`` says where the corrected topic is from."""
     if bag.is_ros1:
         with _ros1(bag, target) as writer:
@@ -103,7 +103,7 @@ def opened_writer(bag: Bag, target: Path, note: str) -> Iterator[BagWriter]:
         os.replace(made, target)
 
 
-def _ros1(bag: Bag, target: Path) -> Any:
+def _ros1(bag: OpenBag, target: Path) -> Any:
     writer = Writer1(target)
     for compression in Writer1.CompressionFormat:
         if compression.name.lower() in bag.reader.codecs:

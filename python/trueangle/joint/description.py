@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ..errors import ArgumentError, FileError
-from ..support.decoding import Decoder, read_text, shown
+from ..support.decoding import Decoder, read_text, shown_value
 from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
 from ..support.roles import role_kind
 from ..support.suggestions import did_you_mean
@@ -201,7 +201,7 @@ class _DescriptionReader(Decoder):
 
     def named(self, value: Any, key: str) -> Mapping[str, Any]:
         if not isinstance(value, Mapping):
-            raise self.error(f"a table is needed, got {shown(value)}", key)
+            raise self.error(f"a table is needed, got {shown_value(value)}", key)
         return value
 
 

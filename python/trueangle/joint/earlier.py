@@ -9,7 +9,7 @@ import numpy as np
 from .signals import Signals
 
 
-def earlier(signals: Signals, delay_s: float) -> Signals:
+def earlier_signals(signals: Signals, delay_s: float) -> Signals:
     """The signals with angle, direction and speed of a time ``τ`` before each reading.
 
     ::

@@ -1,4 +1,4 @@
-"""Known lines of a joint: which physical cause an order may have."""
+"""Known lines of a joint: explanations of an order by its gear, harmonics and shafts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
 from ..errors import ArgumentError
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from ..support.suggestions import check_choice
 from .members import FIXED_MEMBERS
 

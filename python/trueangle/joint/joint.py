@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import ArgumentError
-from ..support.kinds import all_of_type, told_kinds
+from ..support.argumentkinds import all_of_type, told_kinds
 from ..support.suggestions import check_choice
 from .declared import Bearing, DeclaredShaft, Head
 from .members import FIXED_MEMBERS

@@ -1,4 +1,4 @@
-"""Periodic part of the error: lines and the pattern they add up to."""
+"""Harmonics, their lines and the pattern they add up to; the joint with its pattern."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..errors import ArgumentError
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.kinds import told_kinds
 from .joint import Joint
 
 ARCSEC_PER_RAD = 1_296_000.0 / (2.0 * math.pi)
@@ -155,7 +155,7 @@ class Pattern:
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class JointPattern:
     """What an effect may depend on beyond the readings: the joint and its pattern."""
 
     joint: Joint

@@ -10,8 +10,8 @@ from typing import Final, NamedTuple, TypeVar
 import numpy as np
 
 from ..errors import ArgumentError
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .members import FIXED_MEMBERS
 
@@ -20,7 +20,7 @@ __all__ = [
     "MOST_ORDERS",
     "Shaft",
     "ShaftOrders",
-    "counted_orders",
+    "limited_orders",
     "resolve_orders",
     "shaft_cycles",
 ]
@@ -117,7 +117,7 @@ def shaft_cycles(
     return cycles
 
 
-def counted_orders(orders: Iterable[T], what: str = "orders") -> list[T]:
+def limited_orders(orders: Iterable[T], what: str = "orders") -> list[T]:
     """Orders as a list, at most `MOST_ORDERS` of them; more are refused before they are made.
 
     Examples
@@ -164,7 +164,7 @@ def resolve_orders(
                 f"how fast shaft {name!r} turns is not known: give `gear_ratio=`, or its "
                 f"cycles per output turn as `shafts={{{name!r}: CYCLES}}`"
             )
-        checked = {_order(k, name) for k in counted_orders(asked, f"orders of shaft {name!r}")}
+        checked = {_order(k, name) for k in limited_orders(asked, f"orders of shaft {name!r}")}
         if checked:
             wanted.append(ShaftOrders(name, float(cycles[name]), tuple(sorted(checked))))
     return wanted

@@ -1,4 +1,4 @@
-"""What happened at every reading: angle, direction, travel, speed, load, temperature."""
+"""Signals of runs, joined: angle, direction, travel, speed, load, temperature of every reading."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array, distinct
 from ..support.quantiles import median
-from ..support.signals import coupled_with
+from ..support.signals import coupled_joint
 from .grid import (
     UniformGrid,
     finer_step,
@@ -313,7 +313,7 @@ def _coupled(runs: Sequence[CalibrationRun]) -> dict[str, Array]:
             [np.unwrap(run.signals[name], period=run.period) * (360.0 / run.period) for run in runs]
         )
         for name in runs[0].signals
-        if (joint := coupled_with(name)) and all(name in run.signals for run in runs)
+        if (joint := coupled_joint(name)) and all(name in run.signals for run in runs)
     }
 
 

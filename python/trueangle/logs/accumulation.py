@@ -27,16 +27,16 @@ from ..formats.format import Format as LogFormat
 from ..formats.format import Labels, Selection, row_labels
 from ..formats.formats import find_format
 from ..model.model import Argument, HarmonicModel
-from ..runs.angles import Angles, find_angles
+from ..runs.angles import RunAngles, find_run_angles
 from ..runs.facets import Facets
 from ..runs.follows import check_follows
+from ..runs.paths import unit_of_path
 from ..runs.run import CalibrationRun
-from ..runs.source import unit_of_path
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.files import partition_keys
 from ..support.times import local_day
-from .keeping import SAMPLE, Kept
+from .keeping import SAMPLE, KeptReadings
 
 #: Roles whose columns tell runs apart.
 LABELS = ("unit", "run")
@@ -98,7 +98,7 @@ class OutlierLimits:
 
 
 @dataclass
-class Tally:
+class RunTally:
     """What is counted of a run.
 
     Attributes
@@ -116,7 +116,7 @@ class Tally:
     high: float = -math.inf
     outliers: list[int] = field(default_factory=list)
 
-    def add(self, other: Tally) -> None:
+    def add(self, other: RunTally) -> None:
         """The next readings of the run."""
         self.outliers += [self.rows + row for row in other.outliers]
         self.rows += other.rows
@@ -142,12 +142,12 @@ class Accumulated:
     """
 
     moments: Moments
-    kept: Kept
+    kept: KeptReadings
     files: tuple[str, ...] = ()
     sha256: tuple[str, ...] = ()
     rows: int = 0
     missing: int = 0
-    tallies: dict[Hashable, Tally] = field(default_factory=dict)
+    tallies: dict[Hashable, RunTally] = field(default_factory=dict)
 
     def add(self, other: Accumulated) -> Accumulated:
         """Itself with the next stretch of the same log, or the next log, taken in."""
@@ -156,7 +156,7 @@ class Accumulated:
         self.rows += other.rows
         self.missing += other.missing
         for run, tally in other.tallies.items():
-            self.tallies.setdefault(run, Tally()).add(tally)
+            self.tallies.setdefault(run, RunTally()).add(tally)
         return self
 
 
@@ -168,7 +168,7 @@ class _LogPart(NamedTuple):
     part: Any
     number: int
     size: float
-    angles: Angles
+    angles: RunAngles
     labels: Mapping[str, str]
     unit: str | None
 
@@ -218,7 +218,7 @@ def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_LogPart]:
     kind = find_format(path)
     header = kind.module.columns(path, settings.topic)
     roles = find_columns(path, header, settings.signals)
-    angles = find_angles(
+    angles = find_run_angles(
         path,
         header,
         roles,
@@ -241,7 +241,7 @@ def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -
     is_first = stretch.number == 0
     found = Accumulated(
         Moments(settings.orders, period=period, shafts=settings.shafts),
-        Kept(settings.kept, settings.part),
+        KeptReadings(settings.kept, settings.part),
         (str(path),),
         (_sha256(path) if settings.checksums and is_first else "",),
     )
@@ -268,7 +268,7 @@ def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -
                 x = np.ascontiguousarray(true[block][rows], dtype=np.float64)
                 y = np.ascontiguousarray(said[block][rows], dtype=np.float64)
                 found.rows += x.size
-                tally = found.tallies.setdefault(run, Tally())
+                tally = found.tallies.setdefault(run, RunTally())
                 if settings.outliers is not None and run in settings.outliers.zeros:
                     y = _without(settings.outliers, run, x, y, argument, tally)
                 known = found.moments.update_known(x, y, argument=argument, run=run)
@@ -298,7 +298,7 @@ def _days(column: Any) -> Any:
 
 
 def _without(
-    outliers: OutlierLimits, run: Hashable, x: Array, y: Array, argument: Argument, tally: Tally
+    outliers: OutlierLimits, run: Hashable, x: Array, y: Array, argument: Argument, tally: RunTally
 ) -> Array:
     """The readings with NaN for the outliers, which are noted."""
     known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))

@@ -12,9 +12,9 @@ from typing import Any
 
 from ..errors import TrueAngleError, UnitWarning
 from ..model.model import HarmonicModel
+from ..support.argumentkinds import told_kinds
 from ..support.files import remove_leftovers
-from ..support.kinds import told_kinds
-from .correction import Task, correct_log, is_disk_full, states_after
+from .correction import CorrectionTask, correct_log, is_disk_full, states_after
 from .joints import JointState, LogSettings, logged_joints
 from .manifest import Manifest, stamp
 from .progress import Progress
@@ -165,7 +165,7 @@ def _one_by_one(
     for place, log in zip(found, logs, strict=True):
         if not done_before(place, log, settings, manifests):
             shown.start_file(log.size)
-            task = Task(place.source, place.target, settings, before, place.manifest)
+            task = CorrectionTask(place.source, place.target, settings, before, place.manifest)
             try:
                 log.result = correct_log(task, shown.advance)
                 log.status = "done"

@@ -12,7 +12,7 @@ from ..errors import ArgumentError, FileError, MissingExtraError, TrueAngleError
 from ..runs.files import read_runs
 from ..runs.run import CalibrationRun
 from .accumulation import Accumulated, LogFitSettings, log_moments, merged_moments
-from .correction import Task, correct_log, count_turns, is_disk_full, states_after
+from .correction import CorrectionTask, correct_log, count_turns, is_disk_full, states_after
 from .joints import JointState, LogSettings
 from .manifest import Manifest
 from .progress import Progress
@@ -134,7 +134,9 @@ def _submitted(
         # Not resolved: links are followed where files are written, and the manifest's names stay.
         manifest = None if place.manifest is None else place.manifest.absolute()
         begin = begins.get(place.source)
-        task = Task(place.source.absolute(), place.target.absolute(), settings, begin, manifest)
+        task = CorrectionTask(
+            place.source.absolute(), place.target.absolute(), settings, begin, manifest
+        )
         before = client.submit(
             _correct, task, before if settings.follows_travel else None, pure=False
         )
@@ -149,7 +151,7 @@ class _LogOutcome(NamedTuple):
     error: Exception | None = None
 
 
-def _correct(task: Task, before: _LogOutcome | None) -> _LogOutcome:
+def _correct(task: CorrectionTask, before: _LogOutcome | None) -> _LogOutcome:
     """On a worker. A log that a lost worker had finished is not done twice."""
     if before is not None:
         task = replace(task, before=states_after(before.result))
@@ -161,7 +163,7 @@ def _correct(task: Task, before: _LogOutcome | None) -> _LogOutcome:
         return _LogOutcome({}, error) if known is None else _LogOutcome(known)
 
 
-def _known(task: Task) -> dict[str, Any] | None:
+def _known(task: CorrectionTask) -> dict[str, Any] | None:
     if task.manifest is None:
         return None
     manifest = Manifest(task.manifest)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..errors import FileError
 from ..formats.columns import find_columns, listed_columns, signed_name
 from ..support.angles import UNIT_PERIODS, unit_name
-from ..support.roles import ANGLE_UNITS, Column, unit_in_name
+from ..support.roles import ANGLE_UNITS, RoleColumn, unit_in_name
 from ..support.signals import SIGNALS
 from ..support.suggestions import check_choice, did_you_mean
 
@@ -95,7 +95,7 @@ def find_joint_signal(
     signal: str,
     joint: str | None,
     column: tuple[str, str | None] | None,
-) -> Column | None:
+) -> RoleColumn | None:
     """The column of ``signal`` (velocity, temperature, ...) of ``joint``, or None.
 
     Without ``column`` it is ``JOINT_velocity_deg_s``, ``velocity_deg_s_JOINT`` or
@@ -104,14 +104,14 @@ def find_joint_signal(
     if column is not None:
         name, is_reversed = signed_name(path, header, column[0])
         unit = column[1] or unit_in_name(name, signal)
-        return Column(signal, name, unit, True, is_reversed)
+        return RoleColumn(signal, name, unit, True, is_reversed)
     patterns = (
         ["{}"] if joint is None else [f"{joint}_{{}}", f"{{}}_{joint}", f"{joint}/{{}}", "{}"]
     )
     for pattern in patterns:
         for ending in SIGNAL_COLUMNS.get(signal, (signal,)):
             if pattern.format(ending) in header:
-                return Column(signal, pattern.format(ending), unit_in_name(ending, signal))
+                return RoleColumn(signal, pattern.format(ending), unit_in_name(ending, signal))
     return find_columns(path, header, {}).get(signal) if joint is None else None
 
 

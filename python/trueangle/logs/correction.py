@@ -17,7 +17,7 @@ from ..formats.format import CopyTask, Selection, Watch
 from ..formats.formats import find_format
 from ..support.files import publish
 from ..support.files.workplace import PARTIAL, workplace
-from .joints import Channel, JointState, LogSettings
+from .joints import JointChannel, JointState, LogSettings
 from .manifest import Manifest, stamp
 from .turns import TurnCounter, TurnSpan
 
@@ -26,7 +26,7 @@ _OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @dataclass(frozen=True)
-class Task:
+class CorrectionTask:
     """One log to correct: can be sent to another process.
 
     ``before`` tells, by joint, where the log before stopped; ``manifest`` is the folder
@@ -40,14 +40,14 @@ class Task:
     manifest: Path | None = None
 
 
-def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str, Any]:
+def correct_log(task: CorrectionTask, watch: Watch = lambda rows, part: None) -> dict[str, Any]:
     """Correct one log; its output is complete and verified, or not there.
 
     Returns
     -------
     dict
         ``rows`` (readings of a joint), ``seconds``, ``rows_per_second``, ``joints`` (see
-        `Channel.summary`) and ``after``, the joints' states to pass on to the log that
+        `JointChannel.summary`) and ``after``, the joints' states to pass on to the log that
         follows.
 
     Raises
@@ -62,9 +62,9 @@ def correct_log(task: Task, watch: Watch = lambda rows, part: None) -> dict[str,
     kind = find_format(source)
     module = kind.module
     before = stamp(source)
-    channels: list[Channel] = []
+    channels: list[JointChannel] = []
 
-    def choose(header: Any) -> list[Channel]:
+    def choose(header: Any) -> list[JointChannel]:
         channels.extend(settings.channels(source, header, task.before, kind.unit))
         return channels
 

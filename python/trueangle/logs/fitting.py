@@ -10,21 +10,21 @@ from typing import Any, TypeAlias
 from ..errors import ArgumentError, FileError, NoModelError
 from ..fitting.argument import AnyArgument
 from ..fitting.fit import fit, fitted_to
-from ..fitting.orders.choice import selected_of
+from ..fitting.orders.choice import selected_orders
 from ..fitting.orders.select import OrderSelection, select_orders
 from ..fitting.result import FitResult
 from ..fitting.robust import without_spikes
-from ..fitting.summed import Summed
+from ..fitting.summed import SummedReadings
 from ..fitting.uncertainty import CovarianceKind, check_covariance
 from ..joint.shafts import resolve_orders
 from ..runs.files import read_runs
 from ..runs.follows import check_follows
 from ..runs.paths import find_logs
 from ..runs.run import CalibrationRun
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from .keeping import KEPT
 from .passes import Passes
-from .sources import hold_at_most
+from .sources import logs_hold_at_most
 
 _Logs: TypeAlias = str | PathLike[str] | Iterable[str | PathLike[str]]
 
@@ -140,7 +140,7 @@ def fit_logs(
         "facets": facets,
     }
     paths = [path for path, _name in find_logs(_listed(logs))]
-    if hold_at_most(paths, KEPT, topic):
+    if logs_hold_at_most(paths, KEPT, topic):
         runs = _runs_of(paths, files, scheduler)
         return fit(runs, orders, threads=threads, **options)  # type: ignore[arg-type]
     asked = (
@@ -150,7 +150,7 @@ def fit_logs(
     )
     passes = Passes(paths, asked, joint, files, threads, checksums, scheduler, progress, KEPT)
 
-    def fitted(summed: Summed) -> FitResult:
+    def fitted(summed: SummedReadings) -> FitResult:
         return fitted_to(summed.runs, orders, summed=summed, threads=threads, **options)  # type: ignore[arg-type]
 
     return fitted(passes.first(argument)) if loss == "linear" else passes.settled(argument, fitted)
@@ -173,12 +173,12 @@ def select_log_orders(
     joint = {"gear_ratio": gear_ratio, "fixed_member": fixed_member, "shafts": shafts}
     options = {**joint, "argument": argument, "covariance": covariance}
     paths = [path for path, _name in find_logs(_listed(logs))]
-    if hold_at_most(paths, KEPT, files.get("topic")):
+    if logs_hold_at_most(paths, KEPT, files.get("topic")):
         runs = [without_spikes(run) for run in _runs_of(paths, files, scheduler)]
         return select_orders(runs, **options)  # type: ignore[arg-type]
     passes = Passes(paths, None, joint, files, threads, False, scheduler, progress, KEPT)
 
-    def fitted(summed: Summed) -> FitResult:
+    def fitted(summed: SummedReadings) -> FitResult:
         return fitted_to(summed.runs, None, loss="auto", summed=summed, **options)  # type: ignore[arg-type]
 
     try:
@@ -187,7 +187,7 @@ def select_log_orders(
     except NoModelError:
         summed = passes.last
         runs = [without_spikes(run) for run in summed.runs]
-        found = selected_of(runs, **options, summed=summed)  # type: ignore[arg-type]
+        found = selected_orders(runs, **options, summed=summed)  # type: ignore[arg-type]
     return found.with_notes((*found.notes, passes.last.note))
 
 

@@ -1,4 +1,4 @@
-"""Correcting data in memory or in a stream: arrays, tables and frames of any library."""
+"""`correct`: data in memory or in a stream, as arrays, tables and frames of any library."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError, MissingExtraError
 from ..model.model import HarmonicModel
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from ..support.labelled import take_apart
-from .joints import Channel, JointState, LogSettings, logged_joints
+from .joints import JointChannel, JointState, LogSettings, logged_joints
 
 _DATA = "data"
 
@@ -304,7 +304,7 @@ def _block(block: Any, settings: LogSettings, state: Any = None) -> Any:
     return _array_channel(settings, state).correct(block)
 
 
-def _array_channel(settings: LogSettings, state: Any = None) -> Channel:
+def _array_channel(settings: LogSettings, state: Any = None) -> JointChannel:
     """Bare angles are those of the one joint, in the model's unit."""
     from ..support.angles import unit_name
     from .columns import AngleColumn
@@ -313,7 +313,7 @@ def _array_channel(settings: LogSettings, state: Any = None) -> Channel:
         raise ArgumentError("an array holds one joint: give one model")
     (joint,) = settings.joints
     angle = AngleColumn("", unit_name(joint.model.period), joint.model.period, "")
-    return Channel(joint, angle, {}, JointState(state) if state else JointState(), settings)
+    return JointChannel(joint, angle, {}, JointState(state) if state else JointState(), settings)
 
 
 _OUT_OF_ORDER = (

@@ -22,7 +22,7 @@ from ..model.model import HarmonicModel
 from ..model.robot import Robot
 from ..model.robotfile import is_robot_file, load_robot
 from ..support.files import sha256_of
-from ..support.roles import Column, signal_code, wanted_columns
+from ..support.roles import RoleColumn, role_code, wanted_columns
 from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_joint_signal
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
@@ -105,7 +105,7 @@ class LogSettings:
         header: Sequence[str],
         before: Mapping[str, JointState] | None = None,
         unit: str | None = None,
-    ) -> list[Channel]:
+    ) -> list[JointChannel]:
         """One channel per joint for a log with the columns ``header``.
 
         ``before`` tells by joint how the log before ended; ``unit`` is that of the log's
@@ -116,7 +116,7 @@ class LogSettings:
         FileError
             A joint has no angle among the columns, or two have the same.
         """
-        found: list[Channel] = []
+        found: list[JointChannel] = []
         taken = list(header)
         for joint in self.joints:
             angle = find_angle_column(
@@ -131,7 +131,7 @@ class LogSettings:
             taken.append(angle.corrected)
             state = (before or {}).get(joint.name or "", JointState())
             found.append(
-                Channel(joint, angle, joint_signal_columns(path, header, joint), state, self)
+                JointChannel(joint, angle, _signal_columns(path, header, joint), state, self)
             )
         return found
 
@@ -160,7 +160,7 @@ class LogSettings:
         return self.counts_turns or self.follows_travel
 
 
-def joint_signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict[str, Column]:
+def _signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict[str, RoleColumn]:
     """Columns of the signals that the joint's model uses; time stands in for velocity.
 
     Raises
@@ -169,7 +169,7 @@ def joint_signal_columns(path: object, header: Sequence[str], joint: LogJoint) -
         Names the column of a signal that the model cannot do without.
     """
     model = joint.model
-    found: dict[str, Column] = {}
+    found: dict[str, RoleColumn] = {}
     for signal in (*model.uses_signals, *(["time"] if "velocity" in model.uses_signals else [])):
         if signal == "time" and "velocity" in found:
             continue
@@ -186,7 +186,7 @@ def joint_signal_columns(path: object, header: Sequence[str], joint: LogJoint) -
                 raise FileError(
                     path,
                     f"no column {columns}: the model's term '{term.kind}' needs {signal}; "
-                    f"name its column with {signal_code(signal, unit=None)}",
+                    f"name its column with {role_code(signal, unit=None)}",
                     line=1,
                 )
     return found
@@ -208,7 +208,7 @@ class JointState(NamedTuple):
         return cls(TurnState(*turns), tuple(travel))
 
 
-class Channel:
+class JointChannel:
     """The indicated angle of one joint in one log, corrected batch after batch.
 
     Batches must come in the order of the rows: turns are counted over their borders where
@@ -220,7 +220,7 @@ class Channel:
         self,
         joint: LogJoint,
         angle: AngleColumn,
-        signals: Mapping[str, Column],
+        signals: Mapping[str, RoleColumn],
         before: JointState,
         settings: LogSettings,
     ) -> None:
@@ -326,7 +326,7 @@ class Channel:
         }
 
 
-def _with_unit(column: Column, angle_unit: str) -> Column:
+def _with_unit(column: RoleColumn, angle_unit: str) -> RoleColumn:
     """A velocity whose column does not state a unit has that of the angle, per second."""
     if column.role == "velocity" and column.unit is None:
         return column._replace(unit=f"{angle_unit}/s")

@@ -21,7 +21,7 @@ _BLOCK: Final = 256
 
 
 @dataclass
-class Kept:
+class KeptReadings:
     """Blocks of the readings of every run, at random, in their order.
 
     A block is kept by a number that its place in the log makes: which ones are left does not
@@ -48,14 +48,14 @@ class Kept:
                 self.readings += int(np.count_nonzero(known))
         self._thin()
 
-    def add(self, other: Kept) -> None:
+    def add(self, other: KeptReadings) -> None:
         """The blocks of the next segment, or log."""
         self.part = min(self.part, other.part)
         for run, blocks in other.blocks.items():
             self.blocks.setdefault(run, []).extend(blocks)
         self.readings += other.readings
 
-    def thinned(self, most: int) -> Kept:
+    def thinned(self, most: int) -> KeptReadings:
         """The same with at most so many readings."""
         self.most = most
         self._thin()

@@ -16,18 +16,18 @@ from ..estimation.moments import Moments
 from ..fitting.argument import AnyArgument, choose_argument
 from ..fitting.fit import ROUNDING, fit
 from ..fitting.orders.candidates import HIGHEST_FREE_ORDER, HIGHEST_SCANNED, SHAFT_HARMONICS
-from ..fitting.problem import Fitted
+from ..fitting.problem import SolvedProblem
 from ..fitting.result import FitResult
 from ..fitting.robust import FAR, HIDDEN, MANY, WILD, WILD_SHARE, robust_scale
-from ..fitting.summed import Summed
+from ..fitting.summed import SummedReadings
 from ..joint.gear import gear_orders
 from ..joint.shafts import Shaft, ShaftOrders, shaft_cycles
 from ..model.model import Argument, HarmonicModel
 from ..runs.files import Conversion
 from ..runs.run import CalibrationRun
-from ..runs.source import checked_reading
+from ..runs.source import checked_reading_options
 from ..support.angles import wrap
-from ..support.files import Source, partition_name
+from ..support.files import InputFile, partition_name
 from ..support.roles import wanted_columns
 from .accumulation import (
     Accumulated,
@@ -84,21 +84,23 @@ class Passes:
             signals=wanted_columns(files.get("signals")),
             topic=files.get("topic"),
             unit_from=files.get("unit_from"),
-            facets=Conversion.of(checked_reading(files)).facets,
+            facets=Conversion.of(checked_reading_options(files)).facets,
             threads=threads,
             checksums=checksums,
             kept=max(min(most, SAMPLE) // len(paths), 1),
             part=min(1.0, SAMPLE / most),
         )
 
-    def first(self, argument: AnyArgument) -> Summed:
+    def first(self, argument: AnyArgument) -> SummedReadings:
         """All readings, at the angle that the error is a function of."""
         given: Argument = "indicated" if argument == "indicated" else "reference"
         found = self._pass(given)
         chosen = choose_argument(found.runs, argument, self.asked).argument
         return found if chosen == given else self._pass(chosen)
 
-    def settled(self, argument: AnyArgument, fitted: Callable[[Summed], FitResult]) -> FitResult:
+    def settled(
+        self, argument: AnyArgument, fitted: Callable[[SummedReadings], FitResult]
+    ) -> FitResult:
         """The fit of all readings but the outliers, which `weigh` would set aside as well."""
         plain = _Judged(self.first(argument), fitted)
         start = plain.start()
@@ -118,7 +120,7 @@ class Passes:
             return plain.answer()  # what the model lacks does not go away with some readings
         return judged.answer()
 
-    def _pass(self, argument: Argument, outliers: OutlierLimits | None = None) -> Summed:
+    def _pass(self, argument: Argument, outliers: OutlierLimits | None = None) -> SummedReadings:
         settings = replace(self.settings, argument=argument, outliers=outliers)
         found = _accumulated(self.paths, settings, self.scheduler, self.progress)
         self.last = _summed(found, argument)
@@ -128,7 +130,9 @@ class Passes:
 class _Judged:
     """The fit of what a pass found, and how far its readings are off."""
 
-    def __init__(self, summed: Summed, fitted: Callable[[Summed], FitResult]) -> None:
+    def __init__(
+        self, summed: SummedReadings, fitted: Callable[[SummedReadings], FitResult]
+    ) -> None:
         self.summed, self._fitted = summed, fitted
         self.result: FitResult | None = None
         self.scale, self.is_hidden = 0.0, True
@@ -177,14 +181,14 @@ class _Judged:
         self.scale = self.scale or math.inf
         return self.outliers(rough.fitted, robust_scale(rough.residuals))
 
-    def outliers(self, fitted: Fitted, scale: float | None = None) -> OutlierLimits:
+    def outliers(self, fitted: SolvedProblem, scale: float | None = None) -> OutlierLimits:
         """Readings that are outliers to a fit of these runs."""
         limit = max(WILD * (self.scale if scale is None else scale), ROUNDING * fitted.period)
         zeros = dict(zip(self.summed.moments.runs, fitted.offsets.tolist(), strict=True))
         return OutlierLimits(_model(fitted), zeros, limit)
 
 
-def _model(fitted: Fitted) -> HarmonicModel:
+def _model(fitted: SolvedProblem) -> HarmonicModel:
     """The series of a fit without its zero."""
     solution = fitted.solution
     pairs = zip(fitted.shafts, solution.cosine, solution.sine, strict=True)
@@ -215,11 +219,11 @@ def _table(cycles: Mapping[str, float], joint: Mapping[str, Any], logs: int) -> 
     return dict.fromkeys(cycles, (1,)) | {"output": (1, math.ceil(most / _REACH))}
 
 
-def _summed(found: Accumulated, argument: Argument) -> Summed:
+def _summed(found: Accumulated, argument: Argument) -> SummedReadings:
     """What a pass found, its runs named as they are in memory."""
     moments, tallies = found.moments, found.tallies
     sources = {
-        file: Source(partition_name(file), sha256)
+        file: InputFile(partition_name(file), sha256)
         for file, sha256 in zip(found.files, found.sha256, strict=True)
     }
     runs, outliers, ends = [], [], []
@@ -236,7 +240,7 @@ def _summed(found: Accumulated, argument: Argument) -> Summed:
         )
         outliers += [(label or str(i), row) for row in tallies[run].outliers]
         ends.append(moments.extremes(run)[:, :2].ravel())
-    return Summed(
+    return SummedReadings(
         moments,
         tuple(runs),
         np.concatenate(ends),

@@ -1,4 +1,4 @@
-"""How many rows logs hold, and where each output goes."""
+"""Logs before they are read: how many rows they hold, and where each output goes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class LogTarget(NamedTuple):
     manifest: Path | None
 
 
-def hold_at_most(paths: Iterable[Path], most: int, topic: str | None = None) -> bool:
+def logs_hold_at_most(paths: Iterable[Path], most: int, topic: str | None = None) -> bool:
     """Whether logs hold at most so many rows, by what they say of themselves."""
     for path in paths:
         if not path.is_dir() and path.stat().st_size > RUNS_BYTES:

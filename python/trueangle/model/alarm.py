@@ -1,11 +1,11 @@
-"""What a window of a watched joint said, and what an alarm is about."""
+"""Windows of a watched joint: what each said of every order, and what an alarm is about."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-from ..support.plainresult import Shown, finite
+from ..support.plainresult import ShownResult, finite_or_none
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class WatchedOrder:
 
 
 @dataclass(frozen=True)
-class WatchedWindow(Shown):
+class WatchedWindow(ShownResult):
     """One window of readings.
 
     Attributes
@@ -55,7 +55,7 @@ class WatchedWindow(Shown):
         return {
             "window": self.window,
             "angle": self.angle,
-            "time_s": None if self.time is None else finite(self.time),
+            "time_s": None if self.time is None else finite_or_none(self.time),
             "orders": [
                 {
                     "order": row.order,

@@ -13,11 +13,11 @@ from ..errors import FileError
 from ..formats.columns import find_columns
 from ..formats.format import Labels, Selection
 from ..formats.formats import find_format
-from ..runs.angles import Angles, find_angles
+from ..runs.angles import RunAngles, find_run_angles
 from ..runs.files import Conversion
-from ..runs.source import Reading, checked_reading
+from ..runs.source import ReadingOptions, checked_reading_options
 from ..support.arrays import Array
-from ..support.roles import Column, wanted_columns
+from ..support.roles import RoleColumn, wanted_columns
 from .model import HarmonicModel
 
 
@@ -29,7 +29,9 @@ class ReadingBatch(NamedTuple):
     time: Array | None
 
 
-def read_batches(path: Path, model: HarmonicModel, reading: Reading) -> Iterator[ReadingBatch]:
+def read_batches(
+    path: Path, model: HarmonicModel, reading: ReadingOptions
+) -> Iterator[ReadingBatch]:
     """Batches of a log of any format, in constant memory.
 
     Raises
@@ -38,7 +40,7 @@ def read_batches(path: Path, model: HarmonicModel, reading: Reading) -> Iterator
         A column is missing or holds no numbers, or the file is damaged.
     """
     kind = find_format(path)
-    given = Conversion.of(checked_reading(reading))
+    given = Conversion.of(checked_reading_options(reading))
     topic = reading.get("topic")
     with kind.at_header(path):
         header = kind.module.columns(path, topic)
@@ -55,7 +57,7 @@ def _numbers(path: Path, name: str, values: Array | Labels) -> Array:
 
 
 def read_lines(
-    lines: IO[str], model: HarmonicModel, reading: Reading, most: int = 256
+    lines: IO[str], model: HarmonicModel, reading: ReadingOptions, most: int = 256
 ) -> Iterator[ReadingBatch]:
     """Batches of a table of text that arrives line by line, the first line naming its columns.
 
@@ -73,7 +75,7 @@ def read_lines(
     delimiter = next((mark for mark in ",;\t" if mark in first), ",")
     header = next(csv.reader([first], delimiter=delimiter))
     columns = _WatchedColumns.of(
-        path, header, reading, Conversion.of(checked_reading(reading)), None
+        path, header, reading, Conversion.of(checked_reading_options(reading)), None
     )
     waiting: dict[int, list[str]] = {}
     for number, line in enumerate(lines, 2):
@@ -107,15 +109,20 @@ def _cells(path: Path, header: list[str], rows: dict[int, list[str]]) -> Any:
 class _WatchedColumns(NamedTuple):
     """Where a log has its angles and times."""
 
-    angles: Angles
-    time: Column | None
+    angles: RunAngles
+    time: RoleColumn | None
 
     @classmethod
     def of(
-        cls, path: Path, header: list[str], reading: Reading, given: Conversion, unit: str | None
+        cls,
+        path: Path,
+        header: list[str],
+        reading: ReadingOptions,
+        given: Conversion,
+        unit: str | None,
     ) -> _WatchedColumns:
         roles = find_columns(path, header, wanted_columns(reading.get("signals")))
-        angles = find_angles(
+        angles = find_run_angles(
             path,
             header,
             roles,

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import ArgumentError
 from ..support.angles import wrap
 from ..support.arrays import Array
-from ..support.signals import GivenSignals, check_names
+from ..support.signals import GivenSignals, check_signal_names
 from .errormodel import ErrorModel
 from .step import Step
 
 
-class Velocity:
+class _Velocity:
     """Backward differences of angle over time, carried over batches.
 
     Examples
@@ -111,7 +111,7 @@ class Corrector:
     def __init__(self, model: ErrorModel) -> None:
         self._model = model
         self._core = model._core_corrector()
-        self._velocity = Velocity(model.period)
+        self._velocity = _Velocity(model.period)
 
     @property
     def step(self) -> Step:
@@ -187,7 +187,7 @@ class Corrector:
         ArgumentError
             Shapes that do not fit.
         """
-        check_names(signals)
+        check_signal_names(signals)
         if (
             time is not None
             and signals.get("velocity") is None

@@ -15,8 +15,8 @@ import trueangle._core as _core
 from ..errors import ArgumentError
 from ..joint.shafts import Shaft
 from ..support.angles import check_period
+from ..support.argumentkinds import all_of_type
 from ..support.arrays import Array
-from ..support.kinds import all_of_type
 from ..support.signals import AT_RUN_TIME
 from .evaluation import Evaluation, SpanGuard
 from .records import FitRecord, Provenance

@@ -1,4 +1,4 @@
-"""A model evaluated: its error at an angle, the angle behind an indicated one."""
+"""A model evaluated: its error at an angle, the angle behind an indicated one, its span guarded."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import OutsideSpanWarning
-from ..support.plainresult import Shown
-from ..support.signals import GivenSignals, check_names
+from ..support.plainresult import ShownResult
+from ..support.signals import GivenSignals, check_signal_names
 
 if TYPE_CHECKING:
     import trueangle._core as _core
@@ -23,7 +23,7 @@ Path: TypeAlias = Literal["table", "cubics", "exact", "direct", "counts"]
 Stretch: TypeAlias = tuple[float, float, bool]
 
 
-class Evaluation(Shown):
+class Evaluation(ShownResult):
     """What a model's series and terms amount to at given angles."""
 
     if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class Evaluation(Shown):
         ``path="table"`` computes it in double precision and rounds once.
         """
         if signals:
-            check_names(signals)
+            check_signal_names(signals)
         if self.terms:
             return self._core_corrector().error(theta, out, threads=threads, path=path, **signals)
         return self._series.error(theta, out, threads, path)
@@ -158,7 +158,7 @@ class Evaluation(Shown):
             angle lies outside that part.
         """
         if signals:
-            check_names(signals)
+            check_signal_names(signals)
         stretch = self._warn.stretch
         if self.terms:
             corrected, outside = self._core_corrector().correct(

@@ -12,23 +12,30 @@ import numpy as np
 
 from ..errors import ArgumentError, FileError, ModelFileError, OutsideSpanWarning
 from ..joint.shafts import Shaft
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.decoding import MAX_LINE_ORDERS, MAX_LINES, MAX_ORDER, json_text, read_text, shown
+from ..support.decoding import (
+    MAX_LINE_ORDERS,
+    MAX_LINES,
+    MAX_ORDER,
+    json_value,
+    read_text,
+    shown_value,
+)
 from ..support.files import MODEL_BYTES
-from ..support.kinds import told_kinds
-from ..support.plainresult import counted
+from ..support.layout import counted
 from .model import HarmonicModel
 from .records import MAX_TERMS, MOST_TURNS, RecordReader
 from .term import Term
-from .text import FORMAT, ROBOT_FORMAT, VERSION, save_model
+from .writing import FORMAT, ROBOT_FORMAT, VERSION, save_model
 
 __all__ = [
     "FORMAT",
     "VERSION",
-    "content_of",
     "embedded_model",
     "load_model",
-    "part_of",
+    "model_file_content",
+    "model_of_part",
     "save_model",
 ]
 
@@ -77,10 +84,10 @@ def load_model(path: str | PathLike[str]) -> HarmonicModel:
 def embedded_model(text: str, path: str | PathLike[str]) -> HarmonicModel:
     """Model of the text of a model file that stands in another file; raises as `load_model`."""
     file = Path(path)
-    return part_of(file, json_text(file, text, ModelFileError, "a model file"), "")
+    return model_of_part(file, json_value(file, text, ModelFileError, "a model file"), "")
 
 
-def content_of(path: Path, wanted: str) -> dict[str, Any]:
+def model_file_content(path: Path, wanted: str) -> dict[str, Any]:
     """The object of a file of the format that is wanted and of a version that is known."""
     reader = _ModelReader(path, ModelFileError)
     content = reader.content(wanted)
@@ -88,7 +95,7 @@ def content_of(path: Path, wanted: str) -> dict[str, Any]:
     return content
 
 
-def part_of(path: Path, value: Any, prefix: str) -> HarmonicModel:
+def model_of_part(path: Path, value: Any, prefix: str) -> HarmonicModel:
     """The model that a part of a file is; ``prefix`` stands before its keys in messages."""
     reader = _ModelReader(path, ModelFileError)
     reader.prefix = prefix
@@ -107,7 +114,7 @@ class _ModelReader(RecordReader):
     def content(self, wanted: str) -> dict[str, Any]:
         """The file's object, of the format that is wanted."""
         text = read_text(self.path, MODEL_BYTES, self.kind, "a model")
-        return self.of_format(json_text(self.path, text, self.kind, "a model file"), wanted)
+        return self.of_format(json_value(self.path, text, self.kind, "a model file"), wanted)
 
     def of_format(self, value: Any, wanted: str) -> dict[str, Any]:
         """The object, where it is of the format that is wanted; names the other's reader."""
@@ -143,7 +150,7 @@ class _ModelReader(RecordReader):
         argument = content["argument"]
         if argument not in ("reference", "indicated"):
             raise self.error(
-                f"must be 'reference' or 'indicated', got {shown(argument)}", "argument"
+                f"must be 'reference' or 'indicated', got {shown_value(argument)}", "argument"
             )
         condition = content.get("condition_number")
         period = self.number(content["period"], "period")
@@ -290,11 +297,11 @@ class _ModelReader(RecordReader):
         for i, entry in enumerate(self.items(value, "terms", "terms", MAX_TERMS)):
             where = f"terms[{i}]"
             if not isinstance(entry, dict):
-                raise self.error(f"an object is needed, got {shown(entry)}", where)
+                raise self.error(f"an object is needed, got {shown_value(entry)}", where)
             kind = entry.get("kind")
             if not isinstance(kind, str) or kind not in TERMS:
                 raise self.error(
-                    f"{shown(kind)} is unknown; the kinds are {', '.join(TERMS)}; "
+                    f"{shown_value(kind)} is unknown; the kinds are {', '.join(TERMS)}; "
                     "a later trueangle may know it",
                     f"{where}.kind",
                 )

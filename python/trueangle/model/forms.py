@@ -1,4 +1,4 @@
-"""The forms that the compiled core corrects by; terms are made of them.
+"""Forms that the compiled core corrects by: play, friction, lag, filter, scaled, spring, bump.
 
 They have no physical names: a term says what it stands for and which forms it takes.
 Angles are in the unit of the model's period; lines are ``(order, cosine, sine)`` with the

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from os import PathLike
@@ -10,18 +11,27 @@ from typing import TYPE_CHECKING, Any
 import trueangle._core as _core
 
 from ..errors import ArgumentError
-from ..support.kinds import of_type, told_kinds
+from ..support.angles import arcsec, unit_name
+from ..support.argumentkinds import of_type, told_kinds
+from ..support.display_units import error_unit, sine_of_rms
+from ..support.layout import counted, laid_out, wrapped_lines
 from ..support.plainresult import result_picture
 from .corrector import Corrector
 from .errormodel import Argument, ErrorModel
-from .step import ExchangeableStep, Step, exchangeable
-from .text import model_summary, one_line, save_model
+from .step import ExchangeableStep, Step, exchangeable_step
 from .validity import check_invertible
+from .writing import save_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["Argument", "HarmonicModel", "Step", "check_invertible"]
+
+#: Lines that a summary lists before it says how many more there are.
+_LISTED = 40
+
+#: Names that one line lists, and their letters.
+_NAMED, _LETTERS = 4, 24
 
 
 @told_kinds
@@ -110,7 +120,9 @@ class HarmonicModel(ErrorModel):
         90.0
         """
         core = self._prepared()
-        step: ExchangeableStep[HarmonicModel] = exchangeable(core.step, partial(_swap, core, self))
+        step: ExchangeableStep[HarmonicModel] = exchangeable_step(
+            core.step, partial(_swap, core, self)
+        )
         return step
 
     def _prepared(self) -> Any:
@@ -120,11 +132,11 @@ class HarmonicModel(ErrorModel):
     # -- description --------------------------------------------------------------
 
     def __repr__(self) -> str:
-        return one_line(self)
+        return _line(self)
 
     def summary(self) -> str:
         """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
-        return model_summary(self)
+        return _summary(self)
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """The error over the angle with its 95 % band (`trueangle.plots.model_error`).
@@ -172,3 +184,51 @@ def _swap(core: Any, first: HarmonicModel, model: HarmonicModel) -> None:
         has = "terms, and the step none" if model.terms else "no terms, and the step some"
         raise ArgumentError(f"swap: model has {has}: take its own compensator()")
     core.swap(model._core_corrector() if model.terms else model._series)
+
+
+def _line(model: ErrorModel) -> str:
+    """What the model is, in one line of a screen."""
+    lines = len(model.orders)
+    parts = [
+        f"{lines} {'order' if lines == 1 else 'orders'}"
+        + (f" of {_names([shaft.name for shaft in model.shafts])}" if model.shafts else ""),
+        f"period {model.period:g}",
+        f"argument {model.argument}",
+    ]
+    if model.terms:
+        parts.append(f"with {_names([term.kind for term in model.terms])}")
+    return f"<HarmonicModel: {', '.join(parts)}>"
+
+
+def _summary(model: ErrorModel) -> str:
+    """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
+    period, unit = model.period, unit_name(model.period)
+    rms = math.sqrt(0.5 * float(model.amplitudes @ model.amplitudes))
+    shown = error_unit("auto", sine_of_rms(arcsec(rms, period)))
+    lines = [
+        *wrapped_lines(_line(model)[1:-1], 2),
+        f"constant {model.constant:.6g} {unit}, {arcsec(model.constant, period):.6g} arcsec",
+        f"{'shaft':16s} {'order':>10s} {f'amplitude, {shown.name}':>18s} {'phase, deg':>11s}",
+    ]
+    rows = [
+        f"{shaft.name:16.16s} {k:10d} {shown.number(arcsec(c, period)):>18} "
+        f"{math.degrees(p) % 360.0:11.2f}"
+        for shaft in model.shafts
+        for k, c, p in zip(shaft.orders, shaft.amplitudes, shaft.phases, strict=True)
+    ]
+    lines += rows[:_LISTED]
+    if len(rows) > _LISTED:
+        lines.append(f"... and {len(rows) - _LISTED} more")
+    if model.fit is not None:
+        start, stop = model.fit.span
+        lines.append(
+            f"fitted to {counted(model.fit.samples, 'reading')} of "
+            f"{counted(model.fit.runs, 'run')} "
+            f"between {start:.6g} and {stop:.6g} {unit}"
+        )
+    return laid_out(lines)
+
+
+def _names(names: list[str]) -> str:
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return ", ".join(name[:_LETTERS] for name in names[:_NAMED]) + more

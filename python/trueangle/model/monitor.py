@@ -14,9 +14,11 @@ import trueangle._core as _core
 from ..errors import ArgumentError
 from ..joint.joint import Joint
 from ..support.angles import arcsec
-from ..support.kinds import of_type, told_kinds
-from ..support.plainresult import Shown, counted
-from ..support.runlength import chart_limit, rare
+from ..support.argumentkinds import of_type, told_kinds
+from ..support.distributions import two_sided_quantile
+from ..support.layout import counted
+from ..support.plainresult import ShownResult
+from ..support.runlength import chart_limit
 from .alarm import WatchedOrder, WatchedWindow
 from .model import HarmonicModel
 
@@ -33,7 +35,7 @@ HIGHEST: Final = 4096
 
 
 @told_kinds
-class Monitor(Shown):
+class Monitor(ShownResult):
     """Watches the error of a running joint in constant memory.
 
     Errors are known where a second encoder, an index pulse or a reference switch gives some. Each
@@ -111,7 +113,7 @@ class Monitor(Shown):
         charts = _MARGIN * (2 * len(orders) + 1)  # that of the zero's steps included
         allowance = 0.5 * self.shift
         self.limit = chart_limit(allowance, self.run_length * charts)
-        step = rare(1.0 / (self.run_length * charts))
+        step = two_sided_quantile(1.0 / (self.run_length * charts))
         known = [0.0] * (2 * len(orders))
         if model.covariance is not None:
             known = _variances(model, orders)

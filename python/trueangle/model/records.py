@@ -1,12 +1,12 @@
-"""What a model file says of its making: the fit and where its readings came from, also as read."""
+"""What a model file says of its making: the record of the fit, its provenance, also as read."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..support.decoding import Decoder, shown
-from ..support.files import Source
+from ..support.decoding import Decoder, shown_value
+from ..support.files import InputFile
 
 #: Ends of a span are within so many turns.
 MOST_TURNS = 1e9
@@ -70,7 +70,7 @@ class FitRecord:
 class Provenance:
     """Where a model came from: its input files with their sha256, and the package."""
 
-    inputs: tuple[Source, ...] = ()
+    inputs: tuple[InputFile, ...] = ()
     package: str = ""
 
 
@@ -90,7 +90,7 @@ class RecordReader(Decoder):
                 checked[key] = self.text(entry, name)
             elif key == "calibrated_without_reference":
                 if not isinstance(entry, bool):
-                    raise self.error(f"true or false is needed, got {shown(entry)}", name)
+                    raise self.error(f"true or false is needed, got {shown_value(entry)}", name)
                 checked[key] = entry
             elif key == "blind":
                 texts = self.items(entry, name, "texts", _MOST_SENTENCES)
@@ -126,7 +126,7 @@ class RecordReader(Decoder):
         """A signal and its least and greatest value."""
         found = self.items(value, key, "a name and two numbers", 3)
         if len(found) != 3:
-            raise self.error(f"a name and two numbers are needed, got {shown(found)}", key)
+            raise self.error(f"a name and two numbers are needed, got {shown_value(found)}", key)
         low, high = (self.number(end, key) for end in found[1:])
         return self.text(found[0], key), low, high
 
@@ -141,5 +141,5 @@ class RecordReader(Decoder):
             where = f"provenance.inputs[{i}]"
             source = self.table(entry, {"file": True, "sha256": True}, where)
             texts = (self.text(source[key], f"{where}.{key}") for key in ("file", "sha256"))
-            inputs.append(Source(*texts))
+            inputs.append(InputFile(*texts))
         return Provenance(tuple(inputs), self.text(table["package"], "provenance.package"))

@@ -14,21 +14,21 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..errors import ArgumentError, KindError, MissingSignalError
 from ..support.angles import arcsec, unit_name
-from ..support.kinds import of_type, told_kinds
-from ..support.layout import laid_out
-from ..support.plainresult import Shown, counted
+from ..support.argumentkinds import of_type, told_kinds
+from ..support.layout import counted, laid_out
+from ..support.plainresult import ShownResult
 from ..support.roles import wanted_columns
-from ..support.signals import GivenSignals, check_names, coupled_with
+from ..support.signals import GivenSignals, check_signal_names, coupled_joint
 from .model import HarmonicModel
-from .step import AllJoints, exchangeable
-from .text import save_robot
+from .step import JointsStep, exchangeable_step
+from .writing import save_robot
 
 #: Columns of a log by role, each with its unit where its name does not tell it.
 Columns: TypeAlias = Mapping[str, tuple[str, str | None]]
 
 
 @told_kinds
-class Robot(Shown, Mapping[str, HarmonicModel]):
+class Robot(ShownResult, Mapping[str, HarmonicModel]):
     """The correction models of a robot's joints, by name, corrected in one call.
 
     ::
@@ -138,7 +138,7 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         -----
         Costs what a call of `HarmonicModel.correct` for every column costs.
         """
-        check_names(signals)
+        check_signal_names(signals)
         given = np.asarray(positions)
         if given.ndim not in (1, 2) or given.shape[-1] != len(self):
             raise ArgumentError(
@@ -165,7 +165,7 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         for j, (joint, model) in enumerate(self.items()):
             own: Any = {n: v.reshape(-1, len(self))[:, j] for n, v in spread.items()}
             for signal in model.signals:
-                other = coupled_with(signal)
+                other = coupled_joint(signal)
                 if other is not None and other in self:
                     unit = model.period / self[other].period
                     own[signal] = columns[self.joints.index(other)] * unit
@@ -175,7 +175,7 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
                 raise type(error)(f"joint {joint}: {error}") from None
         return corrected.T
 
-    def compensator(self) -> AllJoints[Robot]:
+    def compensator(self) -> JointsStep[Robot]:
         """``step(positions) -> corrected`` for one sample of all joints at a time.
 
         One call of the compiled core for all joints: of an array of float64 it allocates
@@ -203,7 +203,7 @@ class Robot(Shown, Mapping[str, HarmonicModel]):
         array([90.,  0.])
         """
         core = self._prepared()
-        step: AllJoints[Robot] = exchangeable(core.step, partial(_swap, core, self))
+        step: JointsStep[Robot] = exchangeable_step(core.step, partial(_swap, core, self))
         return step
 
     def _prepared(self) -> _core.RobotStep:

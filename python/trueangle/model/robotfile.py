@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from ..errors import ArgumentError, ModelFileError
+from ..support.argumentkinds import told_kinds
 from ..support.decoding import Decoder
-from ..support.kinds import told_kinds
-from .file import content_of, part_of
+from .file import model_file_content, model_of_part
 from .robot import Robot
-from .text import ROBOT_FORMAT
+from .writing import ROBOT_FORMAT
 
 #: Joints of one robot, at most.
 MAX_JOINTS: Final = 256
@@ -45,13 +45,14 @@ class _RobotReader(Decoder):
     """Checks the file key by key, every model as a file of its own would be."""
 
     def robot(self) -> Robot:
-        content = content_of(self.path, ROBOT_FORMAT)
+        content = model_file_content(self.path, ROBOT_FORMAT)
         self.table(content, _KEYS)
         joints = content["joints"]
         if not isinstance(joints, dict) or not 1 <= len(joints) <= MAX_JOINTS:
             raise self.error(f"1 to {MAX_JOINTS} joints by name are needed", "joints")
         models = {
-            joint: part_of(self.path, entry, f"joints.{joint}") for joint, entry in joints.items()
+            joint: model_of_part(self.path, entry, f"joints.{joint}")
+            for joint, entry in joints.items()
         }
         name = self.text(content.get("name", ""), "name")
         try:

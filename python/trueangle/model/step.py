@@ -39,7 +39,7 @@ class ExchangeableStep(Step, Protocol[Model_contra]):
         """Correct by another model from the next step on (`HarmonicModel.compensator`)."""
 
 
-class AllJoints(Protocol[Robot_contra]):
+class JointsStep(Protocol[Robot_contra]):
     """The corrected angles of all joints of a robot for their indicated ones."""
 
     def __call__(
@@ -55,7 +55,7 @@ class AllJoints(Protocol[Robot_contra]):
         """Correct by another robot's models from the next step on (`Robot.compensator`)."""
 
 
-def exchangeable(step: Callable[..., Any], swap: Callable[[Any], None]) -> Any:
+def exchangeable_step(step: Callable[..., Any], swap: Callable[[Any], None]) -> Any:
     """A step that can ``swap`` what it corrects by.
 
     A bound function of the core holds no attributes; a partial of it does, and passes calls on

@@ -1,4 +1,4 @@
-"""What every term is: named parameters in the model's unit, and the signals it follows."""
+"""What every term is: named parameters in the model's unit, the signals and lines it follows."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import MISSING, asdict, dataclass, fields
 from typing import Any, ClassVar, Self
 
 from ..errors import ArgumentError
-from ..support.angles import ARCSEC_PER_TURN
+from ..support.angles import from_arcsec
 from ..support.suggestions import did_you_mean
 from .forms import Form, Lines
 
@@ -163,11 +163,6 @@ class Term:
             )
         if any(order <= 0.0 for order in orders):
             raise self._out_of_range("orders", "positive")
-
-
-def from_arcsec(value: float, period: float) -> float:
-    """Seconds of arc in the unit in which a turn is ``period``."""
-    return float(value) * (period / ARCSEC_PER_TURN)
 
 
 def line_values(lines: Sequence[Sequence[float]], period: float) -> dict[str, tuple[float, ...]]:

@@ -1,4 +1,4 @@
-"""What numbers a model may hold, and how steep its error is."""
+"""What numbers and covariances a model may hold, and whether its slope lets it be inverted."""
 
 from __future__ import annotations
 

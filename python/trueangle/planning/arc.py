@@ -8,10 +8,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import ArgumentError
-from ..joint.shafts import counted_orders
+from ..joint.shafts import limited_orders
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.kinds import told_kinds
-from ..support.plainresult import counted
+from ..support.layout import counted
 from .arcplan import ArcPlan
 from .counts import exchanged, rounded
 from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
@@ -110,7 +110,7 @@ def plan_arc(
     (1.0, 0.7)
     """
     check_arc(start, stop)
-    wanted = tuple(float(k) for k in counted_orders(USUAL if orders is None else orders))
+    wanted = tuple(float(k) for k in limited_orders(USUAL if orders is None else orders))
     if not wanted or len(set(wanted)) < len(wanted) or min(wanted) <= 0.0:
         raise ArgumentError(f"orders must be positive and each named once, got {wanted!r}")
     notes: list[str] = []

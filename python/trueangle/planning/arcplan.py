@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult
 from .tables import place_table, plain_arc_plan
 
 

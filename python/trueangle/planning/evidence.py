@@ -1,4 +1,4 @@
-"""Expected evidence between rival causes: T-optimality under correlated noise.
+"""Expected evidence between rival hypotheses: T-optimality under correlated noise.
 
 Where A is the cause, with error s at the readings, the best imitation by another cause B leaves
 
@@ -21,11 +21,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import EFFECTS, Effect
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.effect import ALWAYS
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.arrays import Array
 
@@ -49,7 +49,7 @@ class Hypothesis:
     cause: str
     effects: tuple[Effect, ...]
 
-    def errors(self, signals: Signals, around: Surroundings) -> list[Array]:
+    def errors(self, signals: Signals, around: JointPattern) -> list[Array]:
         """Its error at every reading, arcsec; several draws of one that is random."""
         draws = 1 if all(EFFECTS[e.kind].transfers for e in self.effects) else DRAWS
         return [
@@ -155,7 +155,7 @@ def evidence_between(
     return found
 
 
-def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Blindness]) -> bool:
+def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Ambiguity]) -> bool:
     """Whether readings with this cause would leave it in doubt, whatever their evidence.
 
     ``spots`` are what the design of the readings cannot tell.

@@ -1,4 +1,4 @@
-"""Further runs that limits allow, one choice of each kind at a time."""
+"""Further runs that limits allow: choices of each kind, changes counted, numbers to dial in."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CLOSE = 0.25
 AT_REST = 1.0
 
 
-def base_of(limits: Limits, label: str) -> RunDesign:
+def plainest_run(limits: Limits, label: str) -> RunDesign:
     """The plainest run that limits allow: one way over the arc at the middle of the speeds."""
     slow, fast = limits.speed_deg_s
     return RunDesign(
@@ -34,7 +34,7 @@ def base_of(limits: Limits, label: str) -> RunDesign:
     )
 
 
-def choices(
+def run_choices(
     limits: Limits, with_current: bool = True, samples: int | None = None
 ) -> Iterator[list[dict[str, Any]]]:
     """For each kind of choice all that limits allow, as fields of `RunDesign` that it changes.
@@ -76,7 +76,9 @@ def count_of_changes(design: RunDesign, kinds: Sequence[Sequence[dict[str, Any]]
     )
 
 
-def run_levels(design: RunDesign, limits: Limits) -> Iterator[tuple[str, Callable[[float], float]]]:
+def run_amounts(
+    design: RunDesign, limits: Limits
+) -> Iterator[tuple[str, Callable[[float], float]]]:
     """What of a run is a matter of degree: its field, and what a step of it leads to.
 
     A step of 1 leads over the whole range, of speeds in their logarithm, and never beyond limits.
@@ -129,7 +131,7 @@ def _motions(limits: Limits, samples: int) -> Iterator[dict[str, Any]]:
         yield {**thirds, **close}
 
 
-def seconds_of(design: RunDesign) -> float:
+def run_seconds(design: RunDesign) -> float:
     """How long a run takes, without what is done before it."""
     if design.speed_deg_s == 0.0:
         return AT_REST * design.samples
@@ -151,7 +153,7 @@ def run_steps(design: RunDesign) -> Iterator[str]:
     speed = f"{design.speed_deg_s:g} deg/s"
     if design.speed_end_deg_s is not None:
         speed = f"coasting from {speed} to {design.speed_end_deg_s:g}"
-    yield f"move {way} deg at {speed} ({seconds_of(design):.0f} s)"
+    yield f"move {way} deg at {speed} ({run_seconds(design):.0f} s)"
     free = {"jittered": "at free angles, one in each equal step", "uniform": "at equal steps"}
     yield f"read {design.samples} times, {free.get(design.spacing, design.spacing)}"
     if design.temperature_end_C is not None:

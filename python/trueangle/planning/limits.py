@@ -13,8 +13,8 @@ import numpy as np
 from ..errors import ArgumentError, FileError
 from ..joint.signals import Signals, join_runs
 from ..runs.run import CalibrationRun
-from ..support.decoding import finite_float, read_text, shown
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
+from ..support.decoding import finite_float, read_text, shown_value
 from ..support.suggestions import did_you_mean
 
 #: Speeds of a further run where none are stated, deg/s.
@@ -193,7 +193,9 @@ def load_limits(path: str | Path) -> Limits:
         raise FileError(path, "holds a number or date that cannot be read") from None
     for name in document:
         if name != "limits":
-            raise FileError(path, f"unknown table {shown(name)}; a file of limits has [limits]")
+            raise FileError(
+                path, f"unknown table {shown_value(name)}; a file of limits has [limits]"
+            )
     table = document.get("limits")
     if not isinstance(table, dict):
         raise FileError(path, "has no table [limits]")
@@ -203,7 +205,7 @@ def load_limits(path: str | Path) -> Limits:
         if name not in known:
             close = did_you_mean(name, known)
             raise FileError(
-                path, f"[limits]: unknown key {shown(name)}{close}; it has {', '.join(known)}"
+                path, f"[limits]: unknown key {shown_value(name)}{close}; it has {', '.join(known)}"
             )
         values[name] = _value(path, name, value, known[name])
     try:
@@ -214,7 +216,7 @@ def load_limits(path: str | Path) -> Limits:
 
 def _value(path: str | Path, name: str, value: Any, wanted: str) -> Any:
     def refuse(what: str) -> FileError:
-        return FileError(path, f"[limits]: {name} must be {what}, got {shown(value)}")
+        return FileError(path, f"[limits]: {name} must be {what}, got {shown_value(value)}")
 
     if wanted == "bool":
         if not isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""A plan of positions and mounts, and its words."""
+"""`CalibrationPlan`: a plan of positions and mounts, and its words."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted, finite
-from .tables import factor_table, plain
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult, finite_or_none
+from .tables import factor_table, plain_plan
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,9 @@ class CalibrationPlan(PlainResult):
             "positions": self.positions,
             "mount_offsets_deg": list(self.mount_offsets_deg),
             "facet_shifts": list(self.facet_shifts),
-            "facet_noise_factor": finite(self.facet_noise_factor),
-            "worst_noise_factor": finite(self.worst_noise_factor),
-            "noise_factors": plain(self.noise_factors),
+            "facet_noise_factor": finite_or_none(self.facet_noise_factor),
+            "worst_noise_factor": finite_or_none(self.worst_noise_factor),
+            "noise_factors": plain_plan(self.noise_factors),
             "invisible_orders": list(self.invisible_orders),
             "tolerance_deg": self.tolerance_deg,
             "readings": self.readings,

@@ -1,4 +1,4 @@
-"""The next runs as a result: what to measure, and what it is expected to say."""
+"""The next runs as a result: what to measure, and the evidence expected of the rivals."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult
 from .evidence import Hypothesis
 from .further import run_steps
 
@@ -94,7 +94,7 @@ class NextRuns(PlainResult):
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON."""
         return {
-            "runs": [plain_run(design) for design in self.runs],
+            "runs": [_plain_run(design) for design in self.runs],
             "between": [entry.to_dict() for entry in self.between],
             "readings": self.readings,
             "seconds": self.seconds,
@@ -153,7 +153,7 @@ class NextRuns(PlainResult):
         return f"{runs}, {self.seconds:.3g} s: {listed or 'nothing distinguished'}"
 
 
-def plain_run(design: RunDesign) -> dict[str, Any]:
+def _plain_run(design: RunDesign) -> dict[str, Any]:
     """A ``[[run]]`` table of a simulation file; what is as usual is left out."""
     table = {}
     for f in fields(design):

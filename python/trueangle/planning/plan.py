@@ -12,10 +12,10 @@ import numpy as np
 
 from ..errors import ArgumentError, NoModelError
 from ..joint.gear import HIGHEST_LOW_ORDER, wanted_orders
-from ..joint.shafts import counted_orders
+from ..joint.shafts import limited_orders
 from ..runs.aliasing import fold
+from ..support.argumentkinds import told_kinds
 from ..support.distributions import random_numbers
-from ..support.kinds import told_kinds
 from .mountplan import CalibrationPlan
 from .mountsearch import offset_tolerance, search_offsets, search_shifts
 from .noisefactors import mount_noise_factors, noise_factors
@@ -100,7 +100,7 @@ def plan_mounts(
         if gear_ratio is None:
             wanted = _with_aliases(wanted, positions, mounts)
     else:
-        wanted = tuple(sorted(set(counted_orders(orders))))
+        wanted = tuple(sorted(set(limited_orders(orders))))
     if any(m != int(m) for m in wanted):
         raise ArgumentError(
             "a gear ratio whose orders are not whole needs several turns of a free reference "
@@ -174,7 +174,7 @@ def plan_tilts(
     wanted = (
         wanted_orders(gear_ratio, fixed_member, low)
         if orders is None
-        else tuple(counted_orders(orders))
+        else tuple(limited_orders(orders))
     )
     _check_orders(wanted)
     offsets = [float(o) for o in np.linspace(-tilt_arcsec, tilt_arcsec, tilts) / 3600.0]
@@ -227,7 +227,7 @@ def plan_encoder(
     820
     """
     wanted = (
-        wanted_orders(gear_ratio, fixed_member) if orders is None else tuple(counted_orders(orders))
+        wanted_orders(gear_ratio, fixed_member) if orders is None else tuple(limited_orders(orders))
     )
     _check_orders(wanted)
     count = 2 * math.ceil(max(wanted)) + 20 if positions is None else positions

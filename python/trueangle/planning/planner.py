@@ -1,22 +1,22 @@
-"""The next runs: those within limits that are expected to tell rival causes apart."""
+"""`next_runs`: those within limits that are expected to tell rival causes apart."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 from ..support.blas import one_blas_thread
-from ..support.deadline import with_pace
+from ..support.deadline import with_deadline
 from .evidence import ReadingNoise
-from .further import seconds_of
+from .further import run_seconds
 from .limits import Limits
 from .nextruns import NextRuns, RivalEvidence
-from .scales import Scales
-from .search import Search
+from .scales import DesignScales
+from .search import RunSearch
 
 #: Readings whose diagnosis may take as long by default as a plan may: ten seconds.
 WORK = 20_000
@@ -25,7 +25,7 @@ WORK = 20_000
 def next_runs(
     earlier: Signals | None,
     believed: Simulation,
-    spots: Sequence[Blindness],
+    spots: Sequence[Ambiguity],
     noise: ReadingNoise,
     limits: Limits | None = None,
 ) -> NextRuns:
@@ -52,14 +52,14 @@ def next_runs(
     those, as long as there are any. Half a second to some seconds; after ten of the processor
     where no time is given, the best so far is the answer, and ``notes`` say so.
     """
-    with with_pace() as at, at.bounded(WORK), one_blas_thread():
+    with with_deadline() as at, at.bounded(WORK), one_blas_thread():
         return _next_runs(earlier, believed, spots, noise, limits)
 
 
 def _next_runs(
     earlier: Signals | None,
     believed: Simulation,
-    spots: Sequence[Blindness],
+    spots: Sequence[Ambiguity],
     noise: ReadingNoise,
     limits: Limits | None,
 ) -> NextRuns:
@@ -68,7 +68,7 @@ def _next_runs(
     others = tuple(spot for spot in spots if spot not in asked)
 
     def found(within: Limits, known: Limits) -> NextRuns:
-        scales = Scales(earlier, believed, asked, noise, within)
+        scales = DesignScales(earlier, believed, asked, noise, within)
         return _found(scales, within, others, known)
 
     if limits is not None:
@@ -85,9 +85,11 @@ def _told(plan: NextRuns) -> int:
     return sum(entry.told for entry in plan.between)
 
 
-def _found(scales: Scales, limits: Limits, others: Sequence[Blindness], seen: Limits) -> NextRuns:
+def _found(
+    scales: DesignScales, limits: Limits, others: Sequence[Ambiguity], seen: Limits
+) -> NextRuns:
     """The best runs within limits, beside the earlier ones or by themselves."""
-    search, earlier, alone = Search(scales, limits), scales.earlier, False
+    search, earlier, alone = RunSearch(scales, limits), scales.earlier, False
     designs, worth = search.best(earlier)
     if not worth.told and scales.lack:
         apart = search.best(None)
@@ -102,7 +104,7 @@ def _found(scales: Scales, limits: Limits, others: Sequence[Blindness], seen: Li
         tuple(_entries(scales, designs, others, earlier)),
         alone and bool(designs),
         tuple(_beyond(designs, seen)),
-        sum(map(seconds_of, designs)),
+        sum(map(run_seconds, designs)),
         replace(scales.believed, runs=tuple(designs), source=None),
         tuple(_notes(designs, scales.over)),
         tuple(question.hypotheses for question in scales.questions),
@@ -110,9 +112,9 @@ def _found(scales: Scales, limits: Limits, others: Sequence[Blindness], seen: Li
 
 
 def _entries(
-    scales: Scales,
+    scales: DesignScales,
     designs: Sequence[RunDesign],
-    others: Sequence[Blindness],
+    others: Sequence[Ambiguity],
     start: Signals | None,
 ) -> Iterator[RivalEvidence]:
     """What the runs say of every question, and of what nobody asked."""

@@ -1,4 +1,4 @@
-"""A plan of a calibration without a reference, and its words."""
+"""`SelfPlan`: a plan of a calibration without a reference, and its words."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..support.layout import laid_out
-from ..support.plainresult import PlainResult, counted
-from .tables import factor_table, plain
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult
+from .tables import factor_table, plain_plan
 
 
 @dataclass(frozen=True)
@@ -65,13 +65,13 @@ class SelfPlan(PlainResult):
         return {
             "method": self.method,
             "orders": list(self.orders),
-            "noise_factors": plain(self.noise_factors),
-            "worst_noise_factor": plain(self.worst_noise_factor),
+            "noise_factors": plain_plan(self.noise_factors),
+            "worst_noise_factor": plain_plan(self.worst_noise_factor),
             "blind_orders": list(self.blind_orders),
             "angles_deg": list(self.angles_deg),
-            "given": plain(self.given),
+            "given": plain_plan(self.given),
             "speed_ratio": self.speed_ratio,
-            "speed_ratio_factors": plain(self.speed_ratio_factors),
+            "speed_ratio_factors": plain_plan(self.speed_ratio_factors),
             "turns": self.turns,
             "readings": self.readings,
             "seconds": self.seconds,

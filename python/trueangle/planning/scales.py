@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.blindspots import blind_spots
 from ..effects.effect import telling_apart
 from ..estimation.regression import Regression
 from ..joint.signals import Signals, join_runs
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
-from ..support.deadline import pace
+from ..support.deadline import current_deadline
 from .evidence import (
     ExpectedEvidence,
     Hypothesis,
@@ -24,10 +24,18 @@ from .evidence import (
     evidence_between,
     is_doubted,
 )
-from .further import base_of, choices, seconds_of
-from .hypotheses import Question, question_of
+from .further import plainest_run, run_choices, run_seconds
 from .limits import Limits
-from .worth import ALIKE, NOTHING, Answer, Worth, foretold, is_strong, weight
+from .questions import Question, question_of
+from .worth import (
+    ALIKE,
+    NOTHING,
+    Answer,
+    Worth,
+    is_strong_answer,
+    run_is_foretold,
+    worth_of_evidence,
+)
 
 #: Error of a cause of which nothing is seen, in standard deviations of a reading.
 UNSEEN = 3.0
@@ -46,7 +54,7 @@ MOST_WEIGHED = 250
 MOST_READINGS = 2000
 
 
-class Scales:
+class DesignScales:
     """Weighs designs for a set of questions, beside earlier runs or by themselves.
 
     Parameters
@@ -63,7 +71,7 @@ class Scales:
         self,
         earlier: Signals | None,
         believed: Simulation,
-        asked: Sequence[Blindness],
+        asked: Sequence[Ambiguity],
         noise: ReadingNoise,
         limits: Limits,
     ) -> None:
@@ -87,7 +95,7 @@ class Scales:
     @property
     def over(self) -> bool:
         """As many designs were weighed as a search may take, or its time is up."""
-        return self._left <= 0 or pace().over
+        return self._left <= 0 or current_deadline().over
 
     @property
     def all_seen(self) -> bool:
@@ -142,18 +150,18 @@ class Scales:
         spots = blind_spots(regression)
         are_open = [self._open(question, regression, spots) for question in self.questions]
         opened = sum(are_open)
-        seconds = -sum(map(seconds_of, designs))
+        seconds = -sum(map(run_seconds, designs))
         if opened < least:
             return replace(NOTHING, opened=opened, plain=-changes, seconds=seconds)
         self._left -= 1
         told, total = 0, 0.0
         for question, is_open in zip(self.questions, are_open, strict=True):
             evidence = self._evidence(question, regression)
-            total += weight(evidence, question)
-            told += is_open and is_strong(evidence)
+            total += worth_of_evidence(evidence, question)
+            told += is_open and is_strong_answer(evidence)
         halves = round(total / (np.log(ALIKE) * len(self.questions)))
         clear = -sum(len(self._unclear(question, spots)) for question in self.questions)
-        worth = Worth(opened, told, foretold(regression), clear, halves, -changes, seconds)
+        worth = Worth(opened, told, run_is_foretold(regression), clear, halves, -changes, seconds)
         self._known[key] = worth
         return worth
 
@@ -167,9 +175,9 @@ class Scales:
             if chance is not None and not is_open:
                 chance = 0.0
             bic = min((e.bic for e in evidence), default=None)
-            yield Answer(is_open and is_strong(evidence), bic, chance)
+            yield Answer(is_open and is_strong_answer(evidence), bic, chance)
 
-    def blind(self, designs: Sequence[RunDesign], start: Signals | None) -> list[Blindness]:
+    def blind(self, designs: Sequence[RunDesign], start: Signals | None) -> list[Ambiguity]:
         """What nobody can tell from these runs."""
         return self._at(designs, start)[1]
 
@@ -216,7 +224,7 @@ class Scales:
 
     def _at(
         self, designs: Sequence[RunDesign], start: Signals | None
-    ) -> tuple[Regression, list[Blindness]]:
+    ) -> tuple[Regression, list[Ambiguity]]:
         regression = self._readings(self._signals(designs, start))
         return regression, blind_spots(regression)
 
@@ -241,7 +249,7 @@ class Scales:
         """Whether rivals take the form that imitates best: of many questions that is too slow."""
         return len(self.questions) <= SEARCHED or any(q.seen for q in self.questions)
 
-    def _open(self, question: Question, regression: Regression, spots: Sequence[Blindness]) -> bool:
+    def _open(self, question: Question, regression: Regression, spots: Sequence[Ambiguity]) -> bool:
         """Whether nothing in the design of the readings hides one of the causes."""
         if any(spot.hides(cause) for spot in spots for cause in question.causes):
             return False
@@ -253,7 +261,7 @@ class Scales:
             )
         )
 
-    def _unclear(self, question: Question, spots: Sequence[Blindness]) -> set[str]:
+    def _unclear(self, question: Question, spots: Sequence[Ambiguity]) -> set[str]:
         """What acts on whole runs, may be taken for a cause in question, and is not told by these.
 
         What cannot act at all, as a spring without a load, takes the place of nothing.
@@ -279,8 +287,8 @@ def _thinned(signals: Signals) -> Signals:
 
 def _rich(limits: Limits) -> RunDesign:
     """A run in which all varies that limits allow."""
-    design = base_of(limits, "rich")
-    for options in choices(limits):
+    design = plainest_run(limits, "rich")
+    for options in run_choices(limits):
         design = replace(design, **options[-1])
     return replace(
         design,

@@ -9,9 +9,9 @@ from typing import Any, TypeAlias
 
 from ..joint.signals import Signals
 from ..simulation.designs import RunDesign
-from .further import base_of, choices, count_of_changes, dialled_number, run_levels
+from .further import count_of_changes, dialled_number, plainest_run, run_amounts, run_choices
 from .limits import Limits
-from .scales import Scales
+from .scales import DesignScales
 from .worth import NOTHING, Worth
 
 #: Runs in a row that open nothing, after which no further one is tried; by themselves the first
@@ -39,7 +39,7 @@ Options: TypeAlias = "list[dict[str, Any]]"
 
 
 @dataclass(frozen=True)
-class Search:
+class RunSearch:
     """Runs within limits that tell most, with as few readings as serve.
 
     Attributes
@@ -48,7 +48,7 @@ class Search:
     limits : Limits
     """
 
-    scales: Scales
+    scales: DesignScales
     limits: Limits
 
     def best(self, start: Signals | None) -> tuple[Designs, Worth]:
@@ -77,7 +77,7 @@ class Search:
         kept: Designs = []
         best = NOTHING
         while len(designs) < self.limits.runs and not self.scales.over:
-            design = base_of(self.limits, _label(len(designs)))
+            design = plainest_run(self.limits, _label(len(designs)))
             if self.scales.needs_current and (start is None or start.current is not None):
                 low, _ = self.limits.current_A
                 design = replace(design, current_A=low)  # told where every run recorded it
@@ -95,7 +95,7 @@ class Search:
 
     def _improved(self, designs: Designs, k: int, start: Signals | None) -> tuple[Designs, Worth]:
         """Run k changed to the best there is: choices, and levels where these do not tell all."""
-        kinds = [*choices(self.limits, self.scales.needs_current, designs[k].samples)]
+        kinds = [*run_choices(self.limits, self.scales.needs_current, designs[k].samples)]
         best = self.scales.weighed(designs, start, count_of_changes(designs[k], kinds))
         for _ in range(PASSES):
             before = best
@@ -104,7 +104,7 @@ class Search:
             if best == before:
                 break
         for step in () if self._tells_all(best) else STEPS:
-            for name, at in [*run_levels(designs[k], self.limits)]:
+            for name, at in [*run_amounts(designs[k], self.limits)]:
                 options = [{name: at(step)}, {name: at(-step)}]
                 designs, best = self._picked(designs, k, start, best, options, kinds)
         return designs, best

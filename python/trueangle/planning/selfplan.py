@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError
-from ..joint.shafts import counted_orders
+from ..joint.shafts import limited_orders
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .plan import readings_needed
 from .referencefree import SelfPlan
@@ -161,7 +161,7 @@ def plan_self(
     """
     check_choice("method", method, SELF_METHODS)
     wanted = tuple(
-        sorted({float(k) for k in counted_orders(range(1, 9) if orders is None else orders)})
+        sorted({float(k) for k in limited_orders(range(1, 9) if orders is None else orders)})
     )
     if not wanted or any(not (math.isfinite(k) and k > 0.0) for k in wanted):
         raise ArgumentError(f"orders must be positive numbers, got {orders!r}")

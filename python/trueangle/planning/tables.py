@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..support.plainresult import finite
+from ..support.plainresult import finite_or_none
 
 
 def place_table(places_deg: Sequence[float], counts: Sequence[int]) -> list[str]:
@@ -22,15 +22,16 @@ def factor_table(factors: dict[float, float]) -> list[str]:
 
 def plain_arc_plan(plan: Any, kind: str) -> dict[str, Any]:
     """The JSON object of a plan of readings at places: lists, and orders as the keys of objects."""
-    return {"kind": kind, **plain(vars(plan)), "readings": plan.readings}
+    return {"kind": kind, **plain_plan(vars(plan)), "readings": plan.readings}
 
 
-def plain(value: Any) -> Any:
+def plain_plan(value: Any) -> Any:
     """Orders as keys of an object, tuples as lists; what is not finite is None."""
     if isinstance(value, dict):
         return {
-            (f"{k:g}" if isinstance(k, (int, float)) else k): plain(v) for k, v in value.items()
+            (f"{k:g}" if isinstance(k, (int, float)) else k): plain_plan(v)
+            for k, v in value.items()
         }
     if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
-    return finite(value) if isinstance(value, float) else value
+        return [plain_plan(entry) for entry in value]
+    return finite_or_none(value) if isinstance(value, float) else value

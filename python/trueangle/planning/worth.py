@@ -1,4 +1,4 @@
-"""What designs of further runs are worth: the questions they open and the evidence they add."""
+"""What designs of further runs are worth: questions opened, answers and the evidence they add."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ..estimation.regression import Regression
 from .evidence import ExpectedEvidence
-from .hypotheses import Question
+from .questions import Question
 
 #: Chance of a strong difference of evidence that is wanted.
 WANTED = 0.95
@@ -65,12 +65,12 @@ class Answer:
     chance: float | None
 
 
-def is_strong(evidence: Sequence[ExpectedEvidence]) -> bool:
+def is_strong_answer(evidence: Sequence[ExpectedEvidence]) -> bool:
     """Whether every cause is expected to win; of one without a form the design decides."""
     return min((e.chance for e in evidence), default=1.0) >= WANTED
 
 
-def foretold(regression: Regression) -> bool:
+def run_is_foretold(regression: Regression) -> bool:
     """Whether the zero and lines of any run follow from the others: what is held out needs that.
 
     On average over a run they are foretold no worse than one reading tells them.
@@ -85,7 +85,7 @@ def foretold(regression: Regression) -> bool:
     return True
 
 
-def weight(evidence: Sequence[ExpectedEvidence], question: Question) -> float:
+def worth_of_evidence(evidence: Sequence[ExpectedEvidence], question: Question) -> float:
     """What grows with the evidence: of the causes in question, and of the least of all."""
     logs = {(e.cause, e.rival): _log(e) for e in evidence}
     asked = [log for (_, rival), log in logs.items() if rival in ("", *question.causes)]

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..fitting import summary as fitting_summary
 from ..fitting.orders import summary as orders_summary
-from ..fitting.orders.table import OrderSelection
+from ..fitting.orders.result import OrderSelection
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn
-from ..support.plainresult import counted
+from ..support.layout import counted
 from . import palette
 from .canvas import described, grid, legend, new_axes
 from .orderaxis import OrderAxis

@@ -1,4 +1,4 @@
-"""Axes to draw on: matplotlib at first use, with a clear error where it is missing."""
+"""Figures to draw on: matplotlib at first use, axes, grid, legend, and what they show in text."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import ArgumentError
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
-from ..support.plainresult import counted
+from ..support.layout import counted
 from ..support.suggestions import check_choice
 from . import palette
 from .canvas import described, grid, legend, new_figure

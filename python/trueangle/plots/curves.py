@@ -1,4 +1,4 @@
-"""What the pictures show, as plain arrays in degrees and arcsec; draws nothing."""
+"""What the pictures show, as points and curves in degrees and arcsec; draws nothing."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def reference_degrees(run: CalibrationRun, low: float = 0.0) -> Array:
 def error_points(fit: FitResult) -> list[Points]:
     """Measured error of every run less that run's zero."""
     factor = ARCSEC_PER_TURN / fit.model.period
-    low, _ = seen_span(fit.model)
+    low, _ = fitted_degrees(fit.model)
     found = []
     for number, run in enumerate(fit.runs):
         zero = fit.offsets[number]
@@ -122,7 +122,7 @@ def error_points(fit: FitResult) -> list[Points]:
 def model_curve(model: HarmonicModel, span: tuple[float, float] | None = None) -> Curve:
     """The model without its constant, over ``span`` (deg), the turn or the part that was seen."""
     highest = max(model.orders, default=1.0)
-    low, high = seen_span(model) if span is None else span
+    low, high = fitted_degrees(model) if span is None else span
     count = int(np.clip(_PER_CYCLE * highest * (high - low) / 360.0, _FEWEST, _MOST_SAMPLES))
     angle = np.linspace(low, high, count)
     theta = angle * (model.period / 360.0)
@@ -161,7 +161,7 @@ def curve_envelope(curve: Curve) -> tuple[Array, Array, Array]:
     )
 
 
-def seen_span(model: HarmonicModel) -> tuple[float, float]:
+def fitted_degrees(model: HarmonicModel) -> tuple[float, float]:
     """The stretch the model was fitted on, in degrees; a whole turn when it was all."""
     if model.partial_span is None:
         return 0.0, 360.0
@@ -171,7 +171,7 @@ def seen_span(model: HarmonicModel) -> tuple[float, float]:
     return _about_zero(low, high)
 
 
-def travelled_span(runs: Sequence[CalibrationRun]) -> tuple[float, float]:
+def travelled_degrees(runs: Sequence[CalibrationRun]) -> tuple[float, float]:
     """The stretch of the turn that runs hold readings of, in degrees; a turn without a wide gap."""
     angle = np.sort(np.concatenate([reference_degrees(run) for run in runs]))
     gaps = np.diff(np.append(angle, angle[0] + 360.0))
@@ -195,7 +195,7 @@ def held_out_points(
 
     Each run keeps its own zero (`trueangle.fitting.heldout.correct_held_out`).
     """
-    low, _ = seen_span(model)
+    low, _ = fitted_degrees(model)
     found = []
     for number, run in enumerate(runs):
         label = run_label(run, number)
@@ -215,7 +215,7 @@ def residual_points(fit: FitResult, against: Signal = "angle") -> list[Points]:
     """
     check_choice("against", against, SIGNALS)
     factor = ARCSEC_PER_TURN / fit.model.period
-    low, _ = seen_span(fit.model)
+    low, _ = fitted_degrees(fit.model)
     parts = np.split(fit.residuals, np.cumsum([len(run) for run in fit.runs])[:-1])
     found = []
     for number, (run, rest) in enumerate(zip(fit.runs, parts, strict=True)):

@@ -13,7 +13,7 @@ from ..runs.run import CalibrationRun, as_runs
 from ..support.display_units import ErrorsIn, error_unit
 from . import palette
 from .canvas import described, legend, new_axes
-from .curves import Points, Signal, held_out_points, rms_amplitude, seen_span
+from .curves import Points, Signal, fitted_degrees, held_out_points, rms_amplitude
 from .drawnpanel import draw_clouds, draw_panel
 from .panel import PanelPicture
 from .readingpictures import (
@@ -87,7 +87,7 @@ def before_after(
     pairs = held_out_points(model, as_runs(runs))
     unit = error_unit(errors_in, rms_amplitude(before for before, _ in pairs), model.period)
     numbered = [(number, *pair) for number, pair in enumerate(pairs)]
-    picture = before_after_picture(numbered, seen_span(model), unit)
+    picture = before_after_picture(numbered, fitted_degrees(model), unit)
     ax = new_axes(ax)
     draw_panel(ax, picture.panels[0])
     _zero_line(ax)

@@ -12,7 +12,7 @@ from ..errors import ArgumentError
 from ..support.angles import arcsec
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
-from ..support.plainresult import counted
+from ..support.layout import counted
 from ..support.suggestions import check_choice
 from . import palette
 from .canvas import described, grid, legend, new_axes, new_figure, turn_axis

@@ -1,4 +1,4 @@
-"""Which picture the ``plot`` method of a result draws."""
+"""Which picture the ``plot`` method of a result draws, and its thumbnail."""
 
 from __future__ import annotations
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..support.display_units import ErrorsIn, error_unit, significant, sine_of_rms
-from ..support.plainresult import counted
+from ..support.display_units import ErrorsIn, error_unit, significant_digits, sine_of_rms
+from ..support.layout import counted
 from .canvas import described, legend, new_axes, turn_axis
-from .curves import model_curve, seen_span, strong_gear_order
+from .curves import fitted_degrees, model_curve, strong_gear_order
 from .drawnpanel import draw_curve
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsI
     curve = model_curve(pattern)
     unit = error_unit(errors_in, sine_of_rms(float(np.std(curve.error))), model.period)
     curve = curve.scaled(unit.per_arcsec)
-    low, high = seen_span(model)
+    low, high = fitted_degrees(model)
     dense = strong_gear_order(pattern.orders, pattern.amplitudes, high - low) is not None
     draw_curve(ax, curve, dense)
     turn_axis(ax, low, high)
@@ -62,7 +62,7 @@ def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsI
     terms = ", ".join(term.kind for term in model.terms)
     return described(
         ax,
-        f"Error of the model over the angle: {significant(float(np.ptp(curve.error)), 3)} "
+        f"Error of the model over the angle: {significant_digits(float(np.ptp(curve.error)), 3)} "
         f"{unit.name} peak-to-peak in {counted(len(model.orders), 'order')}"
         + (f"; not drawn: {terms}" if terms else "")
         + ".",

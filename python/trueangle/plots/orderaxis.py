@@ -105,7 +105,7 @@ class OrderAxis:
             ax.tick_params(axis="x", labelsize="small")
         ends = self.places([high for _, high in self.groups])
         ax.set_xlim(self.starts[0] - 0.8, float(ends[-1]) + 0.8)
-        for end, start in pairwise_gaps(ends, self.starts):
+        for end, start in _pairwise_gaps(ends, self.starts):
             middle = 0.5 * (end + start)
             for side in (-0.09, 0.09):
                 ax.plot(
@@ -126,7 +126,7 @@ class OrderAxis:
         ]
 
 
-def pairwise_gaps(ends: Array, starts: Sequence[float]) -> list[tuple[float, float]]:
+def _pairwise_gaps(ends: Array, starts: Sequence[float]) -> list[tuple[float, float]]:
     """End of each group and start of the next."""
     return [(float(end), float(start)) for end, start in zip(ends[:-1], starts[1:], strict=True)]
 

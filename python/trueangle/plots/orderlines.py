@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ..fitting.orders.rows import OrderRow
+from ..fitting.orders.result import OrderSelection
 from ..fitting.orders.selection import FALSE_ALARM
-from ..fitting.orders.table import OrderSelection
+from ..fitting.orders.table import OrderRow
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
-from ..support.display_units import ErrorUnit, significant
+from ..support.display_units import ErrorUnit, significant_digits
 from .curves import CONFIDENCE
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def largest_orders_text(lines: Sequence[OrderLine], unit: ErrorUnit) -> str:
     """The largest orders kept with their amplitudes, and how many more there are."""
     kept = sorted((line for line in lines if line.kept), key=lambda line: -line.amplitude)
     told = [
-        f"{line.order:g} ({significant(unit.per_arcsec * line.amplitude, 3)} {unit.name})"
+        f"{line.order:g} ({significant_digits(unit.per_arcsec * line.amplitude, 3)} {unit.name})"
         for line in kept[:_TOLD]
     ]
     more = f" and {len(kept) - _TOLD} smaller ones" if len(kept) > _TOLD else ""

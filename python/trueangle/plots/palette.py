@@ -1,4 +1,4 @@
-"""Colours that survive colour blindness, grey print and dark pages, and what they mean.
+"""Colours, markers and ink that survive colour blindness, grey print and dark pages.
 
 Six hues of Okabe and Ito, the two light ones darkened or exchanged, so that each stands out
 of white and of black paper by 3 to 1. What must be told apart in grey has a marker of its own.

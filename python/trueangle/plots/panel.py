@@ -1,4 +1,4 @@
-"""What a picture of readings is made of; draws nothing.
+"""Panels of a picture of readings: clouds of dots, medians, a magnified segment; draws nothing.
 
 A picture is described once: matplotlib (`trueangle.plots.drawnpanel`) and the report
 (`trueangle.reports.panelcharts`) both draw what stands here, each in its own sizes and colours.

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, wrap
-from ..support.display_units import ErrorUnit, significant
-from ..support.plainresult import counted
+from ..support.display_units import ErrorUnit, significant_digits
+from ..support.layout import counted
 from . import curves
 from .curves import Points, Signal
 from .panel import (
@@ -46,15 +46,16 @@ def errors_picture(
     y = f"error less the run's zero / {unit.name}"
     about = f"Error of {counted(runs, 'run')} over the angle"
     if fit is None:
-        size = significant(max(float(np.ptp(cloud.points.y)) for cloud in clouds), 3)
+        size = significant_digits(max(float(np.ptp(cloud.points.y)) for cloud in clouds), 3)
         told = f"{about}, without a model: up to {size} {unit.name} peak-to-peak."
-        return PanelPicture((Panel(ANGLE, y, clouds, curves.travelled_span(runs)),), told)
-    low, high = span = curves.seen_span(fit.model)
+        return PanelPicture((Panel(ANGLE, y, clouds, curves.travelled_degrees(runs)),), told)
+    low, high = span = curves.fitted_degrees(fit.model)
     strong = curves.strong_gear_order(fit.orders, fit.amplitudes, high - low)
     model = curves.model_curve(fit.model).scaled(unit.per_arcsec)
     whole = Panel(ANGLE, y, clouds, span, model=model, dense=strong is not None)
     told = (
-        f"{about} and the fitted model, which spans {significant(float(np.ptp(model.error)), 3)} "
+        f"{about} and the fitted model, which spans "
+        f"{significant_digits(float(np.ptp(model.error)), 3)} "
         f"{unit.name} peak-to-peak in {counted(len(fit.orders), 'order')}."
     )
     if strong is None:
@@ -65,7 +66,7 @@ def errors_picture(
 
 def _measured(runs: Sequence[CalibrationRun]) -> list[Points]:
     """Readings where there is no model, on the turn that begins where the travel does."""
-    low, _ = curves.travelled_span(runs)
+    low, _ = curves.travelled_degrees(runs)
     found = []
     for number, run in enumerate(runs):
         error = wrap(run.indicated - run.reference - run.zero, run.period)
@@ -91,7 +92,10 @@ def before_after_picture(
     for place, role in ((1, "before"), (2, "after")):
         parts = [(pair[0], pair[place].scaled(unit.per_arcsec)) for pair in pairs]  # type: ignore[union-attr]
         y = np.concatenate([part.y for _, part in parts])
-        rms, ptp = significant(float(np.sqrt(np.mean(y * y)))), significant(float(np.ptp(y)))
+        rms, ptp = (
+            significant_digits(float(np.sqrt(np.mean(y * y)))),
+            significant_digits(float(np.ptp(y))),
+        )
         name = f"{role}: rms {rms}, peak-to-peak {ptp} {unit.name}"
         clouds += [Cloud(part, number, role, name) for number, part in parts]  # type: ignore[arg-type]
         told.append(f"{role} correction rms {rms}, peak-to-peak {ptp} {unit.name}")
@@ -114,7 +118,7 @@ def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> PanelP
         shift = _BESIDE * ((np.arange(len(parts)) + 0.5) / len(parts) - 0.5)
         parts = [Points(p.label, p.x + s, p.y) for p, s in zip(parts, shift, strict=True)]
     scaled = [part.scaled(unit.per_arcsec) for part in parts]
-    span = {"angle": curves.seen_span(fit.model), "direction": (-1.5, 1.5)}.get(against)
+    span = {"angle": curves.fitted_degrees(fit.model), "direction": (-1.5, 1.5)}.get(against)
     panel = Panel(
         curves.SIGNALS[against],
         f"residual / {unit.name}",
@@ -126,7 +130,7 @@ def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> PanelP
     rest = np.concatenate([part.y for part in scaled])
     told = (
         f"What the model leaves of {rest.size} readings against {against}: "
-        f"{significant(float(rest.std()), 3)} {unit.name} standard deviation."
+        f"{significant_digits(float(rest.std()), 3)} {unit.name} standard deviation."
     )
     return PanelPicture((panel,), told)
 
@@ -160,7 +164,7 @@ def comparison_picture(
     deviation = float(np.concatenate([cloud.points.y for cloud in rest]).std())
     told = (
         f"Measured and simulated error of {counted(expected, 'run')} over the angle; they differ "
-        f"by {significant(deviation, 3)} {unit.name} rms."
+        f"by {significant_digits(deviation, 3)} {unit.name} rms."
     )
     return PanelPicture(tuple(panels), told)
 

@@ -1,4 +1,4 @@
-"""Plan the runs that tell what a diagnosis could not, and rehearse them."""
+"""`plan_after`: the runs that tell what a diagnosis could not, planned and rehearsed."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from ..planning.limits import Limits
 from ..planning.nextruns import NextRuns, RivalEvidence
 from ..planning.worth import WANTED
 from ..runs.run import CalibrationRun
-from ..runs.source import Reading
+from ..runs.source import ReadingOptions
 from ..simulation.simulation import Simulation, simulate, simulate_along
-from ..support.deadline import Pace, entered, pace, with_pace
-from ..support.kinds import of_type, told_kinds
+from ..support.argumentkinds import of_type, told_kinds
+from ..support.deadline import Deadline, current_deadline, under_deadline, with_deadline
 from ..support.suggestions import check_choice
 from .trial import trial_outcome
 
@@ -49,7 +49,7 @@ def plan_after(
     seed: int = 0,
     within: float | None = WITHIN,
     progress: str = "none",
-    **reading: Unpack[Reading],
+    **reading: Unpack[ReadingOptions],
 ) -> NextRuns:
     """Say which runs to measure next, so that causes are told apart.
 
@@ -121,7 +121,7 @@ def plan_after(
     for name, value, least in (("seeds", seeds, 0), ("seed", seed, 0)):
         if not isinstance(value, int) or value < least:
             raise ArgumentError(f"{name} must be a whole number from {least}, got {value!r}")
-    with with_pace(within, progress) as at:
+    with with_deadline(within, progress) as at:
         at.at("diagnosis", 0, 1)
         found = diagnose(runs, sim, **reading)
         plan = found.plan(limits, between=names)
@@ -145,7 +145,7 @@ def _rehearsed(
         )
         plan = replace(plan, between=entries)
         failed = any(e.trials and (e.chance_named or 0.0) < WANTED for e in entries)
-        if not failed or full or pace().over:
+        if not failed or full or current_deadline().over:
             untried = any(e.seen and e.told and not e.trials for e in entries)
             return replace(plan, notes=(*plan.notes, UNTRIED)) if untried else plan
         plan = plan.with_readings(
@@ -176,9 +176,9 @@ class _FurtherTrials:
         for place, hypothesis in enumerate(plan.hypotheses[index]):
             named = made = 0
             for number in range(self.seeds):
-                pace().at("simulated diagnoses", number, self.seeds)
+                current_deadline().at("simulated diagnoses", number, self.seeds)
                 rng = np.random.default_rng([self.seed, index, place, number])
-                answer = None if pace().over else self.names(plan, hypothesis, rng)
+                answer = None if current_deadline().over else self.names(plan, hypothesis, rng)
                 if answer is None:
                     break
                 named, made = named + answer, made + 1
@@ -200,9 +200,9 @@ class _FurtherTrials:
         if not plan.alone:
             motion = [*self.earlier, *motion]
         runs = simulate_along(truth, motion, rng, self.noise.correlation)
-        at = pace()
+        at = current_deadline()
         left = None if at.within is None else max(at.within - at.seconds, 1e-3)
-        with entered(Pace(left)) as own:  # its shares of the time are of what is left
+        with under_deadline(Deadline(left)) as own:  # its shares of the time are of what is left
             found = diagnose(runs, self.stated)
         at.stopped = at.stopped or own.stopped
         return trial_outcome(found, hypothesis.cause).is_named if found.complete else None

@@ -6,17 +6,17 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..support.plainresult import Shown
+from ..support.plainresult import ShownResult
 from .detection import Chance, binomial_interval
 from .trial import TrialOutcome
-from .visibility import Range
+from .visibility import SizeRange
 
 #: Shares of the trials that are told.
 SHARES = (0.5, 0.95)
 
 
 @dataclass(frozen=True)
-class RehearsedCause(Shown):
+class RehearsedCause(ShownResult):
     """From which size on one cause would be named.
 
     Attributes
@@ -96,7 +96,7 @@ class RehearsedCause(Shown):
 def rehearsed_cause(
     cause: str,
     size_name: str,
-    sizes: Range | None,
+    sizes: SizeRange | None,
     answers: list[tuple[int, TrialOutcome]],
     blind_because: str | None,
     measure: str | None,

@@ -7,22 +7,22 @@ from dataclasses import replace
 from typing import Any
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..errors import ArgumentError
 from ..joint.signals import Signals
 from ..planning.evidence import ReadingNoise
 from ..planning.nextruns import NextRuns
 from ..planning.planner import next_runs
 from ..simulation.simulation import SIMULATION, Simulation
-from ..support.deadline import Pace, with_pace
-from ..support.kinds import of_type, told_kinds
+from ..support.argumentkinds import of_type, told_kinds
+from ..support.deadline import Deadline, with_deadline
 from ..support.suggestions import check_choice
 from .cause import RehearsedCause
 from .result import Rehearsal
 from .search import SizeSearch
 from .trial import FAILED, measured_signals
 from .visibility import blind_causes, size_range
-from .workers import Here, Workers, usable_cores
+from .workers import LocalTrials, Workers, usable_cores
 
 #: Trials of a cause where not given.
 SEEDS = 20
@@ -110,7 +110,7 @@ def rehearse(
     """
     of_type("sim", sim, Simulation, SIMULATION)
     names = _checked(sim, causes, seeds, seed, workers)
-    with with_pace(within, progress) as at:
+    with with_deadline(within, progress) as at:
         signals = measured_signals(sim)
         blind = blind_causes(sim, signals)
         searches = {}
@@ -138,7 +138,7 @@ def rehearse(
 
 
 def _ask(
-    sim: Simulation, signals: Any, searches: list[SizeSearch], seed: int, workers: int, at: Pace
+    sim: Simulation, signals: Any, searches: list[SizeSearch], seed: int, workers: int, at: Deadline
 ) -> None:
     """Make the trials of all searches, round by round, until all are done or time is up."""
     trials = [trial for search in searches for trial in search.next_round()]
@@ -146,7 +146,7 @@ def _ask(
         return
     by_cause = {search.cause: search for search in searches}
     count = min(workers, len(trials))
-    asking = Here(sim, signals, seed) if count == 1 else Workers(sim, seed, count)
+    asking = LocalTrials(sim, signals, seed) if count == 1 else Workers(sim, seed, count)
     total = sum(search.seeds for search in searches if not search.done)
     made = 0
     try:
@@ -189,12 +189,12 @@ def _checked(
 
 
 def _opening(
-    sim: Simulation, signals: Signals, closed: Collection[str], blind: Mapping[str, Blindness]
+    sim: Simulation, signals: Signals, closed: Collection[str], blind: Mapping[str, Ambiguity]
 ) -> NextRuns | None:
     """The further runs that tell what these cannot; None where there are none."""
-    asked: dict[str, Blindness] = {}
+    asked: dict[str, Ambiguity] = {}
     for cause in closed:
-        spot = blind.get(cause) or Blindness((cause,), "", "")
+        spot = blind.get(cause) or Ambiguity((cause,), "", "")
         causes = tuple(other for other in spot.causes if other in closed)
         asked.setdefault(repr(causes), replace(spot, causes=causes))
     if not asked:
@@ -214,7 +214,7 @@ def _still(further: NextRuns | None, found: Collection[RehearsedCause]) -> NextR
     return replace(further, between=between)
 
 
-def _notes(searches: Collection[SizeSearch], at: Pace) -> list[str]:
+def _notes(searches: Collection[SizeSearch], at: Deadline) -> list[str]:
     notes = []
     left = [search.cause for search in searches if not search.done]
     if left:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..planning.nextruns import NextRuns
-from ..support.layout import laid_out, wrapped
-from ..support.plainresult import PlainResult, counted, result_picture
+from ..support.layout import counted, laid_out, wrapped_lines
+from ..support.plainresult import PlainResult, result_picture
 from .cause import RehearsedCause
 
 if TYPE_CHECKING:
@@ -84,8 +84,8 @@ class Rehearsal(PlainResult):
         lines: list[str] = []
         for note in self.notes:
             if note.startswith("INCOMPLETE"):
-                lines += [*wrapped(f"{note}.", 2), ""]
-        lines += wrapped(
+                lines += [*wrapped_lines(f"{note}.", 2), ""]
+        lines += wrapped_lines(
             f"{self.runs} runs, {self.readings} readings, noise {self.noise:g} arcsec; "
             f"{self.trials} diagnoses, at most {self.seeds} of a cause, seed "
             f"{self.seed}.",
@@ -98,11 +98,11 @@ class Rehearsal(PlainResult):
         if never:
             lines += ["", "Not named in these runs:"]
             for cause in never:
-                lines += wrapped(f"- {_never(cause)}", 2)
+                lines += wrapped_lines(f"- {_never(cause)}", 2)
         lines += ["", *self._next()]
         for note in self.notes:
             if not note.startswith("INCOMPLETE"):
-                lines += wrapped(f"Note: {note}.", 2)
+                lines += wrapped_lines(f"Note: {note}.", 2)
         return laid_out(lines)
 
     def _next(self) -> list[str]:

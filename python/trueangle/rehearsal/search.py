@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from ..effects import EFFECTS
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from .cause import RehearsedCause, rehearsed_cause
 from .detection import Chance
 from .trial import Trial, TrialOutcome
-from .visibility import Range
+from .visibility import SizeRange
 
 #: Trials of a round while the sizes are bracketed, and steps up and down between two rounds.
 BRACKETING, STEP_UP, STEP_DOWN = 2, 8, 6
@@ -28,7 +28,7 @@ AIMS = (0.3, 0.75, 0.95, 0.95)
 GIVEN_UP = 4
 
 
-def next_steps(
+def next_sizes(
     tried: Mapping[int, tuple[int, int]], lowest: int, highest: int, seeds: int, start: int = 0
 ) -> list[int]:
     """Steps of the next round; none when all is done.
@@ -72,8 +72,8 @@ class SizeSearch:
     """The sizes of one cause, the trials made and those of the round at work."""
 
     cause: str
-    sizes: Range | None
-    spot: Blindness | None
+    sizes: SizeRange | None
+    spot: Ambiguity | None
     seeds: int
     start: int = 0
     answers: list[tuple[int, TrialOutcome]] = field(default_factory=list)
@@ -81,12 +81,14 @@ class SizeSearch:
     done: bool = False
 
     @classmethod
-    def of(cls, cause: str, sizes: Range | None, spot: Blindness | None, seeds: int) -> SizeSearch:
+    def of(
+        cls, cause: str, sizes: SizeRange | None, spot: Ambiguity | None, seeds: int
+    ) -> SizeSearch:
         """The search of a cause; one that the design cannot tell is tried large, to make sure."""
         if spot is None or sizes is None:
             return cls(cause, sizes, spot, seeds, done=sizes is None)
         top = min(sizes.highest, 2 * STEP_UP)
-        return cls(cause, Range(sizes.first, sizes.lowest, top, sizes.grows), spot, seeds, top)
+        return cls(cause, SizeRange(sizes.first, sizes.lowest, top, sizes.grows), spot, seeds, top)
 
     @property
     def is_blind(self) -> bool:
@@ -102,7 +104,7 @@ class SizeSearch:
             named, count = tried.get(step, (0, 0))
             tried[step] = named + outcome.is_named, count + 1
         low, high = self.sizes.lowest, self.sizes.highest
-        steps = next_steps(tried, low, high, self.seeds, self.start)
+        steps = next_sizes(tried, low, high, self.seeds, self.start)
         self.done = not steps
         first = len(self.answers)
         self.round = {first + k: (step, None) for k, step in enumerate(steps)}

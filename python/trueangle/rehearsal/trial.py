@@ -10,7 +10,7 @@ import numpy as np
 from ..diagnosis import Diagnosis, diagnose
 from ..effects import EFFECTS, Effect
 from ..errors import TrueAngleError
-from ..joint.pattern import Surroundings
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals, join_runs
 from ..simulation.simulation import Simulation, simulate
 
@@ -85,13 +85,13 @@ def measured_signals(sim: Simulation) -> Signals:
 
 
 def drawn_effect(
-    cause: str, size: float, signals: Signals, around: Surroundings, rng: np.random.Generator
+    cause: str, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
 ) -> Effect | None:
     """An effect of this cause and size; None where these runs cannot have it."""
     return EFFECTS[cause].drawn(size, signals, around, rng)
 
 
-def asked(sim: Simulation, signals: Signals, trial: Trial, seed: int) -> TrialOutcome:
+def run_trial(sim: Simulation, signals: Signals, trial: Trial, seed: int) -> TrialOutcome:
     """Hide the effect of a trial in readings of the simulation, diagnose them, and compare."""
     rng = trial_rng(seed, trial.cause, trial.number)
     effect = drawn_effect(trial.cause, trial.size, signals, sim.surroundings, rng)

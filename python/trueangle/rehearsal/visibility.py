@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import EFFECTS, Effect
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.blindspots import blind_spots
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
@@ -33,7 +33,7 @@ ROUNDS, NEAR = 40, 1.2
 
 
 @dataclass(frozen=True)
-class Range:
+class SizeRange:
     """Sizes of a cause that are worth trying: ``first * 2 ** (k / STEPS)`` of a step k.
 
     Attributes
@@ -56,10 +56,10 @@ class Range:
         return float(self.first * 2.0 ** ((step if self.grows else -step) / STEPS))
 
 
-def blind_causes(sim: Simulation, signals: Signals) -> dict[str, Blindness]:
+def blind_causes(sim: Simulation, signals: Signals) -> dict[str, Ambiguity]:
     """Causes that a diagnosis of such readings does not name, and why."""
     noise = np.random.default_rng(0).standard_normal(len(signals)) * sim.sigma_arcsec
-    found: dict[str, Blindness] = {}
+    found: dict[str, Ambiguity] = {}
     for spot in blind_spots(Regression.of(signals, noise, sim.surroundings)):
         for cause in spot.causes:
             if EFFECTS[cause].is_doubted and spot.hides(cause):
@@ -67,7 +67,7 @@ def blind_causes(sim: Simulation, signals: Signals) -> dict[str, Blindness]:
     return found
 
 
-def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Range | None:
+def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> SizeRange | None:
     """The sizes to try; None where these runs show nothing of the cause at any size."""
     effect = EFFECTS[cause]
     noise = np.random.default_rng(seed).standard_normal(len(signals)) * sim.sigma_arcsec
@@ -87,7 +87,7 @@ def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Rang
     if shown(start) == 0.0:
         return None
     if shown(start) == shown(start - 1.0):
-        return Range(1.0, 0, 0, effect.size_grows)  # it has one size only
+        return SizeRange(1.0, 0, 0, effect.size_grows)  # it has one size only
     log_size = start
     for _ in range(ROUNDS):
         value = shown(log_size)
@@ -98,7 +98,7 @@ def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Rang
     highest = 0.5 * np.log2(len(signals) * UP**2 / FIRST)
     highest = min(highest, limit - log_size)
     size = 2.0 ** (log_size if effect.size_grows else -log_size)
-    return Range(
+    return SizeRange(
         float(size),
         int(np.floor(np.log2(DOWN) * STEPS)),
         max(int(np.floor(highest * STEPS)), 0),

@@ -8,7 +8,7 @@ import signal
 import sys
 from typing import Any, BinaryIO
 
-from .trial import asked, measured_signals
+from .trial import measured_signals, run_trial
 
 
 def serve_trials(source: BinaryIO, target: BinaryIO) -> None:
@@ -22,7 +22,7 @@ def serve_trials(source: BinaryIO, target: BinaryIO) -> None:
             return
         answer: Any
         try:
-            answer = asked(sim, signals, trial, seed)
+            answer = run_trial(sim, signals, trial, seed)
         except Exception as failure:  # told by the one who asked
             answer = failure
         pickle.dump(answer, target)

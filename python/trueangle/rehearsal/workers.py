@@ -16,8 +16,8 @@ from typing import Any
 from ..errors import TrueAngleError
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
-from ..support.deadline import Pace, entered, pace
-from .trial import ENDED, Trial, TrialOutcome, asked
+from ..support.deadline import Deadline, current_deadline, under_deadline
+from .trial import ENDED, Trial, TrialOutcome, run_trial
 
 #: Variables that say how many threads a linear algebra library may use.
 THREADS = (
@@ -44,7 +44,7 @@ def usable_cores() -> int:
         return os.cpu_count() or 1
 
 
-class Here:
+class LocalTrials:
     """Trials one after the other, in this process."""
 
     def __init__(self, sim: Simulation, signals: Signals, seed: int) -> None:
@@ -59,12 +59,12 @@ class Here:
     def answers(self) -> Iterator[tuple[Trial, TrialOutcome]]:
         """Answers as they come, until none is outstanding or the time is up."""
         sim, signals, seed = self._asked
-        at = pace()
+        at = current_deadline()
         while self._ready and not at.over:
             trial = self._ready.pop(0)
             left = None if at.within is None else max(at.within - at.seconds, 1e-3)
-            with entered(Pace(left)) as own:
-                outcome = asked(sim, signals, trial, seed)
+            with under_deadline(Deadline(left)) as own:
+                outcome = run_trial(sim, signals, trial, seed)
             at.stopped = at.stopped or own.stopped
             if outcome.verdict != ENDED:
                 yield trial, outcome
@@ -102,7 +102,7 @@ class Workers:
 
     def answers(self) -> Iterator[tuple[Trial, TrialOutcome]]:
         """Answers as they come, until none is outstanding or the time is up."""
-        at = pace()
+        at = current_deadline()
         while self._outstanding and not at.over:
             try:
                 trial, answer = self._done.get(timeout=LOOK)

@@ -21,7 +21,7 @@ Model = dict[str, Any]
 _identities = count(1)
 
 
-def model(kind: str, **attributes: Any) -> Model:
+def bokeh_model(kind: str, **attributes: Any) -> Model:
     """A new model; what is not named keeps Bokeh's default."""
     return {"type": "object", "name": kind, "id": f"p{next(_identities)}", "attributes": attributes}
 
@@ -31,12 +31,12 @@ def bokeh_reference(made: Model) -> dict[str, str]:
     return {"id": made["id"]}
 
 
-def field(column: str) -> dict[str, str]:
+def bokeh_field(column: str) -> dict[str, str]:
     """A property of marks that takes its values from a column."""
     return {"type": "field", "field": column}
 
 
-def value(same: Any) -> dict[str, Any]:
+def bokeh_value(same: Any) -> dict[str, Any]:
     """A property of marks that is the same for all."""
     return {"type": "value", "value": same}
 
@@ -47,7 +47,7 @@ def bokeh_columns(data: Mapping[str, Iterable[Any]]) -> Model:
         [name, _written(some) if isinstance(some, np.ndarray) else list(some)]
         for name, some in data.items()
     ]
-    return model("ColumnDataSource", data={"type": "map", "entries": entries})
+    return bokeh_model("ColumnDataSource", data={"type": "map", "entries": entries})
 
 
 def _written(array: np.ndarray[Any, Any]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from .bokehmodels import Model, bokeh_reference, model
+from .bokehmodels import Model, bokeh_model, bokeh_reference
 
 #: Decades of a logarithmic axis up to which it has ticks within them.
 _FEW_DECADES: Final = 4
@@ -57,27 +57,29 @@ class ChartAxis:
     def range(self) -> Model:
         """What the axis shows."""
         if self.categories is not None:
-            return model("FactorRange", factors=list(reversed(list(self.categories))))
+            return bokeh_model("FactorRange", factors=list(reversed(list(self.categories))))
         if self.limits is None:
-            return model("DataRange1d")
+            return bokeh_model("DataRange1d")
         low, high = self.limits
-        return model("Range1d", start=float(low), end=float(high))
+        return bokeh_model("Range1d", start=float(low), end=float(high))
 
     def scale(self) -> Model:
         """How numbers become places."""
-        return model(f"{self._kind('Linear')}Scale")
+        return bokeh_model(f"{self._kind('Linear')}Scale")
 
     def drawn(self, dimension: int) -> tuple[Model, Model]:
         """The axis, and the grid that refers to it."""
-        axis = model(
+        axis = bokeh_model(
             f"{self._kind('Linear')}Axis", axis_label=self.title or None, visible=self.visible
         )
-        grid = model("Grid", axis=bokeh_reference(axis), dimension=dimension)
+        grid = bokeh_model("Grid", axis=bokeh_reference(axis), dimension=dimension)
         if self.log and self.limits is not None:
             self.ticks = _within_decades(*self.limits)
-            axis["attributes"]["formatter"] = model("BasicTickFormatter", use_scientific=False)
+            axis["attributes"]["formatter"] = bokeh_model(
+                "BasicTickFormatter", use_scientific=False
+            )
         if self.ticks is not None:
-            axis["attributes"]["ticker"] = model("FixedTicker", ticks=self.ticks)
+            axis["attributes"]["ticker"] = bokeh_model("FixedTicker", ticks=self.ticks)
         return axis, grid
 
     def _kind(self, plain: str) -> str:

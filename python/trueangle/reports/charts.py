@@ -14,9 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..support.arrays import Array
-from .bokehmodels import Model, bokeh_columns, bokeh_reference, field, model, value
+from .bokehmodels import (
+    Model,
+    bokeh_columns,
+    bokeh_field,
+    bokeh_model,
+    bokeh_reference,
+    bokeh_value,
+)
 from .chartaxes import ChartAxis
-from .stills import Mark, still
+from .stills import StillMark, still_picture
 
 #: Part of a chart's width at either border from which texts are turned inwards.
 _EDGE: Final = 0.3
@@ -109,7 +116,7 @@ class Chart:
         self._up = ChartAxis(y, y_range, log_y, categories, visible=not joined)
         self._renderers: list[Model] = []
         self._spans: list[Model] = []
-        self._marks: list[Mark] = []
+        self._marks: list[StillMark] = []
         self._uprights: list[float] = []
         #: Legend, set as text of the page: label -> colour and sign.
         self._legend: dict[str, tuple[str, str]] = {}
@@ -131,7 +138,7 @@ class Chart:
         hollow: bool = False,
     ) -> None:
         """Dots; ``hover`` is a line of text with ``@{column}`` of ``more`` columns in it."""
-        self._marks.append(Mark("dots", (x, y), colour, size))
+        self._marks.append(StillMark("dots", (x, y), colour, size))
         data = {"x": _short(x), "y": _short(y), **(more or {})}
         sign = "○" if hollow else _GLYPHS[_MARKERS.index(marker)]
         self._add(
@@ -143,8 +150,10 @@ class Chart:
         dash: str = "solid", run: int | None = None, hover: str = "",
     ) -> None:  # fmt: skip
         """A line through the points."""
-        self._marks.append(Mark("line", (x, y), colour, width))
-        glyph = model("Line", x=field("x"), y=field("y"), line_width=width, line_dash=dash)
+        self._marks.append(StillMark("line", (x, y), colour, width))
+        glyph = bokeh_model(
+            "Line", x=bokeh_field("x"), y=bokeh_field("y"), line_width=width, line_dash=dash
+        )
         sign = "━" if dash == "solid" else "╍"
         self._add(glyph, _points(x, y), colour, label, run, hover, sign)
 
@@ -159,8 +168,14 @@ class Chart:
         alpha: float = 0.25,
     ) -> None:
         """The area between two curves."""
-        self._marks.append(Mark("band", (x, low, high), colour))
-        glyph = model("VArea", x=field("x"), y1=field("low"), y2=field("y"), fill_alpha=alpha)
+        self._marks.append(StillMark("band", (x, low, high), colour))
+        glyph = bokeh_model(
+            "VArea",
+            x=bokeh_field("x"),
+            y1=bokeh_field("low"),
+            y2=bokeh_field("y"),
+            fill_alpha=alpha,
+        )
         source = bokeh_columns({"x": _short(x), "low": _short(low), "y": _short(high)})
         self._add(glyph, source, colour, label, sign="▒")
 
@@ -170,19 +185,19 @@ class Chart:
     ) -> None:  # fmt: skip
         """Upright lines from ``low`` to ``high``."""
         feet = np.broadcast_to(np.asarray(low, dtype=np.float64), high.shape)
-        self._marks.append(Mark("segments", (x, feet, x, high), colour, width))
+        self._marks.append(StillMark("segments", (x, feet, x, high), colour, width))
         source = bokeh_columns({"x": _short(x), "y": _short(high), "low": _short(feet)})
         self._add(_segment("x", "low", "x", "y", width), source, colour, label, sign="┃")
 
     def ticks(self, x: Array, y: Array, half: float, *, colour: str, label: str = "") -> None:
         """Short level lines of half width ``half`` at every point."""
-        self._marks.append(Mark("segments", (x - half, y, x + half, y), colour, 2.0))
+        self._marks.append(StillMark("segments", (x - half, y, x + half, y), colour, 2.0))
         source = bokeh_columns({"x0": _short(x - half), "x1": _short(x + half), "y": _short(y)})
         self._add(_segment("x0", "y", "x1", "y", 2.0), source, colour, label, sign="━")
 
     def level_dots(self, names: Sequence[str], values: Array, *, colour: str, hover: str) -> None:
         """A dot of each category at its value."""
-        self._marks.append(Mark("dots", (values, list(names)), colour, 11.0))
+        self._marks.append(StillMark("dots", (values, list(names)), colour, 11.0))
         source = bokeh_columns({"y": names, "x": _short(values)})
         self._add(_marks("circle", 11.0), source, colour, hover=hover)
 
@@ -190,7 +205,7 @@ class Chart:
         """A dashed line over the whole height."""
         self._uprights.append(x)
         self._spans.append(
-            model(
+            bokeh_model(
                 "Span",
                 location=x,
                 dimension="height",
@@ -213,15 +228,15 @@ class Chart:
         low, high = inside
         place = (np.asarray(x, dtype=np.float64) - low) / (high - low)
         sides = ["left" if p < _EDGE else "right" if p > 1.0 - _EDGE else "center" for p in place]
-        glyph = model(
+        glyph = bokeh_model(
             "Text",
-            x=field("x"),
-            y=field("y"),
-            text=field("text"),
-            text_align=field("side"),
-            text_baseline=field("line"),
-            text_font_size=value("11px"),
-            y_offset=field("off"),
+            x=bokeh_field("x"),
+            y=bokeh_field("y"),
+            text=bokeh_field("text"),
+            text_align=bokeh_field("side"),
+            text_baseline=bokeh_field("line"),
+            text_font_size=bokeh_value("11px"),
+            y_offset=bokeh_field("off"),
         )
         under = list(below) or [False] * len(texts)
         source = bokeh_columns(
@@ -261,14 +276,16 @@ class Chart:
 
     def still(self, share: float) -> str:
         """The chart as SVG that takes this part of the page's width."""
-        return still(self._marks, self._across, self._up, self.height_rem, share, self._uprights)
+        return still_picture(
+            self._marks, self._across, self._up, self.height_rem, share, self._uprights
+        )
 
     def _root(self) -> Model:
         below, across = self._across.drawn(0)
         left, up = self._up.drawn(1)
-        zoom = model("BoxZoomTool")
+        zoom = bokeh_model("BoxZoomTool")
         hover = [
-            model(
+            bokeh_model(
                 "HoverTool",
                 renderers=[bokeh_reference(r) for r in shown],
                 tooltips=text,
@@ -276,8 +293,8 @@ class Chart:
             )
             for text, shown in self._hover.items()
         ]
-        tools = [zoom, model("PanTool"), model("ResetTool"), *hover]
-        return model(
+        tools = [zoom, bokeh_model("PanTool"), bokeh_model("ResetTool"), *hover]
+        return bokeh_model(
             "Figure",
             # What is referred to, as renderers are by tools and axes by grids, stands before that.
             renderers=self._renderers,
@@ -285,7 +302,7 @@ class Chart:
             y_range=self._up.range(),
             x_scale=self._across.scale(),
             y_scale=self._up.scale(),
-            toolbar=model("Toolbar", tools=tools, active_drag=bokeh_reference(zoom)),
+            toolbar=bokeh_model("Toolbar", tools=tools, active_drag=bokeh_reference(zoom)),
             toolbar_location=None,
             left=[left],
             below=[below],
@@ -303,7 +320,7 @@ class Chart:
         self, glyph: Model, source: Model, colour: str, label: str = "", run: int | None = None,
         hover: str = "", sign: str = "",
     ) -> None:  # fmt: skip
-        drawn = model(
+        drawn = bokeh_model(
             "GlyphRenderer",
             tags=_tags(colour, run),
             data_source=source,
@@ -328,27 +345,27 @@ def _points(x: Array, y: Array) -> Model:
 
 
 def _marks(marker: str, size: float, hollow: bool = False) -> Model:
-    return model(
+    return bokeh_model(
         "Scatter",
-        x=field("x"),
-        y=field("y"),
-        size=value(size),
-        marker=value(marker),
-        fill_alpha=value(0.0 if hollow else 1.0),
-        line_alpha=value(1.0 if hollow or marker == "cross" else 0.0),
+        x=bokeh_field("x"),
+        y=bokeh_field("y"),
+        size=bokeh_value(size),
+        marker=bokeh_value(marker),
+        fill_alpha=bokeh_value(0.0 if hollow else 1.0),
+        line_alpha=bokeh_value(1.0 if hollow or marker == "cross" else 0.0),
     )
 
 
 def _segment(x0: str, y0: str, x1: str, y1: str, width: float) -> Model:
     """Lines between two points each, which end with these."""
-    return model(
+    return bokeh_model(
         "Segment",
-        x0=field(x0),
-        y0=field(y0),
-        x1=field(x1),
-        y1=field(y1),
-        line_width=value(width),
-        line_cap=value("butt"),
+        x0=bokeh_field(x0),
+        y0=bokeh_field(y0),
+        x1=bokeh_field(x1),
+        y1=bokeh_field(y1),
+        line_width=bokeh_value(width),
+        line_cap=bokeh_value("butt"),
     )
 
 

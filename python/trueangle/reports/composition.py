@@ -14,12 +14,12 @@ from ..runs.checks.record import records_of
 from ..runs.files import runs_of
 from ..runs.provenance import provenance
 from ..runs.run import CalibrationRun
-from ..runs.source import Reading
+from ..runs.source import ReadingOptions
+from ..support.argumentkinds import of_type, told_kinds
 from ..support.blas import one_blas_thread
-from ..support.deadline import pace
+from ..support.deadline import current_deadline
 from ..support.display_units import ErrorsIn
-from ..support.files import CERTIFICATE, PDF, REPORT, Kind, check_output
-from ..support.kinds import of_type, told_kinds
+from ..support.files import CERTIFICATE, PDF, REPORT, FileKind, check_output
 from .diagnosed import diagnosis_content
 from .figures import figures_of_diagnosis, figures_of_runs
 from .fitted import (
@@ -67,7 +67,7 @@ class Report(Page):
     content: dict[str, Any]
     figures: dict[str, dict[str, Any]]
 
-    _kind: ClassVar[Kind] = REPORT
+    _kind: ClassVar[FileKind] = REPORT
 
     def _written(self) -> str:
         return rendered_report(self.content, self.figures)
@@ -117,7 +117,7 @@ def report(
     positions: None = None,
     model: HarmonicModel | str | PathLike[str] | None = None,
     errors_in: ErrorsIn = "auto",
-    **reading: Unpack[Reading],
+    **reading: Unpack[ReadingOptions],
 ) -> Report: ...
 
 
@@ -135,7 +135,7 @@ def report(
     certificate: Identity | str | PathLike[str],
     positions: int | None = None,
     errors_in: ErrorsIn = "auto",
-    **reading: Unpack[Reading],
+    **reading: Unpack[ReadingOptions],
 ) -> Certificate: ...
 
 
@@ -155,7 +155,7 @@ def report(
     positions: int | None = None,
     model: HarmonicModel | str | PathLike[str] | None = None,
     errors_in: ErrorsIn = "auto",
-    **reading: Unpack[Reading],
+    **reading: Unpack[ReadingOptions],
 ) -> Report | Certificate:
     """Fit, select orders, hold out, diagnose and put it all on one page; or certify.
 
@@ -244,7 +244,7 @@ def report(
     scale = error_scale(
         errors_in, sizes["error"]["rms_arcsec"], sizes["error"]["max_abs_arcsec"], found
     )
-    at = pace()
+    at = current_deadline()
     at.at("fitting", 0, _STAGES)
     fit, selection, why_not = fit_or_reason(found, orders, joint)
     at.at("holding runs out", 1, _STAGES)

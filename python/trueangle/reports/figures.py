@@ -20,12 +20,12 @@ from ..plots.readingpictures import (
 )
 from ..plots.simulatedcurves import ErrorLeft, error_left_of, simulated_points
 from ..support.arrays import Array
-from ..support.display_units import significant
-from ..support.plainresult import counted
+from ..support.display_units import significant_digits
+from ..support.layout import counted
 from .charts import Chart, Figure, chart_figure, chart_run_marker, css_run_colour
 from .linenames import LineNames
 from .panelcharts import panel_figure
-from .scale import Scale
+from .scale import ErrorScale
 from .spectrum import spectrum_figure
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def figures_of_runs(
     selection: OrderSelection | None,
     held: HeldOut | None,
     name: LineNames,
-    scale: Scale,
+    scale: ErrorScale,
 ) -> dict[str, Figure]:
     """Figures of a report on runs: those that the fit, the selection and the gain allow."""
     made = {"errors": panel_figure(errors_picture(runs, fit, scale.unit), scale)}
@@ -62,16 +62,16 @@ def figures_of_runs(
     return made
 
 
-def _before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: Scale) -> Figure:
+def _before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: ErrorScale) -> Figure:
     """Error of every held-out run before and after correction."""
     pairs = []
     for run in held.runs:
-        low = 0.0 if run.model is None else curves.seen_span(run.model)[0]
+        low = 0.0 if run.model is None else curves.fitted_degrees(run.model)[0]
         x = curves.reference_degrees(run.run, low)
         number = next(i for i, known in enumerate(runs) if known is run.run)
         pairs.append((number, Points(run.label, x, run.before), Points(run.label, x, run.after)))
     model = next((run.model for run in held.runs if run.model is not None), None)
-    span = (0.0, 360.0) if model is None else curves.seen_span(model)
+    span = (0.0, 360.0) if model is None else curves.fitted_degrees(model)
     return panel_figure(before_after_picture(pairs, span, scale.unit), scale)
 
 
@@ -100,7 +100,7 @@ def figures_of_diagnosis(
     diagnosis: Diagnosis,
     runs: Sequence[CalibrationRun],
     sim: Simulation,
-    scale: Scale,
+    scale: ErrorScale,
 ) -> dict[str, Figure]:
     """Measured against simulated; what is left without each of several causes.
 
@@ -122,7 +122,7 @@ def figures_of_diagnosis(
     return found
 
 
-def _left(left: ErrorLeft, scale: Scale) -> Figure:
+def _left(left: ErrorLeft, scale: ErrorScale) -> Figure:
     """On a logarithmic axis: one cause may leave a hundred times what another does."""
     # The title says "without each cause".
     names = [name.removeprefix("without ") for name, _ in left.rows]
@@ -150,7 +150,7 @@ _MOST: Final = 12
 _LEAST: Final = 15.0
 
 
-def phase_figure(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None:
+def phase_figure(fit: FitResult, name: LineNames, scale: ErrorScale) -> Figure | None:
     """Phase of every order in every run; None where no run holds them, or there is one."""
     try:
         found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST]
@@ -170,7 +170,7 @@ def phase_figure(fit: FitResult, name: LineNames, scale: Scale) -> Figure | None
     return chart_figure(alt, charts, "multiples")
 
 
-def _of_order(order: Phases, numbers: dict[str, int], name: str, scale: Scale) -> Chart:
+def _of_order(order: Phases, numbers: dict[str, int], name: str, scale: ErrorScale) -> Chart:
     mean = np.angle(np.mean(order.amplitude * np.exp(1j * order.phase)))
     around = np.angle(np.exp(1j * (order.phase - mean)))
     degrees = np.degrees(mean + around)
@@ -178,7 +178,7 @@ def _of_order(order: Phases, numbers: dict[str, int], name: str, scale: Scale) -
     if middle < 0.0:
         degrees, middle = degrees + 360.0, middle + 360.0
     half = min(max(1.3 * float(np.abs(np.degrees(around)).max()), _LEAST), 190.0)
-    size = significant(scale.factor * float(order.amplitude.mean()), 3)
+    size = significant_digits(scale.factor * float(order.amplitude.mean()), 3)
     chart = Chart(
         "run",
         "phase / deg",

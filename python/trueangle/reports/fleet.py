@@ -17,7 +17,7 @@ from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from .chartaxes import ChartAxis
 from .page import Page, filled_template
-from .stills import Mark, StillPicture, still
+from .stills import StillMark, StillPicture, still_picture
 
 #: Units whose patterns are drawn at most, those that need something first.
 _DRAWN: Final = 24
@@ -111,13 +111,13 @@ class FleetReport(Page):
         across = ChartAxis("date", (1.5, len(rows) + 1.5))
         across.at_whole(2.0, len(rows) + 1.0, 6)
         up = ChartAxis("cumulative sum", (0.0, most))
-        marks = [Mark("line", (across.limits, (limit, limit)), "muted")]
+        marks = [StillMark("line", (across.limits, (limit, limit)), "muted")]
         for values in sums.T:
             colour = "warning" if float(values[-1]) > limit else "after"
-            marks.append(Mark("line", (date, values), colour))
+            marks.append(StillMark("line", (date, values), colour))
         title = f"{unit}: cumulative sums of its orders"
         alt = f"{title} on {len(rows)} further dates, limit {limit:.3g}"
-        return StillPicture(title, alt, still(marks, across, up, 9.0, 1.0 / 3.0))
+        return StillPicture(title, alt, still_picture(marks, across, up, 9.0, 1.0 / 3.0))
 
     def _pattern(self, unit: FleetUnit) -> StillPicture:
         """The error of a unit over a turn; the same axis for all, so that sizes compare."""
@@ -129,11 +129,13 @@ class FleetReport(Page):
         across.at_angles(0.0, 360.0, 4)
         up = ChartAxis(f"error / {self.unit.name}", (-most or -1.0, most or 1.0))
         colour = "after" if unit.verdict == "fine" else "warning"
-        marks = [Mark("line", (angle, size * turn_pattern(unit.orders, angle)), colour)]
+        marks = [StillMark("line", (angle, size * turn_pattern(unit.orders, angle)), colour)]
         said = f"{unit.unit}: {unit.verdict.replace('_', ' ')}"
         ptp = self.unit.text(self._scale * unit.peak_to_peak)
         return StillPicture(
-            said, f"error of {said}, {ptp} peak-to-peak", still(marks, across, up, 9.0, 1.0 / 3.0)
+            said,
+            f"error of {said}, {ptp} peak-to-peak",
+            still_picture(marks, across, up, 9.0, 1.0 / 3.0),
         )
 
     def _phasor(self, at: int) -> StillPicture:
@@ -144,7 +146,7 @@ class FleetReport(Page):
         turn = np.linspace(0.0, 2.0 * math.pi, 91)
         circle = RADIUS_OF_95 * between.std
         marks = [
-            Mark(
+            StillMark(
                 "line",
                 (
                     size * (common.cosine + circle * np.cos(turn)),
@@ -159,11 +161,11 @@ class FleetReport(Page):
                 phase = np.radians([row.phase_deg for row in rows])
                 amplitude = size * np.array([row.amplitude for row in rows])
                 places = (amplitude * np.sin(phase), amplitude * np.cos(phase))
-                marks.append(Mark("dots", places, colour, 8.0))
+                marks.append(StillMark("dots", places, colour, 8.0))
         reach = 1.1 * max(np.abs(part).max() for mark in marks for part in mark.arrays) or 1.0
         name = self.unit.name
         across = ChartAxis(f"cosine / {name}", (-reach, reach))
         up = ChartAxis(f"sine / {name}", (-reach, reach))
         title = f"order {common.order:g} of the {common.shaft}"
         alt = f"cosine and sine of {title} of every unit, and the circle that holds 95 % of them"
-        return StillPicture(title, alt, still(marks, across, up, _SQUARE, 1.0 / 3.0))
+        return StillPicture(title, alt, still_picture(marks, across, up, _SQUARE, 1.0 / 3.0))

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.model import HarmonicModel
-from ..plots.curves import seen_span
+from ..plots.curves import fitted_degrees
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
-from ..support.plainresult import finite
+from ..support.plainresult import finite_or_none
 from .linenames import LineNames
 
 if TYPE_CHECKING:
@@ -53,12 +53,12 @@ def model_content(fit: FitResult, name: LineNames) -> dict[str, Any]:
         )
     return {
         "argument": model.argument,
-        "span_deg": list(seen_span(model)),
+        "span_deg": list(fitted_degrees(model)),
         "constant_deg": model.constant * 360.0 / model.period,
         "coefficients": coefficients,
-        "residual_std_arcsec": finite(factor * fit.residual_std),
+        "residual_std_arcsec": finite_or_none(factor * fit.residual_std),
         "degrees_of_freedom": float(fit.degrees_of_freedom),
-        "condition_number": finite(fit.condition_number),
+        "condition_number": finite_or_none(fit.condition_number),
         "offset_spread_arcsec": factor * fit.offset_spread,
         "wild_readings": len(fit.wild),
         "ridge": fit.ridge,
@@ -96,9 +96,9 @@ def order_content(selection: OrderSelection, name: LineNames) -> dict[str, Any]:
         "orders": [float(m) for m in selection.orders],
         "reason": selection.reason,
         "holdout": selection.holdout,
-        "holdout_rms_before_arcsec": finite(factor * before),
-        "holdout_rms_after_arcsec": finite(factor * after),
-        "noise_arcsec": finite(factor * selection.noise.standard_deviation),
+        "holdout_rms_before_arcsec": finite_or_none(factor * before),
+        "holdout_rms_after_arcsec": finite_or_none(factor * after),
+        "noise_arcsec": finite_or_none(factor * selection.noise.standard_deviation),
         "noise_source": selection.noise.source,
         "gear_ratio": selection.gear_ratio,
         "notes": list(selection.notes),
@@ -108,12 +108,12 @@ def order_content(selection: OrderSelection, name: LineNames) -> dict[str, Any]:
                 "order": float(row.order),
                 "retained": row.retained,
                 "verdict": row.verdict,
-                "amplitude_arcsec": finite(factor * row.amplitude),
-                "std_arcsec": finite(factor * row.standard_error),
-                "phase_deg": finite(row.phase_deg % 360.0),
-                "phase_std_deg": finite(row.phase_error_deg),
-                "phase_spread_deg": finite(row.phase_spread_deg),
-                "holdout_gain_percent": finite(100.0 * row.holdout_gain),
+                "amplitude_arcsec": finite_or_none(factor * row.amplitude),
+                "std_arcsec": finite_or_none(factor * row.standard_error),
+                "phase_deg": finite_or_none(row.phase_deg % 360.0),
+                "phase_std_deg": finite_or_none(row.phase_error_deg),
+                "phase_spread_deg": finite_or_none(row.phase_spread_deg),
+                "holdout_gain_percent": finite_or_none(100.0 * row.holdout_gain),
                 "aliases": [float(m) for m in row.aliases],
                 "explanations": [str(e) for e in row.explanations],
                 "reason": row.reason,

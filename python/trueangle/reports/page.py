@@ -1,4 +1,4 @@
-"""The page: content and figures set into one HTML file that needs no network; saved or printed."""
+"""The page: content and figures in templates, one HTML file that needs no network; printed too."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from ..errors import ArgumentError, MissingExtraError
-from ..support.files import PAGE, PDF, Kind, check_output, external_output, written_atomically
-from ..support.plainresult import Shown
+from ..support.files import PAGE, PDF, FileKind, check_output, external_output, written_atomically
+from ..support.plainresult import ShownResult
 from . import charts, wording
 from .numbers import Numbers
 
@@ -50,7 +50,7 @@ def rendered_report(
 
     ``framed`` in a page that holds the library, it takes that one.
     """
-    made = template_environment()
+    made = _template_environment()
     from markupsafe import Markup
 
     numbers = Numbers(content)
@@ -76,7 +76,7 @@ def _live(figures: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def template_environment() -> Environment:
+def _template_environment() -> Environment:
     """What sets contents into the templates.
 
     Raises
@@ -102,18 +102,18 @@ def template_environment() -> Environment:
 def filled_template(template: str, **values: Any) -> str:
     """A template with its values and the report's style."""
     style = (_TEMPLATES / "report.css").read_text("utf-8")
-    text: str = template_environment().get_template(template).render(style=style, **values)
+    text: str = _template_environment().get_template(template).render(style=style, **values)
     return text
 
 
-class Page(Shown):
+class Page(ShownResult):
     """A result that is a page: one HTML file that needs no network.
 
     A class says by ``_written`` what the page holds.
     """
 
     #: What it is written as.
-    _kind: ClassVar[Kind] = PAGE
+    _kind: ClassVar[FileKind] = PAGE
 
     @cached_property
     def html(self) -> str:

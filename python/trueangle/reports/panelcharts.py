@@ -7,7 +7,7 @@ from typing import Final
 from ..plots.curves import CONFIDENCE, Curve, curve_envelope, thinned_points
 from ..plots.panel import ANGLE, Cloud, Panel, PanelPicture
 from .charts import Chart, Figure, chart_figure, chart_run_marker, css_run_colour
-from .scale import Scale
+from .scale import ErrorScale
 
 #: Readings drawn in one chart at most: more do not show, and make the page heavy and slow.
 _MOST_POINTS: Final = 2_000
@@ -26,12 +26,12 @@ _TICKS = {True: 4.0, False: 9.0}
 
 
 def panel_figure(
-    picture: PanelPicture, scale: Scale, arrangement: str = "row", **given: float
+    picture: PanelPicture, scale: ErrorScale, arrangement: str = "row", **given: float
 ) -> Figure:
     """All panels of a picture; the main one is twice as wide as its segment."""
     grows = [2.0 if number == 0 else 1.0 for number in range(len(picture.panels))]
     charts = [
-        panel_chart(panel, scale, grow=grow, **given)
+        _panel_chart(panel, scale, grow=grow, **given)
         for panel, grow in zip(picture.panels, grows, strict=True)
     ]
     segments = [panel.title for panel in picture.panels if panel.title]
@@ -39,7 +39,7 @@ def panel_figure(
     return chart_figure(picture.told + more, charts, arrangement)
 
 
-def panel_chart(panel: Panel, scale: Scale, **given: float) -> Chart:
+def _panel_chart(panel: Panel, scale: ErrorScale, **given: float) -> Chart:
     """Readings, model and medians of a panel."""
     segment = bool(panel.title)
     chart = Chart(panel.x, panel.y, x_range=panel.span, title=panel.title, **given)  # type: ignore[arg-type]
@@ -68,7 +68,7 @@ def dots_of_run(runs: int, most: int = _MOST_POINTS) -> int:
 
 
 def _draw_cloud(
-    chart: Chart, cloud: Cloud, panel: Panel, scale: Scale, most: int | None, large: bool
+    chart: Chart, cloud: Cloud, panel: Panel, scale: ErrorScale, most: int | None, large: bool
 ) -> None:
     part = cloud.points if most is None else thinned_points(cloud.points, most, cloud.run)
     size = _LARGE_DOT if large else _DOT

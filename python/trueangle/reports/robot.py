@@ -1,4 +1,4 @@
-"""The joints of a robot: in one table, the worst first, and on one page, a section for each."""
+"""The joints of a robot ranked: in one table, the worst first, and on one page, a section each."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from ..runs.checks.result import Check
 from ..runs.run import CalibrationRun
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
-from ..support.layout import laid_out
-from ..support.plainresult import counted
+from ..support.layout import counted, laid_out
 from . import wording
 from .composition import Report
 from .measured import measured_content

@@ -17,7 +17,7 @@ _FINEST: Final = 3e-4
 
 
 @dataclass(frozen=True)
-class Scale:
+class ErrorScale:
     """One unit for every error of a page; results are in arcsec, what is drawn in it.
 
     Attributes
@@ -75,7 +75,7 @@ class Scale:
 
 def error_scale(
     asked: ErrorsIn, rms: float, largest: float, runs: Sequence[CalibrationRun]
-) -> Scale:
+) -> ErrorScale:
     """The scale asked for; counts are those of the runs where no number says otherwise.
 
     Raises
@@ -86,4 +86,4 @@ def error_scale(
     period = runs[0].period
     unit = error_unit(asked, sine_of_rms(rms), period)
     turn = None if unit.name != "count" else period if isinstance(asked, str) else float(asked)
-    return Scale(unit, largest, turn)
+    return ErrorScale(unit, largest, turn)

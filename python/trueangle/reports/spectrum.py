@@ -12,7 +12,7 @@ from ..plots.orderaxis import order_groups
 from ..plots.orderlines import OrderLine, order_lines, seen_sizes
 from .charts import Chart, Figure, chart_figure
 from .linenames import LineNames
-from .scale import Scale
+from .scale import ErrorScale
 
 if TYPE_CHECKING:
     from ..fitting.orders.select import OrderSelection
@@ -30,7 +30,7 @@ _MOST_ALIASES, _MOST_EXPLANATIONS = 4, 3
 
 
 def spectrum_figure(
-    fit: FitResult | None, selection: OrderSelection | None, name: LineNames, scale: Scale
+    fit: FitResult | None, selection: OrderSelection | None, name: LineNames, scale: ErrorScale
 ) -> Figure:
     """Amplitude of every order: candidates of a selection, or the orders of a fit."""
     result = fit if selection is None else selection
@@ -57,7 +57,7 @@ def _group(
     group: tuple[float, float],
     y_range: tuple[float, float],
     named: Sequence[OrderLine],
-    scale: Scale,
+    scale: ErrorScale,
     name: LineNames,
     joined: bool,
 ) -> Chart:
@@ -156,7 +156,7 @@ def _orders(lines: Sequence[OrderLine]) -> NDArray[np.float64]:
     return np.array([line.order for line in lines])
 
 
-def _sizes(lines: Sequence[OrderLine], size: str, scale: Scale) -> NDArray[np.float64]:
+def _sizes(lines: Sequence[OrderLine], size: str, scale: ErrorScale) -> NDArray[np.float64]:
     """A size of every line in the unit of the page."""
     return scale.factor * np.array([getattr(line, size) for line in lines])
 

@@ -27,7 +27,7 @@ _MOST: Final = 120
 _TICKS: Final = 6
 
 
-class Mark(NamedTuple):
+class StillMark(NamedTuple):
     """What is drawn: ``kind`` dots, line, band or segments, with its arrays."""
 
     kind: str
@@ -44,8 +44,8 @@ class StillPicture(NamedTuple):
     svg: str
 
 
-def still(
-    marks: Sequence[Mark],
+def still_picture(
+    marks: Sequence[StillMark],
     across: ChartAxis,
     up: ChartAxis,
     height_rem: float,
@@ -75,7 +75,7 @@ class _Placement:
 
     def __init__(
         self,
-        marks: Sequence[Mark],
+        marks: Sequence[StillMark],
         across: ChartAxis,
         up: ChartAxis,
         x: tuple[float, float],
@@ -117,9 +117,9 @@ def _covered(parts: list[Any]) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _together(marks: Sequence[Mark]) -> list[Mark]:
+def _together(marks: Sequence[StillMark]) -> list[StillMark]:
     """Dots of one colour and size as one mark, where the first of them stands: runs are many."""
-    found: dict[tuple[str, float], list[Mark]] = {}
+    found: dict[tuple[str, float], list[StillMark]] = {}
     for mark in marks:
         if mark.kind == "dots":
             found.setdefault((mark.colour, mark.size), []).append(mark)
@@ -135,7 +135,7 @@ def _together(marks: Sequence[Mark]) -> list[Mark]:
     return joined
 
 
-def _drawn(mark: Mark, place: _Placement) -> str:
+def _drawn(mark: StillMark, place: _Placement) -> str:
     style = f'style="color:var(--{mark.colour})"'
     if mark.kind == "segments":
         x0, y0, x1, y1 = mark.arrays

@@ -13,10 +13,10 @@ from ..model.alarm import WatchedWindow
 from ..support.angles import arcsec
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
-from ..support.plainresult import counted
+from ..support.layout import counted
 from .chartaxes import ChartAxis
 from .page import Page, filled_template
-from .stills import Mark, StillPicture, still
+from .stills import StillMark, StillPicture, still_picture
 
 #: Orders whose windows are drawn at most: those whose sums rose highest.
 _DRAWN: Final = 12
@@ -131,13 +131,13 @@ class WatchReport(Page):
         axis.at_whole(first, last, 8)
         return axis
 
-    def _limited(self, values: Array) -> tuple[list[Mark], ChartAxis]:
+    def _limited(self, values: Array) -> tuple[list[StillMark], ChartAxis]:
         """Sums over the windows under their limit."""
         limit = self.windows[-1].limit
         across = self._across()
         up = ChartAxis("cumulative sum", (0.0, 1.1 * max(limit, float(values.max()))))
-        marks = [Mark("line", (across.limits, (limit, limit)), "muted")]
-        return [*marks, Mark("line", (self._number, values), "after")], up
+        marks = [StillMark("line", (across.limits, (limit, limit)), "muted")]
+        return [*marks, StillMark("line", (self._number, values), "after")], up
 
     def _chart(self) -> StillPicture:
         """The largest sum of all charts, those of the zero with them, and the alarms."""
@@ -145,10 +145,12 @@ class WatchReport(Page):
         marks, up = self._limited(largest)
         if self.alarms:
             places = [(one.window, one.statistic) for one in self.alarms]
-            marks.append(Mark("dots", tuple(np.array(places, dtype=np.float64).T), "warning", 8.0))
+            marks.append(
+                StillMark("dots", tuple(np.array(places, dtype=np.float64).T), "warning", 8.0)
+            )
         title = "largest cumulative sum of all charts"
         alt = f"{title} over {counted(self.windows, 'window')} with its limit, {self._told()}"
-        return StillPicture(title, alt, still(marks, self._across(), up, 14.0, 1.0))
+        return StillPicture(title, alt, still_picture(marks, self._across(), up, 14.0, 1.0))
 
     def _order(self, k: int) -> tuple[StillPicture, StillPicture]:
         """The sums of one order, and what it is off the model by."""
@@ -156,11 +158,11 @@ class WatchReport(Page):
         marks, up = self._limited(self._sums[:, k])
         title = f"{order}: cumulative sum"
         alt = f"{title}, {float(self._sums[:, k].max()):.3g} at most"
-        sums = StillPicture(title, alt, still(marks, self._across(), up, 9.0, 0.5))
+        sums = StillPicture(title, alt, still_picture(marks, self._across(), up, 9.0, 0.5))
         size = self._scale * self._sizes[:, k]
         title = f"{order}: less the model"
         alt = f"{title}, {self.unit.text(float(size.max()))} at most"
         shown = self.unit.per_arcsec * size
         up = ChartAxis(f"size / {self.unit.name}", (0.0, 1.1 * float(shown.max()) or 1.0))
-        marks = [Mark("line", (self._number, shown), "after")]
-        return sums, StillPicture(title, alt, still(marks, self._across(), up, 9.0, 0.5))
+        marks = [StillMark("line", (self._number, shown), "after")]
+        return sums, StillPicture(title, alt, still_picture(marks, self._across(), up, 9.0, 0.5))

@@ -1,4 +1,4 @@
-"""Words of the page that depend on the content; numbers are set in by the template."""
+"""Words that the template of a page asks for: titles, sentences, lists, conditions, gains."""
 
 from __future__ import annotations
 

@@ -7,6 +7,6 @@ from typing import Any
 
 def __getattr__(name: str) -> Any:
     # `trueangle.runs` was one module.
-    from ..support.renamed import attribute
+    from ..support.renamed import renamed_attribute
 
-    return attribute(__name__, f"{__name__}.run", name)
+    return renamed_attribute(__name__, f"{__name__}.run", name)

@@ -1,4 +1,4 @@
-"""What a set of positions can tell apart: distinct positions and folded orders.
+"""What a set of positions can tell apart: distinct positions, folded orders, closure errors.
 
 On N equispaced positions the orders m and k are one column of numbers wherever
 ``m = k`` or ``m = -k`` modulo N: a tooth mesh 202 times per turn, read every 10

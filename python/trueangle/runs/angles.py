@@ -9,7 +9,7 @@ from ..errors import FileError
 from ..formats.columns import listed_columns
 from ..support.angles import UNIT_PERIODS
 from ..support.arrays import Array
-from ..support.roles import Column, offsets_of, signal_code
+from ..support.roles import RoleColumn, offsets_of, role_code
 from ..support.suggestions import did_you_mean
 from .facets import Facets
 
@@ -28,7 +28,7 @@ class _Part(NamedTuple):
         return values if self.factor == 1.0 else values * self.factor
 
 
-class Angles(NamedTuple):
+class RunAngles(NamedTuple):
     """Columns of the reference with what is added to it, of the indicated angle, or of the error.
 
     ::
@@ -81,16 +81,16 @@ class Angles(NamedTuple):
         return reference, indicated
 
 
-def find_angles(
+def find_run_angles(
     path: object,
     header: Sequence[str],
-    roles: Mapping[str, Column],
+    roles: Mapping[str, RoleColumn],
     *,
     unit: str | None = None,
     counts_per_turn: float | None = None,
     counts_per_turn_reference: float | None = None,
     facets: Facets | None = None,
-) -> Angles:
+) -> RunAngles:
     """What the angles of a table are made of, and their period.
 
     ``unit`` is that of angles whose columns state none, ``path`` stands in messages.
@@ -120,7 +120,7 @@ def find_angles(
     first = found.get("reference") or found["indicated"]
     if first.unit is None:
         raise error(
-            f"its unit is not known; give it: {signal_code(first.role, first.name, 'deg')}",
+            f"its unit is not known; give it: {role_code(first.role, first.name, 'deg')}",
             first.name,
         )
     if first.role == "reference" and "indicated" in found:
@@ -130,7 +130,7 @@ def find_angles(
     for role, column in found.items():
         if column.unit is None:
             raise error(
-                f"its unit is not known; give it: {signal_code(role, column.name, 'arcsec')}",
+                f"its unit is not known; give it: {role_code(role, column.name, 'arcsec')}",
                 column.name,
             )
         if column.unit == "count" and counts.get(role, counts_per_turn) is None:
@@ -149,7 +149,7 @@ def find_angles(
         )
     period = UNIT_PERIODS.get(first.unit, _PERIOD)
 
-    def part(column: Column | None) -> _Part | None:
+    def part(column: RoleColumn | None) -> _Part | None:
         if column is None:
             return None
         turn = counts.get(column.role, counts_per_turn)
@@ -160,12 +160,12 @@ def find_angles(
         if column.unit is None:
             raise error(
                 "its unit is not known; give it: "
-                f"{signal_code('reference_offset', column.name, 'arcsec')}",
+                f"{role_code('reference_offset', column.name, 'arcsec')}",
                 column.name,
             )
         offsets.append(_Part(column.name, column.scale(period, counts_per_turn_reference)[0]))
     mount = part(roles.get("mount")) if facets is not None else None
-    return Angles(
+    return RunAngles(
         path,
         period,
         part(found.get("reference")),
@@ -177,7 +177,7 @@ def find_angles(
     )
 
 
-def _check_alike(error: Callable[[str, str], FileError], found: Mapping[str, Column]) -> None:
+def _check_alike(error: Callable[[str, str], FileError], found: Mapping[str, RoleColumn]) -> None:
     """Refuse two angles that were found by their names and have unlike units."""
     if not {"reference", "indicated"} <= found.keys():
         return
@@ -200,6 +200,6 @@ def _refuse_missing(path: object, header: Sequence[str], role: str) -> None:
     raise FileError(
         path,
         f"no column {role}_deg (one of {names} is needed, or another named with "
-        f"{signal_code(role)}){guess}; {listed_columns(header)}",
+        f"{role_code(role)}){guess}; {listed_columns(header)}",
         line=1,
     )

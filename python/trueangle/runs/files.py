@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import EmptyCellsWarning, FileError, level_of_caller
-from ..support.files import Source
-from ..support.kinds import told_kinds
-from ..support.plainresult import counted
-from ..support.roles import LABELS, Column, count_turn, signal_code, unit_in_name
+from ..support.argumentkinds import told_kinds
+from ..support.files import InputFile
+from ..support.layout import counted
+from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, unit_in_name
 from ..support.signals import FIELDS
 from ..support.times import local_day
-from .angles import find_angles
+from .angles import find_run_angles
 from .facets import Facets, read_facets
 from .readings import FileReadings
-from .run import CalibrationRun, as_runs, given_runs
-from .source import Reading, checked_reading, each_table
+from .run import CalibrationRun, as_runs, runs_or_data
+from .source import ReadingOptions, checked_reading_options, each_table
 
 
-class RunLabels(NamedTuple):
+class _RunLabels(NamedTuple):
     """What tells a run from the others: its joint, when it was calibrated, and its label."""
 
     unit: str | None = None
@@ -32,14 +32,14 @@ class RunLabels(NamedTuple):
 
 
 #: Labels and rows of every run.
-Groups: TypeAlias = list[tuple[RunLabels, NDArray[np.intp]]]
+Groups: TypeAlias = list[tuple[_RunLabels, NDArray[np.intp]]]
 
 #: Unit of the run's angles where the reference has none that a run may be in.
 _PERIOD = 360.0
 
 
 @told_kinds
-def read_runs(path: Any, **reading: Unpack[Reading]) -> list[CalibrationRun]:
+def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationRun]:
     """Calibration runs of files or tables, in the order these name them.
 
     Parameters
@@ -94,7 +94,7 @@ def read_runs(path: Any, **reading: Unpack[Reading]) -> list[CalibrationRun]:
     >>> read_runs({"reference": [0.0, 90.0], "indicated": [0.1, 90.1]}, period=360.0)
     [CalibrationRun(None, 2 readings, period=360)]
     """
-    return _read(path, checked_reading(reading), "path")
+    return _read(path, checked_reading_options(reading), "path")
 
 
 def runs_of(
@@ -112,8 +112,8 @@ def runs_of(
     FileError
         As `read_runs`.
     """
-    asked = checked_reading(reading)
-    runs, data = given_runs(data)
+    asked = checked_reading_options(reading)
+    runs, data = runs_or_data(data)
     if runs is not None:
         return as_runs(runs)
     return _read(data, asked, name, table)
@@ -131,18 +131,20 @@ def each_runs(
     ArgumentError, FileError
         As `runs_of`; runs in different units are left to ``take``.
     """
-    asked = checked_reading(reading)
-    runs, data = given_runs(data)
+    asked = checked_reading_options(reading)
+    runs, data = runs_or_data(data)
     if runs is not None:
         take(as_runs(runs))
         return
     given = Conversion.of(asked)
-    each_table(data, lambda table: take(runs_of_readings(table, given)), asked)
+    each_table(data, lambda table: take(_runs_of_readings(table, given)), asked)
 
 
-def _read(data: Any, reading: Reading, name: str, table: str = "table") -> list[CalibrationRun]:
+def _read(
+    data: Any, reading: ReadingOptions, name: str, table: str = "table"
+) -> list[CalibrationRun]:
     given = Conversion.of(reading)
-    found = each_table(data, lambda t: runs_of_readings(t, given), reading, name, table)
+    found = each_table(data, lambda t: _runs_of_readings(t, given), reading, name, table)
     runs = [run for part in found for run in part]
     units = {run.period: run for run in runs}
     if len(units) > 1:
@@ -164,17 +166,17 @@ class Conversion(NamedTuple):
     facets: Facets | None = None
 
     @classmethod
-    def of(cls, reading: Reading) -> Conversion:
+    def of(cls, reading: ReadingOptions) -> Conversion:
         """From the keywords of `read_runs`."""
         facets = reading["facets"]
         return cls(
-            count_turn(reading["counts_per_turn"], "counts_per_turn"),
-            count_turn(reading["counts_per_turn_reference"], "counts_per_turn_reference"),
+            checked_count_turn(reading["counts_per_turn"], "counts_per_turn"),
+            checked_count_turn(reading["counts_per_turn_reference"], "counts_per_turn_reference"),
             facets if facets is None or isinstance(facets, Facets) else read_facets(facets),
         )
 
 
-class RunColumns(NamedTuple):
+class _RunColumns(NamedTuple):
     """Columns of one file of runs as they were read, nothing of them judged but the numbers.
 
     Angles and signals are in the unit of ``period``; ``groups`` are unit, label, and the
@@ -188,23 +190,23 @@ class RunColumns(NamedTuple):
     signals: dict[str, NDArray[np.float64]]
     groups: Groups
     left_out: list[int]
-    source: Source
+    source: InputFile
 
 
-def read_columns(data: Any, reading: Reading) -> list[RunColumns]:
+def read_columns(data: Any, reading: ReadingOptions) -> list[_RunColumns]:
     """The columns of every file or table, grouped by run; time may run backwards."""
     given = Conversion.of(reading)
     return each_table(data, lambda table: _columns(table, given), reading, "data")
 
 
-def _columns(table: FileReadings, given: Conversion) -> RunColumns:
+def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
     asked = {role for role, column in table.roles.items() if column.is_asked}
     filled = any(len(column) for column in table.columns.values())
     # A log of an angle called indicated_deg is no table.
     if len(table.columns) == 1 and filled and table.roles.keys() <= asked & {"indicated"}:
         return _entries(table, given.counts)
     roles, path = table.roles, table.path
-    angles = find_angles(
+    angles = find_run_angles(
         path,
         list(table.columns),
         roles,
@@ -238,18 +240,18 @@ def _columns(table: FileReadings, given: Conversion) -> RunColumns:
         groups.append((found, present))
         left_out.append(rows.size - present.size)
     _warn_of_empty(table, missing, {"reference": reference, "indicated": indicated, **signals})
-    return RunColumns(table, period, reference, indicated, signals, groups, left_out, table.source)
+    return _RunColumns(table, period, reference, indicated, signals, groups, left_out, table.source)
 
 
-def _entries(table: FileReadings, counts: float | None) -> RunColumns:
+def _entries(table: FileReadings, counts: float | None) -> _RunColumns:
     """A table of a turn as firmware holds it: entry i of n is the reading at i/n of a turn."""
     (name,) = table.columns
-    column = table.roles.get("indicated", Column("indicated", name, None))
+    column = table.roles.get("indicated", RoleColumn("indicated", name, None))
     unit = column.unit or unit_in_name(name, "indicated") or (None if counts is None else "count")
     if unit is None or (unit == "count" and counts is None):
         raise table.error(
             "one column is taken for a table whose entry i of n is the reading at i/n of a turn, "
-            f"and its unit is not known: give {signal_code('indicated', name, 'deg')} (or another "
+            f"and its unit is not known: give {role_code('indicated', name, 'deg')} (or another "
             "unit), or `counts_per_turn=`; or name the file's reference column",
             name,
         )
@@ -260,11 +262,11 @@ def _entries(table: FileReadings, counts: float | None) -> RunColumns:
         raise FileError(table.path, "has a header but no readings", line=1)
     left_out = indicated.size - rows.size
     _warn_of_empty(table, np.isnan(indicated), {"indicated": indicated})
-    groups: Groups = [(RunLabels(), rows)]
-    return RunColumns(table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source)
+    groups: Groups = [(_RunLabels(), rows)]
+    return _RunColumns(table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source)
 
 
-def runs_of_readings(table: FileReadings, given: Conversion) -> list[CalibrationRun]:
+def _runs_of_readings(table: FileReadings, given: Conversion) -> list[CalibrationRun]:
     """Runs of the rows of a table; raises as `read_runs`."""
     found = _columns(table, given)
     signals = found.signals
@@ -322,11 +324,11 @@ def _groups(table: FileReadings, size: int) -> Groups:
     """Labels and rows of every run, in the order of their first row: of one day each."""
     columns = {
         role: [*map(_label, table.columns[table.roles[role].name].tolist())]
-        for role in RunLabels._fields
+        for role in _RunLabels._fields
         if role in table.roles
     }
     if not columns:
-        return [(RunLabels(), np.arange(size))]
+        return [(_RunLabels(), np.arange(size))]
     days = {text: local_day(text) for text in set(columns.get("when", ()))}
     if not all(days.values()):
         row = next(i for i, text in enumerate(columns["when"]) if not days[text])
@@ -337,7 +339,7 @@ def _groups(table: FileReadings, size: int) -> Groups:
         del columns["when"]  # a column of this name that holds something else
         days = {}
     if not columns:
-        return [(RunLabels(), np.arange(size))]
+        return [(_RunLabels(), np.arange(size))]
     keys = dict(columns)
     if days:
         keys["when"] = [days[text] for text in columns["when"]]
@@ -346,7 +348,7 @@ def _groups(table: FileReadings, size: int) -> Groups:
         rows.setdefault(key, []).append(i)
     return [
         (
-            RunLabels(**{role: texts[places[0]] for role, texts in columns.items()}),
+            _RunLabels(**{role: texts[places[0]] for role, texts in columns.items()}),
             np.array(places, dtype=np.intp),
         )
         for places in rows.values()

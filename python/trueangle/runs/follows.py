@@ -13,7 +13,7 @@ from ..errors import ArgumentError, UnitWarning
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.quantiles import quantile
-from .checks.angles import AGREES, angle_ratio, suggestion
+from .checks.angles import AGREES, angle_ratio, ratio_suggestion
 from .checks.record import records_of
 from .run import CalibrationRun
 
@@ -142,6 +142,6 @@ def _moves(ratio: float | None) -> str:
         return "check units, sign, gear ratio and that the rows belong together"
     return (
         f"it moves {ratio:.6g} times as far as the reference, which looks like "
-        f"{suggestion(ratio)}; unwrap it and divide it by {ratio:.6g}, so that it is reduced to "
-        "the output"
+        f"{ratio_suggestion(ratio)}; unwrap it and divide it by {ratio:.6g}, so that it is reduced "
+        "to the output"
     )

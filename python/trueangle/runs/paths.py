@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Final
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..formats.formats import known_format
 from ..support.files import check_input, restore
 
@@ -101,3 +101,24 @@ def _natural(path: Path) -> list[tuple[int, str]]:
     """Sorts log2 before log10."""
     parts = re.split(r"(\d+)", str(path))
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]
+
+
+def unit_of_path(path: Path, pattern: str | None) -> str | None:
+    r"""The unit that a path names: the first group of ``pattern`` in it, or all that it finds.
+
+    Raises
+    ------
+    FileError
+        The pattern finds nothing.
+
+    Examples
+    --------
+    >>> unit_of_path(Path("cell7/joint-A12.csv"), r"joint-(\w+)")
+    'A12'
+    """
+    if pattern is None:
+        return None
+    found = re.search(pattern, path.as_posix())
+    if found is None:
+        raise FileError(path, f"the pattern of `unit_from=` finds nothing in this path: {pattern}")
+    return found[1] if found.re.groups and found[1] is not None else found[0]

@@ -19,19 +19,19 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from ..formats.budget import DecodedSizeError, check_decoded
 from ..formats.columns import find_columns
-from ..formats.csvheader import number
+from ..formats.csvheader import cell_number
 from ..formats.format import TEXTS, Batch, Format, Labels, Selection
 from ..formats.formats import format_of_content
 from ..support.files import (
     RUNS_BYTES,
-    Source,
+    InputFile,
     check_input,
     partition_keys,
     partition_name,
     read_whole,
     sha256_of,
 )
-from ..support.roles import LABELS, Column, role_kind, signal_code, wanted_columns
+from ..support.roles import LABELS, RoleColumn, role_code, role_kind, wanted_columns
 from ..support.times import elapsed_seconds, parsed_time
 
 T = TypeVar("T")
@@ -46,7 +46,7 @@ _ONCE: ContextVar[_Kept | None] = ContextVar("columns of files", default=None)
 
 
 @contextmanager
-def read_once() -> Iterator[None]:
+def reading_files_once() -> Iterator[None]:
     """Files that are asked for their readings again, of another joint, are not read again.
 
     The columns of as many as a table of runs may hold are kept meanwhile.
@@ -74,16 +74,16 @@ class FileReadings(NamedTuple):
 
     path: Path
     format: Format
-    roles: dict[str, Column]
+    roles: dict[str, RoleColumn]
     columns: dict[str, NDArray[Any]]
-    source: Source
+    source: InputFile
 
     def error(self, problem: str, column: str | None = None, row: int | None = None) -> FileError:
         """The error that says ``problem`` of a column, at the line of a row."""
         line = 1 if row is None else self.format.line_of(self.path, row)
         return FileError(self.path, problem, line=line, column=column)
 
-    def raw(self, column: Column) -> NDArray[np.float64]:
+    def raw(self, column: RoleColumn) -> NDArray[np.float64]:
         """A column as finite numbers, NaN where a cell is empty."""
         values = self.columns[column.name]
         if values.dtype == object and column.role == "time":
@@ -106,11 +106,11 @@ class FileReadings(NamedTuple):
         return numbers
 
     def values(
-        self, column: Column, period: float, counts_per_turn: float | None
+        self, column: RoleColumn, period: float, counts_per_turn: float | None
     ) -> NDArray[np.float64]:
         """A column in the unit of a run of ``period``, refused where its own is not known."""
         if role_kind(column.role) == "angle" and column.unit is None:
-            code = signal_code(column.role, column.name, "deg")
+            code = role_code(column.role, column.name, "deg")
             raise self.error(f"its unit is not known; give it: {code}", column.name)
         if column.unit == "count" and counts_per_turn is None:
             beside = "_reference" if column.role == "reference" else ""
@@ -228,13 +228,13 @@ def _whole(
     return columns
 
 
-def _source(path: Path) -> Source:
-    return Source(partition_name(path), "" if path.is_dir() else sha256_of(path))
+def _source(path: Path) -> InputFile:
+    return InputFile(partition_name(path), "" if path.is_dir() else sha256_of(path))
 
 
 def _repeated(value: str, size: int, is_text: bool) -> NDArray[Any]:
     """A column of one value: a number where it is written as one and is no label."""
-    found = None if is_text or not _is_number(value) else number(value, ".")
+    found = None if is_text or not _is_number(value) else cell_number(value, ".")
     return np.full(size, value, dtype=object) if found is None else np.full(size, found)
 
 
@@ -284,7 +284,7 @@ def _is_number(text: str | None) -> bool:
     """A number that is written as one: 007 is a name."""
     if text is None:
         return True
-    return number(text, ",") is not None and not _NUMBERED.match(text)
+    return cell_number(text, ",") is not None and not _NUMBERED.match(text)
 
 
 _NUMBERED = re.compile(r"[+-]?0\d")

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError, KindError
 from ..support.angles import check_period, circular_mean, wrap
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
-from ..support.files import Source
-from ..support.kinds import told_kinds
-from ..support.plainresult import counted
+from ..support.files import InputFile
+from ..support.layout import counted
 from ..support.signals import FIELDS, find_signal, signal_column, signal_columns
 
 
@@ -89,7 +89,7 @@ class CalibrationRun:
     when: str | None = field(default=None, kw_only=True)
     left_out: int = field(default=0, kw_only=True)
     columns: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
-    source: Source | None = field(default=None, kw_only=True)
+    source: InputFile | None = field(default=None, kw_only=True)
 
     if TYPE_CHECKING:  # what is taken is more than what is kept
 
@@ -111,7 +111,7 @@ class CalibrationRun:
             when: str | None = None,
             left_out: int = 0,
             columns: Mapping[str, Any] = ...,
-            source: Source | None = None,
+            source: InputFile | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -269,7 +269,7 @@ def as_runs(runs: CalibrationRun | Iterable[CalibrationRun]) -> list[Calibration
     return found
 
 
-def given_runs(data: Any) -> tuple[list[CalibrationRun] | None, Any]:
+def runs_or_data(data: Any) -> tuple[list[CalibrationRun] | None, Any]:
     """The list where ``data`` is a run or runs, else None; and the data, iterators as lists."""
     if isinstance(data, CalibrationRun):
         return [data], data

@@ -11,18 +11,18 @@ from typing import Any, TypedDict, TypeVar
 
 import numpy as np
 
-from ..errors import ArgumentError, FileError, KindError
+from ..errors import ArgumentError, KindError
 from ..support.angles import check_period, unit_name
-from ..support.roles import Column, wanted_columns
+from ..support.roles import RoleColumn, wanted_columns
 from ..support.suggestions import did_you_mean
-from .paths import find_logs
+from .paths import find_logs, unit_of_path
 from .readings import FileReadings, named_source, readings_of
 from .tables import table_readings
 
 T = TypeVar("T")
 
 
-class OtherReading(TypedDict, total=False):
+class OtherReadingOptions(TypedDict, total=False):
     """How columns are read, but for the unit of those that name none.
 
     Attributes
@@ -51,7 +51,7 @@ class OtherReading(TypedDict, total=False):
     facets: Any
 
 
-class Reading(OtherReading, total=False):
+class ReadingOptions(OtherReadingOptions, total=False):
     """Keyword arguments of all that takes files or tables of readings.
 
     Attributes
@@ -64,7 +64,7 @@ class Reading(OtherReading, total=False):
     period: float | None
 
 
-def checked_reading(given: Mapping[str, Any]) -> Reading:
+def checked_reading_options(given: Mapping[str, Any]) -> ReadingOptions:
     """Keywords of reading, whole and checked; a ``period`` in counts is the counts of a turn.
 
     Raises
@@ -75,10 +75,10 @@ def checked_reading(given: Mapping[str, Any]) -> Reading:
         A value that it cannot have.
     """
     for name in given:
-        if name not in Reading.__annotations__:
+        if name not in ReadingOptions.__annotations__:
             raise TypeError(
                 f"got an unexpected keyword argument {name!r}"
-                f"{did_you_mean(name, Reading.__annotations__)}"
+                f"{did_you_mean(name, ReadingOptions.__annotations__)}"
             )
     signals, by = given.get("signals"), given.get("by")
     if signals is not None and not isinstance(signals, Mapping):
@@ -87,7 +87,7 @@ def checked_reading(given: Mapping[str, Any]) -> Reading:
         raise KindError(f"by must be the name of a column, got {by!r:.60}")
     if by is not None and "run" in (signals or {}):
         raise ArgumentError("by= and signals={'run': ...} both name the column of runs; give one")
-    found = Reading(
+    found = ReadingOptions(
         signals={**(signals or {}), **({} if by is None else {"run": by})},
         period=given.get("period"),
         by=None,
@@ -115,15 +115,15 @@ def checked_reading(given: Mapping[str, Any]) -> Reading:
 def each_table(
     data: Any,
     read: Callable[[FileReadings], T],
-    reading: Reading,
+    reading: ReadingOptions,
     name: str = "runs",
     table: str = "table",
 ) -> list[T]:
     """What ``read`` makes of every table: one of each file, one of each table in memory.
 
     ``data`` are paths of files, folders and patterns (``"log*.csv"``), tables as
-    `tables.table_readings` takes them, or lists of both; ``reading`` is as `checked_reading` gives
-    it, ``name`` and ``table`` as in `files.runs_of`.
+    `tables.table_readings` takes them, or lists of both; ``reading`` is as
+    `checked_reading_options` gives it, ``name`` and ``table`` as in `files.runs_of`.
 
     Raises
     ------
@@ -174,27 +174,6 @@ def each_table(
     return found
 
 
-def unit_of_path(path: Path, pattern: str | None) -> str | None:
-    r"""The unit that a path names: the first group of ``pattern`` in it, or all that it finds.
-
-    Raises
-    ------
-    FileError
-        The pattern finds nothing.
-
-    Examples
-    --------
-    >>> unit_of_path(Path("cell7/joint-A12.csv"), r"joint-(\w+)")
-    'A12'
-    """
-    if pattern is None:
-        return None
-    found = re.search(pattern, path.as_posix())
-    if found is None:
-        raise FileError(path, f"the pattern of `unit_from=` finds nothing in this path: {pattern}")
-    return found[1] if found.re.groups and found[1] is not None else found[0]
-
-
 def _of_joint(table: FileReadings, unit: str | None) -> FileReadings:
     """All rows of one unit, that the name of the file tells."""
     if unit is None:
@@ -205,7 +184,7 @@ def _of_joint(table: FileReadings, unit: str | None) -> FileReadings:
             table.roles["unit"].name,
         )
     rows = len(next(iter(table.columns.values()), ()))
-    roles = {**table.roles, "unit": Column("unit", "unit", None, True)}
+    roles = {**table.roles, "unit": RoleColumn("unit", "unit", None, True)}
     return table._replace(
         roles=roles, columns={**table.columns, "unit": np.full(rows, unit, dtype=object)}
     )
@@ -216,8 +195,8 @@ def _with_unit(table: FileReadings, period: float | None) -> FileReadings:
     if period is None:
         return table
     unit = unit_name(period)
-    bare: dict[str, Column] = {
-        role: Column(role, role, unit, True)
+    bare: dict[str, RoleColumn] = {
+        role: RoleColumn(role, role, unit, True)
         for role in ("reference", "indicated")
         if role not in table.roles and role in table.columns
     }

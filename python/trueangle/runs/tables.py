@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError, KindError, MissingExtraError
 from ..formats.columns import find_columns
 from ..formats.format import Format
-from ..support.files import Source
+from ..support.files import InputFile
 from ..support.labelled import take_apart
 from ..support.roles import Wanted
 from .readings import FileReadings
@@ -61,7 +61,7 @@ def table_readings(data: Any, name: str, wanted: Wanted) -> FileReadings | None:
                 f"{name}: column {column!r} has the shape {values.shape}; columns must be "
                 "one-dimensional and equally long"
             )
-    return FileReadings(path, _MEMORY, roles, columns, Source(name, ""))
+    return FileReadings(path, _MEMORY, roles, columns, InputFile(name, ""))
 
 
 def _columns(data: Any) -> dict[Any, Any] | None:

@@ -1,4 +1,4 @@
-"""Partial travel: where readings are missing on the circle.
+"""Partial travel: the span that is covered on the circle, the orders it holds, drift in a pass.
 
 A joint with hard stops shows its harmonics on an arc only. There they nearly cancel
 each other, and plain least squares buys a last hundredth of a degree with amplitudes of

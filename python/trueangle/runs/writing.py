@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.argumentkinds import told_kinds
 from ..support.files import RUNS, written_atomically
-from ..support.kinds import told_kinds
 from ..support.signals import find_signal
 from .run import CalibrationRun, as_runs
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any, Final, Unpack
 
 from ..errors import ArgumentError, NoModelError
-from ..joint.shafts import MOST_ORDERS, counted_orders
-from ..runs.source import OtherReading
+from ..joint.shafts import MOST_ORDERS, limited_orders
+from ..runs.source import OtherReadingOptions
 from ..support.angles import check_period
+from ..support.argumentkinds import told_kinds
 from ..support.blas import one_blas_thread
-from ..support.kinds import told_kinds
 from ..support.suggestions import check_choice
 from .dual import dual
 from .heads import head_patterns
@@ -37,7 +37,7 @@ def selfcal(
     ripple: str | Sequence[float] = "auto",
     head_angles: Sequence[float] | None = None,
     period: float | None = None,
-    **reading: Unpack[OtherReading],
+    **reading: Unpack[OtherReadingOptions],
 ) -> SelfCalibration:
     """Calibrate a joint without a reference: from time stamps, heads, shifts or a motor.
 
@@ -92,7 +92,7 @@ def selfcal(
     Notes
     -----
     Reaches the Cramer-Rao limit of white noise where motion is smooth; standard errors
-    include what the wander of the motion, fitted beside, takes away. Never seen: the zero;
+    include what the drift of the motion, fitted beside, takes away. Never seen: the zero;
     see `SelfCalibration.blind` for the rest. A million readings, 30 orders: about a second.
 
     References
@@ -157,7 +157,7 @@ def _orders(orders: Any) -> str | tuple[float, ...]:
             return orders
         raise ArgumentError(f"orders must be 'auto' or whole numbers from 1, got {orders!r}")
     try:
-        found = sorted({float(k) for k in counted_orders(orders)})
+        found = sorted({float(k) for k in limited_orders(orders)})
     except ArgumentError:
         raise
     except (TypeError, ValueError):

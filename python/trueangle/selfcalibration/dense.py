@@ -216,7 +216,7 @@ def _evidence(
     return evidence
 
 
-def fixed_point(fit_at: Callable[[Array], DenseFit], size: int) -> DenseFit:
+def dense_fixed_point(fit_at: Callable[[Array], DenseFit], size: int) -> DenseFit:
     """The fit at the places that its own patterns correct, from no correction on."""
     coefficients = np.zeros(size)
     for _ in range(_ROUNDS):

@@ -26,20 +26,35 @@ from .dense import fit_dense
 from .dualfit import (
     BESIDE_RATIO,
     DualFit,
+    DualSample,
     RatioEstimate,
-    Sample,
-    chosen_lines,
-    estimate_ratio,
-    fit_lines,
-    rows_of,
-    with_slow,
+    choose_dual_lines,
+    dual_fit_with_slow_orders,
+    dual_rows,
+    estimate_dual_ratio,
+    fit_dual_lines,
 )
-from .gearlines import Channels, SharedLine, channels_of, lines_of, slope_ratio, varied
-from .modelling import made_model
-from .projected import pairs
+from .gearlines import (
+    GearedChannels,
+    SharedLine,
+    geared_channels,
+    lines_of_gear,
+    motion_varies,
+    slope_ratio,
+)
+from .model import reference_free_model
+from .projected import harmonic_unknowns
 from .recording import Recording
-from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates, listed
-from .verification import chance_of
+from .result import (
+    ARCSEC,
+    Blind,
+    HeldOutPattern,
+    OrderEstimate,
+    SelfCalibration,
+    blind_words,
+    order_estimates,
+)
+from .verification import chance_of_difference
 
 #: A ratio is taken for another than the given or a whole one beyond so many standard errors:
 #: a chance of 6e-5.
@@ -87,14 +102,14 @@ def dual(
     """Sums at every order with their names; see `trueangle.selfcal`."""
     if gear_ratio is not None and not (math.isfinite(gear_ratio) and gear_ratio != 0.0):
         raise ArgumentError(f"gear_ratio must be motor turns per output turn, got {gear_ratio!r}")
-    channels = channels_of(recordings)
+    channels = geared_channels(recordings)
     start = slope_ratio(channels) if gear_ratio is None else float(gear_ratio)
     turns = sum(float(np.ptp(m)) for m in channels.motor) / abs(start) / (2.0 * math.pi)
     found = _ratio(channels, start, orders, turns, gear_ratio is not None, fit_ratio)
     ratio = found.used
-    lines = lines_of(orders, ratio, turns)
+    lines = lines_of_gear(orders, ratio, turns)
     if isinstance(orders, str):
-        kept, lost = chosen_lines(channels, ratio, lines)
+        kept, lost = choose_dual_lines(channels, ratio, lines)
     else:
         kept, lost = lines, []
     if not kept:
@@ -102,11 +117,11 @@ def dual(
             f"{recordings[0].named}: no order of either shaft stands out of what is left; record "
             "more travel (whole output turns)"
         )
-    fit = fit_lines(channels, ratio, kept)
+    fit = fit_dual_lines(channels, ratio, kept)
     dense = fit.dense
     count = sum(o.size for o in channels.output)
     noise = math.sqrt(dense.projected.variance)
-    table = estimates(
+    table = order_estimates(
         [line.order for line in kept],
         dense.patterns,
         dense.covariance,
@@ -123,10 +138,10 @@ def dual(
     notes = [note for note in (found.note, _arc_note(span, kept, period)) if note]
     notes += _notes(fit, ratio, channels)
     pairs_ = list(zip(kept, table, strict=True))
-    model = made_model(
+    model = reference_free_model(
         [o for line, o in pairs_ if line.output],
         "dual",
-        [f"{listed(b.orders)}: {b.because}" for b in blind],
+        [f"{blind_words(b.orders)}: {b.because}" for b in blind],
         notes,
         recordings,
         readings=count,
@@ -154,7 +169,7 @@ def dual(
 
 
 def _ratio(
-    channels: Channels,
+    channels: GearedChannels,
     start: float,
     orders: str | Sequence[float],
     turns: float,
@@ -162,7 +177,7 @@ def _ratio(
     asked: bool,
 ) -> _UsedRatio:
     """The ratio to use: as given, else whole unless the readings exclude that."""
-    measured = estimate_ratio(channels, start, orders, turns)
+    measured = estimate_dual_ratio(channels, start, orders, turns)
     whole = math.copysign(max(round(abs(measured.value)), 1), start)
     far = _FAR * measured.std
     told = f"{measured.value:.7g} (std {measured.std:.2g})"
@@ -191,15 +206,15 @@ def _ratio(
             "give the count of teeth as `gear_ratio=`"
         )
     if not given and turns < 1.0 and _eccentricity(channels, used, turns) > _ECCENTRIC:
-        used = estimate_ratio(channels, start, orders, turns, ()).value
+        used = estimate_dual_ratio(channels, start, orders, turns, ()).value
         note += "; orders 1 and 2 of more than a degree apart"
     return _UsedRatio(used, measured, f"{note}, taken as {used:.7g}")
 
 
-def _eccentricity(channels: Channels, ratio: float, turns: float) -> float:
+def _eccentricity(channels: GearedChannels, ratio: float, turns: float) -> float:
     """Amplitude, in radians, of orders 1 and 2 that a ratio asks for."""
-    lines = [line for line in lines_of(BESIDE_RATIO, ratio, turns) if not line.motor]
-    return float(np.linalg.norm(fit_lines(channels, ratio, lines).dense.patterns))
+    lines = [line for line in lines_of_gear(BESIDE_RATIO, ratio, turns) if not line.motor]
+    return float(np.linalg.norm(fit_dual_lines(channels, ratio, lines).dense.patterns))
 
 
 def _at_output(o: OrderEstimate, line: SharedLine, zero: float) -> OrderEstimate:
@@ -248,8 +263,8 @@ def _blind(
     return blind
 
 
-def _beside(fit: DualFit, ratio: _UsedRatio, channels: Channels) -> dict[str, Any]:
-    reversing, timed = map(int, varied(channels, ratio.used))
+def _beside(fit: DualFit, ratio: _UsedRatio, channels: GearedChannels) -> dict[str, Any]:
+    reversing, timed = map(int, motion_varies(channels, ratio.used))
     std = ratio.measured.std
     found: dict[str, Any] = {
         "gear_ratio": ratio.used,
@@ -272,14 +287,14 @@ def _arc_note(span: Span, kept: Sequence[SharedLine], period: float) -> str:
     if not low or span.stop - span.start >= period:
         return ""
     return (
-        f"over {span.describe(period)} {listed(low)} of the output tell the error within this "
+        f"over {span.describe(period)} {blind_words(low)} of the output tell the error within this "
         "travel: beyond it they are extrapolated, and others would fit as well"
     )
 
 
-def _notes(fit: DualFit, ratio: float, channels: Channels) -> list[str]:
+def _notes(fit: DualFit, ratio: float, channels: GearedChannels) -> list[str]:
     notes = fit.dense.notes
-    if not varied(channels, ratio)[0]:
+    if not motion_varies(channels, ratio)[0]:
         notes.append("one direction of travel only: reversal error is not seen")
     notes.append(
         "the model takes what is seen for the output's: it makes the output agree with the motor"
@@ -287,20 +302,21 @@ def _notes(fit: DualFit, ratio: float, channels: Channels) -> list[str]:
     return notes
 
 
-def _held_out(channels: Channels, ratio: float, fit: DualFit) -> dict[str, HeldOut]:
+def _held_out(channels: GearedChannels, ratio: float, fit: DualFit) -> dict[str, HeldOutPattern]:
     """One part of the readings predicts the other: halves, or blocks in turn over one pass."""
     if min(o.size for o in channels.output) < _READINGS:
         return {}
     halves = all(_same_places(m) for m in channels.motor)
     blocks = 2 if halves else _BLOCKS
-    columns = [c for line in fit.lines for c in pairs(line.of, [line.order])]
+    columns = [c for line in fit.lines for c in harmonic_unknowns(line.of, [line.order])]
     trained, judged = (
-        list(rows_of(channels, ratio, fit.lines, fit.zeros, Sample(blocks, first)))
+        list(dual_rows(channels, ratio, fit.lines, fit.zeros, DualSample(blocks, first)))
         for first in (0, 1)
     )
     many = len(columns) > _FEW
     first, own = (
-        with_slow(fit_dense(rows, columns), fit.lines, motor=many) for rows in (trained, judged)
+        dual_fit_with_slow_orders(fit_dense(rows, columns), fit.lines, motor=many)
+        for rows in (trained, judged)
     )
     nuisances = np.concatenate([p.nuisances for p in judged])
     plain = np.concatenate([p.target for p in judged])
@@ -315,11 +331,11 @@ def _held_out(channels: Channels, ratio: float, fit: DualFit) -> dict[str, HeldO
         freedom = math.inf if many else _FREEDOM
     names = ("the first half", "the second half") if halves else ("odd blocks", "even blocks")
     return {
-        "halves" if halves else "blocks": HeldOut(
+        "halves" if halves else "blocks": HeldOutPattern(
             *names,
             before * ARCSEC,
             after * ARCSEC,
-            chance_of(
+            chance_of_difference(
                 (own.patterns - first.patterns)[seen],
                 (own.covariance + first.covariance)[np.ix_(seen, seen)],
                 freedom,

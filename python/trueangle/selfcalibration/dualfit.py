@@ -17,8 +17,15 @@ from numpy.typing import NDArray
 
 from ..support.distributions import chi_squared_quantile
 from .dense import DenseFit, DenseRows, fit_dense, low_frequency_inflation
-from .gearlines import Channels, SharedLine, lines_of, motion, turning, varied
-from .projected import Unknown, pairs
+from .gearlines import (
+    GearedChannels,
+    SharedLine,
+    gear_motion,
+    lines_of_gear,
+    motion_varies,
+    near_reversal,
+)
+from .projected import Unknown, harmonic_unknowns
 
 #: Probability of taking up any line that is not there.
 _CHANCE: Final = 0.01
@@ -36,7 +43,7 @@ _RATIO: Final = Unknown("the gear ratio", 0.0, "")
 _CHUNK: Final = 8192
 
 
-class Sample(NamedTuple):
+class DualSample(NamedTuple):
     """Readings that take part: even or odd ones of so many blocks of a run; all where 1."""
 
     blocks: int = 1
@@ -64,8 +71,8 @@ class RatioEstimate(NamedTuple):
     std: float
 
 
-def fit_lines(
-    channels: Channels,
+def fit_dual_lines(
+    channels: GearedChannels,
     ratio: float,
     lines: Sequence[SharedLine],
     *,
@@ -76,17 +83,17 @@ def fit_lines(
 
     The patterns are functions of the corrected place, so that its zero is that of the fit.
     """
-    columns = [c for line in lines for c in pairs(line.of, [line.order])]
+    columns = [c for line in lines for c in harmonic_unknowns(line.of, [line.order])]
     columns += [_RATIO] * slope
     zeros = [float(np.median(o - m / ratio)) for m, o in zip(*channels[:2], strict=True)]
     for _ in range(_ZEROS if settled and any(line.output for line in lines) else 1):
         at = tuple(zeros)
-        dense = fit_dense(list(rows_of(channels, ratio, lines, at, slope=slope)), columns)
+        dense = fit_dense(list(dual_rows(channels, ratio, lines, at, slope=slope)), columns)
         zeros = [z + float(dz) for z, dz in zip(at, dense.nuisances[-len(at) :], strict=True)]
-    return DualFit(with_slow(dense, lines, slope=slope), tuple(lines), at)
+    return DualFit(dual_fit_with_slow_orders(dense, lines, slope=slope), tuple(lines), at)
 
 
-def with_slow(
+def dual_fit_with_slow_orders(
     fit: DenseFit, lines: Sequence[SharedLine], *, slope: bool = False, motor: bool = False
 ) -> DenseFit:
     """The fit with the covariance of slow patterns: blocks hold too few of their waves.
@@ -102,20 +109,20 @@ def with_slow(
     return replace(fit, covariance=covariance)
 
 
-def rows_of(
-    channels: Channels,
+def dual_rows(
+    channels: GearedChannels,
     ratio: float,
     lines: Sequence[SharedLine],
     zeros: Sequence[float],
-    sample: Sample | None = None,
+    sample: DualSample | None = None,
     *,
     slope: bool = False,
 ) -> Iterator[DenseRows]:
     """Nuisances: direction, velocity where time is known, a zero per run (the last ones)."""
-    reversing, timed = map(int, varied(channels, ratio))
+    reversing, timed = map(int, motion_varies(channels, ratio))
     for j, (m, o, t) in enumerate(zip(*channels, strict=True)):
         theta = m / ratio
-        way, speed = motion(theta, t)
+        way, speed = gear_motion(theta, t)
         place = theta + zeros[j]
         nuisances = np.zeros((o.size, reversing + timed + len(zeros)))
         if reversing:
@@ -130,8 +137,8 @@ def rows_of(
         if slope:
             rows[:, -1] = theta - float(np.mean(theta))
         target = o - place
-        sampled = (sample or Sample()).of(o.size)
-        known = ~turning(way)
+        sampled = (sample or DualSample()).of(o.size)
+        known = ~near_reversal(way)
         if reversing and np.mean(known) > 0.5:  # else it is noise that turns
             sampled &= known
         used = np.flatnonzero(sampled)
@@ -140,8 +147,8 @@ def rows_of(
             yield DenseRows(rows[part], nuisances[part], target[part])
 
 
-def chosen_lines(
-    channels: Channels,
+def choose_dual_lines(
+    channels: GearedChannels,
     ratio: float,
     lines: Sequence[SharedLine],
     *,
@@ -155,7 +162,7 @@ def chosen_lines(
     Of the output's own orders the first few are taken beyond which no higher one is missed;
     of these, and of the motor's, those are left out that do not stand out.
     """
-    fit = fit_lines(channels, ratio, lines, slope=slope, settled=False).dense
+    fit = fit_dual_lines(channels, ratio, lines, slope=slope, settled=False).dense
     scale = fit.projected.variance * low_frequency_inflation(fit)
     own = [i for i, line in enumerate(lines) if not line.motor]
     fixed = [i for i in own if lines[i].output in held]
@@ -186,7 +193,7 @@ def chosen_lines(
     retained = fit.projected.retained()
     lost = [i for i in own if i not in kept and float(retained[2 * i : 2 * i + 2].min()) < _LEAST]
     candidates = [lines[i] for i in sorted((*motor, *kept))]
-    fit = fit_lines(channels, ratio, candidates, slope=slope, settled=False).dense
+    fit = fit_dual_lines(channels, ratio, candidates, slope=slope, settled=False).dense
     told = [
         line
         for i, line in enumerate(candidates)
@@ -204,8 +211,8 @@ def _statistic(fit: DenseFit, pair: slice) -> float:
     return float(value @ np.linalg.pinv(block, hermitian=True) @ value)
 
 
-def estimate_ratio(
-    channels: Channels,
+def estimate_dual_ratio(
+    channels: GearedChannels,
     start: float,
     orders: str | Sequence[float],
     turns: float,
@@ -226,10 +233,10 @@ def estimate_ratio(
         orders = sorted({*orders, *beside})
     ratio = start
     for _ in range(_RATIOS):
-        lines = lines_of(orders, ratio, turns)
+        lines = lines_of_gear(orders, ratio, turns)
         if isinstance(orders, str):
-            lines = chosen_lines(channels, ratio, lines, slope=True, held=beside)[0]
-        fit = fit_lines(channels, ratio, lines, slope=True).dense
+            lines = choose_dual_lines(channels, ratio, lines, slope=True, held=beside)[0]
+        fit = fit_dual_lines(channels, ratio, lines, slope=True).dense
         if not fit.projected.seen[-1]:
             return RatioEstimate(start, math.inf)
         slope, variance = float(fit.patterns[-1]), float(fit.covariance[-1, -1])

@@ -1,4 +1,4 @@
-"""The two readings of a geared joint, and the orders that both shafts give the output."""
+"""The two readings of a geared joint, their motion, and the lines that both shafts leave."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class SharedLine(NamedTuple):
         return f"motor {self.motor} (motor encoder or gear)"
 
 
-class Channels(NamedTuple):
+class GearedChannels(NamedTuple):
     """Both readings of every run, unwrapped, in radians; its time where recorded."""
 
     motor: list[Array]
@@ -54,7 +54,7 @@ class Channels(NamedTuple):
     time: list[Array | None]
 
 
-def channels_of(recordings: Sequence[Recording]) -> Channels:
+def geared_channels(recordings: Sequence[Recording]) -> GearedChannels:
     """The readings of the runs.
 
     Raises
@@ -73,7 +73,7 @@ def channels_of(recordings: Sequence[Recording]) -> Channels:
         motor.append(_unwrapped(r.motor))
         output.append(_unwrapped(reading))
         time.append(r.time)
-    return Channels(motor, output, time)
+    return GearedChannels(motor, output, time)
 
 
 def _unwrapped(angle: Array) -> Array:
@@ -82,7 +82,7 @@ def _unwrapped(angle: Array) -> Array:
     return np.asarray(np.unwrap(angle, period=2.0 * math.pi))
 
 
-def slope_ratio(channels: Channels) -> float:
+def slope_ratio(channels: GearedChannels) -> float:
     """Motor turns per output turn, by the slope of one reading over the other."""
     top = bottom = 0.0
     for m, o in zip(channels.motor, channels.output, strict=True):
@@ -96,7 +96,7 @@ def slope_ratio(channels: Channels) -> float:
     return top / bottom
 
 
-def lines_of(orders: str | Sequence[float], ratio: float, turns: float) -> list[SharedLine]:
+def lines_of_gear(orders: str | Sequence[float], ratio: float, turns: float) -> list[SharedLine]:
     """Orders of both shafts; those that the travel cannot tell apart stand once."""
     size = abs(ratio)
     numbers = range(1, _HIGHEST + 1) if isinstance(orders, str) else [int(k) for k in orders]
@@ -111,12 +111,14 @@ def lines_of(orders: str | Sequence[float], ratio: float, turns: float) -> list[
     return [lines[k] for k in sorted(lines)]
 
 
-def varied(channels: Channels, ratio: float) -> tuple[bool, bool]:
+def motion_varies(channels: GearedChannels, ratio: float) -> tuple[bool, bool]:
     """Whether both directions were travelled, and at speeds that differ.
 
     At one speed the column would hold nothing but the motor's own error, differentiated.
     """
-    motions = [motion(m / ratio, t) for m, t in zip(channels.motor, channels.time, strict=True)]
+    motions = [
+        gear_motion(m / ratio, t) for m, t in zip(channels.motor, channels.time, strict=True)
+    ]
     ways = np.unique(np.concatenate([np.unique(way) for way, _ in motions]))
     speed = np.abs(np.concatenate([v for _, v in motions]))
     known = all(t is not None for t in channels.time)
@@ -124,7 +126,7 @@ def varied(channels: Channels, ratio: float) -> tuple[bool, bool]:
     return bool({-1.0, 1.0} <= set(ways.tolist())), bool(varied)
 
 
-def motion(theta: Array, time: Array | None) -> tuple[Array, Array]:
+def gear_motion(theta: Array, time: Array | None) -> tuple[Array, Array]:
     """Direction of travel (-1, 1) and speed of the output in radians per second."""
     step = np.diff(theta, prepend=theta[0])
     smooth = np.convolve(step, np.ones(_WIDTH) / _WIDTH, "same")
@@ -146,7 +148,7 @@ def motion(theta: Array, time: Array | None) -> tuple[Array, Array]:
     return np.asarray(way), speed
 
 
-def turning(way: Array) -> NDArray[np.bool_]:
+def near_reversal(way: Array) -> NDArray[np.bool_]:
     """Readings so near to a reversal that the direction of a smoothed step is none of theirs.
 
     Examples

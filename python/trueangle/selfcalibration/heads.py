@@ -18,14 +18,22 @@ import numpy as np
 from ..errors import ArgumentError, NoModelError
 from ..support.angles import wrap
 from ..support.arrays import Array
-from .choice import chosen_orders
-from .dense import DenseFit, DenseRows, fit_dense, fixed_point
-from .modelling import made_model
+from .dense import DenseFit, DenseRows, dense_fixed_point, fit_dense
+from .model import reference_free_model
+from .orderchoice import significant_orders
 from .pattern import ENCODER, pattern_model
-from .projected import harmonic_rows, pairs
+from .projected import harmonic_rows, harmonic_unknowns
 from .recording import Recording
-from .result import ARCSEC, Blind, HeldOut, OrderEstimate, SelfCalibration, estimates, listed
-from .verification import judged
+from .result import (
+    ARCSEC,
+    Blind,
+    HeldOutPattern,
+    OrderEstimate,
+    SelfCalibration,
+    blind_words,
+    order_estimates,
+)
+from .verification import judged_patterns
 
 #: Orders tried by default.
 _HIGHEST: Final = 32
@@ -61,7 +69,7 @@ def head_patterns(
     lost = {k for b in blind for k in b.orders}
     kept = tuple(k for k in wanted if k not in lost)
     if isinstance(orders, str):
-        kept = chosen_orders(fit.projected, fit.patterns, fit.covariance, kept)
+        kept = significant_orders(fit.projected, fit.patterns, fit.covariance, kept)
     if not kept:
         raise NoModelError(
             f"{recordings[0].named}: no order stands out of the noise between the heads"
@@ -69,7 +77,7 @@ def head_patterns(
     fit = _fit(readings, kept)
     count = sum(h.size for h in readings)
     noise = math.sqrt(fit.projected.variance)
-    table = estimates(
+    table = order_estimates(
         kept,
         fit.patterns,
         fit.covariance,
@@ -79,10 +87,10 @@ def head_patterns(
     turns = sum(float(np.ptp(np.unwrap(h[0]))) for h in readings) / (2.0 * math.pi)
     notes = _notes(fit, readings, numbers, turns, table)
     blind.insert(0, Blind.zero("no reading without a reference shows it"))
-    model = made_model(
+    model = reference_free_model(
         table,
         "heads",
-        [f"{listed(b.orders)}: {b.because}" for b in blind],
+        [f"{blind_words(b.orders)}: {b.because}" for b in blind],
         notes,
         recordings,
         readings=count,
@@ -137,14 +145,14 @@ def _places(
 
 def _fit(readings: Sequence[Array], orders: Sequence[float]) -> DenseFit:
     """Fixed point over the places: patterns at corrected readings."""
-    columns = pairs(ENCODER, orders)
+    columns = harmonic_unknowns(ENCODER, orders)
     lost = float(sum(h.shape[1] for h in readings))
 
     def at(coefficients: Array) -> DenseFit:
         parts = list(_rows(readings, orders, coefficients))
         return fit_dense(parts, columns, freedom_lost=lost, floor=_LEAST)
 
-    return fixed_point(at, len(columns))
+    return dense_fixed_point(at, len(columns))
 
 
 def _rows(
@@ -239,7 +247,7 @@ def _notes(
 
 def _held_out(
     readings: Sequence[Array], orders: Sequence[float], noise: float
-) -> dict[str, HeldOut]:
+) -> dict[str, HeldOutPattern]:
     """Odd turns against even ones."""
     odd, even = [], []
     for h in readings:
@@ -251,7 +259,7 @@ def _held_out(
         return {}
     first, second = (_fit([h for h in part if h.shape[1]], orders) for part in (odd, even))
     return {
-        "odd_even_turns": judged(
+        "odd_even_turns": judged_patterns(
             first.patterns,
             second.patterns,
             first.covariance + second.covariance,

@@ -1,4 +1,4 @@
-"""Was the speed held by the encoder under test? Then it hides its own error."""
+"""Was the speed held by the encoder under test? Then the loop followed, and hides, its error."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def followed_share(hertz: float, loop: str, bandwidth: float | None) -> float:
     return min(1.0, bandwidth / hertz)
 
 
-def widened(estimate: OrderEstimate, share: float) -> OrderEstimate:
+def widened_by_loop(estimate: OrderEstimate, share: float) -> OrderEstimate:
     """The estimate where any part of it up to ``share`` may be the loop's doing.
 
     In any phase: the standard deviation of a disc of that radius, along one direction.

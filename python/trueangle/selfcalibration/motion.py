@@ -1,8 +1,8 @@
 """Patterns beside a smooth motion, and the motion's stiffness.
 
 The motion of each stretch is a cubic spline in time under a prior: smooth trends are free,
-beside them the acceleration wanders, with a memory. The stiffness (the ratio of noise to that
-wander), the memory and the knot spacing maximise the evidence, that is the likelihood with
+beside them the acceleration drifts, with a memory. The stiffness (the ratio of noise to that
+drift), the memory and the knot spacing maximise the evidence, that is the likelihood with
 motion and patterns integrated out.
 """
 
@@ -19,8 +19,8 @@ from ..estimation.factor import BandedFactor
 from ..support.arrays import Array
 from .projected import Projected, Unknown
 from .splines import (
+    DriftPenalty,
     Knots,
-    Wander,
     banded_product,
     coarser_bands,
     coarser_rows,
@@ -39,7 +39,7 @@ _BEHIND = 2
 #: A combination of common columns of which motion leaves less is the motion's own.
 _GONE = 1e-13
 
-#: Close knots may show a rougher wander than distant ones allow by this factor (wander that
+#: Close knots may show a rougher drift than distant ones allow by this factor (drift that
 #: has a memory), not by more: what coloured noise would ask for is no motion.
 _ROUGHER = 100.0
 
@@ -72,7 +72,7 @@ class MotionFit:
 
     @property
     def roughness(self) -> float:
-        """Spectral density of the wander: variance of the third differences by spacing^5."""
+        """Spectral density of the drift: variance of the third differences by spacing^5."""
         return self.projected.variance / (self.stiffness * self.knots.spacing**5)
 
 
@@ -89,7 +89,7 @@ class _Grid:
         self.sums = sums
         self.right = right  # S^T (e + S c)
         self.chain = chain  # parents from the finest grid down to this one
-        self.wander = Wander(sums.knots)
+        self.drift = DriftPenalty(sums.knots)
         self.trend = smooth_trends(sums.knots, trends)
         moved = (
             np.stack([banded_product(sums.bands, z) for z in self.trend.T], axis=1)
@@ -232,7 +232,7 @@ class MotionSearch:
         assert grid is not None
         m = len(self.columns)
         try:
-            factor = BandedFactor(grid.sums.bands + grid.wander.bands(stiffness, memory))
+            factor = BandedFactor(grid.sums.bands + grid.drift.bands(stiffness, memory))
         except np.linalg.LinAlgError:  # stiffer than the working precision can hold
             return MotionFit(
                 level,
@@ -272,7 +272,7 @@ class MotionSearch:
                 left = (
                     sums.spline_right + banded_product(sums.bands, gap) - sums.cross @ unknowns[:m]
                 )
-                pull = stiffness * grid.wander.pull(spline, memory)
+                pull = stiffness * grid.drift.pull(spline, memory)
                 rest = common(sums.common_right - sums.common @ unknowns[:m], gap)
                 rest[m:] -= grid.trend.T @ grid.coarsened(sums.cross @ unknowns[:m])
                 more, extra = step(grid.coarsened(left) - pull, rest)
@@ -285,7 +285,7 @@ class MotionSearch:
             - 2.0 * float(found @ (sums.common_right + sums.cross.T @ gap))
             + float(found @ sums.common @ found)
         )
-        penalised = max(squares, 1e-300) + stiffness * grid.wander.energy(spline, memory)
+        penalised = max(squares, 1e-300) + stiffness * grid.drift.energy(spline, memory)
         fixed = 2 * len(grid.sums.knots.intervals) + int(kept.sum())
         freedom = max(sums.weighty - fixed, 1.0)
         twice = (
@@ -293,7 +293,7 @@ class MotionSearch:
             + factor.log_determinant
             + float(np.log(values[kept]).sum())
             + 2.0 * float(np.log(scale).sum())
-            - grid.wander.log_determinant(stiffness, memory)
+            - grid.drift.log_determinant(stiffness, memory)
         )
         projected = Projected(
             self.columns,

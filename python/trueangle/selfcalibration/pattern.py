@@ -31,7 +31,7 @@ def pattern_model(orders: Sequence[float], coefficients: Array) -> HarmonicModel
     )
 
 
-def steepness(orders: Sequence[float], coefficients: Array) -> float:
+def pattern_steepness(orders: Sequence[float], coefficients: Array) -> float:
     """The greatest ``|d error / d angle|``."""
     whole = [int(k) for k in orders]
     parts = [list(coefficients[0::2])], [list(coefficients[1::2])]

@@ -1,4 +1,4 @@
-"""The one estimator: patterns beside nuisances, covariance of what is left, null vectors."""
+"""The one estimator: harmonics unknown beside nuisances, their covariance, null vectors."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Unknown(NamedTuple):
         return f"order {self.order:g} of {self.source}" if self.part else self.source
 
 
-def pairs(source: str, orders: Iterable[float]) -> list[Unknown]:
+def harmonic_unknowns(source: str, orders: Iterable[float]) -> list[Unknown]:
     """Cosine and sine columns of each order of one source."""
     return [Unknown(source, float(k), part) for k in orders for part in ("cos", "sin")]
 

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from ..support.arrays import Array
+from .segments import Segment, ripple_lead
 from .splines import Knots
-from .stretches import Segment, ripple_lead
 
 #: Readings per knot of the finest grid, at least.
 PER_KNOT: Final = 6

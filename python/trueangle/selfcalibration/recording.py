@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError
 from ..runs.readings import FileReadings
-from ..runs.run import CalibrationRun, given_runs
-from ..runs.source import Reading, checked_reading, each_table
+from ..runs.run import CalibrationRun, runs_or_data
+from ..runs.source import ReadingOptions, checked_reading_options, each_table
 from ..support.arrays import Array
-from ..support.files import Source
-from ..support.roles import LABELS, Column, role_kind
+from ..support.files import InputFile
+from ..support.roles import LABELS, RoleColumn, role_kind
 
 _LABELS = ("unit", "run")
 
@@ -38,7 +38,7 @@ class Recording:
     heads: Mapping[int, Array] = field(default_factory=dict)
     current: Array | None = None
     file: str = ""
-    source: Source | None = None
+    source: InputFile | None = None
 
     def __len__(self) -> int:
         for channel in (self.indicated, self.motor, self.reference, *self.heads.values()):
@@ -63,8 +63,8 @@ def as_recordings(logs: Any, reading: Mapping[str, Any]) -> list[Recording]:
     FileError, ArgumentError
         Files that cannot be read; columns in no known unit, of different lengths.
     """
-    asked = checked_reading(reading)
-    runs, logs = given_runs(logs)
+    asked = checked_reading_options(reading)
+    runs, logs = runs_or_data(logs)
     if runs is not None:
         return [_of_run(run) for run in runs]
     parts = each_table(logs, lambda table: _of_table(table, asked), asked, "logs")
@@ -93,7 +93,7 @@ def _of_run(run: CalibrationRun) -> Recording:
     )
 
 
-def _of_table(table: FileReadings, reading: Reading) -> list[Recording]:
+def _of_table(table: FileReadings, reading: ReadingOptions) -> list[Recording]:
     channels = {
         role: _in_radians(
             column._replace(unit=column.unit or table.format.unit)
@@ -117,7 +117,7 @@ def _of_table(table: FileReadings, reading: Reading) -> list[Recording]:
     return _split(channels, labels, file, table.source)
 
 
-def _in_radians(column: Column, table: FileReadings, reading: Reading) -> Array:
+def _in_radians(column: RoleColumn, table: FileReadings, reading: ReadingOptions) -> Array:
     """A channel in radians, seconds or the unit of its only column."""
     is_reference = column.role == "reference"
     turn = reading["counts_per_turn_reference" if is_reference else "counts_per_turn"]
@@ -128,7 +128,7 @@ def _split(
     channels: Mapping[str, Array],
     labels: Sequence[NDArray[Any]],
     file: str,
-    source: Source,
+    source: InputFile,
 ) -> list[Recording]:
     """One recording per unit and run, in the order of their first row, without empty rows."""
     if not channels:

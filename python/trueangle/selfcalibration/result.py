@@ -1,4 +1,4 @@
-"""What a self-calibration found: numbers, of what each is, and what stays unseen; as text."""
+"""What a self-calibration found: orders estimated, what is blind, patterns held out; as text."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
-from ..support.layout import laid_out, wrapped
-from ..support.plainresult import PlainResult, counted
+from ..support.layout import counted, laid_out, wrapped_lines
+from ..support.plainresult import PlainResult
 
 #: Seconds of arc in a radian.
 ARCSEC = ARCSEC_PER_TURN / (2.0 * math.pi)
@@ -82,7 +82,7 @@ class Blind:
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutPattern:
     """A pattern found on one part of the readings, judged on another."""
 
     fitted_on: str
@@ -136,7 +136,7 @@ class SelfCalibration(PlainResult):
     orders: tuple[OrderEstimate, ...]
     sums: tuple[OrderEstimate, ...]
     blind: tuple[Blind, ...]
-    held_out: Mapping[str, HeldOut]
+    held_out: Mapping[str, HeldOutPattern]
     notes: tuple[str, ...]
     noise_arcsec: float
     readings: int
@@ -174,10 +174,10 @@ class SelfCalibration(PlainResult):
             Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         """
-        return selfcal_summary(self, errors_in)
+        return _summary(self, errors_in)
 
 
-def estimates(
+def order_estimates(
     orders: Sequence[float],
     coefficients: Array,
     covariance: Array,
@@ -213,12 +213,12 @@ def estimates(
     return found
 
 
-def listed(orders: Sequence[float]) -> str:
+def blind_words(orders: Sequence[float]) -> str:
     """What is blind, in words: orders, or the zero."""
-    return f"orders {ranges(orders)}" if any(orders) else "zero"
+    return f"orders {order_ranges(orders)}" if any(orders) else "zero"
 
 
-def selfcal_summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
+def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
     """Numbers, what they are numbers of, what is blind, tests, notes."""
     sizes = [result.noise_arcsec, *(o.amplitude for o in (*result.orders, *result.sums))]
     period = result.model.period
@@ -233,8 +233,8 @@ def selfcal_summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> st
         lines += ["", "not the encoder's alone:", *_table(result.sums, unit)]
     lines += ["", "cannot be identified"]
     for blind in result.blind:
-        lines += wrapped(f"{listed(blind.orders)}: {blind.because}", 4, 2)
-        lines += wrapped(f"to see it: {blind.measure}", 6, 4)
+        lines += wrapped_lines(f"{blind_words(blind.orders)}: {blind.because}", 4, 2)
+        lines += wrapped_lines(f"to see it: {blind.measure}", 6, 4)
     if result.held_out:
         lines += ["", "held out"]
         for test in result.held_out.values():
@@ -263,7 +263,7 @@ def _table(orders: tuple[OrderEstimate, ...], unit: ErrorUnit) -> list[str]:
     return lines
 
 
-def ranges(orders: Sequence[float]) -> str:
+def order_ranges(orders: Sequence[float]) -> str:
     """Orders in words: ``1-4, 8``.
 
     Examples

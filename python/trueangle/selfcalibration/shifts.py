@@ -20,14 +20,22 @@ from ..errors import NoModelError
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import f_tail
-from .choice import chosen_orders
 from .clampings import Clampings, clampings_of
-from .dense import DenseFit, DenseRows, fit_dense, fixed_point
-from .modelling import made_model
+from .dense import DenseFit, DenseRows, dense_fixed_point, fit_dense
+from .model import reference_free_model
+from .orderchoice import significant_orders
 from .pattern import ENCODER, pattern_model
-from .projected import Unknown, harmonic_rows, pairs
+from .projected import Unknown, harmonic_rows, harmonic_unknowns
 from .recording import Recording
-from .result import ARCSEC, Blind, HeldOut, SelfCalibration, estimates, listed, ranges
+from .result import (
+    ARCSEC,
+    Blind,
+    HeldOutPattern,
+    SelfCalibration,
+    blind_words,
+    order_estimates,
+    order_ranges,
+)
 
 OTHER: Final = "the other encoder"
 FACETS: Final = "the polygon's facets"
@@ -64,14 +72,18 @@ def shift_patterns(
     lost = _lost(fit, wanted)
     kept = tuple(k for k in wanted if k not in lost)
     if isinstance(orders, str) and not design.facets:
-        kept = chosen_orders(fit.projected, fit.patterns, fit.covariance, kept, None)
+        kept = significant_orders(fit.projected, fit.patterns, fit.covariance, kept, None)
         kept = tuple(sorted({*kept, *lost}))
         fit = _fit(design, kept)
         kept = tuple(k for k in kept if k not in lost)
     if not kept:
         raise NoModelError(
             f"{recordings[0].named}: no order can be determined: "
-            + (f"all shifts are alike at orders {ranges(lost)}" if lost else "none stands out")
+            + (
+                f"all shifts are alike at orders {order_ranges(lost)}"
+                if lost
+                else "none stands out"
+            )
         )
     count = sum(a.size for a in design.joint)
     noise = math.sqrt(fit.projected.variance)
@@ -83,7 +95,7 @@ def shift_patterns(
         if fit.projected.alone[first + 1] == 0.0:
             retained[first + 1] = retained[first]
     covariance = fit.covariance[np.ix_(at, at)]
-    table = estimates(kept, fit.patterns[at], covariance, retained[at], limit)
+    table = order_estimates(kept, fit.patterns[at], covariance, retained[at], limit)
     blind = [Blind.zero("the zero: only differences of two readings are seen")]
     if lost:
         where = ", ".join(f"{math.degrees(s) % 360.0:.4g}" for s in design.shift)
@@ -99,10 +111,10 @@ def shift_patterns(
         )
     notes = [*design.notes, *_notes(design, fit)]
     beside = _beside(design, fit, lost, limit)
-    model = made_model(
+    model = reference_free_model(
         table,
         "shifts",
-        [f"{listed(b.orders)}: {b.because}" for b in blind],
+        [f"{blind_words(b.orders)}: {b.because}" for b in blind],
         notes,
         recordings,
         readings=count,
@@ -125,10 +137,10 @@ def shift_patterns(
 
 
 def _columns(design: Clampings, orders: Sequence[float]) -> list[Unknown]:
-    columns = pairs(ENCODER, orders)
+    columns = harmonic_unknowns(ENCODER, orders)
     if design.facets:
         return columns + [Unknown(f"facet {i}", 0.0, "") for i in range(design.facets)]
-    return columns + pairs(OTHER, orders)
+    return columns + harmonic_unknowns(OTHER, orders)
 
 
 def _fit(design: Clampings, orders: Sequence[float], runs: Sequence[int] | None = None) -> DenseFit:
@@ -145,7 +157,7 @@ def _fit(design: Clampings, orders: Sequence[float], runs: Sequence[int] | None 
         random = list(range(len(runs), parts[0].nuisances.shape[1]))
         return fit_dense(parts, columns, random, floor=_LEAST)
 
-    return fixed_point(at, len(columns))
+    return dense_fixed_point(at, len(columns))
 
 
 def _rows(
@@ -220,7 +232,7 @@ def _beside(
     orders = [c.order for c in fit.projected.columns if c.source == OTHER and c.part == "cos"]
     kept = [k for k in orders if k not in lost]
     at = [i for k in kept for i in fit.projected.index(OTHER, k)]
-    table = estimates(
+    table = order_estimates(
         kept,
         fit.patterns[at],
         fit.covariance[np.ix_(at, at)],
@@ -250,7 +262,9 @@ def _notes(design: Clampings, fit: DenseFit) -> list[str]:
     return [*notes, *fit.notes]
 
 
-def _held_out(design: Clampings, orders: Sequence[float], whole: DenseFit) -> dict[str, HeldOut]:
+def _held_out(
+    design: Clampings, orders: Sequence[float], whole: DenseFit
+) -> dict[str, HeldOutPattern]:
     """Each clamping predicted by the others."""
     runs = len(design.joint)
     if runs < 3:
@@ -283,7 +297,7 @@ def _held_out(design: Clampings, orders: Sequence[float], whole: DenseFit) -> di
     variance = whole.projected.variance
     ratio = after / (count * variance + expected)
     return {
-        "clampings": HeldOut(
+        "clampings": HeldOutPattern(
             "all clampings but one",
             "the one left out",
             math.sqrt(before / count) * ARCSEC,

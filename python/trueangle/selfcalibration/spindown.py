@@ -15,19 +15,27 @@ import numpy as np
 
 from ..errors import NoModelError
 from ..support.arrays import Array
-from ..support.plainresult import counted
-from .choice import choose_orders, highest_order
-from .colour import noise_beside
-from .loop import followed_orders, followed_share, widened
-from .modelling import made_model
+from ..support.layout import counted
+from .loop import followed_orders, followed_share, widened_by_loop
+from .model import reference_free_model
+from .noisespectrum import noise_spectrum_at
+from .orderchoice import choose_selfcal_orders, highest_order
 from .pattern import ENCODER, pattern_series
 from .readings import SegmentReadings
 from .recording import Recording
-from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, estimates, listed, ranges
+from .result import (
+    ARCSEC,
+    Blind,
+    OrderEstimate,
+    SelfCalibration,
+    blind_words,
+    order_estimates,
+    order_ranges,
+)
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
+from .segments import cut_stretches
 from .steady import SteadyFit, fit_steady
-from .stretches import cut_stretches
-from .verification import held_out
+from .verification import held_out_patterns
 
 #: An order of which motion leaves less is not the encoder's to say.
 LEAST_RETAINED: Final = 0.02
@@ -50,7 +58,9 @@ def spin_down(
     readings = SegmentReadings(stretches)
     notes: list[str] = []
     most = highest_order(readings)
-    chosen = choose_orders(readings) if isinstance(orders, str) else tuple(map(float, orders))
+    chosen = (
+        choose_selfcal_orders(readings) if isinstance(orders, str) else tuple(map(float, orders))
+    )
     if any(k > 2.0 * most for k in chosen):
         raise NoModelError(
             f"order {max(chosen):g} passes faster than half the rate of readings: read more often, "
@@ -72,7 +82,7 @@ def spin_down(
     else:
         probable = np.ones(len(rippling))
     theta = readings.angle - pattern_series(chosen, fit.pattern, readings.angle)
-    colour = noise_beside(theta, fit.residuals, chosen, sum(s.turns for s in stretches))
+    colour = noise_spectrum_at(theta, fit.residuals, chosen, sum(s.turns for s in stretches))
     m = 2 * len(chosen)
     scale = np.sqrt(np.repeat(colour, 2))
     pattern_covariance = covariance[:m, :m] * np.outer(scale, scale)
@@ -82,10 +92,10 @@ def spin_down(
     with np.errstate(divide="ignore"):
         retained = np.minimum(fit.projected.variance / (np.diagonal(covariance)[:m] * alone), 1.0)
     retained = np.where(fit.projected.seen[:m], retained, 0.0)
-    table = estimates(chosen, unknowns[:m], pattern_covariance, retained, limit)
+    table = order_estimates(chosen, unknowns[:m], pattern_covariance, retained, limit)
     if rippling:
         rows = slice(m, m + 2 * len(rippling))
-        found = estimates(
+        found = order_estimates(
             rippling,
             unknowns[rows],
             covariance[rows, rows],
@@ -109,18 +119,18 @@ def spin_down(
             f"{first:g} and less of those above: the standard errors allow for it"
         )
     notes += _notes(fit, readings, colour, chosen, given, sums, separable, ripple)
-    tests = held_out(fit, [o.order for o in given or sums or table], float(colour.max()))
+    tests = held_out_patterns(fit, [o.order for o in given or sums or table], float(colour.max()))
     notes += _test_notes(tests, rippling)
     in_model = list(given)
     if loop == "open":
         in_model += sums
         if sums:
-            summed = ranges([o.order for o in sums])
+            summed = order_ranges([o.order for o in sums])
             notes.append(f"the model corrects the sum of encoder and ripple at orders {summed}")
-    model = made_model(
+    model = reference_free_model(
         in_model,
         "spin-down",
-        [*(f"{listed(b.orders)}: {b.because}" for b in blind)],
+        [*(f"{blind_words(b.orders)}: {b.because}" for b in blind)],
         notes,
         recordings,
         readings=readings.size,
@@ -211,7 +221,7 @@ def _sorted_out(
         blind.append(
             Blind(
                 lost,
-                f"order {ranges(lost)} of {ENCODER} together with {what}: less than "
+                f"order {order_ranges(lost)} of {ENCODER} together with {what}: less than "
                 f"{LEAST_RETAINED:.0%} of them is left jointly with it",
                 "turn faster or more steadily, with more inertia",
             )
@@ -229,7 +239,7 @@ def _sorted_out(
             sums.append(_renamed(o, f"{ENCODER} or the speed ripple"))
         else:
             share = 0.0 if with_current else followed_share(o.order * slowest, loop, bandwidth)
-            given.append(widened(o, share))
+            given.append(widened_by_loop(o, share))
     if may_ripple:
         low, high = np.quantile(readings.speed, [0.05, 0.95])
         blind.append(
@@ -289,8 +299,8 @@ def _notes(
         first = max((o.amplitude for o in (*given, *sums) if o.order == 1.0), default=math.nan)
         bound = "" if math.isnan(first) else f" ({first:.3g}/k^2 arcsec)"
         notes.append(
-            f"one speed: orders {ranges([o.order for o in given])} are the encoder's as far as "
-            f"torque at them ripples no more than at order 1{bound}"
+            f"one speed: orders {order_ranges([o.order for o in given])} are the encoder's as far "
+            f"as torque at them ripples no more than at order 1{bound}"
         )
     if not given and sums:
         notes.append("no order can be given as the encoder's")

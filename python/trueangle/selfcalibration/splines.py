@@ -1,4 +1,4 @@
-"""Uniform cubic B-splines in time over several stretches: basis, penalty, coarser grids.
+"""Cubic B-splines on uniform knots in time over several segments: drift penalty, coarser grids.
 
 All stretches share one list of coefficients; a stretch of ``N`` intervals takes ``N + 3``
 of them. A reading touches four neighbours, so everything is banded.
@@ -91,7 +91,7 @@ def spline_basis(place: Array) -> Array:
     )
 
 
-class Wander:
+class DriftPenalty:
     """Prior of the motion: the acceleration is noise of one roughness with a memory.
 
     ::

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from .motion import MotionFit
 from .pattern import ENCODER, RIPPLE
-from .projected import Projected, Unknown, pairs
+from .projected import Projected, Unknown, harmonic_unknowns
 from .readings import PER_KNOT, SegmentReadings
-from .steps import Steps
+from .steps import GaussNewtonSteps
 
 #: Readings that the first iterations look at: enough to come close.
 _FIRST_LOOK: Final = 40_000
@@ -95,14 +95,14 @@ def fit_steady(
     orders, ripple = tuple(orders), tuple(ripple)
     sets = 1 if groups is None else 2
     names = tuple(f"{ENCODER}, part {i + 1}" for i in range(2)) if sets == 2 else (ENCODER,)
-    columns: list[Unknown] = [c for name in names for c in pairs(name, orders)]
-    columns += pairs(RIPPLE, ripple)
+    columns: list[Unknown] = [c for name in names for c in harmonic_unknowns(name, orders)]
+    columns += harmonic_unknowns(RIPPLE, ripple)
     columns += [Unknown(name, 0.0, "") for name in readings.extra_names]
     unknowns = np.zeros(len(columns))
     if start is not None:
         for source in (*names, RIPPLE):
             origin = RIPPLE if source == RIPPLE else ENCODER
-            for column in pairs(source, ripple if source == RIPPLE else orders):
+            for column in harmonic_unknowns(source, ripple if source == RIPPLE else orders):
                 twin = column._replace(source=origin)
                 if twin in start.motion.projected.columns:
                     unknowns[columns.index(column)] = start.unknowns[
@@ -113,7 +113,7 @@ def fit_steady(
             unknowns[-tail:] = start.unknowns[-tail:]
     near_to = start.motion if like is None and start is not None else like
     intervals = _INTERVALS if near_to is None else max(_INTERVALS, sum(near_to.knots.intervals))
-    work = Steps(readings, orders, ripple, groups, columns)
+    work = GaussNewtonSteps(readings, orders, ripple, groups, columns)
     stride = max(1, readings.size // _FIRST_LOOK)
     fit, valid = None, np.ones(readings.size, dtype=bool)
     if start is not None:

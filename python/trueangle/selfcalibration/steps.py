@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from ..support.arrays import Array
 from .motion import MotionFit, MotionSearch
-from .pattern import pattern_model, pattern_series, steepness
+from .pattern import pattern_model, pattern_series, pattern_steepness
 from .projected import Unknown, harmonic_rows, harmonic_sum
 from .readings import SegmentReadings
 from .splines import Knots, spline_basis, spline_values
-from .sums import ordered_sums
+from .sums import ordered_motion_sums
 
 #: Slope of the error that no step goes beyond: at 1 an angle would be read twice.
 _STEEPEST: Final = 0.97
 
 
-class Steps:
+class GaussNewtonSteps:
     """Steps of Gauss and Newton towards pattern and motion, of all readings or every n-th."""
 
     def __init__(
@@ -113,7 +113,7 @@ class Steps:
                 out[at:] = extra[:, part] * weight[part]
 
         good = valid[rows]
-        sums = ordered_sums(
+        sums = ordered_motion_sums(
             knots,
             index,
             place,
@@ -141,7 +141,7 @@ class Steps:
         """
         for _ in range(12):
             parts = (unknowns + step)[: self.sets * self.per_set].reshape(self.sets, -1)
-            if all(steepness(self.orders, part) < _STEEPEST for part in parts):
+            if all(pattern_steepness(self.orders, part) < _STEEPEST for part in parts):
                 break
             step = 0.5 * step
         return unknowns + step

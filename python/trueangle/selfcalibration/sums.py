@@ -43,7 +43,7 @@ class MotionSums(NamedTuple):
         )
 
 
-def ordered_sums(
+def ordered_motion_sums(
     knots: Knots,
     index: NDArray[np.int64],
     place: Array,

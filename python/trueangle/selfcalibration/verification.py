@@ -1,4 +1,4 @@
-"""Honest tests of a pattern: one part of the readings predicts another."""
+"""Tests of a pattern: one part of the readings predicts another; the chance of their difference."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, f_tail
 from .readings import SegmentReadings
-from .result import ARCSEC, HeldOut
+from .result import ARCSEC, HeldOutPattern
 from .steady import SteadyFit, fit_steady
 
 #: Speeds that differ by less than this ratio test nothing.
@@ -22,24 +22,24 @@ _SPEEDS: Final = 1.3
 _TURNS: Final = 4.0
 
 
-def judged(
+def judged_patterns(
     first: Array, second: Array, covariance: Array, noise: float, names: tuple[str, str]
-) -> HeldOut:
+) -> HeldOutPattern:
     """Two patterns (cosine and sine in turn, radians) of two parts of the readings.
 
     ``covariance`` is that of ``second - first``.
     """
     gap = second - first
-    return HeldOut(
+    return HeldOutPattern(
         fitted_on=names[0],
         judged_on=names[1],
         rms_before=math.hypot(noise, math.sqrt(0.5 * float(second @ second))) * ARCSEC,
         rms_after=math.hypot(noise, math.sqrt(0.5 * float(gap @ gap))) * ARCSEC,
-        p=chance_of(gap, covariance),
+        p=chance_of_difference(gap, covariance),
     )
 
 
-def chance_of(gap: Array, covariance: Array, freedom: float = math.inf) -> float:
+def chance_of_difference(gap: Array, covariance: Array, freedom: float = math.inf) -> float:
     """Probability that noise makes so great a difference of patterns (Hotelling).
 
     ::
@@ -56,7 +56,9 @@ def chance_of(gap: Array, covariance: Array, freedom: float = math.inf) -> float
     return f_tail(size * left / (freedom * count), count, left)
 
 
-def held_out(fit: SteadyFit, tested: Sequence[float], colour: float = 1.0) -> dict[str, HeldOut]:
+def held_out_patterns(
+    fit: SteadyFit, tested: Sequence[float], colour: float = 1.0
+) -> dict[str, HeldOutPattern]:
     """Odd turns against even ones, fast against slow, one direction against the other.
 
     Both parts share the motion; each has a pattern of its own. Slow against fast is made
@@ -107,7 +109,7 @@ def _compare(
     colour: float,
     *,
     ripple: bool = True,
-) -> HeldOut:
+) -> HeldOutPattern:
     parts = fit_steady(
         fit.readings,
         fit.orders,
@@ -129,4 +131,6 @@ def _compare(
         - covariance[np.ix_(rows + m, rows)]
     )
     noise = math.sqrt(parts.projected.variance)
-    return judged(parts.unknowns[rows], parts.unknowns[rows + m], colour * difference, noise, names)
+    return judged_patterns(
+        parts.unknowns[rows], parts.unknowns[rows + m], colour * difference, noise, names
+    )

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..joint.pattern import Pattern
 from ..runs.run import CalibrationRun
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from ..support.signals import COUPLED
-from .rotor import Drive, Motion, rotor_angle
+from .rotor import RotorDrive, RotorMotion, rotor_angle
 
 #: Readings of one run, at most: a simulation holds some 150 bytes of each.
 MAX_SAMPLES = 20_000_000
@@ -74,7 +74,7 @@ class RunDesign:
     imbalance_deg_s2, imbalance_phase_deg : float
         Acceleration ``u sin(theta + phase)`` by imbalance.
     friction_deg_s2, friction_memory_s : float
-        Standard deviation and memory of a friction that wanders.
+        Standard deviation and memory of a friction that drifts.
     deg_s2_per_A : float, optional
         Acceleration per ampere; the current that the loop asks for joins ``current_A``.
     motor_sigma_arcsec : float, optional
@@ -176,9 +176,9 @@ class RunDesign:
         return (self.speed_deg_s - self.speed_end_deg_s) / (360.0 * self.turns)
 
     @property
-    def _drive(self) -> Drive:
+    def _drive(self) -> RotorDrive:
         """What moves the shaft."""
-        return Drive(
+        return RotorDrive(
             math.radians(self.start_deg),
             math.radians(self.speed_deg_s) * self.direction,
             self.decay_per_s,
@@ -230,7 +230,7 @@ class RunDesign:
         else:
             speed = self.speed_deg_s - self.decay_per_s * travel
             time = np.log(self.speed_deg_s / speed) / self.decay_per_s
-        motion = Motion(angle, np.asarray(signs * speed), np.zeros(n))
+        motion = RotorMotion(angle, np.asarray(signs * speed), np.zeros(n))
         if self.is_moved:
             motion = rotor_angle(self._drive, time, pattern, rng)
         temperature = np.full(n, float(self.temperature_C))
@@ -253,7 +253,7 @@ class RunDesign:
         )
 
     def _signals(
-        self, motion: Motion, share: NDArray[np.float64]
+        self, motion: RotorMotion, share: NDArray[np.float64]
     ) -> dict[str, NDArray[np.float64]]:
         """Current, shift and the angles of other joints, where the run has them."""
         found = {}

@@ -1,11 +1,11 @@
-"""The shaft as an inertia: what moves it beside the speed that a run asks for.
+"""The rotor as an inertia: what moves it beside the speed that a run asks for.
 
 ::
 
     θ̈ = -γθ̇ + c sin(mθ + φ) + u sin(θ + ψ) + f(t) + a
 
 with viscous friction ``γ`` (none at constant speed), cogging, imbalance and a friction
-that wanders, all as accelerations, and ``a`` what a velocity loop asks of the motor. The
+that drifts, all as accelerations, and ``a`` what a velocity loop asks of the motor. The
 loop is closed on the encoder under test: with what the encoder reads, r, and its speed,
 
 ::
@@ -35,8 +35,8 @@ ARCSEC_PER_RAD: Final = ARCSEC_PER_TURN / (2.0 * math.pi)
 _STEP: Final = 0.1
 
 
-class Drive(NamedTuple):
-    """What moves a shaft, in radians and seconds; the friction that wanders in deg/s^2."""
+class RotorDrive(NamedTuple):
+    """What moves a shaft, in radians and seconds; the friction that drifts, in deg/s^2."""
 
     place: float
     speed: float
@@ -51,7 +51,7 @@ class Drive(NamedTuple):
     memory_s: float
 
 
-class Motion(NamedTuple):
+class RotorMotion(NamedTuple):
     """Angle (deg), speed (deg/s) and acceleration by the motor (deg/s^2) at every reading."""
 
     angle: Array
@@ -59,7 +59,9 @@ class Motion(NamedTuple):
     driven: Array
 
 
-def rotor_angle(drive: Drive, time: Array, pattern: Pattern, rng: np.random.Generator) -> Motion:
+def rotor_angle(
+    drive: RotorDrive, time: Array, pattern: Pattern, rng: np.random.Generator
+) -> RotorMotion:
     """Where the shaft is at ``time``, integrated from the start of the run.
 
     Parameters
@@ -70,7 +72,7 @@ def rotor_angle(drive: Drive, time: Array, pattern: Pattern, rng: np.random.Gene
     pattern : Pattern
         Lines that the loop sees; other effects and noise do not move the shaft.
     rng : numpy.random.Generator
-        Of the friction that wanders.
+        Of the friction that drifts.
 
     Raises
     ------
@@ -122,7 +124,7 @@ def rotor_angle(drive: Drive, time: Array, pattern: Pattern, rng: np.random.Gene
 
     fastest = max([order if cogging else 1.0, *(m for m, _ in lines)])
     longest = _STEP / max(fastest * abs(start) * max(1.0, math.exp(-rate * time[-1])), band, 1e-12)
-    friction = np.radians(_wander(drive, time, rng)).tolist()
+    friction = np.radians(_drift(drive, time, rng)).tolist()
     n = time.size
     angle, speed, driven = np.empty(n), np.empty(n), np.zeros(n)
     x, v, before = place, start, 0.0
@@ -156,10 +158,10 @@ def rotor_angle(drive: Drive, time: Array, pattern: Pattern, rng: np.random.Gene
         if band:
             driven[i] = loop(now, x, v)
         before = now
-    return Motion(np.degrees(angle), np.degrees(speed), np.degrees(driven))
+    return RotorMotion(np.degrees(angle), np.degrees(speed), np.degrees(driven))
 
 
-def _wander(drive: Drive, time: Array, rng: np.random.Generator) -> Array:
+def _drift(drive: RotorDrive, time: Array, rng: np.random.Generator) -> Array:
     """A friction's acceleration at every reading, that forgets itself in ``memory_s``."""
     size = drive.friction_deg_s2
     if size == 0.0:

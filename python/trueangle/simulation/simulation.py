@@ -12,16 +12,17 @@ import numpy as np
 from ..effects import EFFECTS, Effect, MissingOrder, ReferenceLines
 from ..errors import ArgumentError
 from ..joint.joint import Joint
-from ..joint.pattern import Harmonic, Pattern, Surroundings
+from ..joint.pattern import Harmonic, JointPattern, Pattern
 from ..joint.signals import Signals, join_runs
 from ..runs.run import CalibrationRun, as_runs
 from ..support.angles import ARCSEC_PER_DEG
+from ..support.argumentkinds import all_of_type, of_type, told_kinds
 from ..support.arrays import Array
 from ..support.distributions import random_numbers
-from ..support.kinds import all_of_type, of_type, told_kinds
-from ..support.plainresult import Shown, counted
+from ..support.layout import counted
+from ..support.plainresult import ShownResult
 from .designs import RunDesign
-from .simulationtext import Stated, simulation_text, write_simulation
+from .simulationtext import StatedSimulation, simulation_text, write_simulation
 
 #: What must be given, for messages.
 SIMULATION = "a trueangle.Simulation (trueangle.load_simulation reads one)"
@@ -31,7 +32,7 @@ EFFECT = "an effect of a simulation, in arcsec and degrees"
 
 @told_kinds
 @dataclass(frozen=True)
-class Simulation(Shown):
+class Simulation(ShownResult):
     """What is believed of a joint, and how it is measured.
 
     ::
@@ -90,16 +91,16 @@ class Simulation(Shown):
         return Pattern.of(self.harmonics, self.joint)
 
     @property
-    def surroundings(self) -> Surroundings:
+    def surroundings(self) -> JointPattern:
         """What effects are given beyond the readings, of what is believed."""
-        return Surroundings(self.joint, self.pattern)
+        return JointPattern(self.joint, self.pattern)
 
     @property
-    def whole_surroundings(self) -> Surroundings:
+    def whole_surroundings(self) -> JointPattern:
         """The same with further lines in the pattern: a delay moves those as well."""
         further = (e for e in self.effects if isinstance(e, MissingOrder))
         lines = [Harmonic(e.shaft, e.order, e.amplitude_arcsec, e.phase_deg) for e in further]
-        return Surroundings(self.joint, Pattern.of([*self.harmonics, *lines], self.joint))
+        return JointPattern(self.joint, Pattern.of([*self.harmonics, *lines], self.joint))
 
     def _brief(self) -> str:
         return (
@@ -145,8 +146,8 @@ class Simulation(Shown):
         return simulation_text(self._stated)
 
     @property
-    def _stated(self) -> Stated:
-        return Stated(*(getattr(self, entry.name) for entry in fields(self)))
+    def _stated(self) -> StatedSimulation:
+        return StatedSimulation(*(getattr(self, entry.name) for entry in fields(self)))
 
 
 @told_kinds

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..support.kinds import told_kinds
+from ..support.argumentkinds import told_kinds
 from .simulation import Simulation
 from .simulationtext import decoded_simulation, guarded_build
 

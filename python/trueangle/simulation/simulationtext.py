@@ -12,7 +12,7 @@ from ..errors import ArgumentError, FileError
 from ..joint.declared import Bearing, DeclaredShaft, Head
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic
-from ..support.decoding import finite_float, read_text, shown
+from ..support.decoding import finite_float, read_text, shown_value
 from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
 from ..support.suggestions import did_you_mean
 from .designs import MAX_SAMPLES, RunDesign
@@ -33,7 +33,7 @@ MAX_TABLES = 10_000
 T = TypeVar("T")
 
 
-class Stated(NamedTuple):
+class StatedSimulation(NamedTuple):
     """What a simulation file says, the fields of `Simulation` in their order."""
 
     joint: Joint
@@ -44,7 +44,7 @@ class Stated(NamedTuple):
     source: str | None
 
 
-def decoded_simulation(path: str | Path) -> Stated:
+def decoded_simulation(path: str | Path) -> StatedSimulation:
     """The checked parts of a simulation file; see `load_simulation`."""
     text = read_text(path, SIMULATION_BYTES, FileError, "a simulation")
     return _decoded(path, _document(path, text))
@@ -63,12 +63,12 @@ def _document(path: str | Path, text: str) -> dict[str, Any]:
         raise FileError(path, "holds a number or date that cannot be read") from None
 
 
-def _decoded(path: str | Path, document: Mapping[str, Any]) -> Stated:
+def _decoded(path: str | Path, document: Mapping[str, Any]) -> StatedSimulation:
     for name in document:
         if name not in _TABLES:
             raise FileError(
                 path,
-                f"unknown table {shown(name)}{did_you_mean(name, _TABLES)}; a simulation has "
+                f"unknown table {shown_value(name)}{did_you_mean(name, _TABLES)}; a simulation has "
                 f"{', '.join(_TABLES)}",
             )
     joint = _joint(path, document)
@@ -90,12 +90,12 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> Stated:
     noise = _table(path, document, "noise")
     for name in noise:
         if name != "sigma_arcsec":
-            raise FileError(path, f"[noise]: unknown key {shown(name)}; it has sigma_arcsec")
+            raise FileError(path, f"[noise]: unknown key {shown_value(name)}; it has sigma_arcsec")
     sigma = finite_float(noise.get("sigma_arcsec", 0.0))
     if sigma is None:
-        got = shown(noise["sigma_arcsec"])
+        got = shown_value(noise["sigma_arcsec"])
         raise FileError(path, f"[noise]: sigma_arcsec must be a finite number, got {got}")
-    return Stated(joint, harmonics, effects, sigma, designs, str(path))
+    return StatedSimulation(joint, harmonics, effects, sigma, designs, str(path))
 
 
 def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
@@ -105,8 +105,8 @@ def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
         if name not in _JOINT_KEYS:
             raise FileError(
                 path,
-                f"[joint]: unknown key {shown(name)}{did_you_mean(name, _JOINT_KEYS)}; it has "
-                f"{', '.join(_JOINT_KEYS)}",
+                f"[joint]: unknown key {shown_value(name)}{did_you_mean(name, _JOINT_KEYS)}; it "
+                f"has {', '.join(_JOINT_KEYS)}",
             )
     gear = _build(path, "[joint]", Joint, _geared(table))
     further: dict[str, Any] = {
@@ -152,7 +152,7 @@ def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]
         if name not in known:
             raise FileError(
                 path,
-                f"{where}: unknown key {shown(name)}{did_you_mean(name, known)}; it has "
+                f"{where}: unknown key {shown_value(name)}{did_you_mean(name, known)}; it has "
                 f"{', '.join(known)}",
             )
         values[name] = _value(path, where, name, value, known[name])
@@ -165,7 +165,7 @@ def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]
 
 def _value(path: str | Path, where: str, name: str, value: Any, wanted: str) -> Any:
     def refuse(what: str) -> FileError:
-        return FileError(path, f"{where}: {name} must be {what}, got {shown(value)}")
+        return FileError(path, f"{where}: {name} must be {what}, got {shown_value(value)}")
 
     if wanted.startswith("str"):
         if not isinstance(value, str):
@@ -201,11 +201,11 @@ def _effect(path: str | Path, where: str, table: dict[str, Any]) -> Effect:
     if not isinstance(kind, str) or kind not in EFFECTS:
         raise FileError(
             path,
-            f"{where}: kind must be one of {', '.join(EFFECTS)}, got {shown(kind)}"
+            f"{where}: kind must be one of {', '.join(EFFECTS)}, got {shown_value(kind)}"
             f"{did_you_mean(kind, EFFECTS) if isinstance(kind, str) else ''}",
         )
     for name, value in parameters.items():
-        parameters[name] = _checked_numbers(path, f"{where}: {shown(name)}", value)
+        parameters[name] = _checked_numbers(path, f"{where}: {shown_value(name)}", value)
     return guarded_build(path, where, lambda: EFFECTS[kind].from_table(parameters))
 
 
@@ -217,7 +217,7 @@ def _checked_numbers(path: str | Path, where: str, value: Any) -> Any:
         return [_checked_numbers(path, where, item) for item in value]
     if isinstance(value, int | float) and not isinstance(value, bool):
         if finite_float(value) is None:
-            raise FileError(path, f"{where} must be a finite number, got {shown(value)}")
+            raise FileError(path, f"{where} must be a finite number, got {shown_value(value)}")
         return value if abs(value) < 2**53 else float(value)
     return value
 
@@ -232,7 +232,7 @@ def guarded_build(path: str | Path, where: str, build: Callable[[], T]) -> T:
         raise FileError(path, f"{where}: {cause}") from None
 
 
-def to_table(sim: Stated) -> dict[str, Any]:
+def simulation_table(sim: StatedSimulation) -> dict[str, Any]:
     """The tables of a simulation file; keys at their defaults are left out of ``run``."""
     runs = []
     for design in sim.runs:
@@ -261,7 +261,7 @@ def _given(entry: Any) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def write_simulation(sim: Stated, path: str | Path) -> None:
+def write_simulation(sim: StatedSimulation, path: str | Path) -> None:
     """Write a simulation file, beside and then renamed; floats round-trip exactly.
 
     Where the simulation was read from a file, that file's text is kept and only what
@@ -272,14 +272,14 @@ def write_simulation(sim: Stated, path: str | Path) -> None:
         file.write(text)
 
 
-def simulation_text(sim: Stated) -> str:
+def simulation_text(sim: StatedSimulation) -> str:
     """The text of a simulation file, as `write_simulation` writes it."""
-    whole = to_table(sim)
+    whole = simulation_table(sim)
     if sim.source is not None and Path(sim.source).is_file():
         import tomllib
 
         text = Path(sim.source).read_text(encoding="utf-8").rstrip("\n")
-        old = to_table(decoded_simulation(sim.source))
+        old = simulation_table(decoded_simulation(sim.source))
         appended: dict[str, Any] = {
             name: whole[name][len(old[name]) :] for name in ("harmonic", "effect", "run")
         }

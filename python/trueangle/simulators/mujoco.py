@@ -15,7 +15,7 @@ from ..export.mujoco import NOISE_NAME, TEXT_NAME
 from ..model.file import embedded_model
 from ..model.model import HarmonicModel
 from ..support.arrays import Array
-from ..support.signals import coupled_with
+from ..support.signals import coupled_joint
 from ..support.suggestions import did_you_mean
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ class SensorLayer:
         With each, where the other joints' angles are: among the readings, or in ``qpos`` by name.
         """
         wanted = {
-            j: {name: coupled_with(name) for name in joint.model.signals if coupled_with(name)}
+            j: {name: coupled_joint(name) for name in joint.model.signals if coupled_joint(name)}
             for j, joint in enumerate(self._joints)
         }
         places = {joint.joint: j for j, joint in enumerate(self._joints)}
@@ -245,7 +245,7 @@ class _Encoder:
             elif own.get(name) in fields:
                 signals[name] = fields[own[name]][:, self._dof]
         for name in signals:
-            if name == "velocity" or coupled_with(name):
+            if name == "velocity" or coupled_joint(name):
                 signals[name] = signals[name] * self._unit
         missing = [name for name in self.model.signals if name not in {*signals, "direction"}]
         if missing:

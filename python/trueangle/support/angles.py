@@ -1,4 +1,4 @@
-"""Units of angle, wrapping, unwrapping and circular means."""
+"""Angles: periods and other units, arcsec, wrapping, unwrapping and circular means."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
-from .kinds import told_kinds
+from .argumentkinds import told_kinds
 from .unit_periods import ARCSEC_PER_DEG, ARCSEC_PER_TURN, UNIT_PERIODS
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "arcsec",
     "check_period",
     "circular_mean",
+    "from_arcsec",
     "unit_name",
     "wrap",
     "zero_text",
@@ -62,6 +63,11 @@ def unit_name(period: float) -> str:
 def arcsec(angle: float, period: float) -> float:
     """``angle`` (one turn = ``period``) in seconds of arc."""
     return angle * (ARCSEC_PER_TURN / period)
+
+
+def from_arcsec(value: float, period: float) -> float:
+    """Seconds of arc in the unit in which a turn is ``period``."""
+    return float(value) * (period / ARCSEC_PER_TURN)
 
 
 @told_kinds

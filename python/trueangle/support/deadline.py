@@ -1,7 +1,8 @@
 """Time of long work: how far it is, what is left, when it must end.
 
-What works consults the `Pace` that is in force (`pace`) and needs no argument for it; who asked for
-the work enters one with `with_pace`, and may let Ctrl-C end it early (`ending_early`).
+What works consults the `Deadline` that is in force (`current_deadline`) and needs no argument for
+it; who asked for the work enters one with `with_deadline`, and may let Ctrl-C end it early
+(`ending_early`).
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ STYLES: Final = ("auto", "text", "json", "none")
 _FIRST, _INTERVAL = 1.0, 0.5
 
 
-class Pace:
+class Deadline:
     """How far a piece of work is, and whether it must end.
 
     Parameters
@@ -194,17 +195,17 @@ class Pace:
             self._stream.flush()
 
 
-_CURRENT: ContextVar[Pace | None] = ContextVar("pace", default=None)
+_CURRENT: ContextVar[Deadline | None] = ContextVar("pace", default=None)
 
 
-def pace() -> Pace:
+def current_deadline() -> Deadline:
     """The pace in force; an endless, silent one where nobody entered any."""
     found = _CURRENT.get()
-    return Pace() if found is None else found
+    return Deadline() if found is None else found
 
 
 @contextlib.contextmanager
-def entered(own: Pace) -> Iterator[Pace]:
+def under_deadline(own: Deadline) -> Iterator[Deadline]:
     """Work at this pace."""
     token = _CURRENT.set(own)
     try:
@@ -215,8 +216,8 @@ def entered(own: Pace) -> Iterator[Pace]:
 
 
 @contextlib.contextmanager
-def with_pace(within: float | None = None, style: str = "none") -> Iterator[Pace]:
-    """Work at a pace of its own; parameters are those of `Pace`.
+def with_deadline(within: float | None = None, style: str = "none") -> Iterator[Deadline]:
+    """Work at a pace of its own; parameters are those of `Deadline`.
 
     Work inside other work that asks for neither has the pace of that.
     """
@@ -224,24 +225,24 @@ def with_pace(within: float | None = None, style: str = "none") -> Iterator[Pace
     if outer is not None and within is None and style == "none":
         yield outer
         return
-    with entered(Pace(within, style)) as own:
+    with under_deadline(Deadline(within, style)) as own:
         yield own
 
 
-class Interruption:
+class _Interruption:
     """Whether Ctrl-C ended the work."""
 
     happened = False
 
 
 @contextlib.contextmanager
-def ending_early() -> Iterator[Interruption]:
+def ending_early() -> Iterator[_Interruption]:
     """Let a first Ctrl-C ask the work at its pace to end with what it has; a second one ends it.
 
     Where no pace is in force, outside the main thread, or where Ctrl-C is ignored (a job in the
     background), it is what it always is.
     """
-    found = Interruption()
+    found = _Interruption()
     ignored = signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None)
     if ignored or threading.current_thread() is not threading.main_thread():
         yield found

@@ -1,4 +1,4 @@
-"""Decoding what files say: any text gives checked values, or an error that names the place."""
+"""Decoding what files say: any text gives checked values, or an error that shows what and where."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MAX_LINES = 65_536
 MAX_LINE_ORDERS = 1e7
 
 
-def shown(value: Any, most: int = 60) -> str:
+def shown_value(value: Any, most: int = 60) -> str:
     """``value`` as it is told in a message: in one piece, of bounded length."""
     try:
         text = repr(value)
@@ -58,7 +58,7 @@ def read_text(path: str | PathLike[str], most: int, kind: type[FileError], what:
         raise kind(path, f"is not {what}: not UTF-8 text", line=line) from None
 
 
-def json_text(path: Path, text: str, kind: type[FileError], what: str) -> Any:
+def json_value(path: Path, text: str, kind: type[FileError], what: str) -> Any:
     """The value of a JSON text whose keys are unique and whose numbers are finite.
 
     Raises
@@ -73,7 +73,7 @@ def json_text(path: Path, text: str, kind: type[FileError], what: str) -> Any:
             seen: set[str] = set()
             for key, _value in items:
                 if key in seen:
-                    raise kind(path, f"key {shown(key)}: appears twice; keep one")
+                    raise kind(path, f"key {shown_value(key)}: appears twice; keep one")
                 seen.add(key)
         return found
 
@@ -132,12 +132,13 @@ class Decoder:
     ) -> dict[str, Any]:
         """An object with the keys ``known``, each needed where its value there is true."""
         if not isinstance(value, dict):
-            raise self.error(f"an object is needed, got {shown(value)}", key)
+            raise self.error(f"an object is needed, got {shown_value(value)}", key)
         where = f"{key}." if key else ""
         for name in value:
             if name not in known:
                 raise self.error(
-                    f"is unknown; the keys are {', '.join(known)}", f"{where}{shown(name)[1:-1]}"
+                    f"is unknown; the keys are {', '.join(known)}",
+                    f"{where}{shown_value(name)[1:-1]}",
                 )
         for name, needed in known.items():
             if needed and name not in value:
@@ -151,7 +152,7 @@ class Decoder:
     def items(self, value: Any, key: str, what: str, most: int = MAX_LINES) -> list[Any]:
         """A list of at most ``most``."""
         if not isinstance(value, list):
-            raise self.error(f"a list of {what} is needed, got {shown(value)}", key)
+            raise self.error(f"a list of {what} is needed, got {shown_value(value)}", key)
         if len(value) > most:
             raise self.error(f"holds {len(value)} {what}; at most {most} are allowed", key)
         return value
@@ -162,7 +163,7 @@ class Decoder:
         if number is None:
             is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
             wanted = "a finite number within double range" if is_number else "a number"
-            raise self.error(f"{wanted} is needed, got {shown(value)}", key)
+            raise self.error(f"{wanted} is needed, got {shown_value(value)}", key)
         return number
 
     def numbers(self, value: Any, key: str, most: int = MAX_LINES) -> tuple[float, ...]:
@@ -175,12 +176,12 @@ class Decoder:
         number = finite_float(value)
         if number is None or number != math.floor(number) or not least <= number <= most:
             raise self.error(
-                f"a whole number from {least} to {most} is needed, got {shown(value)}", key
+                f"a whole number from {least} to {most} is needed, got {shown_value(value)}", key
             )
         return int(number)
 
     def text(self, value: Any, key: str) -> str:
         """A text."""
         if not isinstance(value, str):
-            raise self.error(f"a text is needed, got {shown(value)}", key)
+            raise self.error(f"a text is needed, got {shown_value(value)}", key)
         return value

@@ -1,4 +1,4 @@
-"""Units that errors are shown in, and numbers rounded to their uncertainty.
+"""Units that errors are shown in, and numbers rounded to digits or to their uncertainty.
 
 Results keep errors in arcsec, or in the unit of their period; a summary chooses one unit for
 all that it prints, so that its numbers can be compared.
@@ -57,7 +57,7 @@ class ErrorUnit(NamedTuple):
         value = arcsec * self.per_arcsec
         spread = math.nan if std is None else std * self.per_arcsec
         if not (math.isfinite(spread) and spread > 0.0):
-            return significant(value, _DIGITS), "-"
+            return significant_digits(value, _DIGITS), "-"
         decimals = _decimals(spread, _UNCERTAIN_DIGITS)
         return _fixed(value, decimals), _fixed(spread, decimals)
 
@@ -92,7 +92,7 @@ class ErrorUnit(NamedTuple):
     def _converted(self, number: str) -> str:
         written = number.partition("e")[0].replace(".", "").lstrip("-0").rstrip("0")
         digits = max(len(written), _UNCERTAIN_DIGITS)
-        return significant(float(number) * self.per_arcsec, digits)
+        return significant_digits(float(number) * self.per_arcsec, digits)
 
 
 def error_unit(
@@ -150,7 +150,7 @@ def sine_of_rms(rms: float) -> float:
     return math.sqrt(2.0) * rms if math.isfinite(rms) else 0.0
 
 
-def phase_pair(phase_deg: float, std_deg: float | None) -> tuple[str, str]:
+def rounded_phase(phase_deg: float, std_deg: float | None) -> tuple[str, str]:
     """A phase in [0, 360) deg and its standard deviation, to the digits that it leaves.
 
     Examples
@@ -165,7 +165,7 @@ def phase_pair(phase_deg: float, std_deg: float | None) -> tuple[str, str]:
     return _fixed(round(phase_deg % 360.0, decimals) % 360.0, decimals), _fixed(spread, decimals)
 
 
-def significant(value: float, digits: int = _DIGITS) -> str:
+def significant_digits(value: float, digits: int = _DIGITS) -> str:
     """``value`` with so many significant digits, written without an exponent.
 
     Examples
@@ -178,7 +178,7 @@ def significant(value: float, digits: int = _DIGITS) -> str:
     return _fixed(value, _decimals(value, digits)) if value else "0"
 
 
-def brief(value: float) -> str:
+def brief_number(value: float) -> str:
     """``value`` with two significant digits, or all before the point: for sentences.
 
     Examples

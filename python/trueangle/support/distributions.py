@@ -50,6 +50,11 @@ def normal_quantile(p: float) -> float:
     return NormalDist().inv_cdf(_probability(p))
 
 
+def two_sided_quantile(chance: float) -> float:
+    """The x with ``P(|Z| > x) = chance``: what a standard normal number exceeds in size."""
+    return normal_quantile(1.0 - 0.5 * chance)
+
+
 def student_tail(t: float, degrees_of_freedom: float) -> float:
     """Probability ``P(T_ν > t)`` of Student's distribution, to about 1e-13 relative.
 
@@ -71,8 +76,8 @@ def student_tail(t: float, degrees_of_freedom: float) -> float:
         return 0.0 if t > 0.0 else 1.0
     square = t * t
     if square < 1.0:  # by its complement, which does not round to 1 near t = 0
-        return 0.5 - math.copysign(0.5 * incomplete_beta(0.5, 0.5 * nu, square / (nu + square)), t)
-    tail = 0.5 * incomplete_beta(0.5 * nu, 0.5, nu / (nu + square))
+        return 0.5 - math.copysign(0.5 * _incomplete_beta(0.5, 0.5 * nu, square / (nu + square)), t)
+    tail = 0.5 * _incomplete_beta(0.5 * nu, 0.5, nu / (nu + square))
     return tail if t >= 0.0 else 1.0 - tail
 
 
@@ -141,7 +146,7 @@ def f_tail(f: float, numerator: float, denominator: float) -> float:
         return 0.0
     if d2 > _NORMAL_BEYOND:
         return chi_squared_tail(d1 * f, d1)
-    return incomplete_beta(0.5 * d2, 0.5 * d1, d2 / (d2 + d1 * f))
+    return _incomplete_beta(0.5 * d2, 0.5 * d1, d2 / (d2 + d1 * f))
 
 
 def f_quantile(p: float, numerator: float, denominator: float) -> float:
@@ -156,7 +161,7 @@ def f_quantile(p: float, numerator: float, denominator: float) -> float:
     return _root(lambda x: f_tail(x, numerator, denominator), upper)
 
 
-def incomplete_beta(a: float, b: float, x: float) -> float:
+def _incomplete_beta(a: float, b: float, x: float) -> float:
     """Regularised incomplete beta function ``I_x(a, b)``, a, b > 0, 0 <= x <= 1.
 
     The continued fraction of DLMF 8.17.22, on the side where it converges fast.

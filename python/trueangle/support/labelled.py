@@ -1,4 +1,4 @@
-"""Data with labels: series of pandas and polars, arrays of xarray go in and come out as such.
+"""Data with labels: series of pandas and polars, arrays of xarray, taken apart and put together.
 
 None of these libraries is imported: whoever passes such data has done so. narwhals would stand for
 two of the four functions below (series of pandas and polars); it knows no xarray and no index of a

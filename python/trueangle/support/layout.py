@@ -1,11 +1,11 @@
-"""Text for people, laid out: lines no wider than the terminal, folded under their text."""
+"""Text for people: counts in words, lines no wider than the terminal, folded under their text."""
 
 from __future__ import annotations
 
 import re
 import shutil
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sized
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final
@@ -55,7 +55,7 @@ def text_columns() -> int:
     return min(max(found, _NARROWEST), _WIDEST)
 
 
-def wrapped(text: str, indent: int = 0, first: int = 0) -> list[str]:
+def wrapped_lines(text: str, indent: int = 0, first: int = 0) -> list[str]:
     """Lines of a paragraph; ``first`` and ``indent`` are how far the first and others stand in.
 
     Words are never broken, so that options and paths can be copied.
@@ -106,3 +106,15 @@ def _folded(line: str, width: int, indent: int) -> list[str]:
         parts.append(line[:cut].rstrip())
         line = " " * indent + line[cut:].lstrip()
     return [*parts, line.rstrip()]
+
+
+def counted(things: Sized | int, one: str, several: str = "") -> str:
+    """How many there are, in words.
+
+    Examples
+    --------
+    >>> counted(1, "run"), counted([1, 2], "run"), counted(0, "reversal", "reversals")
+    ('1 run', '2 runs', '0 reversals')
+    """
+    n = things if isinstance(things, int) else len(things)
+    return f"{n} {one if n == 1 else several or one + 's'}"

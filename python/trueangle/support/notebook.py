@@ -28,7 +28,7 @@ _EM: Final = 0.5
 _NUMBER: Final = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?|[-\N{EN DASH}]")
 
 
-def as_html(result: object) -> str:
+def notebook_html(result: object) -> str:
     """The summary of a result with its tables as tables, and its picture where it has one.
 
     Examples

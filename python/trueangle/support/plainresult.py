@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sized
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 #: Characters of a result's ``repr`` at most: one line of a screen.
@@ -15,7 +15,7 @@ WIDTH = 100
 _SHORT = 30
 
 
-class Shown:
+class ShownResult:
     """A result that shows itself: one line as ``repr``, its summary as text and in notebooks.
 
     A class says what its line holds by ``_brief``, the two or three numbers that matter, and has
@@ -28,7 +28,7 @@ class Shown:
         super().__init_subclass__(**options)
         # `dataclass` leaves alone what a class defines itself.
         if "__repr__" not in cls.__dict__:
-            cls.__repr__ = Shown.__repr__  # type: ignore[method-assign]
+            cls.__repr__ = ShownResult.__repr__  # type: ignore[method-assign]
 
     def _brief(self) -> str:
         """What stands in the brackets of the line."""
@@ -55,12 +55,12 @@ class Shown:
         return repr(self) if summary is None else str(summary())
 
     def _repr_html_(self) -> str:
-        from .notebook import as_html
+        from .notebook import notebook_html
 
-        return as_html(self)
+        return notebook_html(self)
 
 
-class PlainResult(Shown):
+class PlainResult(ShownResult):
     """A result whose ``to_dict`` holds plain values: strings, numbers, lists and mappings."""
 
     __slots__ = ()
@@ -74,19 +74,7 @@ class PlainResult(Shown):
         return json_text(self.to_dict(), indent=2)
 
 
-def counted(things: Sized | int, one: str, several: str = "") -> str:
-    """How many there are, in words.
-
-    Examples
-    --------
-    >>> counted(1, "run"), counted([1, 2], "run"), counted(0, "reversal", "reversals")
-    ('1 run', '2 runs', '0 reversals')
-    """
-    n = things if isinstance(things, int) else len(things)
-    return f"{n} {one if n == 1 else several or one + 's'}"
-
-
-def finite(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
     """A number that JSON can hold, else None."""
     return float(value) if math.isfinite(value) else None
 
@@ -102,7 +90,7 @@ def json_text(value: Any, indent: int | None = None) -> str:
 
     def plain(entry: Any) -> Any:
         if isinstance(entry, float):
-            return finite(entry)
+            return finite_or_none(entry)
         if isinstance(entry, Mapping):
             return {name: plain(one) for name, one in entry.items()}
         return [plain(one) for one in entry] if isinstance(entry, (list, tuple)) else entry

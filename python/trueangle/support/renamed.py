@@ -23,6 +23,7 @@ RENAMED: Final = {
     "decoding": "support.decoding",
     "distributions": "support.distributions",
     "errorunits": "support.display_units",
+    "estimation.estimate": "estimation.quantity",
     "explanations": "joint.gear",
     "files": "support.files",
     "fitting.travel": "runs.travel",
@@ -31,8 +32,8 @@ RENAMED: Final = {
     "logs.ahead": "formats.ahead",
     "logs.checksum": "formats.checksum",
     "modelfile": "model.file",
-    "modelsummary": "model.text",
-    "modeltext": "model.text",
+    "modelsummary": "model.model",
+    "modeltext": "model.writing",
     "moments": "estimation.moments",
     "momentsfit": "estimation.momentsfit",
     "orders": "fitting.orders",
@@ -75,7 +76,7 @@ def moved_name(name: str) -> str | None:
     return None
 
 
-def attribute(module: str, now: str, name: str) -> Any:
+def renamed_attribute(module: str, now: str, name: str) -> Any:
     """What the former module ``module``, which is a room now, held: the attribute of ``now``."""
     if name.startswith("__"):
         raise AttributeError(f"module {module!r} has no attribute {name!r}")
@@ -136,7 +137,7 @@ class _Finder:
         """Nothing is left to do."""
 
 
-def install() -> None:
+def install_former_names() -> None:
     """Let imports of former names find what they name."""
     if not any(isinstance(finder, _Finder) for finder in sys.meta_path):
         sys.meta_path.append(_Finder())

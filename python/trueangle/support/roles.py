@@ -1,4 +1,4 @@
-"""Roles of columns: what one is for, and the units that it may be in.
+"""Roles of columns: what one is for, the units it may be in, offsets, counts of a turn.
 
 A role is what a column is for: ``reference``, ``indicated``, ``run``, ``unit``, or a signal
 of `trueangle.support.signals.SIGNALS`.
@@ -64,7 +64,7 @@ _OFFSET = re.compile(r"reference_offset[1-9]?[0-9]?")
 Wanted: TypeAlias = Mapping[str, tuple[str, str | None]]
 
 
-class Column(NamedTuple):
+class RoleColumn(NamedTuple):
     """A column and what it is.
 
     Attributes
@@ -107,7 +107,7 @@ class Column(NamedTuple):
         return sign * factor, sign * offset
 
 
-def signal_code(role: str, name: str = "NAME", unit: str | None = "UNIT") -> str:
+def role_code(role: str, name: str = "NAME", unit: str | None = "UNIT") -> str:
     """How the column of a role is named, in the Python that messages hold.
 
     Examples
@@ -212,12 +212,12 @@ def wanted_columns(signals: Mapping[str, Any] | None) -> dict[str, tuple[str, st
     return found
 
 
-def offsets_of(roles: Mapping[str, Column]) -> list[Column]:
+def offsets_of(roles: Mapping[str, RoleColumn]) -> list[RoleColumn]:
     """The columns that are added to the reference."""
     return [column for role, column in roles.items() if _OFFSET.fullmatch(role)]
 
 
-def count_turn(value: float | None, name: str) -> float | None:
+def checked_count_turn(value: float | None, name: str) -> float | None:
     """A number of counts per turn, checked."""
     if value is not None and not (math.isfinite(value) and value > 0.0):
         raise ArgumentError(f"{name} must be positive, got {value!r}")

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from ..errors import ArgumentError
-from .distributions import normal_quantile, normal_tail
-from .kinds import told_kinds
+from .argumentkinds import told_kinds
+from .distributions import normal_tail
 
 #: Nodes of Gauss and Legendre's rule in the integral equation.
 _NODES: Final = 64
@@ -86,8 +86,3 @@ def chart_limit(allowance: float, length: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if run_length(allowance, middle) < length else (low, middle)
     return high
-
-
-def rare(chance: float) -> float:
-    """What a standard normal number exceeds in size with this chance."""
-    return normal_quantile(1.0 - 0.5 * chance)

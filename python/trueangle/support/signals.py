@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
-from .plainresult import counted
+from .layout import counted
 from .suggestions import did_you_mean
 
 #: Values by the name of the signal; one per reading, or one for all.
@@ -55,7 +55,7 @@ AT_RUN_TIME: tuple[str, ...] = tuple(GivenSignals.__annotations__)
 COUPLED = "coupled_"
 
 
-def coupled_with(name: str) -> str | None:
+def coupled_joint(name: str) -> str | None:
     """The other joint whose indicated angle the signal ``name`` is; None of other signals.
 
     Examples
@@ -66,12 +66,12 @@ def coupled_with(name: str) -> str | None:
     return (name.startswith(COUPLED) and name.removeprefix(COUPLED)) or None
 
 
-def is_at_run_time(name: str) -> bool:
+def is_run_time_signal(name: str) -> bool:
     """Whether a correction may take a signal of this name."""
-    return name in AT_RUN_TIME or coupled_with(name) is not None
+    return name in AT_RUN_TIME or coupled_joint(name) is not None
 
 
-def check_names(given: Iterable[str]) -> None:
+def check_signal_names(given: Iterable[str]) -> None:
     """Refuse keyword arguments that no correction takes, as Python does.
 
     Raises
@@ -79,7 +79,7 @@ def check_names(given: Iterable[str]) -> None:
     TypeError
     """
     for name in given:
-        if not is_at_run_time(name):
+        if not is_run_time_signal(name):
             raise TypeError(
                 f"got an unexpected keyword argument {name!r}{did_you_mean(name, AT_RUN_TIME)}; "
                 f"signals are {', '.join(AT_RUN_TIME)} and {COUPLED}JOINT"
@@ -145,7 +145,7 @@ def find_signal(name: str) -> Signal:
     """
     if _HEAD.fullmatch(name):
         return Signal(name, "angle", f"{name}_{{}}", "one of several heads on one disc")
-    if coupled_with(name) is not None:
+    if coupled_joint(name) is not None:
         return Signal(name, "angle", f"{name}_{{}}", "indicated angle of another joint")
     try:
         return SIGNALS[name]

@@ -1,4 +1,4 @@
-"""Suggestions of what a mistyped word meant."""
+"""Suggestions of what a mistyped word meant; choices checked and names listed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dates and times as ISO 8601 writes them, with or without zone."""
+"""Dates, days and times as ISO 8601 writes them, with or without zone; seconds that elapsed."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from trueangle.certificate.values import (
     reversal_halfwidth,
 )
 from trueangle.model.records import Provenance
-from trueangle.support.files import Source
+from trueangle.support.files import InputFile
 
 SEED = 61_000
 UNITS = (360.0, 1.0, 2.0 * np.pi)
@@ -249,10 +249,10 @@ def test_the_budget_is_of_the_position_with_the_greatest_uncertainty(beyond):
 @pytest.mark.parametrize("places", [(), (0,), (1,), (2,), (0, 2), (0, 1, 2)])
 def test_readings_are_a_models_own_where_any_file_of_them_is(places):
     runs = [
-        ta.CalibrationRun([0.0, 1.0], [0.0, 1.0], 360.0, source=Source(f"{k}.csv", str(k) * 64))
+        ta.CalibrationRun([0.0, 1.0], [0.0, 1.0], 360.0, source=InputFile(f"{k}.csv", str(k) * 64))
         for k in range(3)
     ]
-    inputs = (Source("elsewhere.csv", "9" * 64), *(Source("x", str(k) * 64) for k in places))
+    inputs = (InputFile("elsewhere.csv", "9" * 64), *(InputFile("x", str(k) * 64) for k in places))
     plain = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.0])], period=360.0)
     model = plain.replace(provenance=Provenance(inputs))
     for order in (runs, runs[::-1]):

@@ -16,7 +16,7 @@ sys.path.insert(0, str(ROOT / "benches"))
 import latency
 from trueangle.cli import main
 from trueangle.cli.benchmarks import compiled, evaluation, scaling
-from trueangle.cli.benchmarks.evaluationpeers import peers
+from trueangle.cli.benchmarks.evaluationpeers import evaluation_peers
 from trueangle.cli.benchmarks.interleaved import Timing
 
 #: The least accurate peer draws chords over 65536 places: h^2/8 times the curvature of
@@ -25,11 +25,11 @@ PEER_ACCURACY = (2 * np.pi / 65536) ** 2 / 8 * 17**2
 
 
 def test_peers_compute_the_same():
-    model = evaluation.harmonics(range(1, 18))
+    model = evaluation.evaluated_model(range(1, 18))
     theta = np.linspace(0.0, 6.0, 1001)
     expected = model.error(theta)
     scale = sum(np.hypot(model.shafts[0].cosine, model.shafts[0].sine))
-    ready, missing = peers(model)
+    ready, missing = evaluation_peers(model)
     assert "numpy per order (reference)" in ready
     assert not set(ready) & set(missing)
     for name, way in ready.items():
@@ -106,23 +106,23 @@ def test_the_model_of_cost_is_found():
     def taken(n, factor=1.0):
         return Timing(*[factor * (2e-6 + 3e-9 * n)] * 3)
 
-    exact = [scaling.Measured("fit", n, 17, 1, taken(n)) for n in (10**3, 10**5, 10**7)]
+    exact = [scaling.MeasuredWork("fit", n, 17, 1, taken(n)) for n in (10**3, 10**5, 10**7)]
     off = [m._replace(threads=2) for m in exact]
     off[1] = off[1]._replace(timing=taken(10**5, 1.1))
-    one, two = scaling.costs(exact + off)
+    one, two = scaling.work_costs(exact + off)
     assert one.call == pytest.approx(2e-6, rel=1e-9)
     assert one.reading == pytest.approx(3e-9, rel=1e-9)
     assert one.spread < 1e-9 < two.spread < 0.11
     assert one.seconds(1e12) == pytest.approx(3000.0, rel=1e-6)
     # A call that comes out below nothing is none.
-    (bare,) = scaling.costs(
+    (bare,) = scaling.work_costs(
         [m._replace(timing=Timing(*[1e-18 * m.readings**2] * 3)) for m in exact]
     )
     assert bare.call == 0.0
 
 
 def test_units_of_a_fleet_and_their_fits_are_timed():
-    found = scaling.by_units(100)
+    found = scaling.scaling_by_units(100)
     assert [(m.work, m.readings) for m in found] == [
         ("fleet", 1800), ("fit of each", 1800), ("fleet", 18_000), ("fit of each", 18_000),
     ]  # fmt: skip
@@ -132,7 +132,7 @@ def test_units_of_a_fleet_and_their_fits_are_timed():
 def test_workers_share_logs():
     pytest.importorskip("distributed")
     pytest.importorskip("pyarrow")
-    (found,) = scaling.by_workers([1], 80_000)
+    (found,) = scaling.scaling_by_workers([1], 80_000)
     assert (found.work, found.readings, found.threads) == ("fit of logs", 80_000, 1)
     assert found.timing.median > 0.0
 
@@ -140,10 +140,10 @@ def test_workers_share_logs():
 def test_loops_in_c_take_any_number_of_angles():
     if not compiled.is_available():
         pytest.skip("no gcc")
-    model = evaluation.harmonics(range(1, 6))
+    model = evaluation.evaluated_model(range(1, 6))
     for size in (0, 1, 511, 512, 1300):
         theta = np.linspace(-3.0, 9.0, size)
         for name in ("per_order", "horner"):
-            found = compiled.compiled(name)(model)(theta)
+            found = compiled.compiled_peer(name)(model)(theta)
             assert np.abs(found - model.error(theta)).max(initial=0.0) < 1e-17
     assert np.array([5e-324])[0] * 1.0 > 0.0, "numbers below 2e-308 are taken for 0"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from trueangle.cli.benchmarks.fit import Case, measure, peers
+from trueangle.cli.benchmarks.fit import Case, fit_peers, measure_fits
 
 # Ours relative to the largest coefficient; the error is a difference of angles of a turn.
 AGREES = 1e-11
@@ -18,10 +18,10 @@ AGREES = 1e-11
     ],
 )
 def test_every_way_solves_the_same_problem(case, methods):
-    rows = measure(case, rounds=1, methods=methods)
+    rows = measure_fits(case, rounds=1, methods=methods)
     names = {row.name for row in rows}
     assert names >= {"trueangle, 1 thread", "trueangle, 2 threads", "numpy.linalg.lstsq"}
-    assert names >= set(peers()[0])
+    assert names >= set(fit_peers()[0])
     for row in rows:
         assert row.deviation < AGREES, row
         assert row.timing.least <= row.timing.median <= row.timing.most

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from trueangle.cli import COMMANDS, build_parser, main, terminal
-from trueangle.cli.terminal import printable
+from trueangle.cli.terminal import printable_text
 
 #: It knows the line of the readings: with nothing to name no further runs are planned, which
 #: takes twenty times as long as the rest.
@@ -375,14 +375,14 @@ HOSTILE = "\x1b[31mred\x1b]0;title\x07\x1b[2J\x9b1m\u202eback\u2066x\rover\x08\x
 
 @pytest.mark.parametrize("character", [c for c in HOSTILE if not c.isprintable()])
 def test_control_characters_become_escapes(character):
-    shown = printable(f"a{character}b")
+    shown = printable_text(f"a{character}b")
     assert shown.isprintable()
     assert shown.startswith("a\\")
 
 
 def test_other_text_stays_as_it_is():
     text = "Gelenk ä, 関節, é, ± 3″\n\tnext"
-    assert printable(text) == text
+    assert printable_text(text) == text
 
 
 def test_names_and_labels_never_steer_the_terminal(desk):
@@ -433,7 +433,7 @@ def test_progress_may_rewrite_its_own_line():
 
     stream = io.StringIO()
     times = iter(range(100))
-    shown = Progress(1, 100, "text", terminal.Plain(stream), lambda: next(times))
+    shown = Progress(1, 100, "text", terminal.PlainStream(stream), lambda: next(times))
     shown.start_file(100)
     shown.advance(10, 0.1)
     assert stream.getvalue().startswith("\r0/1 files")

@@ -52,7 +52,7 @@ def test_readings_from_which_on_one_pass_is_made_are_those_that_the_help_tells(
         limits.append(most)
         return True
 
-    monkeypatch.setattr("trueangle.logs.sources.hold_at_most", hold_at_most)
+    monkeypatch.setattr("trueangle.logs.sources.logs_hold_at_most", hold_at_most)
     args = SimpleNamespace(
         one_pass=False, scheduler=None, runs=["."], topic=None, nuisance="none",
         reference_orders=None, run=None,

@@ -8,12 +8,15 @@ from pathlib import Path
 import pytest
 
 from trueangle.cli import main
-from trueangle.cli.terminal import Plain, coloured_text, has_colours
-from trueangle.support.layout import laid_out, text_columns, wrapped
+from trueangle.cli.terminal import PlainStream, coloured_text, has_colours
+from trueangle.support.layout import laid_out, text_columns, wrapped_lines
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "looks"))
 
-from terminal import COLUMNS, furnish, scenes, shown
+from scenes import furnish, scenes
+from transcripts.terminal import ran
+
+COLUMNS = 80
 
 #: Commands that take seconds, and what each of them prints is told by another here.
 LONG = ("bench", "rehearse")
@@ -29,7 +32,8 @@ def desk(tmp_path_factory):
 def test_no_command_is_wider_than_its_terminal(desk):
     for command, lines in scenes().items():
         for line in lines if command not in LONG else ():
-            status, text = shown(line, desk)
+            status, *told = ran(line.split(), desk, COLUMNS)
+            text = "".join(told)
             assert status == 0, text
             wide = [row for row in text.splitlines() if len(row) > COLUMNS]
             assert not wide, f"{line}: {wide}"
@@ -40,7 +44,7 @@ def test_lines_are_as_wide_as_the_terminal_within_bounds(wanted, found, monkeypa
     monkeypatch.setenv("COLUMNS", wanted)
     text = "of words " * 60
     assert text_columns() == found
-    assert found - 9 < max(map(len, wrapped(text))) <= found
+    assert found - 9 < max(map(len, wrapped_lines(text))) <= found
     assert max(map(len, laid_out(["  label    " + text]).splitlines())) <= found
 
 
@@ -66,14 +70,14 @@ def test_a_terminal_has_colours_unless_it_is_told_otherwise(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     seen = Terminal()
-    Plain(seen).write("trueangle: error: no\x1b[31m file")
+    PlainStream(seen).write("trueangle: error: no\x1b[31m file")
     assert seen == ["trueangle: \x1b[1;31merror:\x1b[0m no\\x1b[31m file"]
     for name, value in (("NO_COLOR", "1"), ("TERM", "dumb")):
         with monkeypatch.context() as changed:
             changed.setenv(name, value)
             assert not has_colours(seen)
             plain = Terminal()
-            Plain(plain).write("error: x")
+            PlainStream(plain).write("error: x")
             assert plain == ["error: x"]
     assert not has_colours(io.StringIO())
     assert coloured_text('[{"says": "warning: x"}]') == '[{"says": "warning: x"}]'
@@ -105,7 +109,7 @@ def test_a_mistyped_cause_is_answered_by_the_nearest(desk, capsys):
 
 
 def test_one_model_has_one_picture(desk, capsys):
-    shown("fit runs.csv -o joint.json --orders 1", desk)
+    ran(["fit", "runs.csv", "-o", "joint.json", "--orders", "1"], desk, COLUMNS)
     for more in (["--kind", "residuals"], [str(desk / "runs.csv")]):
         out = ["-o", str(desk / "x.png")]
         assert main(["plot", str(desk / "joint.json"), *more, *out]) == 1
@@ -115,8 +119,8 @@ def test_one_model_has_one_picture(desk, capsys):
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
 def test_a_picture_is_of_the_format_that_its_ending_says(ending, desk):
     begins = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
-    shown("fit runs.csv -o joint.json --orders 1", desk)
-    status, told = shown(f"plot joint.json -o drawn.{ending} --json", desk)
+    ran(["fit", "runs.csv", "-o", "joint.json", "--orders", "1"], desk, COLUMNS)
+    status, told, _ = ran(f"plot joint.json -o drawn.{ending} --json".split(), desk, COLUMNS)
     assert status == 0
     assert '"shows": "Error of the model' in told
     assert (desk / f"drawn.{ending}").read_bytes().startswith(begins[ending])
@@ -134,7 +138,7 @@ def test_what_is_written_is_as_long_as_what_was_given(colours, encoding, monkeyp
     for name in ("NO_COLOR", "TERM"):
         monkeypatch.delenv(name, raising=False)
     held = io.BytesIO()
-    stream = Plain(Terminal(held, encoding, newline=""), wording=lambda text: f"<{text}>")
+    stream = PlainStream(Terminal(held, encoding, newline=""), wording=lambda text: f"<{text}>")
     for text in ("error: none", "a\x1b[31m", "\u2212 3 \u2192 4\n", "", "Confirmed:\nretained\n"):
         before = len(held.getvalue())
         assert stream.write(text) == len(text)

@@ -8,13 +8,12 @@ from trueangle.fitting.orders import harmonicsums, noise
 from trueangle.fitting.orders.evidence import (
     choose_forward,
     examine_orders,
-    fit_subset,
+    fit_chosen_orders,
     held_out_gains,
-    log_tail,
+    log_chance,
 )
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
-from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
-from trueangle.fitting.orders.zerogroups import zero_units
+from trueangle.fitting.orders.zerogroups import ZeroGroupReadings, zero_groups
 from trueangle.runs.aliasing import distinct_positions
 
 # Normal equations of a few hundred readings, relative to their size.
@@ -101,7 +100,7 @@ def test_statistics_are_those_of_least_squares():
         return solution, float(((error * root - full @ solution) ** 2).sum())
 
     solution, left = residual((3, 1))
-    coefficients, _, squares = fit_subset(sums, [2, 0])
+    coefficients, _, squares = fit_chosen_orders(sums, [2, 0])
     np.testing.assert_allclose(coefficients, solution[:4], rtol=1e-8)
     assert squares == pytest.approx(left)
     test = examine_orders(sums, [2, 0], [0, 4], (0.01, 50.0), None)
@@ -141,8 +140,8 @@ def test_forward_choice_takes_the_lowest_of_aliases():
 def test_tail_of_the_f_distribution():
     stats = pytest.importorskip("scipy.stats")
     for t, dof in ((3.0, 5.0), (15.0, 140.0), (40.0, 1000.0)):
-        assert log_tail(t, dof) == pytest.approx(stats.f.logsf(t / 2, 2, dof))
-    assert log_tail(15.0, np.inf) == pytest.approx(stats.chi2.logsf(15.0, 2))
+        assert log_chance(t, dof) == pytest.approx(stats.f.logsf(t / 2, 2, dof))
+    assert log_chance(15.0, np.inf) == pytest.approx(stats.chi2.logsf(15.0, 2))
 
 
 @pytest.mark.parametrize("sizes", [[2, 1, 7, 40], [2000, 3000]])
@@ -154,7 +153,7 @@ def test_units_have_the_errors_of_their_runs(sizes):
         reference = rng.uniform(-720.0, 720.0, n)
         indicated = reference + 178.0 + 3.0 * rng.standard_normal(n) + 360.0 * (k % 2)
         runs.append(ta.CalibrationRun(reference, indicated, period=360.0))
-    units, places = zero_units(runs, whole=True)
+    units, places = zero_groups(runs, whole=True)
     assert np.array_equal(places, np.arange(sum(sizes)))
     for unit, run in zip(units, runs, strict=True):
         np.testing.assert_allclose(unit.error, run.centred_error, rtol=1e-12, atol=1e-12)

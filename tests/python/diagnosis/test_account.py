@@ -7,7 +7,7 @@ import os
 import numpy as np
 
 import trueangle as ta
-from trueangle.diagnosis.account import Seen
+from trueangle.diagnosis.account import PreparedData
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 
@@ -43,7 +43,7 @@ def turned_early(seed: int, runs: int = 8) -> list[ta.CalibrationRun]:
 
 def test_readings_that_turned_and_have_not_moved_take_no_part() -> None:
     every = join_runs(turned_early(6411))
-    seen = Seen.of(every, np.zeros(len(every)), ta.Simulation())
+    seen = PreparedData.of(every, np.zeros(len(every)), ta.Simulation())
     assert seen.rows is not None
     left_out = np.setdiff1d(np.arange(len(every)), seen.rows)
     np.testing.assert_array_equal(every.row[left_out], np.tile([80, 151], 8))
@@ -55,7 +55,7 @@ def test_a_joint_that_hardly_moves_has_no_turning_points() -> None:
     speed = np.where(np.arange(40) % 10 < 5, 1.0, -1.0)
     run = ta.CalibrationRun(still, still + rng.normal(0.0, 1e-3, 40), period=360.0, velocity=speed)
     every = join_runs([run])
-    assert Seen.of(every, np.zeros(len(every)), ta.Simulation()).rows is None
+    assert PreparedData.of(every, np.zeros(len(every)), ta.Simulation()).rows is None
 
 
 def test_a_play_whose_turning_points_read_the_other_side_is_no_spring() -> None:

@@ -10,8 +10,8 @@ from scipy.stats import chi2, norm
 
 import trueangle as ta
 from trueangle.diagnosis.beliefs import CLOSE, LEVEL, judge_line, verdict_of_factor
-from trueangle.diagnosis.believed import judged_beliefs
 from trueangle.diagnosis.gain import measure_belief_gains
+from trueangle.diagnosis.judgedbeliefs import judged_beliefs
 from trueangle.effects import Backlash, LocalDefect
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs

@@ -10,7 +10,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis import delay
-from trueangle.diagnosis.delay import Delay, delay_finding, error_before
+from trueangle.diagnosis.delay import Delay, delay_finding, error_before_delay
 from trueangle.diagnosis.finding import Finding
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
@@ -74,7 +74,7 @@ def delayed(seed: int) -> tuple:
 
 def told_delay(seed: int, offset: float) -> Finding:
     signals, error, sim = delayed(seed)
-    then, moved_error = error_before(signals, error, TRUE + offset)
+    then, moved_error = error_before_delay(signals, error, TRUE + offset)
     around = sim.surroundings
     chosen = Regression.of(then, moved_error - sim.predict(then), around, rho=0.0)
     # Beside another cause, whose error is its own.

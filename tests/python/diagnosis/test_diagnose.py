@@ -10,12 +10,12 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.confirmation import _by_run, _size
-from trueangle.diagnosis.delay import error_before, find_delay
+from trueangle.diagnosis.delay import error_before_delay, find_delay
 from trueangle.diagnosis.diagnose import _noise, _overall, _ratio_finding, _structure
-from trueangle.diagnosis.forms import share_beside
+from trueangle.diagnosis.formerrors import share_beside_form_errors
 from trueangle.diagnosis.unnamed import CHANNELS, UnnamedPattern, is_line_of, modulator, modulators
 from trueangle.effects import EFFECTS
-from trueangle.effects.time_periodic import WANDER
+from trueangle.effects.time_periodic import FREQUENCY_DRIFT
 from trueangle.estimation.regression import Regression
 from trueangle.joint.pattern import ARCSEC_PER_RAD
 from trueangle.joint.signals import Signals, join_runs
@@ -164,7 +164,7 @@ def test_an_error_at_the_angle_of_before_says_the_same_indication() -> None:
     signals = join_runs([stale(0, 0.02, 1.0)])
     error = np.cos(signals.theta)
     for tau in (0.013, -0.04, 0.0):
-        then, moved = error_before(signals, error, tau)
+        then, moved = error_before_delay(signals, error, tau)
         np.testing.assert_allclose(
             then.theta * ARCSEC_PER_RAD + moved, signals.theta * ARCSEC_PER_RAD + error, atol=1e-6
         )
@@ -211,10 +211,10 @@ def test_modulators_are_in_units_of_their_spread(signals: Signals) -> None:
 
 def test_a_line_is_another_s_within_what_that_wanders() -> None:
     term = SimpleNamespace(cause="time_periodic", shape={"frequency_hz": [3.0, 3.1]})
-    for frequency, same in ((3.0, True), (3.0 * (1.0 - 0.99 * WANDER), True), (3.1, True),
-                            (3.0 * (1.0 - 1.01 * WANDER), False),
-                            (3.1 * (1.0 + 0.99 * WANDER), True),
-                            (3.1 * (1.0 + 1.01 * WANDER), False)):  # fmt: skip
+    for frequency, same in ((3.0, True), (3.0 * (1.0 - 0.99 * FREQUENCY_DRIFT), True), (3.1, True),
+                            (3.0 * (1.0 - 1.01 * FREQUENCY_DRIFT), False),
+                            (3.1 * (1.0 + 0.99 * FREQUENCY_DRIFT), True),
+                            (3.1 * (1.0 + 1.01 * FREQUENCY_DRIFT), False)):  # fmt: skip
         assert is_line_of(term, frequency) == same
     assert not is_line_of(SimpleNamespace(cause="latency", shape={}), 3.0)
 
@@ -226,10 +226,10 @@ def test_the_share_beside_bends_is_that_of_what_they_leave(signals: Signals) -> 
     extension = EFFECTS["backlash"].propose(fitted)
     other = np.random.default_rng(7).normal(size=len(signals)) + signals.direction
     beside = fitted.jointly_with(100.0 * other[:, None], 1.0)
-    share = share_beside(fitted, beside, [extension])
+    share = share_beside_form_errors(fitted, beside, [extension])
     gains = [one.gain(extension.columns)[0] for one in (fitted, beside)]
     assert share == pytest.approx(gains[1] / gains[0])
     assert 0.0 < share < 0.9
-    assert share_beside(fitted, fitted, [extension]) == 1.0
+    assert share_beside_form_errors(fitted, fitted, [extension]) == 1.0
     # Never more than it had.
-    assert share_beside(beside, fitted, [extension]) == 1.0
+    assert share_beside_form_errors(beside, fitted, [extension]) == 1.0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from trueangle._core import Factor
-from trueangle.effects.bends import LAG, _late
-from trueangle.estimation.batch import Blocks
+from trueangle.effects.departures import LAG, _late
+from trueangle.estimation.blocks import Blocks
 from trueangle.estimation.projection import project
 from trueangle.estimation.regression import Regression
 from trueangle.estimation.whitening import LagCorrelation, RunEffect, Whitener

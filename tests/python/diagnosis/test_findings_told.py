@@ -159,7 +159,7 @@ def gained(signals, size):
     """BIC gain of a backlash of this size, and what is selected."""
     regression = fitted(signals, size * signals.direction, seed=11)
     extension = EFFECTS["backlash"].propose(regression)
-    return extension.bic_gain, [term.cause for term in selection.select(regression).terms]
+    return extension.bic_gain, [term.cause for term in selection.select_causes(regression).terms]
 
 
 def test_a_new_cause_must_bring_odds_of_twenty_to_one(signals):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from trueangle.diagnosis.gain import Gain, _control, _shuffled, _units, measure_delay_gain
-from trueangle.diagnosis.holdout import Law, numbers, residual_at
-from trueangle.diagnosis.levels import LevelGain, _reach, gains_by_level, run_levels
+from trueangle.diagnosis.holdout import HoldOutModel, error_numbers, residual_at_held_out
+from trueangle.diagnosis.levels import LevelGain, _reach, gains_by_level, levels_of_runs
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
@@ -162,24 +162,24 @@ def test_levels_are_of_what_each_run_is_at(sign: float) -> None:
         "torque": [torque * size for size in (3.0, 7.0, 11.0)],
     }
     for factor, values in wanted.items():
-        level, found = run_levels(given, factor)
+        level, found = levels_of_runs(given, factor)
         np.testing.assert_array_equal(level, place, err_msg=factor)
         assert found == pytest.approx(values, abs=0.06), factor
     # A load of one sign has it.
     assert given.torque is not None
     hanging = replace(given, torque=sign * (given.torque * 0.0 + 2.0 + levels[given.run]))
-    assert run_levels(hanging, "torque")[1] == pytest.approx(sorted([sign * 2.0, sign * 6.0,
+    assert levels_of_runs(hanging, "torque")[1] == pytest.approx(sorted([sign * 2.0, sign * 6.0,
                                                                       sign * 10.0]))  # fmt: skip
     # Loads within a tenth of each other are one, to whichever side they pull.
     alike = replace(given, torque=sign * (20.0 + 0.3 * levels[given.run]))
-    assert run_levels(alike, "torque") is None
-    assert run_levels(given, "time") is None
-    assert run_levels(
+    assert levels_of_runs(alike, "torque") is None
+    assert levels_of_runs(given, "time") is None
+    assert levels_of_runs(
         replace(given, temperature=20.0 + 0.2 * levels[given.run]), "temperature"
     ) is (None)
     # Of more than five, neighbours are one: all are in one, and values are their means.
     many = np.arange(7) * 5.0
-    level, found = run_levels(signals_of(many), "temperature")
+    level, found = levels_of_runs(signals_of(many), "temperature")
     assert len(found) == 5
     assert level[::80].tolist() == [0, 0, 1, 2, 2, 3, 4]
     assert found == pytest.approx([22.5, 30.0, 37.5, 45.0, 50.0], abs=0.02)
@@ -265,14 +265,14 @@ def test_zeros_of_their_own_are_the_medians_of_held_out_runs() -> None:
     noise[7] += 1e6
     residual = zeros[given.run] + noise
     base = np.ones((len(given), 1))
-    law = Law(np.array([2.0]), [], Simulation().surroundings)
-    left = residual_at(law, given, base, residual, False)
+    law = HoldOutModel(np.array([2.0]), [], Simulation().surroundings)
+    left = residual_at_held_out(law, given, base, residual, False)
     np.testing.assert_allclose(left, residual - 2.0)
-    own = residual_at(law, given, base, residual, True)
+    own = residual_at_held_out(law, given, base, residual, True)
     for start, stop in given.run_bounds():
         part = residual[start:stop]
         np.testing.assert_allclose(own[start:stop], part - np.sort(part)[40], atol=1e-9)
     # The three numbers of what is left, of either sign.
     for sign in (-1.0, 1.0):
         e = sign * np.array([1.0, -2.0, 4.0])
-        assert numbers(e) == pytest.approx((np.sqrt(7.0), 6.0, 4.0))
+        assert error_numbers(e) == pytest.approx((np.sqrt(7.0), 6.0, 4.0))

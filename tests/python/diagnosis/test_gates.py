@@ -13,7 +13,7 @@ from trueangle.diagnosis.finding import Finding
 from trueangle.diagnosis.gain import Gain
 from trueangle.diagnosis.gates import GATES, MANY, alike_columns, gated_findings, many_causes
 from trueangle.diagnosis.levels import LevelGain
-from trueangle.estimation.estimate import quantity
+from trueangle.estimation.quantity import quantity
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Joint, RunDesign, Simulation

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.diagnosis.confirmation import status_of
-from trueangle.diagnosis.findings import Diagnosis
+from trueangle.diagnosis.confirmation import confirmation_status
 from trueangle.diagnosis.gain import Gain, measure_gain
 from trueangle.diagnosis.goodness import Noise, Unexplained
-from trueangle.diagnosis.holdout import held_out, reducible_share
+from trueangle.diagnosis.holdout import held_out_residuals, reducible_share
+from trueangle.diagnosis.result import Diagnosis
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
@@ -43,7 +43,7 @@ def test_held_out_readings_take_no_part_in_the_fit(signals):
     """By lstsq on the others, with the cause and without it."""
     fitted = with_backlash(signals, 3.0)
     test = signals.run < 2
-    with_it, without = held_out(fitted, [[0]], test, own_zero=False)
+    with_it, without = held_out_residuals(fitted, [[0]], test, own_zero=False)
     for design, found in (
         (np.hstack([fitted.base, signals.direction[:, None]]), with_it),
         (fitted.base, without),
@@ -57,7 +57,7 @@ def test_held_out_readings_take_no_part_in_the_fit(signals):
         )
     # A reading that is held out may be anything: the model is the same.
     fitted.residual[test] += 1000.0 * np.random.default_rng(1).normal(size=test.sum())
-    moved = held_out(fitted, [[0]], test, own_zero=False)[0]
+    moved = held_out_residuals(fitted, [[0]], test, own_zero=False)[0]
     np.testing.assert_allclose(fitted.residual[test] - moved, (y[test] - with_it), atol=1e-9)
 
 
@@ -132,7 +132,7 @@ def test_a_cause_is_confirmed_where_the_interval_of_its_gain_excludes_zero(inter
     zeros = (0.0, 0.0, 0.0)
     gain = Gain("runs", zeros, zeros, sum(interval) / 2.0, interval, None, "")
     nothing = Unexplained(False, 0.0, 0.0, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0))
-    found, reason = status_of("backlash", gain, None, (), nothing)
+    found, reason = confirmation_status("backlash", gain, None, (), nothing)
     assert found == status
     assert bool(reason) == (status == "not_confirmed")
 

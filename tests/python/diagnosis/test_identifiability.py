@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trueangle.diagnosis.identifiability import blind_spots, doubts_about, open_origins
+from trueangle.diagnosis.identifiability import ambiguity_of_cause, blind_spots, open_origins
 from trueangle.effects.missing_order import MissingOrder
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
@@ -260,7 +260,7 @@ def line(fitted, order):
 def origins(fitted, order):
     """Pairs of causes that may have made a line, and whether it is doubted at all."""
     found = blind_spots(fitted)
-    assert doubts_about(line(fitted, order), fitted, found) is None
+    assert ambiguity_of_cause(line(fitted, order), fitted, found) is None
     return [spot.causes for spot in open_origins(line(fitted, order), fitted, found)]
 
 
@@ -284,7 +284,7 @@ def test_a_line_is_one_whatever_made_it():
 
 def test_a_line_behind_which_the_gear_may_stand_is_doubted():
     grid = regression(runs(samples=36, spacing="uniform", turns=1.0, reversals=(), start_deg=0.0))
-    doubt = doubts_about(line(grid, 8.0), grid, blind_spots(grid))
+    doubt = ambiguity_of_cause(line(grid, 8.0), grid, blind_spots(grid))
     assert "order 8 and 28, 44, 64" in doubt.because
     # None of the gear's orders looks like order 3 at these positions.
     assert origins(grid, 3.0) == []

@@ -11,8 +11,8 @@ import trueangle as ta
 from trueangle.diagnosis.discrepancy import Discrepancy
 from trueangle.diagnosis.finding import Finding
 from trueangle.effects import EFFECTS
-from trueangle.effects.blindness import Blindness
-from trueangle.estimation.estimate import quantity
+from trueangle.effects.ambiguity import Ambiguity
+from trueangle.estimation.quantity import quantity
 from trueangle.simulation import Harmonic, RunDesign, Simulation, simulate
 
 SIM = Simulation(
@@ -26,7 +26,7 @@ def test_every_figure_of_an_account_has_its_own_key():
     result = ta.diagnose(simulate(SIM, 2), SIM, gain=False)
     sizes = {f"{n}_{w}_arcsec": float(10 * k + j) for k, n in enumerate(("rms", "max_abs"), 2)
              for j, w in enumerate(("before", "after"))}  # fmt: skip
-    spot = Blindness(("backlash", "latency"), "why", "what", True, 9.5, common="backlash")
+    spot = Ambiguity(("backlash", "latency"), "why", "what", True, 9.5, common="backlash")
     made = replace(
         result,
         discrepancy=Discrepancy(1.5, 2.5, 3.5, 4.5, 5.5),

@@ -8,25 +8,25 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from trueangle.diagnosis import believed
+from trueangle.diagnosis import judgedbeliefs
 from trueangle.diagnosis.beliefs import Belief
-from trueangle.diagnosis.candidates import proposed_above
+from trueangle.diagnosis.candidates import candidates_above
 from trueangle.diagnosis.correction import _ranges
 from trueangle.diagnosis.diagnose import _noise, _overall, _structure
 from trueangle.diagnosis.discrepancy import unfolded_error
 from trueangle.diagnosis.finding import Finding
-from trueangle.diagnosis.forms import SIZES, form_error_columns, with_form_errors
+from trueangle.diagnosis.findings import _rivals, findings_of
+from trueangle.diagnosis.formerrors import SIZES, form_error_columns, with_form_errors
 from trueangle.diagnosis.gain import _exchanged, _level
 from trueangle.diagnosis.gearedlines import PLAIN, GearedLines
 from trueangle.diagnosis.gearratio import find_ratio
 from trueangle.diagnosis.holdout import reducible_share
-from trueangle.diagnosis.named import _rivals, findings_of
 from trueangle.diagnosis.overlap import finding_overlaps
 from trueangle.diagnosis.remainder import share_of_run
 from trueangle.diagnosis.wrongplace import misplaced_beliefs
 from trueangle.effects import EFFECTS, LocalDefect
-from trueangle.effects.blindness import Blindness
-from trueangle.estimation.estimate import quantity
+from trueangle.effects.ambiguity import Ambiguity
+from trueangle.estimation.quantity import quantity
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, simulate
@@ -191,7 +191,7 @@ def test_a_finding_of_several_terms_has_the_evidence_of_all():
     gaps = [gap for _, gap in found.rivals]
     assert gaps == sorted(gaps)
     for cause, gap in found.rivals:
-        instead = proposed_above(start, cause)
+        instead = candidates_above(start, cause)
         assert gap == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
 
 
@@ -218,18 +218,18 @@ def test_form_errors_are_the_mean_square_of_bends_given_what_is_left(signals):
 
 def test_a_rival_that_explains_more_has_a_gap_below_zero(signals):
     start = regression(signals, 3.0 * signals.direction)
-    full = start.with_terms([proposed_above(start, "latency")])
+    full = start.with_terms([candidates_above(start, "latency")])
     found = dict(_rivals(full, [0]))
     assert found["backlash"] < -6.0
-    instead = proposed_above(start, "backlash")
+    instead = candidates_above(start, "backlash")
     assert found["backlash"] == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)
 
 
 def test_a_ratio_is_told_with_what_is_found_there_and_left_at_the_believed_one():
     lines = (Harmonic("motor", 1, 12.0, 10.0), Harmonic("motor", 2, 8.0, 100.0))
-    believed = Simulation(Joint(50.0), lines, (), 1.0, RUNS)
-    runs = simulate(replace(believed, joint=Joint(53.0)), 7)
-    found = find_ratio(GearedLines.of(believed, join_runs(runs), unfolded_error(runs)))
+    judgedbeliefs = Simulation(Joint(50.0), lines, (), 1.0, RUNS)
+    runs = simulate(replace(judgedbeliefs, joint=Joint(53.0)), 7)
+    found = find_ratio(GearedLines.of(judgedbeliefs, join_runs(runs), unfolded_error(runs)))
     assert (found.gear_ratio, found.believed) == (53.0, 50.0)
     assert found.found > 0.95
     assert found.left < 0.2
@@ -258,13 +258,13 @@ def test_what_is_at_another_place_is_told_with_its_errors():
 
 def test_a_line_in_doubt_has_the_evidence_that_is_left_of_its_search(monkeypatch, signals):
     """Deviance less two coefficients and the choice among the believed lines."""
-    spot = Blindness(("missing_order", "reference_error"), "why", "what")
-    monkeypatch.setattr(believed, "doubts_about", lambda *_: spot)
+    spot = Ambiguity(("missing_order", "reference_error"), "why", "what")
+    monkeypatch.setattr(judgedbeliefs, "ambiguity_of_cause", lambda *_: spot)
     lines = (*SIM.harmonics, Harmonic("output", 2, 5.0, 0.0), Harmonic("output", 3, 5.0, 0.0))
     around = replace(SIM, harmonics=lines).surroundings
     found = Regression.of(signals, np.zeros(len(signals)), around, rho=0.0)
     change, spread, spots = np.array([3.0, -2.0]), np.array([[0.2, 0.1], [0.1, 0.4]]), []
-    assert believed._doubt(found, 2.0, change, spread, spots)
+    assert judgedbeliefs._doubt(found, 2.0, change, spread, spots)
     deviance = change @ np.linalg.inv(spread) @ change
     (told,) = spots
     assert told.evidence == pytest.approx(deviance - 2.0 * found.log_n - 2.0 * np.log(3.0))

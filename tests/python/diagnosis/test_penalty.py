@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from trueangle.diagnosis.penalty import (
-    cause_terms,
-    lost,
-    net_loss,
+    deviance_lost,
+    net_deviance_lost,
+    regression_without,
     total_penalty,
 )
 from trueangle.effects import EFFECTS
@@ -40,8 +40,8 @@ def test_a_cause_is_worth_what_the_account_without_it_lacks(
     terms = [replace(term, log_grid=log) for term, log in zip(terms, searched, strict=True)]
     fitted = fitted.with_terms(terms, 0.0)
     for group in ([0], [1]):
-        without = cause_terms(fitted, group, settled=True)
+        without = regression_without(fitted, group, settled=True)
         saved = without.deviance - fitted.deviance
-        assert lost(fitted, group) == pytest.approx(saved, abs=ROUNDING)
+        assert deviance_lost(fitted, group) == pytest.approx(saved, abs=ROUNDING)
         lacking = total_penalty(without) - total_penalty(fitted)
-        assert net_loss(fitted, group) == pytest.approx(lacking, abs=ROUNDING)
+        assert net_deviance_lost(fitted, group) == pytest.approx(lacking, abs=ROUNDING)

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import kstest
 
 import trueangle as ta
-from trueangle.diagnosis.remainder import unexplained_after
+from trueangle.diagnosis.remainder import unexplained_remainder
 from trueangle.diagnosis.runzeros import chance_between_runs, scatter_chance
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
@@ -66,7 +66,7 @@ def test_zeros_that_noise_explains_and_readings_within_runs_are_no_doubt(size: f
     error = slips[signals.run] + rng.standard_normal(len(signals))
     error = error + 3600.0 * 1e-3 * signals.velocity
     regression = fitted(signals, error)
-    rest = unexplained_after(regression, None)
+    rest = unexplained_remainder(regression, None)
     zeros = next(item for item in rest.evidence if item.test == "zeros of the runs")
     assert (zeros.p < 0.01) == (size > 0.0)
     assert chance_between_runs(regression, [0], rest) == 0.0

@@ -14,7 +14,7 @@ from trueangle.diagnosis.finding import Finding, brief_finding
 from trueangle.diagnosis.gain import Gain
 from trueangle.diagnosis.levels import LevelGain
 from trueangle.diagnosis.summary import diagnosis_summary
-from trueangle.estimation.estimate import quantity
+from trueangle.estimation.quantity import quantity
 from trueangle.simulation import Simulation
 from trueangle.support.display_units import error_unit
 

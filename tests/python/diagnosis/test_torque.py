@@ -9,10 +9,10 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.discrepancy import unfolded_error
-from trueangle.diagnosis.drive import torque_account
+from trueangle.diagnosis.drive import diagnose_drive
 from trueangle.diagnosis.finding import Finding
 from trueangle.effects import Backlash, Latency
-from trueangle.estimation.estimate import quantity
+from trueangle.estimation.quantity import quantity
 from trueangle.joint.signals import join_runs
 from trueangle.runs.joining import minus_simulated
 from trueangle.simulation import Simulation
@@ -75,7 +75,7 @@ def least_squares(runs, log):
 @pytest.mark.parametrize("period", [2.0 * np.pi, 360.0, 4096.0])
 def test_torques_hidden_in_a_drive_come_back_with_their_signs(period: float) -> None:
     measured, log = runs_of(period, 1.0), runs_of(period, 0.0)
-    account = torque_account(minus_simulated(measured, log), measured, least_squares)
+    account = diagnose_drive(minus_simulated(measured, log), measured, least_squares)
     ripple, friction, damping = account.findings
     assert [f.effect for f in account.findings] == ["torque_ripple", "dry_friction", "damping"]
     assert ripple.parameters["order"].value == 4.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.diagnosis.levels import run_levels
+from trueangle.diagnosis.levels import levels_of_runs
 from trueangle.effects import TorsionalCompliance
 from trueangle.effects.blindspots import blind_spots
 from trueangle.estimation.regression import Regression
@@ -40,7 +40,7 @@ def test_even_steps_of_a_load_are_levels_however_many_they_are(count):
     runs = tuple(RunDesign(f"{k}", samples=60, torque_Nm=t) for k, t in enumerate(loads))
     known = Simulation(sigma_arcsec=2.0, runs=runs)
     signals = join_runs(simulate(known, 0))
-    level, values = run_levels(signals, "torque")
+    level, values = levels_of_runs(signals, "torque")
     assert len(values) == min(count, 5)
     assert np.all(np.diff(level) >= 0)
     of_level = [signals.torque[level == k] for k in range(len(values))]

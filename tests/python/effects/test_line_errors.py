@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.effects import EFFECTS
-from trueangle.effects.drawnline import DrawnLine
+from trueangle.effects.randomphase import RandomPhaseLine
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 
@@ -115,7 +115,7 @@ def test_noise_adds_nothing_to_a_faint_line(signals):
         error = hidden.signal(signals, SIM.surroundings, rng) + rng.standard_normal(len(signals))
         start = Regression.of(signals, error, SIM.surroundings, rho=0.0)
         full = start.with_terms([start.propose_run_effect(cause, shape, waves)])
-        squares.append(DrawnLine(full, cause, waves).amplitude()[0] ** 2)
+        squares.append(RandomPhaseLine(full, cause, waves).amplitude()[0] ** 2)
     # Four standard errors of their mean.
     near = 4.0 * np.std(squares) / np.sqrt(len(squares))
     print(np.mean(squares), near)

@@ -16,7 +16,12 @@ from trueangle.effects.outliers import (
     _interpolated,
 )
 from trueangle.estimation.regression import Regression
-from trueangle.estimation.stretches import MOST_IN_ROW, about_level, short_stretches, stretches
+from trueangle.estimation.segments import (
+    MOST_IN_ROW,
+    flagged_segments,
+    less_local_level,
+    short_segments,
+)
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import RunDesign, Simulation
 
@@ -69,21 +74,21 @@ def test_bursts_are_named_with_their_rows(length, size, alike):
 
 def test_stretches_end_with_their_runs():
     flags = np.array([1, 1, 0, 1, 1, 1, 0, 1], dtype=bool)
-    starts, stops = stretches(flags, [(0, 4), (4, 8)])
+    starts, stops = flagged_segments(flags, [(0, 4), (4, 8)])
     assert list(zip(starts.tolist(), stops.tolist(), strict=True)) == [
         (0, 2), (3, 4), (4, 6), (7, 8),
     ]  # fmt: skip
-    assert not short_stretches(np.ones(MOST_IN_ROW + 1, dtype=bool), [(0, MOST_IN_ROW + 1)]).any()
-    assert not short_stretches(np.zeros(5, dtype=bool), [(0, 5)]).any()
+    assert not short_segments(np.ones(MOST_IN_ROW + 1, dtype=bool), [(0, MOST_IN_ROW + 1)]).any()
+    assert not short_segments(np.zeros(5, dtype=bool), [(0, 5)]).any()
 
 
 def test_the_level_about_a_reading_is_a_median_of_eleven():
     rng = np.random.default_rng(5)
     values = rng.normal(size=60) + np.linspace(0.0, 30.0, 60)
-    found = about_level(values, [(0, 40), (40, 60)])
+    found = less_local_level(values, [(0, 40), (40, 60)])
     for k in range(5, 35):
         assert found[k] == pytest.approx(values[k] - np.median(values[k - 5 : k + 6]))
-    short = about_level(values[:4], [(0, 4)])
+    short = less_local_level(values[:4], [(0, 4)])
     np.testing.assert_allclose(short, values[:4] - np.median(values[:4]))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.effects import EFFECTS, Outliers
-from trueangle.effects.drawnline import DrawnLine
+from trueangle.effects.randomphase import RandomPhaseLine
 from trueangle.estimation.regression import Regression
 from trueangle.joint.declared import Bearing
 from trueangle.joint.pattern import line_columns
@@ -149,7 +149,7 @@ def test_a_drawn_amplitude_is_without_what_noise_adds_and_as_well_known_as_noise
         start = Regression.of(few, error, SIM.surroundings, rho=0.0)
         shape = {"frequency_hz": [frequency] * runs}
         full = start.with_terms([start.propose_run_effect("time_periodic", shape, waves)])
-        amplitude, std = DrawnLine(full, "time_periodic", waves).amplitude()
+        amplitude, std = RandomPhaseLine(full, "time_periodic", waves).amplitude()
         squares, spread = [], []
         for a, b in few.run_bounds():
             wave = waves[a:b] - waves[a:b].mean(axis=0)
@@ -171,7 +171,7 @@ def test_a_drawn_amplitude_of_unlike_runs_is_known_as_a_mean_of_their_squares(si
     start = Regression.of(signals, error, SIM.surroundings, rho=0.0)
     shape = {"frequency_hz": [frequency] * signals.runs}
     full = start.with_terms([start.propose_run_effect("time_periodic", shape, waves)])
-    amplitude, std = DrawnLine(full, "time_periodic", waves).amplitude()
+    amplitude, std = RandomPhaseLine(full, "time_periodic", waves).amplitude()
     assert amplitude**2 == pytest.approx(np.mean(sizes**2), rel=0.02)
     wanted = np.std(sizes**2, ddof=1) / np.sqrt(signals.runs) / (2.0 * amplitude)
     assert std == pytest.approx(wanted, rel=0.02)

@@ -127,9 +127,9 @@ def test_fits_asked_for_last_are_kept_and_large_ones_are_not(start, monkeypatch)
 
 
 def test_a_proposal_that_was_searched_less_far_is_not_taken(start):
-    from trueangle.estimation.cache import Proposal
+    from trueangle.estimation.cache import CachedProposal
 
     key = ("backlash", ())
-    start.cache.propose(key, Proposal(None, 20.0))
+    start.cache.propose(key, CachedProposal(None, 20.0))
     assert start.cache.proposed(key, 20.0) is not None
     assert start.cache.proposed(key, 19.0) is None

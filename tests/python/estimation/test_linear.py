@@ -9,9 +9,9 @@ from trueangle.estimation.linear import (
     cluster_covariance,
     least_squares,
     left_out,
+    linear_residual,
     pseudo_inverse,
     total,
-    unexplained,
 )
 
 #: Relative, of well-conditioned systems of some dozen unknowns.
@@ -64,7 +64,7 @@ def test_rows_agree_with_numpy_and_leave_nothing_along_the_columns(n, m, k):
     found = least_squares(design, target, weights)
     size = np.linalg.cond(design * root) ** 2
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING * size)
-    left = unexplained(design, target, weights)
+    left = linear_residual(design, target, weights)
     assert np.abs(design.T @ (weights[:, None] * left)).max() < ROUNDING * n * size
     model = _core.LinearModel.of_rows(design, target, weights)
     np.testing.assert_allclose(

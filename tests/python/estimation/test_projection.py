@@ -7,10 +7,10 @@ import pytest
 
 from trueangle._core import Factor
 from trueangle.effects.search import golden_maximum
-from trueangle.estimation.batch import Blocks, Products
+from trueangle.estimation.blocks import BlockProducts, Blocks
 from trueangle.estimation.factor import orthonormal_basis
 from trueangle.estimation.projection import Projection, project
-from trueangle.estimation.solution import in_common
+from trueangle.estimation.solution import common_blocks
 from trueangle.estimation.whitening import RunEffect, Whitener
 from trueangle.joint.pattern import line_columns
 
@@ -81,7 +81,7 @@ def test_what_candidates_save_is_what_a_fit_with_them_saves(kind: tuple) -> None
     assert found.gains(x).tolist() == found.fixed_gains(x).tolist() == [0.0] * 4
     assert found.as_deviance(0.25 * found.rss) == pytest.approx(-N * np.log(0.75))
     pairs = np.hstack(blocks[1:3]).astype(np.float32)
-    np.testing.assert_allclose(found.pair_gains(Products(pairs, 2)), gains[1:3], rtol=2e-3,
+    np.testing.assert_allclose(found.pair_gains(BlockProducts(pairs, 2)), gains[1:3], rtol=2e-3,
                                atol=2e-3)  # fmt: skip
     seen, residual = found.seen
     mapped = found.whiten(blocks[3])
@@ -199,9 +199,9 @@ def test_a_factor_is_the_mapped_columns_by_their_singular_values(kind: tuple) ->
 
 def test_blocks_in_common() -> None:
     blocks = [np.zeros((3, k)) for k in range(4)]
-    assert in_common(blocks, [*blocks[:2], blocks[0]]) == 2
-    assert in_common(blocks, blocks[:3]) == 3
-    assert in_common(blocks[1:], blocks) == 0
+    assert common_blocks(blocks, [*blocks[:2], blocks[0]]) == 2
+    assert common_blocks(blocks, blocks[:3]) == 3
+    assert common_blocks(blocks[1:], blocks) == 0
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.5])

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from trueangle import CalibrationRun
-from trueangle.estimation.estimate import Quantity, quantity
 from trueangle.estimation.extension import Extension, penalty_of_parameter
 from trueangle.estimation.lines import LineBasis, plausible_orders
+from trueangle.estimation.quantity import Quantity, quantity
 from trueangle.estimation.readings import Readings
 from trueangle.estimation.regression import Regression
 from trueangle.estimation.whitening import RunEffect
 from trueangle.joint.joint import Joint
-from trueangle.joint.pattern import Harmonic, Pattern, Surroundings
+from trueangle.joint.pattern import Harmonic, JointPattern, Pattern
 from trueangle.joint.signals import Signals, join_runs
 
 JOINT = Joint(20.0, "flexspline", "motor", 2)
-BELIEF = Surroundings(JOINT, Pattern.of([Harmonic("motor", 1, 9.0)], JOINT))
+BELIEF = JointPattern(JOINT, Pattern.of([Harmonic("motor", 1, 9.0)], JOINT))
 
 
 def sweeps(runs: int, size: int = 60) -> Signals:

@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 
-from trueangle.estimation.batch import Blocks, Products
+from trueangle.estimation.blocks import BlockProducts, Blocks
 from trueangle.estimation.whitening import (
     LagCorrelation,
     RunEffect,
     Whitener,
-    wander_basis,
+    drift_basis,
 )
 
 from .dense import BOUNDS, CASES, N, case, covariance
@@ -70,7 +70,7 @@ def test_products_within_blocks_are_those_of_the_inverse_covariance(kind: tuple)
                 )
         seen += places.size
     assert seen == 5
-    single = Products(np.hstack(blocks[:1]).astype(np.float32), 2).under(whiten)
+    single = BlockProducts(np.hstack(blocks[:1]).astype(np.float32), 2).under(whiten)
     np.testing.assert_allclose(single[0], blocks[0].T @ inverse @ blocks[0], rtol=1e-4, atol=1e-3)
 
 
@@ -119,12 +119,12 @@ def test_the_determinant_run_by_run(kind: tuple) -> None:
 
 def test_wander_is_half_periods_over_the_record() -> None:
     clock = np.array([3.0, 4.0, 7.0])
-    found = wander_basis(clock, 3)
+    found = drift_basis(clock, 3)
     for k in (1, 2, 3):
         np.testing.assert_allclose(found[:, k - 1], np.cos(np.pi * k * np.array([0.0, 0.25, 1.0])))
-    assert wander_basis(clock).shape == (3, 8)
-    np.testing.assert_allclose(wander_basis(clock / 9.0, 3), found, atol=1e-12)
-    np.testing.assert_array_equal(wander_basis(np.full(2, 5.0), 2), np.ones((2, 2)))
+    assert drift_basis(clock).shape == (3, 8)
+    np.testing.assert_allclose(drift_basis(clock / 9.0, 3), found, atol=1e-12)
+    np.testing.assert_array_equal(drift_basis(np.full(2, 5.0), 2), np.ones((2, 2)))
 
 
 def slow_correlation(clock: np.ndarray, bounds: list, residual: np.ndarray) -> float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trueangle.export.oneturn import line_floor
+from trueangle.export.oneturn import rounding_floor
 from trueangle.export.proof import Proof, lost_orders, prove_export, rounded_up
 from trueangle.export.table import make_table
 
@@ -53,7 +53,7 @@ def test_what_rounded_numbers_leave_is_that_of_lines_between_them() -> None:
     lines = np.interp(rng.uniform(0.0, 20_000.0, 100_000), np.arange(20_001), knots)
     expected = np.sqrt(np.mean(lines**2)) * ARCSEC
     assert table.floor_arcsec == pytest.approx(expected, rel=0.03)
-    assert line_floor(table.step) == pytest.approx(expected, rel=0.03)
+    assert rounding_floor(table.step) == pytest.approx(expected, rel=0.03)
 
 
 @pytest.mark.parametrize("digits", [2, 4, 6])

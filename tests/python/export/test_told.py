@@ -12,7 +12,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.export import TARGETS
 from trueangle.model.records import FitRecord, Provenance
-from trueangle.support.files import Source
+from trueangle.support.files import InputFile
 
 from .test_bounds import existing
 
@@ -32,7 +32,7 @@ def model():
         period=360.0,
         terms=(ta.Backlash(180 * A), ta.Latency(0.002)),
         fit=fit,
-        provenance=Provenance((Source("rig/axis_7.csv", "0" * 64),), "trueangle"),
+        provenance=Provenance((InputFile("rig/axis_7.csv", "0" * 64),), "trueangle"),
     )
 
 
@@ -220,7 +220,7 @@ ENDING = {"rust": ".rs", "c": ".h"}
 
 
 def test_a_file_name_does_not_end_a_comment(model, tmp_path):
-    source = Source("rig*/ #include <x>\\\n.csv", "0" * 64)
+    source = InputFile("rig*/ #include <x>\\\n.csv", "0" * 64)
     odd = model.replace(provenance=Provenance((source,), "trueangle"))
     text = ta.export_model(odd, "c", bits=8).text
     assert text.count("*/\n#ifndef") == 1

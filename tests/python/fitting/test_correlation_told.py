@@ -13,7 +13,7 @@ import trueangle as ta
 from trueangle.estimation.linear import NormalEquations
 from trueangle.fitting import correlation
 from trueangle.fitting.correlation import correlation_found, scatter_between
-from trueangle.fitting.likeness import far_runs
+from trueangle.fitting.unlikeruns import far_runs
 
 SEED = 47_700
 

@@ -9,7 +9,7 @@ import trueangle as ta
 from trueangle.errors import OutsideSpanWarning, RankError, UnlikeRunsWarning
 from trueangle.fitting.orders import unitgroups
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
-from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
+from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 ARCSEC = 1.0 / 3600.0
 

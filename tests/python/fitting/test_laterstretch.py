@@ -9,10 +9,10 @@ import trueangle as ta
 from trueangle.errors import NoModelError
 from trueangle.fitting.problem import Problem
 from trueangle.fitting.transfer import (
-    check_later_stretch,
+    check_later_segment,
     check_new_run,
     gains_of_runs,
-    gains_of_stretches,
+    gains_of_segments,
 )
 from trueangle.joint.shafts import resolve_orders
 
@@ -31,7 +31,7 @@ def there_and_back(arc, passes=4, n=300):
 
 def gains(run, orders):
     problem = Problem([run], resolve_orders(orders), "reference")
-    return gains_of_stretches(problem, problem.base)
+    return gains_of_segments(problem, problem.base)
 
 
 def test_gains_are_those_of_refits():
@@ -168,4 +168,4 @@ def test_a_refusal_counts_those_that_would_be_made_worse():
     assert (gains(whole, [2]) < 0.0).tolist() == [False, False, False, True]
     problem = Problem([whole], wanted, "reference")
     with pytest.raises(NoModelError, match=r"order 2 would make the error of 1 of 4 segments of"):
-        check_later_stretch(problem, problem.base)
+        check_later_segment(problem, problem.base)

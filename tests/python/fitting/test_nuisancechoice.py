@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fitting.nuisance import take_out
+from trueangle.fitting.nuisance import take_out_nuisance
 from trueangle.fitting.nuisancechoice import (
     FOLDS,
     FoldRows,
@@ -115,7 +115,7 @@ def swept(unit=360.0, turns=0, seed=SEED):
 @pytest.mark.parametrize("kinds", [("ramp",), ("ramp", "direction"), ("ramp", "velocity", "drift")])
 def test_what_is_left_does_not_depend_on_turns_units_or_the_order_of_runs(kinds):
     def left(runs):
-        cleaned, found = take_out(runs, kinds, SHAFTS, "reference")
+        cleaned, found = take_out_nuisance(runs, kinds, SHAFTS, "reference")
         assert set(found.kinds) == set(kinds)
         return [run.centred_error / run.period for run in cleaned]
 
@@ -130,7 +130,7 @@ def test_what_is_left_does_not_depend_on_turns_units_or_the_order_of_runs(kinds)
 def test_a_ramp_moves_no_zero():
     """It is taken off about the middle of each run: what a zero is told by stays."""
     runs = swept()
-    cleaned, found = take_out(runs, ("ramp",), SHAFTS, "reference")
+    cleaned, found = take_out_nuisance(runs, ("ramp",), SHAFTS, "reference")
     assert found.slope == pytest.approx(3e-5, abs=3e-5)
     for before, after in zip(runs, cleaned, strict=True):
         gone = before.indicated - after.indicated

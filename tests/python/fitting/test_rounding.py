@@ -11,7 +11,7 @@ import pytest
 import trueangle as ta
 from coarse import Sensor
 from trueangle.cli import main
-from trueangle.fitting.rounding import repeated_variance
+from trueangle.fitting.rounding import repeated_rounding_variance
 
 
 @pytest.mark.parametrize("noise", [0.05, 0.15, 0.3, 0.6])
@@ -22,14 +22,16 @@ def test_the_variance_that_repeats_is_that_of_the_means_at_each_place(noise):
     error = np.round(place + rng.normal(0.0, noise, (400, 400))) - place
     scatter = float(error.var(axis=1, ddof=1).mean())
     means = float(error.mean(axis=1).var(ddof=1)) - scatter / 400
-    found = repeated_variance(1.0, scatter)
+    found = repeated_rounding_variance(1.0, scatter)
     assert found == pytest.approx(means, rel=5.0 * math.sqrt(2.0 / 400), abs=5e-4)
-    assert repeated_variance(316.4, 316.4**2 * scatter) == pytest.approx(316.4**2 * found, rel=1e-9)
+    assert repeated_rounding_variance(316.4, 316.4**2 * scatter) == pytest.approx(
+        316.4**2 * found, rel=1e-9
+    )
 
 
 def test_what_does_not_scatter_repeats_whole():
-    assert repeated_variance(1.0, 0.0) == pytest.approx(1.0 / 12.0, rel=0.005)
-    assert repeated_variance(1.0, 4.0) < 1e-12
+    assert repeated_rounding_variance(1.0, 0.0) == pytest.approx(1.0 / 12.0, rel=0.005)
+    assert repeated_rounding_variance(1.0, 4.0) < 1e-12
 
 
 def pulls(places: int, runs: int, noise: float, spread: bool, covariance: str) -> np.ndarray:

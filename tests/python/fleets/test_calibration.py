@@ -8,7 +8,7 @@ import pytest
 import trueangle as ta
 from trueangle.fitting.robust import without_spikes
 from trueangle.fleets import calibration
-from trueangle.fleets.calibration import CalibrationSums, columns_of, normal_matrix
+from trueangle.fleets.calibration import CalibrationSums, normal_matrix, order_columns
 
 SEED = 4_711
 ORDERS = np.arange(1.0, 111.0)
@@ -35,7 +35,7 @@ def test_blocks_give_the_sums_of_all_readings(weighted, monkeypatch):
     run = without_spikes(run)
     size = len(run)
     share = np.ones(size) if run.weights is None else run.weights
-    design = np.column_stack([columns_of(run.reference, orders, 360.0), run.centred_error])
+    design = np.column_stack([order_columns(run.reference, orders, 360.0), run.centred_error])
     mean = np.average(design, axis=0, weights=share)
     wanted = (design - mean).T @ (share[:, None] * (design - mean))
     np.testing.assert_allclose(sums.means[0], mean, atol=1e-14)

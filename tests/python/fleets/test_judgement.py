@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fleets.calibration import Calibration, CalibrationSums, columns_of
+from trueangle.fleets.calibration import Calibration, CalibrationSums, order_columns
 from trueangle.fleets.history import changes_of, drift_bound, next_calibration
 from trueangle.support.distributions import f_quantile, normal_quantile
 
@@ -23,7 +23,7 @@ def solved(runs, period=360.0):
     for i, run in enumerate(runs):
         zero = np.zeros((len(run), len(runs)))
         zero[:, i] = 1.0
-        design.append(np.hstack([columns_of(run.reference, ORDERS, period), zero]))
+        design.append(np.hstack([order_columns(run.reference, ORDERS, period), zero]))
         error.append(run.centred_error)
     design, error = np.vstack(design), np.concatenate(error)
     found = np.linalg.lstsq(design, error, None)[0]

@@ -3,7 +3,7 @@
 import numpy as np
 
 import trueangle as ta
-from trueangle.fleets.orders import candidates, worth_keeping
+from trueangle.fleets.orders import candidate_orders, worth_keeping
 
 SEED = 52_700
 PLACES = np.arange(0.0, 360.0, 3.0)
@@ -18,7 +18,7 @@ def kept(rng, lines=()):
             error += size * np.sin(np.radians(order * PLACES) + rng.uniform(0.0, 2.0 * np.pi))
         units.append([ta.CalibrationRun(PLACES, PLACES + error / 3600.0, 360.0)])
     every = [run for runs in units for run in runs]
-    shafts = worth_keeping(units, candidates(every, None, "none", None))
+    shafts = worth_keeping(units, candidate_orders(every, None, "none", None))
     return {order for shaft in shafts for order in shaft.orders}
 
 

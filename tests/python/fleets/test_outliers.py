@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import f
 
 import trueangle as ta
-from trueangle.fleets.outliers import _variance, deviates, weights_of
+from trueangle.fleets.outliers import _variance, deviates, level_by_order
 
 from .made import units
 
@@ -21,7 +21,7 @@ def test_clean_fleets_are_told_of_one_in_a_hundred_at_most(count, orders):
     print("seed", SEED)
     rng = np.random.default_rng(SEED + count)
     fleets, own = 800, [np.zeros((count, 2, 2))] * orders
-    shares = weights_of(np.arange(1.0, orders + 1.0))
+    shares = level_by_order(np.arange(1.0, orders + 1.0))
     told = sum(
         deviates(drawn(rng, count, orders), own, True, shares=shares).outlying.any()
         for _ in range(fleets)
@@ -36,7 +36,7 @@ def test_an_eccentric_unit_is_found(orders):
     print("seed", SEED)
     rng = np.random.default_rng(SEED)
     own, found, others = [np.zeros((40, 2, 2))] * orders, 0, 0
-    shares = weights_of(np.arange(1.0, orders + 1.0))
+    shares = level_by_order(np.arange(1.0, orders + 1.0))
     for _ in range(200):
         values = drawn(rng, 40, orders)
         values[0][7] += [6.5, 0.0]

@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 from statsmodels.regression.mixed_linear_model import MixedLM
 
-from trueangle.fleets.calibration import columns_of
+from trueangle.fleets.calibration import order_columns
 from trueangle.fleets.units import noise_of
 from trueangle.fleets.variance import held_out_score, reml
 
@@ -34,7 +34,7 @@ def test_of_readings_it_is_the_mixed_models_restricted_likelihood():
     print("seed", SEED)
     rng = np.random.default_rng(SEED + 1)
     units, n = 12, 16
-    design = columns_of(np.arange(n) * 22.5, np.array([1.0]), 360.0)
+    design = order_columns(np.arange(n) * 22.5, np.array([1.0]), 360.0)
     own = rng.normal([4.0, -2.0], 1.5, (units, 2))
     readings = own @ design.T + rng.normal(0.0, 0.8, (units, n))
 
@@ -66,7 +66,7 @@ def test_of_readings_it_is_statsmodels_mixed_model(seed):
     print("seed", seed)
     rng = np.random.default_rng(seed)
     units, n = 15, 24
-    design = columns_of(np.arange(n) * 15.0, np.array([1.0]), 360.0)
+    design = order_columns(np.arange(n) * 15.0, np.array([1.0]), 360.0)
     own = rng.normal([4.0, -2.0], 1.5, (units, 2))
     readings = own @ design.T + rng.normal(0.0, 0.8, (units, n))
     table = pd.DataFrame(

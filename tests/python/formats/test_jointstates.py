@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from trueangle.formats.jointstates import Block
+from trueangle.formats.jointstates import JointStateBlock
 
 rosbags = pytest.importorskip("rosbags")
 
@@ -53,7 +53,7 @@ def mixed(is_ros1):
 
 @pytest.mark.parametrize("is_ros1", [True, False])
 def test_numbers_are_those_of_the_messages(is_ros1):
-    block = Block(mixed(is_ros1), is_ros1)
+    block = JointStateBlock(mixed(is_ros1), is_ros1)
     assert block.joints == ["elbow", "wrist", "toe_5"]
     nan = np.nan
     np.testing.assert_array_equal(block.values("elbow", "position"), [0.1, 0.4, 0.5, 0.6, nan, 0.8])
@@ -66,7 +66,7 @@ def test_numbers_are_those_of_the_messages(is_ros1):
 def test_only_positions_change(is_ros1):
     given = mixed(is_ros1)
     wanted = np.arange(6.0)
-    made = Block(given, is_ros1).with_positions({"elbow": wanted, "nose": wanted})
+    made = JointStateBlock(given, is_ros1).with_positions({"elbow": wanted, "nose": wanted})
     for i, (before, after) in enumerate(zip(given, made, strict=True)):
         old, new = decoded(is_ros1, before), decoded(is_ros1, after)
         assert new.name == old.name
@@ -85,10 +85,10 @@ def test_big_endian_messages():
     body += struct.pack(">I", 1) + struct.pack(">I", 2) + b"j\0" + b"\0\0"
     body += struct.pack(">I", 1)
     body += b"\0" * (-len(body) % 8) + struct.pack(">d", 0.25) + struct.pack(">II", 0, 0)
-    block = Block([b"\0\0\0\0" + body], is_ros1=False)
+    block = JointStateBlock([b"\0\0\0\0" + body], is_ros1=False)
     assert block.values("j", "position") == [0.25]
     (made,) = block.with_positions({"j": np.array([0.5])})
-    assert Block([made], is_ros1=False).values("j", "position") == [0.5]
+    assert JointStateBlock([made], is_ros1=False).values("j", "position") == [0.5]
     np.testing.assert_array_equal(decoded(False, made).position, [0.5])
 
 
@@ -99,14 +99,14 @@ def test_damaged_messages_are_refused_or_read(is_ros1):
     good = mixed(is_ros1)[0]
     for cut in range(len(good)):
         with pytest.raises(ValueError, match=r"cut short|plain CDR"):
-            Block([good[:cut]], is_ros1)
+            JointStateBlock([good[:cut]], is_ros1)
     refused = 0
     for _ in range(400):
         bad = bytearray(good)
         for place in rng.integers(len(bad), size=3):
             bad[place] = rng.integers(256)
         try:
-            (made,) = Block([bytes(bad)], is_ros1).with_positions({"elbow": np.zeros(1)})
+            (made,) = JointStateBlock([bytes(bad)], is_ros1).with_positions({"elbow": np.zeros(1)})
         except ValueError:
             refused += 1
         else:
@@ -151,7 +151,7 @@ def test_plain_cdr_is_told_by_its_two_first_bytes(head, taken):
     """The two behind are options: padding at the end, or anything."""
     data = head + message(False, ["elbow"], [0.5], [1.5])[4:]
     if taken:
-        assert Block([data], False).values("elbow", "velocity").tolist() == [1.5]
+        assert JointStateBlock([data], False).values("elbow", "velocity").tolist() == [1.5]
         return
     with pytest.raises(ValueError, match="a joint state is not in plain CDR, which alone is under"):
-        Block([data], False)
+        JointStateBlock([data], False)

@@ -14,7 +14,7 @@ pa = pytest.importorskip("pyarrow")
 from trueangle.formats import arrow, hdf5  # noqa: E402
 from trueangle.formats.arrowplaces import placed_batch  # noqa: E402
 from trueangle.formats.arrowtables import arrow_numbers  # noqa: E402
-from trueangle.formats.hdf5places import Places  # noqa: E402
+from trueangle.formats.hdf5places import Hdf5Places  # noqa: E402
 
 ROWS = 30_001
 PARTS = 3
@@ -59,7 +59,7 @@ def test_values_are_those_of_the_library(layout: str, tmp_path: Path):
     path = tmp_path / "log.h5"
     wanted = made(path, layout)
     with h5py.File(path) as file:
-        assert (Places.of(file["a"], range(ROWS)) is not None) == LAYOUTS[layout][2]
+        assert (Hdf5Places.of(file["a"], range(ROWS)) is not None) == LAYOUTS[layout][2]
     for parts in ([None], [hdf5.RowRange(i, PARTS) for i in range(PARTS)]):
         batches = [
             batch

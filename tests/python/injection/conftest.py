@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.model.text import model_text
+from trueangle.model.writing import model_text
 
 from .shim import Driver, compiled
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from trueangle import CalibrationRun
-from trueangle.joint.earlier import earlier
+from trueangle.joint.earlier import earlier_signals
 from trueangle.joint.signals import join_runs
 
 
@@ -21,7 +21,7 @@ def signals(step):
 @pytest.mark.parametrize("delay", [0.05, -0.05])
 def test_close_readings_are_read_off_their_own_record(delay):
     found, time = signals(0.01)
-    then = earlier(found, delay)
+    then = earlier_signals(found, delay)
     inside = (time - delay > 0.0) & (time - delay < 10.9)
     wanted = np.interp(time - delay, time, found.degrees)
     assert np.abs(then.degrees - wanted)[inside].max() < 1e-9
@@ -32,7 +32,7 @@ def test_close_readings_are_read_off_their_own_record(delay):
 
 def test_the_direction_is_that_of_the_time_before():
     found, time = signals(0.01)
-    then = earlier(found, 0.1)
+    then = earlier_signals(found, 0.1)
     turned = time[np.flatnonzero(np.diff(found.direction))]
     later = time[np.flatnonzero(np.diff(then.direction))]
     assert turned.size == 1
@@ -41,14 +41,14 @@ def test_the_direction_is_that_of_the_time_before():
 
 def test_readings_farther_apart_follow_the_speed():
     found, _ = signals(0.5)
-    then = earlier(found, 0.1)
+    then = earlier_signals(found, 0.1)
     assert then.degrees == pytest.approx(found.degrees - 0.1 * found.velocity)
     assert (then.direction == found.direction).all()
 
 
 def test_no_delay_is_no_change():
     found, _ = signals(0.01)
-    assert (earlier(found, 0.0).theta == found.theta).all()
+    assert (earlier_signals(found, 0.0).theta == found.theta).all()
 
 
 @pytest.mark.parametrize("delay", [0.07, 0.1, -0.035])
@@ -56,7 +56,7 @@ def test_every_signal_is_that_of_the_last_reading_before(delay):
     """Reading by reading, in two runs: nothing comes over the border between them."""
     one, time = signals(0.01)
     found = one.followed_by(one)
-    then = earlier(found, delay)
+    then = earlier_signals(found, delay)
     n = time.size
     for k in range(0, 2 * n, 7):
         start, at = (k // n) * n, time[k % n] - delay

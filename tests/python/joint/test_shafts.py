@@ -12,7 +12,7 @@ from trueangle.errors import ArgumentError
 from trueangle.joint.shafts import (
     MOST_ORDERS,
     Shaft,
-    counted_orders,
+    limited_orders,
     resolve_orders,
     shaft_cycles,
 )
@@ -61,12 +61,12 @@ def test_a_shaft_is_the_sines_that_it_says() -> None:
 
 def test_so_many_orders_and_not_one_more() -> None:
     assert MOST_ORDERS == 4096
-    assert counted_orders(range(MOST_ORDERS)) == list(range(MOST_ORDERS))
+    assert limited_orders(range(MOST_ORDERS)) == list(range(MOST_ORDERS))
     with pytest.raises(ArgumentError, match="lines are too many: 4096 at a time"):
-        counted_orders(range(MOST_ORDERS + 1), "lines")
+        limited_orders(range(MOST_ORDERS + 1), "lines")
     # What never ends is refused too.
     with pytest.raises(ArgumentError, match="too many"):
-        counted_orders(itertools.count())
+        limited_orders(itertools.count())
 
 
 def test_orders_are_sorted_and_told_once() -> None:

@@ -13,7 +13,7 @@ from trueangle.logs import accumulation
 from trueangle.logs.accumulation import (
     LogFitSettings,
     OutlierLimits,
-    Tally,
+    RunTally,
     log_moments,
     merged_moments,
 )
@@ -65,9 +65,9 @@ def test_outliers_have_their_row_among_the_known_ones_of_their_run(log) -> None:
 
 def test_stretches_of_a_run_follow_each_other() -> None:
     """Rows of a later one are counted on; the ends are those of both."""
-    first = Tally(100, -3.0, 40.0, [7, 90])
-    first.add(Tally(50, -5.0, 12.0, [0, 49]))
-    assert first == Tally(150, -5.0, 40.0, [7, 90, 100, 149])
+    first = RunTally(100, -3.0, 40.0, [7, 90])
+    first.add(RunTally(50, -5.0, 12.0, [0, 49]))
+    assert first == RunTally(150, -5.0, 40.0, [7, 90, 100, 149])
 
 
 def test_ends_are_those_of_all_blocks_where_a_turn_is_not_all(tmp_path, monkeypatch) -> None:

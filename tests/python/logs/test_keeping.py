@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trueangle.logs.keeping import Kept
+from trueangle.logs.keeping import KeptReadings
 
 SEED = 71_300
 BLOCK = 256
@@ -13,7 +13,7 @@ X = np.arange(ROWS, dtype=np.float64)
 
 def kept_of(cuts, most=1 << 30, part=1.0, salt=3):
     """What is kept of a log that comes in batches, each beginning where a block does."""
-    kept = Kept(most, part)
+    kept = KeptReadings(most, part)
     for begin, end in zip([0, *cuts], [*cuts, ROWS], strict=True):
         kept.take("run", salt, begin, X[begin:end], -X[begin:end])
     return kept
@@ -86,7 +86,7 @@ def test_segments_that_were_thinned_unlike_are_one_sample():
 
 
 def test_readings_that_are_missing_take_no_place():
-    kept, x = Kept(1 << 30), X.copy()
+    kept, x = KeptReadings(1 << 30), X.copy()
     x[10:300] = np.nan
     y = -X
     y[5000:6000] = np.nan

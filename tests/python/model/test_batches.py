@@ -8,7 +8,7 @@ import pytest
 import trueangle as ta
 from trueangle.errors import FileError
 from trueangle.model.batches import read_batches, read_lines
-from trueangle.runs.source import Reading
+from trueangle.runs.source import ReadingOptions
 
 TURN = np.array([0.05, 0.3, 0.55, 0.8, 1.05])
 ERROR = 1e-3 * np.array([1.0, -2.0, 0.5, 3.0, -1.5])
@@ -33,7 +33,7 @@ def text(unit, clock):
 @pytest.mark.parametrize(("unit", "clock"), [("deg", "s"), ("rad", "ms"), ("turn", "s")])
 def test_angle_and_error_are_in_the_unit_of_the_model(unit, clock, period, argument, tmp_path):
     (tmp_path / "log.csv").write_text(text(unit, clock))
-    watched, reading = model(period, argument), Reading()
+    watched, reading = model(period, argument), ReadingOptions()
     (whole,) = read_batches(tmp_path / "log.csv", watched, reading)
     parts = list(read_lines(io.StringIO(text(unit, clock)), watched, reading, most=2))
     assert [part.error.size for part in parts] == [2, 2, 1]
@@ -50,4 +50,8 @@ def test_a_line_that_holds_no_number_is_named_wherever_it_stands():
     lines.insert(2, "Ready.\n")  # a word of a firmware is no reading
     lines[5] = lines[5].replace(",", ",x", 1)
     with pytest.raises(FileError, match=r"line 6, column 'reference_deg': a number is needed"):
-        list(read_lines(io.StringIO("".join(lines)), model(360.0, "reference"), Reading(), most=3))
+        list(
+            read_lines(
+                io.StringIO("".join(lines)), model(360.0, "reference"), ReadingOptions(), most=3
+            )
+        )

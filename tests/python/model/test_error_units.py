@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import trueangle as ta
 from trueangle.cli import build_parser, main
 from trueangle.errors import ArgumentError
-from trueangle.support.display_units import ERROR_UNITS, error_unit, significant
+from trueangle.support.display_units import ERROR_UNITS, error_unit, significant_digits
 
 #: Commands that print errors.
 PRINTING = {
@@ -75,7 +75,7 @@ def test_rounding_loses_less_than_a_twentieth_of_the_uncertainty(value, std, ask
 
 @given(st.floats(1e-9, 1e9))
 def test_four_digits_are_kept(value):
-    text = significant(value)
+    text = significant_digits(value)
     assert "e" not in text
     assert float(text) == pytest.approx(value, rel=5.1e-4)
 

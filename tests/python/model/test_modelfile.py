@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import trueangle as ta
 from trueangle.errors import ModelFileError
 from trueangle.model.records import FitRecord, Provenance
-from trueangle.support.files import Source
+from trueangle.support.files import InputFile
 
 numbers = st.floats(-1e-3, 1e-3, allow_nan=False).map(lambda x: x + 0.0)
 
@@ -33,7 +33,7 @@ def models(draw):
         covariance=draw(st.sampled_from([None, np.eye(size) / 3])),
         condition_number=draw(st.none() | st.floats(1, 1e9)),
         fit=FitRecord(37, 2, (0.0, 360.0), 0.1, offsets=(draw(numbers), 1 / 3), note="n"),
-        provenance=Provenance((Source("a.csv", "00ff"),), "trueangle 0"),
+        provenance=Provenance((InputFile("a.csv", "00ff"),), "trueangle 0"),
     )
 
 

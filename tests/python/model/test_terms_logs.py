@@ -176,12 +176,12 @@ def test_travel_crosses_files_on_a_cluster(recording, tmp_path):
 def test_a_velocity_without_a_unit_has_that_of_the_angle():
     """A log in radians whose speeds are named without a unit: radians per second."""
     from trueangle.logs.joints import _with_unit
-    from trueangle.support.roles import Column
+    from trueangle.support.roles import RoleColumn
 
-    speed = Column("velocity", "v", None)
+    speed = RoleColumn("velocity", "v", None)
     for unit in ("deg", "rad", "turn"):
         assert _with_unit(speed, unit).unit == f"{unit}/s"
-    told = Column("velocity", "v", "rad/s")
+    told = RoleColumn("velocity", "v", "rad/s")
     assert _with_unit(told, "deg") is told
-    torque = Column("torque", "t", None)
+    torque = RoleColumn("torque", "t", None)
     assert _with_unit(torque, "rad") is torque

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from trueangle.effects import EFFECTS
-from trueangle.effects.blindness import Blindness
+from trueangle.effects.ambiguity import Ambiguity
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 from trueangle.planning.evidence import ExpectedEvidence, Hypothesis, ReadingNoise, evidence_between
-from trueangle.planning.hypotheses import of_size, question_of
+from trueangle.planning.questions import effect_of_size, question_of
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
 
 SIM = Simulation(
@@ -78,7 +78,7 @@ def test_evidence_grows_with_the_square_of_the_size_and_falls_with_the_variance(
 def test_evidence_is_the_deviance_less_what_parameters_and_searches_cost():
     """A logarithm of the readings for each parameter, twice that of the places searched."""
     fitted = regression(0.0)
-    defect = of_size("local_defect", 3.0, fitted.signals, SIM.surroundings)
+    defect = effect_of_size("local_defect", 3.0, fitted.signals, SIM.surroundings)
     rivals = (RIVALS[1], Hypothesis("local_defect", (defect,)))
     log_n, prices = np.log(len(fitted.signals)), {}
     for one in rivals:
@@ -122,20 +122,20 @@ def test_an_effect_has_the_size_that_is_asked_for(cause):
     rich = join_runs(
         simulate(SIM, 0, [RunDesign(reversals=(0.4,), temperature_end_C=30.0, speed_deg_s=30.0)])
     )
-    effect = of_size(cause, 3.0, rich, SIM.surroundings)
+    effect = effect_of_size(cause, 3.0, rich, SIM.surroundings)
     error = effect.signal(rich, SIM.surroundings, np.random.default_rng(0))
     assert error.std() == pytest.approx(3.0, rel=0.03)
 
 
 def test_an_effect_that_a_run_cannot_show_has_no_size():
     still = join_runs(simulate(SIM, 0, [RunDesign()]))
-    assert of_size("torsional_compliance", 3.0, still, SIM.surroundings) is None
+    assert effect_of_size("torsional_compliance", 3.0, still, SIM.surroundings) is None
 
 
 def test_what_is_too_small_to_be_seen_is_not_in_question():
     """The argument's error of a line of 14 arcsec is a thousandth of an arcsec; of 1000 it is 5."""
     rich = join_runs(simulate(SIM, 0, [RunDesign(reversals=(0.4,))]))
-    spot = Blindness(("local_defect", "argument_error"), "", "")
+    spot = Ambiguity(("local_defect", "argument_error"), "", "")
 
     def asked(around):
         return {one.cause for one in question_of(spot, rich, around, 3.0).hypotheses}
@@ -143,5 +143,5 @@ def test_what_is_too_small_to_be_seen_is_not_in_question():
     assert asked(SIM.surroundings) == {"local_defect"}
     steep = Simulation(harmonics=(Harmonic("output", 1, 2000.0, 240.0),))
     assert asked(steep.surroundings) == {"local_defect", "argument_error"}
-    alone = Blindness(("argument_error",), "", "")
+    alone = Ambiguity(("argument_error",), "", "")
     assert question_of(alone, rich, SIM.surroundings, 3.0).hypotheses

@@ -11,8 +11,8 @@ from trueangle.cli import main
 from trueangle.errors import ArgumentError, FileError
 from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits, load_limits
-from trueangle.planning.further import base_of, choices, run_steps, seconds_of
-from trueangle.planning.scales import Scales
+from trueangle.planning.further import plainest_run, run_choices, run_seconds, run_steps
+from trueangle.planning.scales import DesignScales
 from trueangle.simulation import (
     Backlash,
     Harmonic,
@@ -85,8 +85,8 @@ def test_play_and_a_delay_are_told_by_another_speed(plan):
 
 def test_every_run_stays_within_limits(plan):
     limits = Limits.of_runs(RUNS)
-    design = base_of(limits, "x")
-    options = [option for options in choices(limits) for option in options]
+    design = plainest_run(limits, "x")
+    options = [option for options in run_choices(limits) for option in options]
     assert len(options) > 8
     for run in (*plan.runs, *(replace(design, **option) for option in options)):
         measured = simulate(Simulation(), 0, [run])[0]
@@ -98,19 +98,19 @@ def test_every_run_stays_within_limits(plan):
         assert speed.max() <= 60.0
         # The time that is told is that of the simulated run, to one reading: of a run that
         # coasts to a quarter of its speed the last takes 2.2 times the mean.
-        assert measured.time[-1] == pytest.approx(seconds_of(run), rel=2.2 / run.samples)
+        assert measured.time[-1] == pytest.approx(run_seconds(run), rel=2.2 / run.samples)
         assert any(f"read {run.samples} times" in step for step in run_steps(run))
 
 
 def test_designs_that_were_weighed_are_worth_what_they_were(found, plan, monkeypatch):
-    weighed, known = Scales.weighed, []
+    weighed, known = DesignScales.weighed, []
 
     def anew(self, *given):
         known.append(len(self._known))
         self._known.clear()
         return weighed(self, *given)
 
-    monkeypatch.setattr(Scales, "weighed", anew)
+    monkeypatch.setattr(DesignScales, "weighed", anew)
     assert found.plan().to_dict() == plan.to_dict()
     assert max(known) == 1
 

@@ -10,7 +10,7 @@ import pytest
 
 from trueangle.planning import plan_arc, plan_encoder, plan_mounts, plan_tilts
 from trueangle.planning.doptimal import OrthonormalColumns
-from trueangle.planning.further import run_steps, seconds_of
+from trueangle.planning.further import run_seconds, run_steps
 from trueangle.planning.mountsearch import TOLERATED_FACTOR
 from trueangle.planning.noisefactors import (
     facet_noise_factor,
@@ -138,7 +138,7 @@ def test_an_arcs_efficiencies_and_factors_are_those_of_its_places(both: bool, ru
     ],
 )
 def test_a_run_takes_its_travel_over_its_speed(design: RunDesign, seconds: float) -> None:
-    assert seconds_of(design) == pytest.approx(seconds)
+    assert run_seconds(design) == pytest.approx(seconds)
 
 
 @pytest.mark.parametrize("end", [5.0, 25.0, 60.0])
@@ -148,7 +148,7 @@ def test_a_coasting_run_takes_the_integral_over_its_speeds(end: float) -> None:
     speeds = np.linspace(40.0, end, 20_001)
     middles = 0.5 * (speeds[1:] + speeds[:-1])
     wanted = (3.0 * 360.0 / 20_000 / middles).sum()
-    assert seconds_of(design) == pytest.approx(wanted, rel=1e-6)
+    assert run_seconds(design) == pytest.approx(wanted, rel=1e-6)
 
 
 def test_the_steps_of_a_run_lead_where_it_goes() -> None:

@@ -16,7 +16,7 @@ from trueangle.planning import plan_mounts, plan_tilts
 from trueangle.plots import curves, palette
 from trueangle.plots.orderaxis import OrderAxis
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
-from trueangle.support.display_units import significant
+from trueangle.support.display_units import significant_digits
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
@@ -162,7 +162,7 @@ def test_before_after_states_rms_and_peak_to_peak(fit: ta.FitResult, runs) -> No
     rms, ptp = np.sqrt(np.mean(left**2)), np.ptp(left)
     assert (
         legend_texts(ax)[1]
-        == f"after: rms {significant(rms)}, peak-to-peak {significant(ptp)} arcsec"
+        == f"after: rms {significant_digits(rms)}, peak-to-peak {significant_digits(ptp)} arcsec"
     )
     assert rms < 2.5
 

@@ -14,7 +14,7 @@ from trueangle.certificate.typesetting import certified_errors
 from trueangle.planning import wanted_orders
 from trueangle.rehearsal.cause import rehearsed_cause
 from trueangle.rehearsal.trial import TrialOutcome
-from trueangle.rehearsal.visibility import Range
+from trueangle.rehearsal.visibility import SizeRange
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
@@ -102,7 +102,7 @@ def test_sizes_named_in_a_rehearsal(grows: bool) -> None:
         for step, (named, count) in tried.items()
         for k in range(count)
     ]
-    cause = rehearsed_cause("x", "size", Range(3.0, -16, 20, grows), answers, "", "")
+    cause = rehearsed_cause("x", "size", SizeRange(3.0, -16, 20, grows), answers, "", "")
     (ax,) = plots.detection(SimpleNamespace(causes=[cause])).axes
     dashed = sorted(float(line.get_xdata()[0]) for line in ax.lines if line.get_linestyle() == "--")
     assert len(dashed) == 2

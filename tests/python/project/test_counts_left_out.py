@@ -13,10 +13,10 @@ import pytest
 import trueangle as ta
 from fleets.made import units
 from trueangle.diagnosis.finding import named_quantity
-from trueangle.estimation.estimate import quantity
+from trueangle.estimation.quantity import quantity
 from trueangle.export.export import _source
 from trueangle.export.pattern import TurnPattern
-from trueangle.fitting.likeness import unlike_sentence
+from trueangle.fitting.unlikeruns import unlike_runs_sentence
 from trueangle.fleets.fleet import Fleet
 from trueangle.formats.columns import listed_columns
 from trueangle.model.records import Provenance
@@ -24,7 +24,7 @@ from trueangle.plots.orderlines import OrderLine, largest_orders_text
 from trueangle.reports.numbers import shortened_list
 from trueangle.reports.unknowns import unknown_content
 from trueangle.support.display_units import ErrorUnit
-from trueangle.support.files import Source
+from trueangle.support.files import InputFile
 from trueangle.support.suggestions import listed_names
 
 PLAIN = ErrorUnit("arcsec", 1.0)
@@ -46,7 +46,7 @@ def model(count: int) -> ta.HarmonicModel:
 
 def fitted_from(count: int) -> str:
     """The first line of an export: its model's files."""
-    files = tuple(Source(name, "0" * 64) for name in names(count))
+    files = tuple(InputFile(name, "0" * 64) for name in names(count))
     one = model(2).replace(provenance=Provenance(files, ""))
     return _source(TurnPattern(one), "0" * 64, None)[0]
 
@@ -92,7 +92,7 @@ LISTS: dict[str, tuple[Callable[[int], str], str]] = {
         lambda n: largest_orders_text([OrderLine(k, 1.0 / k) for k in range(1, n + 1)], PLAIN),
         r"\d+ \(\S+ arcsec\)",
     ),
-    "runs unlike the others": (lambda n: unlike_sentence(names(n), n + 1), r"\bname\d+"),
+    "runs unlike the others": (lambda n: unlike_runs_sentence(names(n), n + 1), r"\bname\d+"),
     "columns of a log": (lambda n: listed_columns(names(n)), r"\bname\d+"),
     "names in a message": (lambda n: listed_names(names(n)), r"\bname\d+"),
     "lines of a page's cell": (lambda n: "\n".join(shortened_list(names(n))), r"\bname\d+"),

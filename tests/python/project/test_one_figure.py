@@ -12,7 +12,7 @@ import pytest
 import trueangle as ta
 from trueangle.certificate import Identity, certify
 from trueangle.simulation import Harmonic, RunDesign, Simulation
-from trueangle.support.display_units import error_unit, phase_pair
+from trueangle.support.display_units import error_unit, rounded_phase
 
 ARCSEC = 3600.0
 
@@ -45,7 +45,7 @@ def shown(fit) -> dict[float, tuple[str, str, str, str]]:
     return {
         float(order): (
             *unit.pair(ARCSEC * fit.amplitudes[n], ARCSEC * fit.amplitude_std[n]),
-            *phase_pair(np.degrees(fit.phases[n]), np.degrees(fit.phase_std[n])),
+            *rounded_phase(np.degrees(fit.phases[n]), np.degrees(fit.phase_std[n])),
         )
         for n, order in enumerate(fit.orders)
     }
@@ -112,7 +112,7 @@ def test_a_diagnosis_has_the_same_unit_convention_and_digits(runs, fit) -> None:
         assert 0.0 <= phase.value < 360.0
         for name, (value, std) in {
             "amplitude_arcsec": error_unit("arcsec").pair(size.value, size.std),
-            "phase_deg": phase_pair(phase.value, phase.std),
+            "phase_deg": rounded_phase(phase.value, phase.std),
         }.items():
             assert f"{name}: {value} +- {std}" in text
         told += 1

@@ -9,7 +9,7 @@ import trueangle as ta
 from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits
 from trueangle.planning.evidence import ReadingNoise
-from trueangle.planning.scales import Scales
+from trueangle.planning.scales import DesignScales
 from trueangle.planning.worth import WANTED
 from trueangle.rehearsal import after
 from trueangle.simulation import Harmonic, Latency, RunDesign, Simulation, simulate
@@ -60,7 +60,8 @@ def test_correlated_noise_leaves_less_evidence():
     signals, limits = join_runs(RUNS), Limits.of_runs(RUNS)
     out_and_back = RunDesign("next", speed_deg_s=60.0, samples=120, reversals=(0.5,))
     white, red = (
-        Scales(signals, found.extended, spots, ReadingNoise(1.0, rho), limits) for rho in (0.0, 0.9)
+        DesignScales(signals, found.extended, spots, ReadingNoise(1.0, rho), limits)
+        for rho in (0.0, 0.9)
     )
     (more,), (less,) = (one.answers([out_and_back], signals) for one in (white, red))
     assert less.bic < more.bic

@@ -11,7 +11,7 @@ from statsmodels.stats.proportion import proportion_confint
 from trueangle.rehearsal.cause import SHARES, rehearsed_cause
 from trueangle.rehearsal.detection import HIGH, LAPSES, LOW, WIDTHS, Chance, binomial_interval
 from trueangle.rehearsal.trial import TrialOutcome
-from trueangle.rehearsal.visibility import STEPS, Range
+from trueangle.rehearsal.visibility import STEPS, SizeRange
 
 TRIED = {-4: (0, 4), 0: (1, 6), 3: (4, 6), 6: (6, 7), 10: (5, 6)}
 
@@ -77,7 +77,7 @@ def test_intervals_of_shares_are_wilsons(count: int) -> None:
 @pytest.mark.parametrize("grows", [True, False])
 def test_what_is_told_of_a_cause_is_counted(grows: bool) -> None:
     """Sizes either way from the first; the less visible end of an interval first."""
-    sizes = Range(3.0, -16, 20, grows)
+    sizes = SizeRange(3.0, -16, 20, grows)
     answers = []
     for step, (named, count) in TRIED.items():
         for k in range(count):

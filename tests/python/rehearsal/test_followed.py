@@ -18,7 +18,7 @@ import trueangle as ta
 from trueangle.effects.argument_error import ArgumentShift
 from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits
-from trueangle.planning.hypotheses import of_size
+from trueangle.planning.questions import effect_of_size
 from trueangle.rehearsal.trial import trial_outcome
 from trueangle.simulation import (
     Harmonic,
@@ -171,7 +171,7 @@ def hidden(cause):
         return ArgumentShift(-1.0)
     varied = [replace(run, current_A=2.0 * (k % 3 - 1)) for k, run in enumerate(RICH)]
     rich = join_runs(simulate(SIM, 0, varied))
-    return of_size(cause, SIZE, rich, SIM.surroundings)
+    return effect_of_size(cause, SIZE, rich, SIM.surroundings)
 
 
 def followed(entry, cause, seeds, seed):

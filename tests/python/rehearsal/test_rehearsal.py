@@ -26,8 +26,8 @@ from trueangle.errors import ArgumentError
 from trueangle.rehearsal import rehearse
 from trueangle.rehearsal import trial as trials
 from trueangle.rehearsal.detection import Chance, binomial_interval
-from trueangle.rehearsal.search import next_steps
-from trueangle.rehearsal.trial import NOTHING, Trial, TrialOutcome, asked, measured_signals
+from trueangle.rehearsal.search import next_sizes
+from trueangle.rehearsal.trial import NOTHING, Trial, TrialOutcome, measured_signals, run_trial
 from trueangle.rehearsal.visibility import FIRST, NEAR, blind_causes, size_range
 from trueangle.rehearsal.workers import THREADS, WorkerError, Workers
 from trueangle.simulation import Backlash, Harmonic, Joint, RunDesign, Simulation
@@ -188,7 +188,7 @@ def test_a_diagnosis_that_fails_is_told_and_loses_nothing(monkeypatch):
 
 def test_what_is_taken_for_another_is_told(monkeypatch):
     monkeypatch.setattr(
-        "trueangle.rehearsal.workers.asked",
+        "trueangle.rehearsal.workers.run_trial",
         lambda sim, signals, trial, seed: TrialOutcome(
             "taken_for_another", ("latency", "scale_error")
         ),
@@ -211,8 +211,8 @@ def test_another_seed_is_another_exam():
     assert first != second
     assert trials.trial_rng(0, "backlash", 1).random() != first
     assert trials.trial_rng(0, "latency", 0).random() != first
-    one = asked(SIM, signals, Trial("backlash", 0, 12.0, 0), 3)
-    assert one == asked(SIM, signals, Trial("backlash", 0, 12.0, 0), 3)
+    one = run_trial(SIM, signals, Trial("backlash", 0, 12.0, 0), 3)
+    assert one == run_trial(SIM, signals, Trial("backlash", 0, 12.0, 0), 3)
     assert one.is_named
 
 
@@ -355,7 +355,7 @@ def test_every_cause_can_be_hidden_or_is_seen_to_be_impossible():
 def test_an_effect_of_the_simulation_itself_is_named_by_its_belief():
     """A second backlash on top of one that is believed: the belief is refuted."""
     believed = SIM.with_effects([Backlash(3.0)])
-    outcome = asked(believed, measured_signals(believed), Trial("backlash", 0, 6.0, 0), 0)
+    outcome = run_trial(believed, measured_signals(believed), Trial("backlash", 0, 6.0, 0), 0)
     assert outcome.is_named
 
 
@@ -365,7 +365,7 @@ def test_an_effect_of_the_simulation_itself_is_named_by_its_belief():
 def searched(place, width, lapse, rng, seeds=20, lowest=-16, highest=30):
     """Counts of a search in which the chance is known."""
     tried: dict[int, tuple[int, int]] = {}
-    while steps := next_steps(tried, lowest, highest, seeds):
+    while steps := next_sizes(tried, lowest, highest, seeds):
         for step in steps:
             p = (1.0 - lapse) / (1.0 + np.exp(-(step - place) / width))
             named, count = tried.get(step, (0, 0))

@@ -148,7 +148,7 @@ def drawn(monkeypatch):
         return "<svg></svg>"
 
     for module in ("fleet", "watched"):
-        monkeypatch.setattr(f"trueangle.reports.{module}.still", still)
+        monkeypatch.setattr(f"trueangle.reports.{module}.still_picture", still)
     return found
 
 

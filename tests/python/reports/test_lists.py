@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.plots.curves import travelled_span
+from trueangle.plots.curves import travelled_degrees
 from trueangle.reports.charts import _short
 from trueangle.reports.diagnosed import _parameter
 
@@ -31,7 +31,7 @@ def test_a_travel_without_a_model_is_drawn_in_one_piece(low, high, shown) -> Non
     rng = np.random.default_rng(20261122)
     error = rng.normal(0.0, 0.01, (2, theta.size))
     runs = [ta.CalibrationRun(theta % 360.0, theta % 360.0 + e, 360.0) for e in error]
-    assert travelled_span(runs) == pytest.approx(shown)
+    assert travelled_degrees(runs) == pytest.approx(shown)
     pytest.importorskip("bokeh")
     made = ta.report(runs)
     assert made.content["model"] is None

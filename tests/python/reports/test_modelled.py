@@ -15,7 +15,7 @@ from trueangle.reports.linenames import line_names
 from trueangle.reports.modelled import model_content, order_content
 from trueangle.reports.numbers import shortened_list
 from trueangle.reports.scale import error_scale
-from trueangle.reports.stills import Mark, _Placement
+from trueangle.reports.stills import StillMark, _Placement
 
 SEED = 56_100
 NAMES = line_names(None)
@@ -119,7 +119,7 @@ def test_a_still_picture_places_numbers_along_its_axes(log):
     limits = (1.0, 1000.0) if log else (-3.0, 12.0)
     across, up = ChartAxis("x", limits, log), ChartAxis("y", limits, log)
     place = _Placement(
-        [Mark("dots", ([1.0], [1.0]), "fore")], across, up, (60.0, 660.0), (300.0, 0.0)
+        [StillMark("dots", ([1.0], [1.0]), "fore")], across, up, (60.0, 660.0), (300.0, 0.0)
     )
     values = [1.0, 10.0, 100.0, 1000.0] if log else [-3.0, 2.0, 7.0, 12.0]
     np.testing.assert_allclose(place.of(values, 0), [60.0, 260.0, 460.0, 660.0])

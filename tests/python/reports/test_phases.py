@@ -6,7 +6,7 @@ import pytest
 import trueangle as ta
 from trueangle.reports.figures import phase_figure
 from trueangle.reports.linenames import line_names
-from trueangle.reports.scale import Scale
+from trueangle.reports.scale import ErrorScale
 from trueangle.support.display_units import error_unit
 
 SEED = 44
@@ -27,7 +27,7 @@ def fit_of(runs, orders=(1, 3)):
 @pytest.mark.parametrize(("runs", "orders"), [(3, (1, 3)), (2, (1,)), (1, (1, 3))])
 def test_every_order_of_several_runs_has_a_chart(runs, orders):
     figure = phase_figure(
-        fit_of(runs, orders), line_names(None), Scale(error_unit("arcsec"), 100.0)
+        fit_of(runs, orders), line_names(None), ErrorScale(error_unit("arcsec"), 100.0)
     )
     if runs == 1:
         assert figure is None

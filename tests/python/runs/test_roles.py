@@ -27,7 +27,7 @@ def each_door(path, tmp_path, **reading):
     import trueangle.logs.fitting as fitting
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(fitting, "hold_at_most", lambda *_args: False)
+        patched.setattr(fitting, "logs_hold_at_most", lambda *_args: False)
         fits.append(ta.fit_logs(path, [1], loss="linear", **reading))
     found = []
     for fit in fits:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trueangle.selfcalibration.choice import chosen_orders
 from trueangle.selfcalibration.dense import (
     DenseRows,
     _evidence,
@@ -14,10 +13,11 @@ from trueangle.selfcalibration.dense import (
     fit_dense,
     low_frequency_inflation,
 )
-from trueangle.selfcalibration.projected import Projected, Unknown, pairs
+from trueangle.selfcalibration.orderchoice import significant_orders
+from trueangle.selfcalibration.projected import Projected, Unknown, harmonic_unknowns
 
 N = 300
-COLUMNS = pairs("the encoder", [1, 2])
+COLUMNS = harmonic_unknowns("the encoder", [1, 2])
 
 
 def rows(seed: int, n: int = N) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -187,12 +187,12 @@ def test_orders_stand_out_of_their_errors_as_often_as_chance_says() -> None:
     """One in a hundred of noise, of as many orders as are tried."""
     rng = np.random.default_rng(7)
     orders = list(range(1, 11))
-    columns = tuple(pairs("a", orders) + pairs("b", orders))
+    columns = tuple(harmonic_unknowns("a", orders) + harmonic_unknowns("b", orders))
     nothing = Projected(columns, np.eye(40), np.zeros(40), np.ones(40), 1.0, 1.0)
     half = rng.normal(size=(40, 40)) * 0.3 + np.eye(40)
     covariance = half @ half.T
     told = [
-        bool(chosen_orders(nothing, half @ rng.normal(size=40), covariance, orders, "b"))
+        bool(significant_orders(nothing, half @ rng.normal(size=40), covariance, orders, "b"))
         for _ in range(600)
     ]
     assert 1 <= sum(told) <= 16  # of 6, four deviations
@@ -200,5 +200,5 @@ def test_orders_stand_out_of_their_errors_as_often_as_chance_says() -> None:
     for size, kept in ((limit * 0.999, ()), (limit * 1.001, (3,))):
         at = np.zeros(40)
         at[columns.index(Unknown("b", 3.0, "sin"))] = np.sqrt(size)
-        assert chosen_orders(nothing, at, np.eye(40), orders, "b") == kept
-        assert chosen_orders(nothing, at, np.eye(40), orders, "a") == ()
+        assert significant_orders(nothing, at, np.eye(40), orders, "b") == kept
+        assert significant_orders(nothing, at, np.eye(40), orders, "a") == ()

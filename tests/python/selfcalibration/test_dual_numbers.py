@@ -10,7 +10,7 @@ from scipy import signal, stats
 
 import trueangle as ta
 from selfcalibration.rotor import ARCSEC
-from trueangle.selfcalibration.gearlines import motion, turning
+from trueangle.selfcalibration.gearlines import gear_motion, near_reversal
 
 SEED = 68_000
 SEEDS = range(SEED, SEED + 10)
@@ -70,8 +70,8 @@ def test_numbers_and_errors_are_those_of_least_squares(found: list[ta.SelfCalibr
     """All columns of the readings away from reversals, beside a zero, solved at once."""
     log, one = there_and_back(SEED), found[0]
     theta = log["motor_rad"] / RATIO
-    way, speed = motion(theta, log["time_s"])
-    kept = ~turning(way)
+    way, speed = gear_motion(theta, log["time_s"])
+    kept = ~near_reversal(way)
     # The output's waves begin at the median of its zero, which moves them by nothing seen.
     place = theta + float(np.median(log["indicated_rad"] - theta))
     waves = [
@@ -136,7 +136,7 @@ def test_p_is_that_of_patterns_fitted_to_each_part(found: list[ta.SelfCalibratio
     """Hotelling's T squared of two fits by themselves, with the freedom that both leave."""
     log = there_and_back(SEED)
     theta = log["motor_rad"] / RATIO
-    way, speed = motion(theta, log["time_s"])
+    way, speed = gear_motion(theta, log["time_s"])
     place = theta + float(np.median(log["indicated_rad"] - theta))
     columns = [
         f(o.order * (place if o.order in (1.0, 2.0) else theta))
@@ -146,7 +146,7 @@ def test_p_is_that_of_patterns_fitted_to_each_part(found: list[ta.SelfCalibratio
     design = np.column_stack([*columns, way, speed, np.ones(theta.size)])
     size, fits, spread, freedom = len(columns), [], 0.0, 0
     for first in (0, 1):  # even and odd ones of 20 blocks of the run
-        part = (np.arange(700) // 35 % 2 == first) & ~turning(way)
+        part = (np.arange(700) // 35 % 2 == first) & ~near_reversal(way)
         rows, target = design[part], (log["indicated_rad"] - theta)[part]
         x, squares, *_ = np.linalg.lstsq(rows, target, rcond=None)
         left = len(rows) - rows.shape[1]
@@ -189,11 +189,11 @@ def test_the_model_takes_off_the_lines_of_both_shafts(found: list[ta.SelfCalibra
     """Where the motor's lines stand at the output is told with their phase."""
     log = there_and_back(SEED)
     theta = log["motor_rad"] / RATIO
-    way, speed = motion(theta, log["time_s"])
+    way, speed = gear_motion(theta, log["time_s"])
     read = log["indicated_rad"] + DELAY * speed - 0.5 * PLAY * ARCSEC * way
     left = np.radians(found[0].model.correct(np.degrees(read))) - theta
     # 700 readings tell their deviation to 2.7 %, and 20 coefficients follow them.
-    assert np.std(left[~turning(way)]) / ARCSEC == pytest.approx(NOISE, rel=0.12)
+    assert np.std(left[~near_reversal(way)]) / ARCSEC == pytest.approx(NOISE, rel=0.12)
 
 
 def told(one: ta.SelfCalibration) -> dict[str, object]:

@@ -8,8 +8,8 @@ from scipy import stats
 
 import trueangle as ta
 from trueangle.errors import ArgumentError, NoModelError
-from trueangle.selfcalibration.choice import chosen_orders
-from trueangle.selfcalibration.projected import Projected, pairs
+from trueangle.selfcalibration.orderchoice import significant_orders
+from trueangle.selfcalibration.projected import Projected, harmonic_unknowns
 
 from .test_other_methods import dual_log, heads_log, shifts_log
 
@@ -177,9 +177,9 @@ def test_an_order_stands_out_where_chance_makes_none_of_thirty_so_large() -> Non
     size = np.sqrt(limit * np.where(np.arange(30) % 3 == 0, 1.01, 0.99))
     turned = np.stack([np.cos(np.arange(30.0)), np.sin(np.arange(30.0))], axis=1)
     values = (size[:, None] * turned) @ half.T
-    columns = tuple(pairs("the encoder", orders))
+    columns = tuple(harmonic_unknowns("the encoder", orders))
     one = np.ones(60)
     told = Projected(columns, np.eye(60), one, one, 1.0, 900.0)
     covariance = np.kron(np.eye(30), half @ half.T)
-    kept = chosen_orders(told, values.ravel(), covariance, orders)
+    kept = significant_orders(told, values.ravel(), covariance, orders)
     assert kept == tuple(orders[::3])

@@ -7,25 +7,31 @@ import math
 import numpy as np
 import pytest
 
+from trueangle import selfcalibration
 from trueangle.errors import ArgumentError, NotInvertibleError
 from trueangle.model.model import HarmonicModel
-from trueangle.selfcalibration.colour import noise_beside, spectrum_at
-from trueangle.selfcalibration.loop import check_loop, followed_orders, followed_share, widened
-from trueangle.selfcalibration.modelling import made_model
-from trueangle.selfcalibration.pattern import pattern_model, pattern_series, steepness
+from trueangle.selfcalibration.loop import (
+    check_loop,
+    followed_orders,
+    followed_share,
+    widened_by_loop,
+)
+from trueangle.selfcalibration.model import reference_free_model
+from trueangle.selfcalibration.noisespectrum import noise_spectrum_at, spectrum_at
+from trueangle.selfcalibration.pattern import pattern_model, pattern_series, pattern_steepness
 from trueangle.selfcalibration.projected import harmonic_rows, harmonic_sum
 from trueangle.selfcalibration.recording import Recording
 from trueangle.selfcalibration.result import (
     Blind,
-    HeldOut,
+    HeldOutPattern,
     OrderEstimate,
     SelfCalibration,
-    estimates,
-    listed,
-    ranges,
+    blind_words,
+    order_estimates,
+    order_ranges,
 )
 from trueangle.selfcalibration.ripple import averaged_over_ripple, cost_of_ripple
-from trueangle.selfcalibration.verification import chance_of, judged
+from trueangle.selfcalibration.verification import chance_of_difference, judged_patterns
 
 ARCSEC = 1_296_000.0 / (2.0 * math.pi)
 
@@ -41,8 +47,10 @@ def test_orders_with_the_errors_of_their_amplitudes() -> None:
     covariance[2:, 2:] = half @ half.T
     covariance[:2, :2] = np.eye(2) * 1e-12
     coefficients = np.array([0.0, 0.0, 3e-4, -4e-4])
-    first, second = estimates([1, 2.5], coefficients, covariance, np.array([0.9, 0.8, 0.7, 0.6]),
-                              1e-6, ["zero", "second"])  # fmt: skip
+    reached = np.array([0.9, 0.8, 0.7, 0.6])
+    first, second = order_estimates(
+        [1, 2.5], coefficients, covariance, reached, 1e-6, ["zero", "second"]
+    )
     rng = np.random.default_rng(1)
     drawn = coefficients[2:] + rng.normal(size=(20_000, 2)) @ half.T
     assert second.std == pytest.approx(np.hypot(*drawn.T).std() * ARCSEC, rel=0.03)
@@ -57,7 +65,7 @@ def test_orders_with_the_errors_of_their_amplitudes() -> None:
     )
     assert 0.0 <= second.phase_deg < 360.0
     assert (first.std, first.retained) == (pytest.approx(1e-6 * ARCSEC), 0.8)
-    alone = estimates([1], coefficients[2:], covariance[2:, 2:], np.ones(2), 0.0)[0]
+    alone = order_estimates([1], coefficients[2:], covariance[2:, 2:], np.ones(2), 0.0)[0]
     assert alone.std_factor == math.inf
     told = alone.to_dict()
     assert told == {
@@ -78,19 +86,21 @@ def test_halves_are_judged_by_chi_squared() -> None:
     half = np.tril(rng.normal(size=(4, 4))) + 2.0 * np.eye(4)
     first = rng.normal(size=4)
     ps = [
-        judged(first, first + half @ rng.normal(size=4), half @ half.T, 1.0, ("a", "b")).p
+        judged_patterns(first, first + half @ rng.normal(size=4), half @ half.T, 1.0, ("a", "b")).p
         for _ in range(500)
     ]
     # Kolmogorov's distance of 500 uniform numbers: 1.95 / sqrt(500) once in a thousand.
     away = np.abs(np.sort(ps) - (np.arange(500) + 0.5) / 500).max()
     assert away < 1.95 / math.sqrt(500)
-    found = judged(np.array([1e-5, 0.0]), np.array([1e-5, 2e-5]), np.eye(2), 3e-5, ("a", "b"))
+    found = judged_patterns(
+        np.array([1e-5, 0.0]), np.array([1e-5, 2e-5]), np.eye(2), 3e-5, ("a", "b")
+    )
     assert found.rms_before == pytest.approx(math.sqrt(9.0 + 0.5 * 5.0) * 1e-5 * ARCSEC)
     assert found.rms_after == pytest.approx(math.sqrt(9.0 + 0.5 * 4.0) * 1e-5 * ARCSEC)
     assert (found.fitted_on, found.judged_on) == ("a", "b")
-    assert HeldOut("a", "b", 1.0, 2.0, 0.0011).to_dict()["agrees"]
-    assert not HeldOut("a", "b", 1.0, 2.0, 0.001).to_dict()["agrees"]
-    none = judged(np.zeros(0), np.zeros(0), np.zeros((0, 0)), 1e-5, ("a", "b"))
+    assert HeldOutPattern("a", "b", 1.0, 2.0, 0.0011).to_dict()["agrees"]
+    assert not HeldOutPattern("a", "b", 1.0, 2.0, 0.001).to_dict()["agrees"]
+    none = judged_patterns(np.zeros(0), np.zeros(0), np.zeros((0, 0)), 1e-5, ("a", "b"))
     assert none.p == 1.0
 
 
@@ -100,9 +110,9 @@ def test_so_great_a_difference_is_as_frequent_as_its_chance_says() -> None:
     half = np.tril(rng.normal(size=(4, 4))) + 2.0 * np.eye(4)
     for _ in range(500):
         gap, *draws = (half @ rng.normal(size=(4, 13))).T
-        ps.append(chance_of(gap, np.mean([np.outer(x, x) for x in draws], axis=0), 12.0))
+        ps.append(chance_of_difference(gap, np.mean([np.outer(x, x) for x in draws], axis=0), 12.0))
     assert np.abs(np.sort(ps) - (np.arange(500) + 0.5) / 500).max() < 1.95 / math.sqrt(500)
-    assert chance_of(np.array([3.0, 0.0]), np.eye(2)) == pytest.approx(math.exp(-4.5))
+    assert chance_of_difference(np.array([3.0, 0.0]), np.eye(2)) == pytest.approx(math.exp(-4.5))
 
 
 def test_a_loop_hides_what_passes_slowly() -> None:
@@ -139,12 +149,12 @@ def test_what_a_loop_may_have_done_widens_the_error() -> None:
     rng = np.random.default_rng(3)
     radius = 0.2 * 5.0 * np.sqrt(rng.uniform(size=200_000))
     along = radius * np.cos(rng.uniform(0.0, 2.0 * np.pi, radius.size))
-    found = widened(given, 0.2)
+    found = widened_by_loop(given, 0.2)
     assert found.std == pytest.approx(math.hypot(0.5, along.std()), rel=0.01)
     assert found.std_factor / found.std == pytest.approx(given.std_factor / given.std)
-    assert widened(given, 0.0) is given
+    assert widened_by_loop(given, 0.0) is given
     still = order(3.0, std=0.0)
-    assert widened(still, 0.2) is still
+    assert widened_by_loop(still, 0.2) is still
 
 
 @pytest.mark.parametrize("speeds", [1.0, 1.3, 5.0])
@@ -245,11 +255,11 @@ def test_loud_noise_beside_an_order_is_told() -> None:
             rng.normal() * np.cos(k * theta) + rng.normal() * np.sin(k * theta)
             for k in np.arange(4.5, 5.5, 0.025)
         )
-        found = noise_beside(theta, white + 0.3 * band, [2.0, 5.0], turns)
+        found = noise_spectrum_at(theta, white + 0.3 * band, [2.0, 5.0], turns)
         assert found[0] < 3.0
         assert (found[1] > 20.0) == loud
     # Once in a thousand orders, as the level says: of 300 more than four once in a million.
-    assert (noise_beside(theta, white, list(range(1, 301)), 40.0) != 1.0).sum() <= 4
+    assert (noise_spectrum_at(theta, white, list(range(1, 301)), 40.0) != 1.0).sum() <= 4
 
 
 def test_patterns_are_their_sines() -> None:
@@ -272,14 +282,14 @@ def test_patterns_are_their_sines() -> None:
     assert pattern_model([], np.zeros(0)).shafts == ()
     fine = np.linspace(0.0, 2.0 * np.pi, 20_001)
     slope = np.gradient(pattern_series([1, 3], c, fine), fine)
-    assert np.abs(slope).max() * 0.999 <= steepness([1, 3], c) <= np.abs(slope).max() * 1.5
+    assert np.abs(slope).max() * 0.999 <= pattern_steepness([1, 3], c) <= np.abs(slope).max() * 1.5
 
 
 @pytest.mark.parametrize("period", [360.0, 2.0 * math.pi, 1.0, 4096.0])
 def test_a_model_has_the_orders_of_both_shafts_in_every_unit(period: float) -> None:
     motor = (50.0, [OrderEstimate(50.0, 1.0, 2.0, 0.3, 1.0, 1.0)])
     recordings = [Recording("a"), Recording("b")]
-    model = made_model(
+    model = reference_free_model(
         [order(3.0), order(1.0, 6.0, 8.0)], "dual", ["zero: unseen"], ["one note", "another"],
         recordings, readings=77, noise=1e-5, period=period, motor=motor,
     )  # fmt: skip
@@ -298,8 +308,8 @@ def test_a_model_has_the_orders_of_both_shafts_in_every_unit(period: float) -> N
     assert record.residual / period == pytest.approx(1e-5 / (2.0 * math.pi))
     assert record.calibrated_without_reference
     assert record.note == "One note. Another."
-    alone = made_model([], "heads", [], [], recordings, readings=1, noise=0.0, period=period,
-                       motor=motor, span=(0.0, 0.5 * period))  # fmt: skip
+    alone = reference_free_model([], "heads", [], [], recordings, readings=1, noise=0.0,
+                                 period=period, motor=motor, span=(0.0, 0.5 * period))  # fmt: skip
     assert [s.name for s in alone.shafts] == ["motor"]
     assert alone.fit.span == (0.0, 0.5 * period)
 
@@ -308,19 +318,21 @@ def test_a_pattern_that_no_encoder_has_is_refused_without_an_advice_for_fits() -
     """Order 3 of 1/3 rad has the slope 1; the message neither names an argument of a fit."""
     steep = [order(3.0, 0.5 * ARCSEC, 0.0)]
     with pytest.raises(NotInvertibleError, match=r"no encoder's: its slope reaches 1\.5") as told:
-        made_model(steep, "heads", [], [], [Recording("a")], readings=9, noise=0.0, period=360.0)
+        reference_free_model(
+            steep, "heads", [], [], [Recording("a")], readings=9, noise=0.0, period=360.0
+        )
     assert told.value.slope == pytest.approx(1.5)
     assert "argument" not in str(told.value)
 
 
 def test_a_summary_tells_every_number() -> None:
-    assert ranges([]) == ""
-    assert ranges([5, 1, 2]) == "1, 2, 5"
-    assert ranges([1, 2, 3, 7.3, 8, 9, 10]) == "1-3, 7.3, 8-10"
-    assert listed([0.0]) == "zero"
-    assert listed([1.0, 2.0, 3.0]) == "orders 1-3"
-    tests = {"a": HeldOut("odd turns", "even turns", 9.0, 2.0, 0.5),
-             "b": HeldOut("forward", "backward", 9.0, 2.0, 0.0005)}  # fmt: skip
+    assert order_ranges([]) == ""
+    assert order_ranges([5, 1, 2]) == "1, 2, 5"
+    assert order_ranges([1, 2, 3, 7.3, 8, 9, 10]) == "1-3, 7.3, 8-10"
+    assert blind_words([0.0]) == "zero"
+    assert blind_words([1.0, 2.0, 3.0]) == "orders 1-3"
+    tests = {"a": HeldOutPattern("odd turns", "even turns", 9.0, 2.0, 0.5),
+             "b": HeldOutPattern("forward", "backward", 9.0, 2.0, 0.0005)}  # fmt: skip
     result = SelfCalibration(
         "dual", pattern_model([], np.zeros(0)), (order(1.0),), (), (Blind((2.0, 3.5), "x", "y"),),
         tests, ("careful",), 1.5, 900, 12.34,
@@ -344,3 +356,9 @@ def test_a_summary_tells_every_number() -> None:
     assert "not the encoder's alone" in named
     assert "both" in named
     assert result.to_dict()["blind"][0]["orders"] == [2, 3.5]
+
+
+def test_the_former_name_of_a_pattern_held_out() -> None:
+    with pytest.warns(DeprecationWarning, match="HeldOutPattern"):
+        assert selfcalibration.HeldOut is HeldOutPattern
+    assert not hasattr(selfcalibration, "HeldIn")

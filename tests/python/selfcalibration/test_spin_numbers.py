@@ -185,7 +185,7 @@ def test_louder_noise_beside_the_orders_widens_errors_by_its_root(
 ) -> None:
     from trueangle.selfcalibration import spindown
 
-    monkeypatch.setattr(spindown, "noise_beside", lambda *_: np.array([4.0, 1.0, 9.0]))
+    monkeypatch.setattr(spindown, "noise_spectrum_at", lambda *_: np.array([4.0, 1.0, 9.0]))
     louder = ta.selfcal(log, **OPTIONS)
     for o, p, times in zip(found.orders, louder.orders, (2.0, 1.0, 3.0), strict=True):
         assert p.std == pytest.approx(times * o.std, rel=1e-9)
@@ -198,7 +198,7 @@ def test_parts_are_held_against_the_loudest_neighbourhood(log, found, place, mon
     """T^2 of two parts is less by as much as the noise is louder, beside whichever order."""
     colour = np.ones(3)
     colour[place] = 5.0
-    monkeypatch.setattr("trueangle.selfcalibration.spindown.noise_beside", lambda *_: colour)
+    monkeypatch.setattr("trueangle.selfcalibration.spindown.noise_spectrum_at", lambda *_: colour)
     loud = ta.selfcal(log, **OPTIONS)
     assert loud.held_out.keys() == found.held_out.keys()
     for name, test in found.held_out.items():

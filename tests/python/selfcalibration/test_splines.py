@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from trueangle.selfcalibration.motion import MotionSearch
-from trueangle.selfcalibration.projected import pairs
+from trueangle.selfcalibration.projected import harmonic_unknowns
 from trueangle.selfcalibration.splines import (
+    DriftPenalty,
     Knots,
-    Wander,
     banded_product,
     coarser_bands,
     coarser_rows,
@@ -20,7 +20,7 @@ from trueangle.selfcalibration.splines import (
     spline_basis,
     spline_values,
 )
-from trueangle.selfcalibration.sums import MotionSums, ordered_sums
+from trueangle.selfcalibration.sums import MotionSums, ordered_motion_sums
 
 KNOTS = Knots((1.0, 30.0), (16, 8), 0.5)
 
@@ -105,15 +105,15 @@ def test_a_coarser_spline_is_a_finer_one() -> None:
 
 @pytest.mark.parametrize("memory", [0.3, 7.0])
 def test_the_prior_is_that_of_its_differences(memory: float) -> None:
-    wander = Wander(KNOTS)
+    drift = DriftPenalty(KNOTS)
     third, second = differences(KNOTS, 3), differences(KNOTS, 2)
     mu = (0.5 / memory) ** 2
     prior = third.T @ third + mu * second.T @ second
-    np.testing.assert_allclose(dense(wander.bands(2.5, memory)), 2.5 * prior, atol=1e-12)
+    np.testing.assert_allclose(dense(drift.bands(2.5, memory)), 2.5 * prior, atol=1e-12)
     c = np.random.default_rng(6).normal(size=KNOTS.size)
-    assert wander.energy(c, memory) == pytest.approx(c @ prior @ c)
-    np.testing.assert_allclose(wander.pull(c, memory), prior @ c, atol=1e-12)
-    assert wander.rank == np.linalg.matrix_rank(prior) == 26
+    assert drift.energy(c, memory) == pytest.approx(c @ prior @ c)
+    np.testing.assert_allclose(drift.pull(c, memory), prior @ c, atol=1e-12)
+    assert drift.rank == np.linalg.matrix_rank(prior) == 26
     # Of what the prior holds: with the lines of each stretch measured in place and speed.
     lines = np.zeros((KNOTS.size, 4))
     for g, (first, n) in enumerate(zip(KNOTS.first, KNOTS.intervals, strict=False)):
@@ -123,7 +123,7 @@ def test_the_prior_is_that_of_its_differences(memory: float) -> None:
     held = np.linalg.slogdet(2.5 * prior + lines @ np.linalg.inv(lines.T @ lines) @ lines.T)[1]
     # The measure of the lines: the volume that one second of place and speed spans.
     volume = np.linalg.slogdet(lines.T @ lines)[1]
-    assert wander.log_determinant(2.5, memory) == pytest.approx(held - volume, abs=1e-8)
+    assert drift.log_determinant(2.5, memory) == pytest.approx(held - volume, abs=1e-8)
 
 
 def test_trends_are_polynomials_that_no_straight_line_is() -> None:
@@ -150,7 +150,7 @@ def summed(valid: np.ndarray | None = None, repeat: int = 1) -> tuple[MotionSums
     def columns(part: slice, out: np.ndarray) -> None:
         out[:] = common[:, part]
 
-    found = ordered_sums(KNOTS, index, place, target, weight, columns, 2, valid)
+    found = ordered_motion_sums(KNOTS, index, place, target, weight, columns, 2, valid)
     return found, (design(KNOTS, stretch, time) * weight[:, None], common.T, target)
 
 
@@ -180,7 +180,7 @@ def test_sums_are_those_of_the_rows(kept: float | None, repeat: int) -> None:
 def test_a_fit_of_motion_is_penalised_least_squares(level: int, trends: tuple) -> None:
     """Motion, columns, covariance and evidence against one dense system."""
     sums, (s, x, y) = summed()
-    columns = pairs("the encoder", [3.0])
+    columns = harmonic_unknowns("the encoder", [3.0])
     motion = np.random.default_rng(9).normal(size=KNOTS.size)
     found = MotionSearch(sums, motion, columns, trends).fit(level, 4.0, 2.0)
     knots = KNOTS if level == 0 else KNOTS.coarser
@@ -219,7 +219,7 @@ def test_a_fit_of_motion_is_penalised_least_squares(level: int, trends: tuple) -
         * (
             freedom * math.log(variance)
             + np.linalg.slogdet(normal)[1]
-            - Wander(knots).log_determinant(4.0, 2.0)
+            - DriftPenalty(knots).log_determinant(4.0, 2.0)
         ),
         abs=1e-6,
     )

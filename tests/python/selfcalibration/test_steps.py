@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from selfcalibration.test_stretches import TURN, segment
+from selfcalibration.test_segments import TURN, segment
 from trueangle.selfcalibration import steps as module
 from trueangle.selfcalibration.projected import Unknown
 from trueangle.selfcalibration.readings import SegmentReadings
-from trueangle.selfcalibration.steps import Steps
+from trueangle.selfcalibration.steps import GaussNewtonSteps
 
 SEED = 69_000
 ORDERS, RIPPLE = (1.0, 3.0), (1.0, 2.0)
 
 
-def work(sets: int, extra: bool) -> tuple[Steps, np.ndarray]:
+def work(sets: int, extra: bool) -> tuple[GaussNewtonSteps, np.ndarray]:
     """A coast of 600 readings over 8 turns, and unknowns some mrad in size."""
     rng = np.random.default_rng(SEED)
     time = np.arange(600) / 300.0
@@ -26,7 +26,7 @@ def work(sets: int, extra: bool) -> tuple[Steps, np.ndarray]:
     groups = (np.arange(600) // 150) % 2 if sets == 2 else None
     size = sets * 2 * len(ORDERS) + 2 * len(RIPPLE) + extra
     columns = [Unknown(f"{k}", 0.0, "") for k in range(size)]
-    found = Steps(readings, ORDERS, RIPPLE, groups, columns)
+    found = GaussNewtonSteps(readings, ORDERS, RIPPLE, groups, columns)
     return found, 5e-3 * rng.normal(size=size)
 
 
@@ -67,7 +67,7 @@ def test_columns_are_what_each_unknown_takes_of_what_is_left(
         write(slice(0, left.size), out)
         raise CaughtError(weight, out)
 
-    monkeypatch.setattr(module, "ordered_sums", caught)
+    monkeypatch.setattr(module, "ordered_motion_sums", caught)
     with pytest.raises(CaughtError) as raised:
         steps.step(knots, spline, unknowns, np.ones(600, bool), 1)
     weight, out = raised.value.args

@@ -47,13 +47,13 @@ def test_a_difference_is_worth_what_both_patterns_and_their_link_say(
         fits.append(_fit(*given, **more))
         return fits[-1]
 
-    def judged(first, second, covariance, *rest, _judged=verification.judged):
+    def judged(first, second, covariance, *rest, _judged=verification.judged_patterns):
         taken.append((second - first, covariance))
         return _judged(first, second, covariance, *rest)
 
     monkeypatch.setattr(verification, "fit_steady", fitted)
-    monkeypatch.setattr(verification, "judged", judged)
-    monkeypatch.setattr(spindown, "noise_beside", lambda *_: np.array([4.0, 1.0]))
+    monkeypatch.setattr(verification, "judged_patterns", judged)
+    monkeypatch.setattr(spindown, "noise_spectrum_at", lambda *_: np.array([4.0, 1.0]))
     assert set(selfcal(log_of(SEED)).held_out) == {"odd_even_turns", "speeds"}
     contrast = np.hstack([-np.eye(4), np.eye(4)])
     for fit, (gap, covariance) in zip(fits, taken, strict=True):

@@ -6,10 +6,10 @@ from scipy.integrate import solve_ivp
 
 from trueangle.errors import ArgumentError
 from trueangle.joint.pattern import Pattern
-from trueangle.simulation.rotor import ARCSEC_PER_RAD, Drive, rotor_angle
+from trueangle.simulation.rotor import ARCSEC_PER_RAD, RotorDrive, rotor_angle
 
 TIME = np.sort(np.random.default_rng(3).uniform(0.0, 4.0, 60))
-NOTHING = Drive(0.3, 2.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0)
+NOTHING = RotorDrive(0.3, 2.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0)
 #: Orders, cosines and sines in arcsec of what the loop sees.
 LINES = ((1.0, 900.0, -400.0), (4.0, 0.0, 300.0))
 
@@ -73,8 +73,8 @@ def test_a_friction_that_wanders_pushes_by_its_size_and_forgets():
     """Each reading's own, until the next; its correlation falls by e in its memory."""
     time = np.arange(40_000) * 0.05
     drive = NOTHING._replace(friction_deg_s2=3.0, memory_s=0.5)
-    from trueangle.simulation.rotor import _wander
+    from trueangle.simulation.rotor import _drift
 
-    pushed = _wander(drive, time, np.random.default_rng(7))
+    pushed = _drift(drive, time, np.random.default_rng(7))
     assert np.std(pushed) == pytest.approx(3.0, rel=0.05)
     assert np.mean(pushed[10:] * pushed[:-10]) / 9.0 == pytest.approx(np.exp(-1.0), abs=0.03)

@@ -14,10 +14,10 @@ from trueangle.errors import ArgumentError
 from trueangle.support.display_units import (
     LARGE,
     ErrorUnit,
-    brief,
+    brief_number,
     error_unit,
-    phase_pair,
-    significant,
+    rounded_phase,
+    significant_digits,
     sine_of_rms,
 )
 
@@ -43,12 +43,12 @@ def test_a_number_is_rounded_to_two_digits_of_its_error(asked, value, std) -> No
         assert 9.9 <= float(spread) * 10.0**decimals <= 100.0
     name = asked if isinstance(asked, str) else "count"
     assert unit.text(value, std) == f"{shown} +- {spread} {name}"
-    assert unit.text(value) == f"{significant(value * per)} {name}"
+    assert unit.text(value) == f"{significant_digits(value * per)} {name}"
 
 
 @given(value=sizes, digits=st.integers(1, 6))
 def test_significant_digits_are_so_many(value: float, digits: int) -> None:
-    shown = significant(value, digits)
+    shown = significant_digits(value, digits)
     assert "e" not in shown
     assert float(shown) == pytest.approx(value, rel=0.5000001 * 10.0 ** (1 - digits), abs=1e-12)
     assert not shown.startswith("-0.") or float(shown) < 0.0
@@ -56,12 +56,12 @@ def test_significant_digits_are_so_many(value: float, digits: int) -> None:
 
 @given(phase=st.floats(-720.0, 720.0), std=st.floats(1e-3, 500.0))
 def test_a_phase_lies_in_one_turn_and_is_known_to_half_of_it_at_least(phase, std) -> None:
-    shown, spread = phase_pair(phase, std)
+    shown, spread = rounded_phase(phase, std)
     assert 0.0 <= float(shown) < 360.0
     away = (float(shown) - phase + 180.0) % 360.0 - 180.0
     assert abs(away) <= 0.5000001 * 10.0 ** -len(spread.partition(".")[2])
     assert float(spread) == pytest.approx(min(std, 180.0), rel=0.051)
-    assert phase_pair(phase, None)[1] == "-"
+    assert rounded_phase(phase, None)[1] == "-"
 
 
 def test_the_unit_by_itself_is_arcsec_below_a_degree() -> None:
@@ -91,8 +91,8 @@ def test_sentences_say_their_sizes_in_the_unit(asked: str) -> None:
 
 @given(value=sizes)
 def test_a_size_in_a_sentence_has_two_digits(value: float) -> None:
-    assert float(brief(value)) == pytest.approx(value, rel=0.0501, abs=0.5)
-    assert "e" not in brief(value) or abs(value) < 1e-4
+    assert float(brief_number(value)) == pytest.approx(value, rel=0.0501, abs=0.5)
+    assert "e" not in brief_number(value) or abs(value) < 1e-4
 
 
 @pytest.mark.parametrize("arcsec", [0.0, math.nan, math.inf, 36.0, 0.00123])

@@ -282,7 +282,7 @@ def test_files_have_a_size_limit_that_the_message_names(tmp_path, monkeypatch):
 
 
 def test_what_is_written_is_small_enough_to_be_read(tmp_path, model, monkeypatch):
-    from trueangle.model import text as modeltext
+    from trueangle.model import writing as modeltext
 
     monkeypatch.setattr(modeltext, "MODEL_BYTES", 100)
     with pytest.raises(ta.errors.ArgumentError, match="covariance"):

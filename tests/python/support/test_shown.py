@@ -16,7 +16,7 @@ import pytest
 import trueangle as ta
 from trueangle.planning import plan_mounts, plan_self
 from trueangle.simulation import Backlash, Harmonic, RunDesign, Simulation
-from trueangle.support.plainresult import Shown
+from trueangle.support.plainresult import ShownResult
 
 #: Characters of one line of a screen.
 LINE = 120
@@ -164,10 +164,10 @@ def test_every_public_result_class_shows_itself() -> None:
     results = {kind for kind in found if returns_text(getattr(kind, "summary", None))}
     assert len(results) > 10
     for kind in sorted(results, key=lambda kind: kind.__qualname__):
-        assert issubclass(kind, Shown), kind
+        assert issubclass(kind, ShownResult), kind
         assert "__str__" not in kind.__dict__, f"{kind}: its text is its summary"
     for kind in found:
-        if issubclass(kind, Shown) and "__dataclass_fields__" in kind.__dict__:
+        if issubclass(kind, ShownResult) and "__dataclass_fields__" in kind.__dict__:
             own = kind.__dict__["__repr__"]
             assert own.__qualname__.startswith((kind.__qualname__, "Shown")), kind
 
@@ -188,7 +188,7 @@ def test_a_long_line_is_cut() -> None:
         runs=tuple(RunDesign(label="x" * 40) for _ in range(3)), sigma_arcsec=float(np.pi)
     )
 
-    class Wordy(Shown):
+    class Wordy(ShownResult):
         def _brief(self) -> str:
             return "word " * 100
 

@@ -45,6 +45,26 @@ ALTERS = (
 )
 
 
+def ran(arguments: list[str], folder: Path, columns: int) -> tuple[int, str, str]:
+    """Status of a command in ``folder``, and what it prints and tells at so many columns."""
+    told, warned = io.StringIO(), io.StringIO()
+    before, width = os.getcwd(), os.environ.get("COLUMNS")
+    os.chdir(folder)
+    os.environ["COLUMNS"] = str(columns)
+    try:
+        with contextlib.redirect_stdout(told), contextlib.redirect_stderr(warned):
+            try:
+                status = main(arguments)
+            except SystemExit as left:
+                status = int(left.code or 0)
+    finally:
+        os.chdir(before)
+        os.environ.pop("COLUMNS")
+        if width is not None:
+            os.environ["COLUMNS"] = width
+    return status, told.getvalue(), warned.getvalue()
+
+
 class Terminal:
     """Runs the commands of one transcript, one after the other, in one folder.
 
@@ -90,20 +110,13 @@ class Terminal:
         return [line.rstrip() for line in text.splitlines()]
 
     def _trueangle(self, arguments: list[str]) -> str:
-        told, warned = io.StringIO(), io.StringIO()
-        with self._inside(), contextlib.redirect_stdout(told), contextlib.redirect_stderr(warned):
-            try:
-                # As a command has them: here, warnings are errors.
-                with warnings.catch_warnings():
-                    warnings.simplefilter("default")
-                    status = main(arguments)
-            except SystemExit as left:
-                status = int(left.code or 0)
-        text = told.getvalue()
+        with self._kept(), warnings.catch_warnings():
+            warnings.simplefilter("default")  # as a command has them: here, warnings are errors
+            status, text, warned = ran(arguments, self.folder, COLUMNS)
         if "--json" in arguments:
             objects = text.splitlines() if arguments[0] == "watch" else [text] if text else []
             text = "".join(f"{line}\n" for each in objects for line in file_lines(each, ".json"))
-        return text + warned.getvalue() + (f"[{status}]" if status else "")
+        return text + warned + (f"[{status}]" if status else "")
 
     def _show(self, arguments: list[str]) -> str:
         path, wanted = self.folder / arguments[0], " ".join(arguments[1:])
@@ -186,21 +199,18 @@ class Terminal:
         return eval(expression, self._names)
 
     @contextlib.contextmanager
-    def _inside(self) -> Iterator[None]:
-        """Commands run in the folder, on a terminal of so many columns; figures are kept."""
+    def _kept(self) -> Iterator[None]:
+        """Lines on every figure that is saved are kept; no runs are planned."""
         from matplotlib.figure import Figure
 
-        from trueangle.diagnosis.findings import Diagnosis
+        from trueangle.diagnosis.result import Diagnosis
 
-        before, width, save = os.getcwd(), os.environ.get("COLUMNS"), Figure.savefig
-        planned = Diagnosis.next_runs
+        save, planned = Figure.savefig, Diagnosis.next_runs
 
         def kept(figure: Figure, *args: Any, **kwargs: Any) -> None:
             self._figures += figure_lines(figure)
             save(figure, *args, **kwargs)
 
-        os.chdir(self.folder)
-        os.environ["COLUMNS"] = str(COLUMNS)
         Figure.savefig = kept  # type: ignore[method-assign]
         # Seconds each; `plan --after` shows one.
         Diagnosis.next_runs = None  # type: ignore[assignment]
@@ -209,7 +219,3 @@ class Terminal:
         finally:
             Figure.savefig = save  # type: ignore[method-assign]
             Diagnosis.next_runs = planned  # type: ignore[method-assign]
-            os.chdir(before)
-            os.environ.pop("COLUMNS")
-            if width is not None:
-                os.environ["COLUMNS"] = width

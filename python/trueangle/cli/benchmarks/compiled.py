@@ -49,7 +49,7 @@ def _library() -> ctypes.CDLL:
         return ctypes.CDLL(str(library))
 
 
-def compiled(name: str) -> Callable[[HarmonicModel], Callable[[_Array], _Array]]:
+def compiled_peer(name: str) -> Callable[[HarmonicModel], Callable[[_Array], _Array]]:
     """The peer of a function of the source, ready to be prepared for a model of dense orders."""
 
     def prepare(model: HarmonicModel) -> Callable[[_Array], _Array]:

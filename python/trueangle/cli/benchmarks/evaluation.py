@@ -13,7 +13,7 @@ import trueangle._core as _core
 
 from ...joint.shafts import Shaft
 from ...model.model import HarmonicModel
-from .evaluationpeers import peers
+from .evaluationpeers import evaluation_peers
 from .interleaved import Timing, interleave
 
 #: Orders of the models timed, by name.
@@ -40,7 +40,9 @@ class EvaluationRow(NamedTuple):
         return self.timing.median / self.samples * 1e9
 
 
-def harmonics(orders: Sequence[int], period: float = 2.0 * math.pi, seed: int = 0) -> HarmonicModel:
+def evaluated_model(
+    orders: Sequence[int], period: float = 2.0 * math.pi, seed: int = 0
+) -> HarmonicModel:
     """Model of random phases whose amplitudes sum to a thousandth of the slope limit."""
     rng = np.random.default_rng(seed)
     size = 1e-3 * period / (2.0 * math.pi) / sum(orders)
@@ -55,16 +57,16 @@ def _rows(ways: dict[str, Callable[[], object]], samples: int, rounds: int) -> l
     return [EvaluationRow(name, samples, timing) for name, timing in timings.items()]
 
 
-def batches(samples: int, rounds: int) -> list[EvaluationRow]:
+def evaluate_batches(samples: int, rounds: int) -> list[EvaluationRow]:
     """Our paths and number types, and copies of the same arrays; random angles, seed 0."""
     rng = np.random.default_rng(0)
     theta = rng.uniform(0.0, 2.0 * math.pi, samples)
     out = np.empty_like(theta)
     theta32, out32 = theta.astype(np.float32), np.empty(samples, np.float32)
     counts = rng.integers(0, 65536, samples, dtype=np.uint16)
-    models = {name: harmonics(orders) for name, orders in ORDERS.items()}
+    models = {name: evaluated_model(orders) for name, orders in ORDERS.items()}
     dense = models["17 orders"]
-    encoder = harmonics(ORDERS["17 orders"], period=65536.0)
+    encoder = evaluated_model(ORDERS["17 orders"], period=65536.0)
     ways: dict[str, Callable[[], object]] = {
         "copy float64": partial(np.copyto, out, theta),
         "copy float32": partial(np.copyto, out32, theta32),
@@ -83,12 +85,12 @@ def batches(samples: int, rounds: int) -> list[EvaluationRow]:
     return _rows(ways, samples, rounds)
 
 
-def peer_batches(samples: int, rounds: int) -> tuple[list[EvaluationRow], list[str]]:
+def evaluate_peers(samples: int, rounds: int) -> tuple[list[EvaluationRow], list[str]]:
     """The peers on 17 orders, with ours beside them, and the names of those missing."""
     theta = np.random.default_rng(0).uniform(0.0, 2.0 * math.pi, samples)
     out = np.empty_like(theta)
-    model = harmonics(ORDERS["17 orders"])
-    ready, missing = peers(model)
+    model = evaluated_model(ORDERS["17 orders"])
+    ready, missing = evaluation_peers(model)
     ways: dict[str, Callable[[], object]] = {
         "trueangle": partial(model.error, theta, out=out),
         "trueangle, 1 thread": partial(model.error, theta, out=out, threads=1),
@@ -101,12 +103,12 @@ def peer_batches(samples: int, rounds: int) -> tuple[list[EvaluationRow], list[s
     return _rows(ways, samples, rounds), missing
 
 
-def small(samples: int = 37, rounds: int = 200) -> list[EvaluationRow]:
+def evaluate_small(samples: int = 37, rounds: int = 200) -> list[EvaluationRow]:
     """Whole calls on few samples."""
     theta = np.random.default_rng(0).uniform(0.0, 2.0 * math.pi, samples)
     out = np.empty_like(theta)
-    model = harmonics(ORDERS["17 orders"])
-    reference = peers(model)[0]["numpy per order (reference)"]
+    model = evaluated_model(ORDERS["17 orders"])
+    reference = evaluation_peers(model)[0]["numpy per order (reference)"]
     calls = range(100)
 
     def repeat(way: Callable[[], object]) -> Callable[[], object]:
@@ -121,9 +123,9 @@ def small(samples: int = 37, rounds: int = 200) -> list[EvaluationRow]:
     return _rows(ways, len(calls), rounds)
 
 
-def single(rounds: int = 200) -> list[EvaluationRow]:
+def evaluate_single(rounds: int = 200) -> list[EvaluationRow]:
     """One float in, one float out; the loop around it is in every figure."""
-    compensator = _core.Compensator(harmonics(ORDERS["17 orders"])._series)
+    compensator = _core.Compensator(evaluated_model(ORDERS["17 orders"])._series)
     calls = range(_CALLS)
     functions: dict[str, Callable[[float], float]] = {
         "step": compensator.step,

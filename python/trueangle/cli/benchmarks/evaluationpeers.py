@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...estimation import reference
 from ...model.model import HarmonicModel
-from .compiled import compiled, is_available
+from .compiled import compiled_peer, is_available
 
 _Array = NDArray[np.float64]
 _Evaluate = Callable[[_Array], _Array]
@@ -176,7 +176,7 @@ _PEERS: dict[str, tuple[str, Callable[[HarmonicModel], _Evaluate]]] = {
 }
 
 
-def peers(model: HarmonicModel) -> tuple[dict[str, _Evaluate], list[str]]:
+def evaluation_peers(model: HarmonicModel) -> tuple[dict[str, _Evaluate], list[str]]:
     """Ways that are installed, ready to evaluate the model, and the names of the others."""
     ways, missing = {}, []
     for name, (package, prepare) in _PEERS.items():
@@ -189,7 +189,7 @@ def peers(model: HarmonicModel) -> tuple[dict[str, _Evaluate], list[str]]:
         ("C -Ofast, libmvec, Horner", "horner"),
     ):
         if is_available():
-            ways[name] = compiled(function)(model)
+            ways[name] = compiled_peer(function)(model)
         else:
             missing.append(name)
     return ways, missing

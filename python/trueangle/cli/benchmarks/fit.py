@@ -49,7 +49,7 @@ class FitRow(NamedTuple):
     """Largest difference of a coefficient from ours, relative to the largest."""
 
 
-def readings(case: Case) -> tuple[_Array, _Array]:
+def fit_readings(case: Case) -> tuple[_Array, _Array]:
     """Angles in radians at random over the arc, and errors with noise; seed 0."""
     rng = np.random.default_rng(0)
     theta = rng.uniform(0.0, np.radians(case.arc_deg), case.samples)
@@ -87,7 +87,7 @@ def _coefficients(solution: _core.Solution, period: float) -> _Array:
     return np.concatenate([[solution.constant], pairs]) * (2.0 * np.pi / period)
 
 
-def measure(
+def measure_fits(
     case: Case,
     rounds: int = 5,
     only: Iterable[str] | None = None,
@@ -95,7 +95,7 @@ def measure(
     methods: Iterable[str] = (),
 ) -> list[FitRow]:
     """Time our fit, by numbers of threads and forced methods, and those of the peers."""
-    theta, error = readings(case)
+    theta, error = fit_readings(case)
     unit = case.period / (2.0 * np.pi)
     place = theta * unit if case.counts is None else np.rint(theta * unit)
     run = CalibrationRun(place, place + error * unit, period=case.period)
@@ -107,7 +107,7 @@ def measure(
         name = f"trueangle, 1 thread, {method}"
         ways[name] = partial(_ours, run, case.highest, threads=1, method=method)
     ways["trueangle.fit, all it does"] = partial(_whole, run, case.highest)
-    for name, peer in peers()[0].items():
+    for name, peer in fit_peers()[0].items():
         if only is None or name in only:
             ways[name] = partial(peer, theta, error, case.highest)
     timings = interleave(ways, rounds)
@@ -119,13 +119,13 @@ def measure(
     ]
 
 
-def quick(samples: int, rounds: int) -> list[FitRow]:
+def quick_fits(samples: int, rounds: int) -> list[FitRow]:
     """A polygon's problem and one of ``samples`` readings."""
-    small = measure(Case(37, 5), 20 * rounds, threads=(1,))
-    return small + measure(Case(samples, 17), rounds)
+    small = measure_fits(Case(37, 5), 20 * rounds, threads=(1,))
+    return small + measure_fits(Case(samples, 17), rounds)
 
 
-def design(theta: _Array, highest: int) -> _Array:
+def fit_columns(theta: _Array, highest: int) -> _Array:
     """Columns ``1, cos, sin, cos 2x, sin 2x ...``."""
     columns = np.empty((theta.size, 2 * highest + 1))
     columns[:, 0] = 1.0
@@ -136,17 +136,17 @@ def design(theta: _Array, highest: int) -> _Array:
 
 
 def _lstsq(theta: _Array, error: _Array, highest: int) -> _Array:
-    return np.asarray(np.linalg.lstsq(design(theta, highest), error)[0], dtype=np.float64)
+    return np.asarray(np.linalg.lstsq(fit_columns(theta, highest), error)[0], dtype=np.float64)
 
 
 def _normal_equations(theta: _Array, error: _Array, highest: int) -> _Array:
-    rows = design(theta, highest)
+    rows = fit_columns(theta, highest)
     return np.asarray(np.linalg.solve(rows.T @ rows, rows.T @ error), dtype=np.float64)
 
 
 def _gelsy(theta: _Array, error: _Array, highest: int) -> _Array:
     linalg = importlib.import_module("scipy.linalg")
-    found = linalg.lstsq(design(theta, highest), error, lapack_driver="gelsy")[0]
+    found = linalg.lstsq(fit_columns(theta, highest), error, lapack_driver="gelsy")[0]
     return np.asarray(found)
 
 
@@ -161,7 +161,7 @@ def _astropy(theta: _Array, error: _Array, highest: int) -> _Array:
 
 def _statsmodels(theta: _Array, error: _Array, highest: int) -> _Array:
     api = importlib.import_module("statsmodels.api")
-    return np.asarray(api.OLS(error, design(theta, highest)).fit(method="qr").params)
+    return np.asarray(api.OLS(error, fit_columns(theta, highest)).fit(method="qr").params)
 
 
 def _finufft(theta: _Array, error: _Array, highest: int) -> _Array:
@@ -181,7 +181,7 @@ def _finufft(theta: _Array, error: _Array, highest: int) -> _Array:
     return found
 
 
-def peers() -> tuple[dict[str, _Fit], list[str]]:
+def fit_peers() -> tuple[dict[str, _Fit], list[str]]:
     """The peers that are installed, and the names of those that are not."""
     known: list[tuple[str, _Fit, tuple[str, ...]]] = [
         ("numpy.linalg.lstsq", _lstsq, ()),

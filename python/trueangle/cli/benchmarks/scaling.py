@@ -20,8 +20,8 @@ from ...model.model import HarmonicModel
 from ...model.monitor import Monitor
 from ...runs.run import CalibrationRun
 from ...support.arrays import Array
-from .evaluation import harmonics
-from .fit import Case, readings
+from .evaluation import evaluated_model
+from .fit import Case, fit_readings
 from .interleaved import Timing, interleave
 
 _Ways: TypeAlias = dict[tuple[str, int], Callable[[], object]]
@@ -45,7 +45,7 @@ WATCHED: Final = 8
 _MANY: Final = 30_000_000
 
 
-class Measured(NamedTuple):
+class MeasuredWork(NamedTuple):
     """What a piece of work took."""
 
     work: str
@@ -55,7 +55,7 @@ class Measured(NamedTuple):
     timing: Timing
 
 
-class Cost(NamedTuple):
+class WorkCost(NamedTuple):
     """The model of cost ``t(n) = t₀ + n t₁`` of one work with so many threads, in seconds.
 
     ``spread`` is the largest relative departure of what was measured from it.
@@ -72,11 +72,13 @@ class Cost(NamedTuple):
         return self.call + self.reading * readings
 
 
-def by_readings(largest: int, rounds: int = 5, threads: Sequence[int] = (1, 2)) -> list[Measured]:
+def scaling_by_readings(
+    largest: int, rounds: int = 5, threads: Sequence[int] = (1, 2)
+) -> list[MeasuredWork]:
     """Corrections and fits of 10^3 readings and more, a decade apart, `ORDERS` orders."""
-    theta, error = readings(Case(largest, ORDERS))
+    theta, error = fit_readings(Case(largest, ORDERS))
     indicated, out = theta + error, np.empty_like(theta)
-    model = harmonics(range(1, ORDERS + 1))
+    model = evaluated_model(range(1, ORDERS + 1))
     found = []
     for size in (10**k for k in range(3, round(math.log10(largest)) + 1)):
         run = CalibrationRun(theta[:size], indicated[:size], period=2.0 * math.pi)
@@ -88,23 +90,25 @@ def by_readings(largest: int, rounds: int = 5, threads: Sequence[int] = (1, 2)) 
     return found
 
 
-def by_orders(rounds: int = 5, most: int = 1024, size: int = READINGS) -> list[Measured]:
+def scaling_by_orders(
+    rounds: int = 5, most: int = 1024, size: int = READINGS
+) -> list[MeasuredWork]:
     """Corrections and fits of `READINGS` readings with ever more orders, one thread."""
-    theta, error = readings(Case(size, 1))
+    theta, error = fit_readings(Case(size, 1))
     indicated, out = theta + error, np.empty_like(theta)
     run = CalibrationRun(theta, indicated, period=2.0 * math.pi)
     found = []
     for orders in (k for k in _STEPS if k <= most):
         wanted = range(1, orders + 1)
         ways: _Ways = {
-            ("correct", 1): partial(harmonics(wanted).correct, indicated, out=out, threads=1),
+            ("correct", 1): partial(evaluated_model(wanted).correct, indicated, out=out, threads=1),
             ("fit", 1): partial(fit, run, orders=wanted, threads=1),
         }
         found += _measured(ways, size, orders, rounds)
     return found
 
 
-def by_workers(workers: Sequence[int], size: int, files: int = 8) -> list[Measured]:
+def scaling_by_workers(workers: Sequence[int], size: int, files: int = 8) -> list[MeasuredWork]:
     """Fits of logs (Parquet) shared by the workers of a Dask cluster on this machine.
 
     Raises
@@ -125,7 +129,7 @@ def by_workers(workers: Sequence[int], size: int, files: int = 8) -> list[Measur
     found = []
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder, f"{k}.parquet") for k in range(files)]
-        theta, error = readings(Case(size // files, ORDERS))
+        theta, error = fit_readings(Case(size // files, ORDERS))
         columns = {"reference_rad": theta, "indicated_rad": theta + error}
         for path in paths:
             pq.write_table(pa.table(columns), path)
@@ -142,11 +146,11 @@ def by_workers(workers: Sequence[int], size: int, files: int = 8) -> list[Measur
                 work()
                 taken = time.perf_counter() - start
             timing = Timing(taken, taken, taken)
-            found.append(Measured("fit of logs", files * theta.size, ORDERS, count, timing))
+            found.append(MeasuredWork("fit of logs", files * theta.size, ORDERS, count, timing))
     return found
 
 
-def by_units(most: int) -> list[Measured]:
+def scaling_by_units(most: int) -> list[MeasuredWork]:
     """A fleet of 10 units and more, a decade apart, and a fit of each of them: once.
 
     The units are made one after the other and only their sums are kept.
@@ -162,15 +166,17 @@ def by_units(most: int) -> list[Measured]:
             way()
             taken = time.perf_counter() - start
             found.append(
-                Measured(work, READINGS_EACH * units, ORDERS_EACH, 1, Timing(taken, taken, taken))
+                MeasuredWork(
+                    work, READINGS_EACH * units, ORDERS_EACH, 1, Timing(taken, taken, taken)
+                )
             )
         units *= 10
     return found
 
 
-def by_windows(readings: int, rounds: int = 5) -> list[Measured]:
+def scaling_by_windows(readings: int, rounds: int = 5) -> list[MeasuredWork]:
     """Watching so many readings in windows of `WINDOWS`, and their sums (`Moments`) alone."""
-    model = harmonics(range(1, WATCHED + 1))
+    model = evaluated_model(range(1, WATCHED + 1))
     rng = np.random.default_rng(0)
     noise = 1e-5 * rng.normal(size=readings)
     found = []
@@ -184,11 +190,13 @@ def by_windows(readings: int, rounds: int = 5) -> list[Measured]:
             },
             rounds,
         )
-        found += [Measured(work, readings, WATCHED, 1, taken) for work, taken in timings.items()]
+        found += [
+            MeasuredWork(work, readings, WATCHED, 1, taken) for work, taken in timings.items()
+        ]
     return found
 
 
-def costs(measured: Sequence[Measured]) -> list[Cost]:
+def work_costs(measured: Sequence[MeasuredWork]) -> list[WorkCost]:
     """The model of cost of each work and number of threads, by relative least squares."""
     found = []
     for work, threads in dict.fromkeys((m.work, m.threads) for m in measured):
@@ -200,13 +208,13 @@ def costs(measured: Sequence[Measured]) -> list[Cost]:
         if call < 0.0:  # nothing but readings
             call, reading = 0.0, float(rows[:, 1].sum() / (rows[:, 1] @ rows[:, 1]))
         spread = float(np.abs((call + reading * size) / taken - 1.0).max())
-        found.append(Cost(work, threads, call, reading, spread))
+        found.append(WorkCost(work, threads, call, reading, spread))
     return found
 
 
-def _measured(ways: _Ways, size: int, orders: int, rounds: int) -> list[Measured]:
+def _measured(ways: _Ways, size: int, orders: int, rounds: int) -> list[MeasuredWork]:
     timings = interleave({f"{work} {n}": way for (work, n), way in ways.items()}, rounds)
-    return [Measured(work, size, orders, n, timings[f"{work} {n}"]) for work, n in ways]
+    return [MeasuredWork(work, size, orders, n, timings[f"{work} {n}"]) for work, n in ways]
 
 
 def _summed(angle: Array, error: Array) -> None:

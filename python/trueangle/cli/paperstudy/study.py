@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...fitting.orders.result import OrderSelection
 from ...fitting.orders.select import select_orders
-from ...fitting.orders.table import OrderSelection
 from ...planning.mountplan import CalibrationPlan
 from ...planning.plan import plan_mounts, wanted_orders
 from ...runs.aliasing import fold

@@ -1,4 +1,4 @@
-"""One test of a goodness of fit, and p values of the largest of many."""
+"""One test of a goodness of fit; p values of the largest of many, made even, by drawn signs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...support.plainresult import finite
+from ...support.plainresult import finite_or_none
 
 #: Times that a search is repeated with signs at random, and units from which on they differ enough.
 DRAWS, ENOUGH_UNITS = 32, 6
@@ -52,7 +52,7 @@ class Evidence:
         """The entry of ``unexplained.evidence``."""
         return {
             "test": self.test,
-            "statistic": finite(self.statistic),
+            "statistic": finite_or_none(self.statistic),
             "p": self.p,
             "says": self.says,
             "decides": self.decides,

@@ -1,7 +1,7 @@
 """Lines that every run draws anew: of one frequency in time, or of one order in angle.
 
 The periodograms of the runs, each divided by its own level about every frequency (which takes
-correlation and wander away), add up to
+correlation and drift away), add up to
 
 ::
 
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ...support.arrays import Array, distinct
-from ...support.display_units import brief
+from ...support.display_units import brief_number
 from ...support.distributions import f_tail
 from .evidence import Evidence, largest_of
 from .leftover import Leftover
@@ -60,7 +60,7 @@ LEAST_READINGS = 32
 
 
 @dataclass(frozen=True, eq=False)
-class Periodogram:
+class _Periodogram:
     """Sum over runs of periodograms divided by their levels.
 
     Attributes
@@ -99,7 +99,7 @@ def periodogram(
     bounds: list[tuple[int, int]],
     top: float | None = None,
     correlation: float = 0.0,
-) -> Periodogram | None:
+) -> _Periodogram | None:
     """Periodogram of ``values`` along ``axis``, phases of the runs left out.
 
     Parameters
@@ -185,7 +185,7 @@ def periodogram(
     reach = int(WIDTHS[k] * over)
     near = slice(max(j - reach, first), j + reach + 1)
     amplitude = float(np.sqrt(max(float(raw[near].max()), 0.0)))
-    return Periodogram(
+    return _Periodogram(
         frequency[first:last],
         total[0, first:] / freedom[0],
         float(frequency[j]),
@@ -264,8 +264,8 @@ def time_test(left: Leftover, correlation: float = 0.0) -> Evidence | None:
         "time periodogram",
         found.statistic,
         found.p,
-        f"a line of {found.peak:.5g} {unit}{detail}, about {brief(found.amplitude)} arcsec, its "
-        "phase new in every run",
+        f"a line of {found.peak:.5g} {unit}{detail}, about {brief_number(found.amplitude)} arcsec, "
+        "its phase new in every run",
         looks_like="a line in time",
         rms=float(found.amplitude / np.sqrt(2.0)),
         at=found.peak,
@@ -282,8 +282,8 @@ def order_test(left: Leftover, top: float, correlation: float = 0.0) -> Evidence
         "place within runs",
         found.statistic,
         found.p,
-        f"a line of order {found.peak:.5g}, about {brief(found.amplitude)} arcsec, comes back at "
-        "the same place within runs and not between them",
+        f"a line of order {found.peak:.5g}, about {brief_number(found.amplitude)} arcsec, comes "
+        "back at the same place within runs and not between them",
         looks_like="a line whose size changes in time",
         rms=float(found.amplitude / np.sqrt(2.0)),
         at=found.peak,

@@ -1,4 +1,4 @@
-"""What comes back at the same place, alike or by direction, speed or load.
+"""What comes back at the same place: alike, or modulated by direction, speed or load; unit sums.
 
 Each unit u (a run, or a piece of one of few runs) gives one complex sum per order m,
 
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ...support.arrays import Array
-from ...support.display_units import brief
+from ...support.display_units import brief_number
 from ...support.distributions import incomplete_gamma_tail, student_tail
 from .evidence import Evidence, drawn_signs, largest_of, made_even
 from .leftover import Leftover
@@ -176,11 +176,11 @@ def _judged(
         detail = f"strongest in the orders up to {band * step:.4g}"
         rms = float(np.sqrt(power[: int(band)].sum()))
     elif band < 0.0:
-        detail = f"by about {brief(abs(size))} arcsec at every place"
+        detail = f"by about {brief_number(abs(size))} arcsec at every place"
         rms = abs(size) * float(np.sqrt(whole / len(left)))
     else:
         amplitude = float(np.sqrt(2.0 * power[k]))
-        detail = f"strongest at order {(k + 1) * step:.4g}, about {brief(amplitude)} arcsec"
+        detail = f"strongest at order {(k + 1) * step:.4g}, about {brief_number(amplitude)} arcsec"
         rms = float(np.sqrt(power[np.exp(-logs) * count < 0.01].sum()))
     says = f"what is left {modulator.what}: {detail}"
     looks_like = modulator.looks_like

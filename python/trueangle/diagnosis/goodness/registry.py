@@ -16,7 +16,7 @@ from .zeros import run_test
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class TestedResidual:
     """What the tests are asked about.
 
     Attributes
@@ -37,7 +37,7 @@ class Asked:
 
 
 #: Every test, in the order in which equally sure ones are told.
-DECIDING: tuple[Callable[[Asked], Iterable[Evidence | None]], ...] = (
+DECIDING: tuple[Callable[[TestedResidual], Iterable[Evidence | None]], ...] = (
     lambda asked: place_tests(asked.left, asked.top),
     lambda asked: [order_test(asked.left, asked.top, asked.noise.correlation)],
     lambda asked: [time_test(asked.left, asked.noise.correlation)],
@@ -48,6 +48,6 @@ DECIDING: tuple[Callable[[Asked], Iterable[Evidence | None]], ...] = (
 )
 
 
-def evidence_of_tests(asked: Asked) -> list[Evidence]:
+def evidence_of_tests(asked: TestedResidual) -> list[Evidence]:
     """Evidence of every test that can be made of such readings."""
     return [item for test in DECIDING for item in test(asked) if item is not None]

@@ -38,7 +38,7 @@ def scatter_tests(left: Leftover, noise: Noise, sigma: float | None = None) -> l
         Noise of one reading that the simulation states.
     """
     found = [_correlation(noise)]
-    e = whitened_residual(left, noise)
+    e = _whitened_residual(left, noise)
     if e.size >= LEAST_READINGS and np.ptp(e) > 0.0:
         found += [_tails(e), _bursts(e)]
     same = scatter_of_repeats(left)
@@ -61,7 +61,7 @@ def scatter_tests(left: Leftover, noise: Noise, sigma: float | None = None) -> l
     return found
 
 
-def whitened_residual(left: Leftover, noise: Noise) -> Array:
+def _whitened_residual(left: Leftover, noise: Noise) -> Array:
     """Innovations of the residual under the noise's correlation, over their deviation."""
     e = left.centred(left.bounds)
     rho = noise.correlation

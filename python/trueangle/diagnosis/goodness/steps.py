@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...support.display_units import brief
+from ...support.display_units import brief_number
 from ...support.distributions import normal_tail
 from .evidence import Evidence
 from .leftover import Leftover
@@ -67,7 +67,8 @@ def steps_test(left: Leftover) -> Evidence | None:
         "steps in time",
         kurtosis,
         normal_tail(normal_kurtosis(kurtosis - ALLOWED, d.size / SHARED)),
-        f"what is left changes in steps between levels: {steps.size} of about {brief(size)} arcsec",
+        f"what is left changes in steps between levels: {steps.size} of about "
+        f"{brief_number(size)} arcsec",
         rms=0.5 * size,
         looks_like=STEPS,
     )

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ...support.plainresult import Shown
+from ...support.plainresult import ShownResult
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise, estimate_noise
 from .place import LEAST_ORDERS
-from .registry import Asked, evidence_of_tests
+from .registry import TestedResidual, evidence_of_tests
 from .scatter import scatter_tests
 
 #: What a path in time looks like that no law prescribes.
@@ -31,7 +31,7 @@ SMALLEST = 1e-9
 
 
 @dataclass(frozen=True)
-class Unexplained(Shown):
+class Unexplained(ShownResult):
     """What tests that need no name say of the residual.
 
     Attributes
@@ -127,7 +127,7 @@ def goodness_of_fit(
     'place'
     """
     noise = estimate_noise(left)
-    deciding = evidence_of_tests(Asked(left, left if loose is None else loose, noise, top))
+    deciding = evidence_of_tests(TestedResidual(left, left if loose is None else loose, noise, top))
     deciding += [path] if path is not None else []
     describing = scatter_tests(left, noise, sigma)
     firing = _firing(deciding)

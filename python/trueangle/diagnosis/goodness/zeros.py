@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...support.display_units import brief
+from ...support.display_units import brief_number
 from ...support.distributions import f_tail
 from .evidence import Evidence
 from .leftover import Leftover
@@ -71,7 +71,8 @@ def run_test(left: Leftover, noise: Noise) -> Evidence | None:
         ZEROS,
         statistic,
         p,
-        f"the runs differ in their zeros by {brief(spread)} arcsec beyond what the noise explains",
+        f"the runs differ in their zeros by {brief_number(spread)} arcsec beyond what the noise "
+        "explains",
         rms=spread,
         looks_like="a new zero in every run",
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...errors import ArgumentError
 from ...joint.gear import COMMON_RATIOS, HIGHEST_LOW_ORDER, gear_orders
-from ...joint.shafts import counted_orders
+from ...joint.shafts import limited_orders
 from ...runs.aliasing import POSITION_TOLERANCE, Positions, distinct_positions, position_coherence
 from ...runs.run import CalibrationRun
 from ...support.arrays import Array
@@ -111,7 +111,7 @@ class Candidates:
         return limits
 
 
-def effective_positions(positions: Positions) -> Positions:
+def _effective_positions(positions: Positions) -> Positions:
     """Positions as a grid even where small shifts of the zero blur it.
 
     Unnamed orders are looked for only below the Nyquist limit of that grid.
@@ -149,7 +149,7 @@ def choose_candidates(
     """
     gear = [] if gear_ratio is None else [float(m) for m in gear_orders(gear_ratio, fixed_member)]
     gear += [k * float(f) for f in (shafts or {}).values() for k in SHAFT_HARMONICS]
-    effective = effective_positions(positions)
+    effective = _effective_positions(positions)
     highest = effective.highest_order
     if effective.divisions is None:
         highest = min(highest, math.floor((len(positions) - 1) / (2.0 * positions.span)))
@@ -216,7 +216,7 @@ def _apart(positions: Positions, order: float, others: Sequence[float]) -> bool:
 
 def _checked(orders: Iterable[float], name: str) -> list[float]:
     found = []
-    for k in counted_orders(orders, name):
+    for k in limited_orders(orders, name):
         value = float(k)
         if not (math.isfinite(value) and value > 0.0):
             raise ArgumentError(f"{name} must be positive orders, got {k!r}")

@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 import numpy as np
 
 from ...errors import ArgumentError
-from ...joint.shafts import counted_orders
+from ...joint.shafts import limited_orders
 from ...runs.aliasing import distinct_positions
 from ...runs.run import CalibrationRun
 from ...runs.travel import held_orders, over_turns
 from ...support.arrays import Array
 from ...support.blas import one_blas_thread
 from ...support.suggestions import check_choice
-from ..argument import AnyArgument, at_indicated, choose_argument
+from ..argument import AnyArgument, choose_argument, run_at_indicated
 from ..uncertainty import CovarianceKind, check_covariance
 from .candidates import choose_candidates
+from .result import OrderSelection
 from .selection import EvidenceSelection
-from .table import OrderSelection
 
 if TYPE_CHECKING:
-    from ..summed import Summed
+    from ..summed import SummedReadings
 
 Method: TypeAlias = Literal["evidence", "paper"]
 
@@ -32,7 +32,7 @@ _LOOKED_AT: Final = 4096
 
 
 @one_blas_thread()
-def selected_of(
+def selected_orders(
     found: Sequence[CalibrationRun],
     candidates: Iterable[float] | None = None,
     gear_ratio: float | None = None,
@@ -45,7 +45,7 @@ def selected_of(
     nuisance: str | Iterable[str] = "none",
     reference_orders: Iterable[float] = (),
     tolerance: float | None = None,
-    summed: Summed | None = None,
+    summed: SummedReadings | None = None,
 ) -> OrderSelection:
     """As `trueangle.select_orders`; with ``summed`` of all readings of which the runs are some."""
     check_choice("method", method, ("evidence", "paper"))
@@ -54,29 +54,31 @@ def selected_of(
     if not kept:
         raise ArgumentError("all readings have weight 0: nothing is left to select orders from")
     said: tuple[str, ...] = ()
-    lines = tuple(map(float, counted_orders(reference_orders, "reference_orders")))
+    lines = tuple(map(float, limited_orders(reference_orders, "reference_orders")))
     kinds: tuple[str, ...] | None = ()
     if nuisance != "none":
         from ..nuisance import asked_nuisance
 
         kinds = asked_nuisance(nuisance)
     if kinds != () or (lines and len(kept) > 1):
-        from ..nuisance import likely_orders, take_out
+        from ..nuisance import orders_beside_nuisance, take_out_nuisance
 
-        likely = likely_orders(kept, gear_ratio, fixed_member, shafts)
+        likely = orders_beside_nuisance(kept, gear_ratio, fixed_member, shafts)
         angle = "indicated" if argument == "indicated" else "reference"
-        cleaned, taken = take_out(kept, kinds, likely, angle, lines if len(kept) > 1 else ())
+        cleaned, taken = take_out_nuisance(
+            kept, kinds, likely, angle, lines if len(kept) > 1 else ()
+        )
         if lines and not taken.turned:
             # Lines that are the same in every run stay, to be fitted and named.
-            cleaned, taken = take_out(kept, kinds, likely, angle)
+            cleaned, taken = take_out_nuisance(kept, kinds, likely, angle)
         kept, said = cleaned, tuple(taken.sentences(kept[0].period))
     choice = choose_argument(kept, argument)
     if choice.argument == "indicated":
-        kept = [at_indicated(run) for run in kept]
+        kept = [run_at_indicated(run) for run in kept]
     # The ends of the travel are known of all readings.
     ends = [] if summed is None else [CalibrationRun(summed.ends, summed.ends, kept[0].period)]
     positions = distinct_positions([*kept, *ends], tolerance)
-    held_from, agree = held_orders(kept, declared_cycles(gear_ratio, shafts))
+    held_from, agree = held_orders(kept, _declared_cycles(gear_ratio, shafts))
     if agree and covariance == "auto":
         covariance = "hac"
     chosen = choose_candidates(
@@ -116,7 +118,7 @@ def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
     )
 
 
-def declared_cycles(gear_ratio: float | None, shafts: Mapping[str, float] | None) -> list[float]:
+def _declared_cycles(gear_ratio: float | None, shafts: Mapping[str, float] | None) -> list[float]:
     """Cycles per output turn of all shafts that were declared."""
     return [*(shafts or {}).values(), *(() if gear_ratio is None else (gear_ratio,))]
 
@@ -127,7 +129,7 @@ def _travelled(
     shafts: Mapping[str, float] | None,
 ) -> Array | None:
     """Angles of the readings in turns, whole turns kept; None where every order is whole."""
-    cycles = declared_cycles(gear_ratio, shafts)
+    cycles = _declared_cycles(gear_ratio, shafts)
     if all(float(f).is_integer() for f in cycles):
         return None
     turns = np.concatenate([over_turns(run).reference for run in runs]) / runs[0].period

@@ -1,4 +1,4 @@
-"""Evidence for orders: significance with a bound for the search, and held-out gain.
+"""Evidence for orders: log chances with a bound for the search, forward choice, held-out gain.
 
 All of it works on the normal equations of `HarmonicSums`; the readings are not touched
 again. An order has two coefficients, so that with noise variance s^2 known from v
@@ -33,13 +33,13 @@ _LEAST_DOF: Final = 3
 OVERDISPERSED: Final = 1e-3
 
 
-def log_tail(statistic: Array | float, dof: float) -> Array:
+def log_chance(statistic: Array | float, dof: float) -> Array:
     """Logarithm of the probability that noise alone reaches ``statistic``."""
     t = np.maximum(np.asarray(statistic, dtype=np.float64), 0.0)
     return np.asarray(-0.5 * t if math.isinf(dof) else -0.5 * dof * np.log1p(t / dof))
 
 
-def log_chi2_tail(x: Array, dof: int) -> Array:
+def log_chi_squared_tail(x: Array, dof: int) -> Array:
     """Log of the upper tail of chi-square with an even number of degrees of freedom."""
     half = 0.5 * np.asarray(x, dtype=np.float64)[..., None]
     i = np.arange(dof // 2)
@@ -99,9 +99,9 @@ def choose_forward(
             if noise is None:
                 # Of collinear columns rounding makes a gain beyond all there is.
                 left = np.maximum(rest - gain, 1e-200)
-                score = log_tail(gain * dof / left, dof) - log_limits
+                score = log_chance(gain * dof / left, dof) - log_limits
             else:
-                score = log_tail(gain / max(noise[0], 1e-200), noise[1]) - log_limits
+                score = log_chance(gain / max(noise[0], 1e-200), noise[1]) - log_limits
             score = np.where(alive, score, math.inf)
             top = int(np.argmin(score))
             if not score[top] <= 0.0:
@@ -119,7 +119,7 @@ def choose_forward(
     return chosen
 
 
-def fit_subset(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array, Array, float]:
+def fit_chosen_orders(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array, Array, float]:
     """Coefficients of the chosen orders, inverse normal matrix, residual sum of squares."""
     gram, rhs, squares = sums.total()
     columns = sums.columns(chosen)
@@ -167,11 +167,11 @@ def examine_orders(
     if scatter is not None:
         each = 2 * (sums.units - 1) if freedom is None else freedom
         ratio = np.maximum(scatter, 0.0) / noise[0] * each
-        own = np.isfinite(scatter) & (log_chi2_tail(ratio, each) < math.log(OVERDISPERSED))
+        own = np.isfinite(scatter) & (log_chi_squared_tail(ratio, each) < math.log(OVERDISPERSED))
         np.copyto(level, scatter, where=own)
         dof[own] = each
     position = {k: i for i, k in enumerate(chosen)}
-    coefficients, inverse, _ = fit_subset(sums, chosen)
+    coefficients, inverse, _ = fit_chosen_orders(sums, chosen)
     base = sums.columns(chosen)
     size = len(chosen)
     outside = [k for k in orders if k not in position]
@@ -212,7 +212,7 @@ def examine_orders(
     with np.errstate(divide="ignore", invalid="ignore"):
         statistic = np.where(level > 0.0, gain / level, math.inf)
     statistic[np.isnan(cosine)] = 0.0
-    log_p = np.array([float(log_tail(t, v)) for t, v in zip(statistic, dof, strict=True)])
+    log_p = np.array([float(log_chance(t, v)) for t, v in zip(statistic, dof, strict=True)])
     return OrderTest(cosine, sine, variance, statistic, log_p)
 
 

@@ -20,7 +20,8 @@ import trueangle._core as _core
 from ...estimation.linear import NormalEquations
 from ...support.arrays import Array
 from ...support.powersums import power_sums
-from .unitgroups import GROUPS, MOST_UNITS, ZeroGroupReadings, columns_summed, units_in_groups
+from .unitgroups import GROUPS, MOST_UNITS, sums_of_unit_means, units_in_groups
+from .zerogroups import ZeroGroupReadings
 
 #: From so many readings on the core's piecewise moments are faster than this file's powers.
 _LARGE: Final = 1024
@@ -252,7 +253,7 @@ def _in_groups(
             spectrum[None, :],
             np.zeros((1, 2 * size)),
         )
-        grams.append(bare.gram(0, np.arange(size)) - columns_summed(group, index.astype(float)))
+        grams.append(bare.gram(0, np.arange(size)) - sums_of_unit_means(group, index.astype(float)))
     sums = [np.array([v[m].sum() for m in groups]) for v in (weight, count, squares)]
     means = np.zeros((len(groups), 2 * size))
     return HarmonicSums(orders, sums[0], sums[1], sums[2], np.array(moments), grams, None, means)

@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 
 from ...runs.aliasing import Positions, position_coherence
-from .evidence import fit_subset
+from .evidence import fit_chosen_orders
 from .harmonicsums import harmonic_sums
-from .unitgroups import ZeroGroupReadings
+from .zerogroups import ZeroGroupReadings
 
 #: Two orders are told apart when one explains better by this many noise variances: a
 #: likelihood ratio of e^5, about 150 to 1.
@@ -48,13 +48,13 @@ def find_lookalikes(
         coherence[[int(k) - 1 for k in orders if k <= highest and k == int(k)]] = 0.0
         same = {int(m): 0.0 for m in every[coherence > _SAME]}
         alike = [int(m) for m in every[coherence > _ALIKE] if m not in same]
-        losses = substitution_losses(units, orders, order, alike) if alike else []
+        losses = _substitution_losses(units, orders, order, alike) if alike else []
         tried = same | dict(zip(alike, losses, strict=True))
         found.append({m: tried[m] for m in sorted(tried) if tried[m] < DECISIVE * variance})
     return found
 
 
-def substitution_losses(
+def _substitution_losses(
     units: Sequence[ZeroGroupReadings],
     orders: Sequence[float],
     order: float,
@@ -65,5 +65,7 @@ def substitution_losses(
     together = [*rest, order, *others]
     sums = harmonic_sums(units, together)
     kept = list(range(len(rest)))
-    best = fit_subset(sums, [*kept, len(rest)])[2]
-    return [fit_subset(sums, [*kept, len(rest) + 1 + j])[2] - best for j in range(len(others))]
+    best = fit_chosen_orders(sums, [*kept, len(rest)])[2]
+    return [
+        fit_chosen_orders(sums, [*kept, len(rest) + 1 + j])[2] - best for j in range(len(others))
+    ]

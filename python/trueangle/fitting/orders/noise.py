@@ -1,4 +1,4 @@
-"""The noise of readings: by repeats, and at each order by units and neighbouring orders."""
+"""The noise of readings: pure error of repeats, scatter by units, runs and neighbouring orders."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ...runs.aliasing import Positions
 from ...support.arrays import Array
 from ...support.quantiles import median
-from .evidence import COLLINEAR, OVERDISPERSED, fit_subset, log_chi2_tail
+from .evidence import COLLINEAR, OVERDISPERSED, fit_chosen_orders, log_chi_squared_tail
 from .harmonicsums import HarmonicSums
-from .unitgroups import ZeroGroupReadings
+from .zerogroups import ZeroGroupReadings
 
 #: Sweeps of alternating means (positions, zeros); whole grids need one.
 _SWEEPS: Final = 20
@@ -117,7 +117,7 @@ def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
     index = np.asarray(orders, dtype=np.intp)
     if sums.units < 2 or index.size == 0:
         return np.full(index.size, math.inf)
-    coefficients, _, _ = fit_subset(sums, chosen)
+    coefficients, _, _ = fit_chosen_orders(sums, chosen)
     n = index.size
     parts = []
     # What one order has in common with itself does not depend on those chosen.
@@ -153,7 +153,7 @@ def neighbour_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array | None
     if others.size < 2 * NEIGHBOURS:
         return None
     total, rhs, _ = sums.total()
-    coefficients, inverse, _ = fit_subset(sums, chosen)
+    coefficients, inverse, _ = fit_chosen_orders(sums, chosen)
     base = sums.columns(chosen)
     n = sums.orders.size
     cosine, sine = others, others + n
@@ -191,7 +191,7 @@ def pooled_scatter(scatter: Array, units: int) -> tuple[float, float] | None:
     middle = float(median(finite)) / (1.0 - 2.0 / (9.0 * each)) ** 3
     if middle <= 0.0:  # copies of one run
         return None
-    usual = finite[log_chi2_tail(finite / middle * each, each) > math.log(OVERDISPERSED)]
+    usual = finite[log_chi_squared_tail(finite / middle * each, each) > math.log(OVERDISPERSED)]
     if usual.size * each < 20:
         return None
     return float(usual.mean()), float(usual.size * each)

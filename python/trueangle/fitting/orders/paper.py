@@ -20,15 +20,14 @@ from ...runs.run import CalibrationRun
 from ...support.arrays import Array
 from ...support.quantiles import median
 from .candidates import Candidates
-from .evidence import log_tail
+from .evidence import log_chance
 from .lookalikes import find_lookalikes
 from .noise import ReadingVariance
 from .phases import circular_range_deg
-from .rows import OrderRow
-from .table import OrderSelection
-from .unitgroups import ZeroGroupReadings
-from .verdicts import explained_row, selection_notes
-from .zerogroups import zero_units
+from .result import OrderSelection
+from .table import OrderRow
+from .verdicts import row_with_verdict, selection_notes
+from .zerogroups import ZeroGroupReadings, zero_groups
 
 #: Phases of a retained order lie within this arc over the runs. Noise alone stays within
 #: 60 degrees over five runs in 0.4 % of cases, within the paper's "about 10" in 3e-6,
@@ -39,7 +38,7 @@ PHASE_RANGE_DEG: Final = 60.0
 PROMINENCE: Final = 0.1
 
 
-def run_coefficients(
+def _run_coefficients(
     units: Sequence[ZeroGroupReadings], orders: Sequence[float]
 ) -> tuple[Array, Array]:
     """A and B of Eq. 1 for each run by itself, its constant fitted too.
@@ -102,10 +101,10 @@ def select_by_paper(
     orders = [k for k in candidates.orders if k in candidates.main and k <= candidates.highest]
     if not orders:
         raise ArgumentError("none of the candidates lies below the Nyquist limit of the positions")
-    units, places = zero_units(runs, candidates.whole)
+    units, places = zero_groups(runs, candidates.whole)
     placed = positions.of_rows(places)
     training, held = units[:-1], units[-1]
-    each, left = run_coefficients(training, orders)
+    each, left = _run_coefficients(training, orders)
     mean = each.mean(axis=0)
     amplitude = np.abs(mean)
     scatter = (np.abs(each - mean) ** 2).sum(axis=0) / (2.0 * (len(training) - 1) * len(training))
@@ -127,7 +126,7 @@ def select_by_paper(
     rows = []
     for n, k in enumerate(orders):
         t = float(amplitude[n] ** 2 / scatter[n]) if scatter[n] > 0.0 else math.inf
-        chance = (float(log_tail(t, dof)) + math.log(len(orders))) / math.log(10.0)
+        chance = (float(log_chance(t, dof)) + math.log(len(orders))) / math.log(10.0)
         verdict = "retained" if kept[n] else ("small" if not prominent[n] else "phase varies")
         row = OrderRow(
             order=k,
@@ -144,7 +143,7 @@ def select_by_paper(
         )
         rows.append(row)
     amplitudes = {row.order: row.amplitude for row in rows if row.retained}
-    rows = [explained_row(row, candidates, placed, amplitudes) for row in rows]
+    rows = [row_with_verdict(row, candidates, placed, amplitudes) for row in rows]
     before, after = (_residual(held, orders, mean, which) for which in (np.zeros_like(kept), kept))
     selection = OrderSelection(
         orders=tuple(retained),

@@ -1,4 +1,4 @@
-"""Phases of orders, run by run."""
+"""Phases of orders, run by run, and the circular range that holds them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...support.arrays import Array
-from .evidence import fit_subset
+from .evidence import fit_chosen_orders
 from .harmonicsums import HarmonicSums
 
 
@@ -29,7 +29,7 @@ def circular_range_deg(phases: ArrayLike) -> float:
     return float(np.degrees(2.0 * math.pi - gaps.max()))
 
 
-def unit_coefficients(
+def _unit_coefficients(
     sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
 ) -> tuple[Array, Array]:
     """A and B of each order in each unit, the other chosen orders held at the common fit.
@@ -41,7 +41,7 @@ def unit_coefficients(
     both = np.concatenate([index, np.asarray(chosen, dtype=np.intp)])
     mine = np.stack([np.arange(n), np.arange(n) + both.size], axis=1)
     theirs = np.concatenate([np.arange(n, both.size), np.arange(n, both.size) + both.size])
-    coefficients, _, _ = fit_subset(sums, chosen)
+    coefficients, _, _ = fit_chosen_orders(sums, chosen)
     common = np.zeros((n, 2))
     for j, k in enumerate(orders):
         if k in chosen:
@@ -63,5 +63,5 @@ def unit_coefficients(
 
 def unit_phases(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]) -> Array:
     """Phase ``atan2(A, B)`` of each order in each unit, shape (units, orders), radians."""
-    cosine, sine = unit_coefficients(sums, chosen, orders)
+    cosine, sine = _unit_coefficients(sums, chosen, orders)
     return np.asarray(np.arctan2(cosine, sine))

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...estimation.factor import orthonormal_basis
-from ...estimation.readings import is_good_part
-from ...estimation.rounded import fit_rounded
+from ...estimation.rounded import fit_rounded, is_rounding_visible
 from ...joint.pattern import lines_columns
 from ...support.arrays import Array
-from .unitgroups import ZeroGroupReadings
+from .zerogroups import ZeroGroupReadings
 
 
-def beyond_rounding(
+def orders_beyond_rounding(
     units: Sequence[ZeroGroupReadings],
     step: float,
     orders: Sequence[float],
@@ -44,7 +43,7 @@ def beyond_rounding(
 
     left = error - _fitted(columns(range(len(orders))), error)
     about = error - _fitted(zeros, error)
-    if not is_good_part(step**2 / 12.0, float(np.var(left)), float(np.var(about))):
+    if not is_rounding_visible(step**2 / 12.0, float(np.var(left)), float(np.var(about))):
         return list(range(forced, len(orders)))
     told = list(range(forced))
     fit = fit_rounded(orthonormal_basis(columns(told)), error, step)

@@ -15,7 +15,7 @@ import numpy as np
 from ...model.validity import greatest_slope
 from ...support.arrays import Array
 from ..uncertainty import CovarianceKind
-from .evidence import OrderTest, choose_forward, examine_orders, fit_subset, held_out_gains
+from .evidence import OrderTest, choose_forward, examine_orders, fit_chosen_orders, held_out_gains
 from .harmonicsums import HarmonicSums
 from .noise import NEIGHBOURS, ReadingVariance, neighbour_scatter, pooled_scatter, run_scatter
 
@@ -123,7 +123,7 @@ class EvidenceSearch:
         """
         if self.barred:
             dof = max(1, self.free - 2 * len(chosen))
-            return ReadingVariance(fit_subset(self.sums, chosen)[2] / dof, dof, "model")
+            return ReadingVariance(fit_chosen_orders(self.sums, chosen)[2] / dof, dof, "model")
         repeats = self.repeats
         # Copies of the same readings repeat to the last digit, which says nothing of noise.
         known = repeats is not None and repeats.degrees_of_freedom >= _ENOUGH_DOF
@@ -133,11 +133,11 @@ class EvidenceSearch:
         rounding = _EPSILON * self.sums.total()[2]
         everything = len(self.orders)
         if self.free - 2 * everything >= max(_ENOUGH_DOF, 2 * everything):
-            _, _, squares = fit_subset(self.sums, range(everything))
+            _, _, squares = fit_chosen_orders(self.sums, range(everything))
             dof = self.free - 2 * everything
             return ReadingVariance(max(squares, rounding) / dof, dof, "residual")
         dof = max(1, self.free - 2 * len(chosen))
-        squares = fit_subset(self.sums, chosen)[2]
+        squares = fit_chosen_orders(self.sums, chosen)[2]
         return ReadingVariance(max(squares, rounding) / dof, dof, "model")
 
     def _level(self, chosen: Sequence[int]) -> _Level:
@@ -209,7 +209,7 @@ class EvidenceSearch:
         kept = sorted(chosen)
         gone: list[int] = []
         while True:
-            cosine, sine = fit_subset(self.sums, kept)[0].reshape(2, -1)
+            cosine, sine = fit_chosen_orders(self.sums, kept)[0].reshape(2, -1)
             # What is fitted jointly and never retained makes no correction steep.
             mine = [n for n, i in enumerate(kept) if i not in self.forced]
             cosine, sine = cosine[mine], sine[mine]

@@ -7,18 +7,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Unpack
 
 from ...errors import TrueAngleError, UnlikeRunsWarning
-from ...joint.shafts import counted_orders
+from ...joint.shafts import limited_orders
 from ...runs.files import runs_of
 from ...runs.run import CalibrationRun
-from ...runs.source import Reading
-from ...support.kinds import told_kinds
+from ...runs.source import ReadingOptions
+from ...support.argumentkinds import told_kinds
 from ..argument import AnyArgument
 from ..fit import fitted_to
 from ..uncertainty import CovarianceKind
-from .choice import Method, selected_of
-from .rows import OrderRow
+from .choice import Method, selected_orders
+from .result import OrderSelection
 from .selection import FALSE_ALARM
-from .table import OrderSelection
+from .table import OrderRow
 
 __all__ = ["FALSE_ALARM", "OrderRow", "OrderSelection", "select_orders"]
 
@@ -37,7 +37,7 @@ def select_orders(
     nuisance: str | Iterable[str] = "none",
     reference_orders: Iterable[float] = (),
     tolerance: float | None = None,
-    **reading: Unpack[Reading],
+    **reading: Unpack[ReadingOptions],
 ) -> OrderSelection:
     """Orders of the angle error that the readings support.
 
@@ -120,8 +120,8 @@ def select_orders(
     found = runs_of(runs, reading)
     joint: dict[str, Any] = {"gear_ratio": gear_ratio, "fixed_member": fixed_member}
     joint |= {"shafts": shafts, "covariance": covariance, "nuisance": nuisance}
-    joint |= {"reference_orders": tuple(counted_orders(reference_orders, "reference_orders"))}
-    selection = selected_of(
+    joint |= {"reference_orders": tuple(limited_orders(reference_orders, "reference_orders"))}
+    selection = selected_orders(
         found, candidates, method=method, argument=argument, tolerance=tolerance, **joint
     )
     return selection if method == "paper" else _as_fitted(selection, found, joint)

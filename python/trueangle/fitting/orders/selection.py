@@ -10,23 +10,23 @@ import numpy as np
 
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
-from ...support.display_units import brief
-from ..rounding import repeated_over, rounding_step
+from ...support.display_units import brief_number
+from ..rounding import rounding_over_repeats, rounding_step
 from ..uncertainty import CovarianceKind
 from .candidates import Candidates
 from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
 from .noise import pure_error
 from .phases import circular_range_deg, unit_phases
-from .rounding import beyond_rounding
-from .rows import OrderRow
+from .result import OrderSelection
+from .rounding import orders_beyond_rounding
 from .search import FALSE_ALARM, EvidenceSearch
-from .table import OrderSelection
-from .verdicts import explained_row, selection_notes, verdict_reason
-from .zerogroups import angle_blocks, zero_units
+from .table import OrderRow
+from .verdicts import row_with_verdict, selection_notes, verdict_reason
+from .zerogroups import folds_of_run, zero_groups
 
 if TYPE_CHECKING:
-    from ..summed import Summed
+    from ..summed import SummedReadings
 
 __all__ = ["FALSE_ALARM", "EvidenceSelection"]
 
@@ -40,11 +40,11 @@ class EvidenceSelection(EvidenceSearch):
         positions: Positions,
         candidates: Candidates,
         covariance: CovarianceKind = "auto",
-        summed: Summed | None = None,
+        summed: SummedReadings | None = None,
     ) -> None:
         self.runs = runs
         self.candidates = candidates
-        self.units, places = zero_units(runs, candidates.whole)
+        self.units, places = zero_groups(runs, candidates.whole)
         self.positions = positions.of_rows(places)
         orders = candidates.orders
         sums = harmonic_sums(self.units, orders) if summed is None else summed.sums(orders)
@@ -58,7 +58,7 @@ class EvidenceSelection(EvidenceSearch):
                 self.holdout = f"one of {sums.units} groups of runs at a time"
             folds: HarmonicSums | None = sums
         else:
-            parts = angle_blocks(self.units[0], self.positions)
+            parts = folds_of_run(self.units[0], self.positions)
             self.holdout = "whole blocks of neighbouring positions (single run)"
             folds = harmonic_sums(parts, candidates.orders) if parts else None
         repeats = pure_error(self.units, self.positions)
@@ -73,7 +73,7 @@ class EvidenceSelection(EvidenceSearch):
             repeats,
             [i for i, k in enumerate(candidates.orders) if k in reference],
             covariance,
-            repeated_over(self.step, repeats, self.samples / len(self.positions)),
+            rounding_over_repeats(self.step, repeats, self.samples / len(self.positions)),
         )
 
     def result(self) -> OrderSelection:
@@ -95,7 +95,7 @@ class EvidenceSelection(EvidenceSearch):
         test = self.examined(chosen, mine)
         strongest = np.argsort(-np.hypot(test.cosine, test.sine), kind="stable")
         places = [*self.forced, *(mine[k] for k in strongest)]
-        told = beyond_rounding(
+        told = orders_beyond_rounding(
             self.units,
             self.step,
             self.orders_of(places),
@@ -164,7 +164,7 @@ class EvidenceSelection(EvidenceSearch):
                 )
             )
         retained = {row.order: row.amplitude for row in rows if row.retained}
-        rows = [explained_row(row, self.candidates, self.positions, retained) for row in rows]
+        rows = [row_with_verdict(row, self.candidates, self.positions, retained) for row in rows]
         orders = tuple(retained)
         without, with_ = self._held_out_rms(model)
         selection = OrderSelection(
@@ -199,7 +199,7 @@ class EvidenceSelection(EvidenceSearch):
         chance = 100.0 * 10.0**best.log10_false_alarm
         return (
             f"{beside} does not stand out of the noise "
-            f"(noise alone does as well in {brief(chance)} % of such searches)"
+            f"(noise alone does as well in {brief_number(chance)} % of such searches)"
         )
 
     def _held_out_rms(self, model: float) -> tuple[float, float]:

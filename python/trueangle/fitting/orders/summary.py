@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from ...support.angles import arcsec
-from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, phase_pair, sine_of_rms
-from ...support.layout import laid_out, wrapped
-from ...support.plainresult import finite
-from .rows import OrderRow, OrderTable
+from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, rounded_phase, sine_of_rms
+from ...support.layout import laid_out, wrapped_lines
+from ...support.plainresult import finite_or_none
+from .table import OrderRow, OrderTable
 
 #: Rejected orders listed beside the retained ones, the strongest first.
 _REJECTED = 8
@@ -48,9 +48,9 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
     for row in selection.table:
         if row.doubtful or row.verdict == "reference":
             text = row.reason if row.doubtful else f"{row.order:g}: {row.reason}"
-            lines += wrapped(f"! {text}", 2)
+            lines += wrapped_lines(f"! {text}", 2)
     for note in selection.notes:
-        lines += wrapped(f"note: {note}", 2)
+        lines += wrapped_lines(f"note: {note}", 2)
     return laid_out(lines).rstrip()
 
 
@@ -78,7 +78,7 @@ def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
     if -math.inf < row.log10_false_alarm < -3:
         chance = f"1e{math.floor(row.log10_false_alarm):d}"
     spread = f"{row.phase_spread_deg:.0f}" if math.isfinite(row.phase_spread_deg) else "-"
-    phase, phase_std = phase_pair(row.phase_deg, row.phase_error_deg)
+    phase, phase_std = rounded_phase(row.phase_deg, row.phase_error_deg)
     gain = f"{100.0 * row.holdout_gain:.3g}"
     order = f"{row.order:g}"
     return _COLUMNS.format(order, size, std, phase, phase_std, spread, chance, gain, row.verdict)
@@ -91,7 +91,7 @@ def _explanations(rows: Sequence[OrderRow]) -> list[str]:
         names = [e.name for e in row.explanations if e.order == row.order and not e.assumed]
         if names:
             text = f"{row.order:g}: {'; or '.join(names)}"
-            lines += wrapped(text, 5, 2)
+            lines += wrapped_lines(text, 5, 2)
     return ["What they may be:", *lines, ""] if lines else []
 
 
@@ -116,11 +116,11 @@ def plain_selection(selection: OrderTable) -> dict[str, Any]:
         "runs": selection.runs,
         "method": selection.method,
         "argument": selection.argument,
-        "noise_arcsec": finite(scale * selection.noise.standard_deviation),
+        "noise_arcsec": finite_or_none(scale * selection.noise.standard_deviation),
         "noise_source": selection.noise.source,
         "holdout": selection.holdout,
-        "holdout_rms_before_arcsec": finite(scale * before),
-        "holdout_rms_after_arcsec": finite(scale * after),
+        "holdout_rms_before_arcsec": finite_or_none(scale * before),
+        "holdout_rms_after_arcsec": finite_or_none(scale * after),
         "reason": selection.reason,
         "notes": list(selection.notes),
         "orders": [_row(row, scale) for row in selection.table],
@@ -132,13 +132,13 @@ def _row(row: OrderRow, scale: float) -> dict[str, Any]:
         "order": row.order,
         "retained": row.retained,
         "verdict": row.verdict,
-        "amplitude_arcsec": finite(scale * row.amplitude),
-        "phase_deg": finite(row.phase_deg % 360.0),
-        "std_arcsec": finite(scale * row.standard_error),
-        "phase_std_deg": finite(row.phase_error_deg),
-        "phase_spread_deg": finite(row.phase_spread_deg),
-        "log10_false_alarm": finite(row.log10_false_alarm),
-        "holdout_gain": finite(row.holdout_gain),
+        "amplitude_arcsec": finite_or_none(scale * row.amplitude),
+        "phase_deg": finite_or_none(row.phase_deg % 360.0),
+        "std_arcsec": finite_or_none(scale * row.standard_error),
+        "phase_std_deg": finite_or_none(row.phase_error_deg),
+        "phase_spread_deg": finite_or_none(row.phase_spread_deg),
+        "log10_false_alarm": finite_or_none(row.log10_false_alarm),
+        "holdout_gain": finite_or_none(row.holdout_gain),
         "aliases": list(row.aliases),
         "explanations": [str(e) for e in row.explanations],
         "reason": row.reason,

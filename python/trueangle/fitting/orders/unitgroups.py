@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...support.arrays import Array
+from .zerogroups import ZeroGroupReadings
 
 #: With more units than this they are taken together, in so many groups.
 MOST_UNITS: Final = 96
@@ -27,36 +27,12 @@ _RESEED: Final = 64
 _BLOCK: Final = 1 << 21
 
 
-class ZeroGroupReadings(NamedTuple):
-    """Readings of one unit: a run, or a run on one mount, that has its own zero.
-
-    Attributes
-    ----------
-    turns : ndarray, shape (n,)
-        Reference angle in turns; unwrapped where the orders are not whole.
-    error : ndarray, shape (n,)
-        Error around its zero, in any unit.
-    weights : ndarray, shape (n,)
-        Positive.
-    label : str
-    """
-
-    turns: Array
-    error: Array
-    weights: Array
-    label: str
-
-    def part(self, mask: NDArray[np.bool_], label: str) -> ZeroGroupReadings:
-        """The readings where ``mask`` is true."""
-        return ZeroGroupReadings(self.turns[mask], self.error[mask], self.weights[mask], label)
-
-
 def units_in_groups(units: Sequence[ZeroGroupReadings]) -> list[list[int]]:
     """Units of each group, dealt in turn, so that a slow change is in all of them."""
     return [list(range(group, len(units), GROUPS)) for group in range(GROUPS)]
 
 
-def unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
+def _unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     """Weighted means of cosines and sines of each order, a row a unit, for short units."""
     found = np.empty((len(units), 2 * orders.size))
     sizes = np.array([unit.turns.size for unit in units])
@@ -80,13 +56,13 @@ def unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     return found
 
 
-def columns_summed(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
+def sums_of_unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     """``sum of weight x mean x mean'`` over the units, in blocks of them."""
     size = max(1, _BLOCK // (2 * orders.size))
     total = np.zeros((2 * orders.size, 2 * orders.size))
     for begin, end in pairwise([*range(0, len(units), size), len(units)]):
         block = units[begin:end]
         root = np.sqrt([float(unit.weights.sum()) for unit in block])
-        scaled = unit_means(block, orders) * root[:, None]
+        scaled = _unit_means(block, orders) * root[:, None]
         total += scaled.T @ scaled
     return total

@@ -26,8 +26,8 @@ from ...runs.aliasing import (
 from ...runs.run import CalibrationRun, as_runs
 from ...support.angles import arcsec
 from .candidates import Candidates, choose_candidates
-from .rows import OrderRow
-from .table import OrderSelection
+from .result import OrderSelection
+from .table import OrderRow
 
 #: Share of the energy in the upper half of the orders from which under-sampling is said.
 _UNDER_SAMPLED: Final = 0.25
@@ -57,7 +57,7 @@ def verdict_reason(verdict: str) -> str:
     return _VERDICTS[verdict]
 
 
-def explained_row(
+def row_with_verdict(
     row: OrderRow, candidates: Candidates, positions: Positions, retained: Mapping[float, float]
 ) -> OrderRow:
     """The row with its explanations and the reason of its verdict.

@@ -1,10 +1,10 @@
-"""Units of readings with a zero of their own, and folds of a single run."""
+"""Groups of readings with a zero of their own, and folds of a single run."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
 from ...runs.travel import over_turns
 from ...support.angles import wrap
-from .unitgroups import ZeroGroupReadings
+from ...support.arrays import Array
 
 #: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
 _FOLDS: Final = 6
@@ -23,7 +23,31 @@ _BLOCKS: Final = 24
 _SHORT: Final = 1000
 
 
-def zero_units(
+class ZeroGroupReadings(NamedTuple):
+    """Readings of one unit: a run, or a run on one mount, that has its own zero.
+
+    Attributes
+    ----------
+    turns : ndarray, shape (n,)
+        Reference angle in turns; unwrapped where the orders are not whole.
+    error : ndarray, shape (n,)
+        Error around its zero, in any unit.
+    weights : ndarray, shape (n,)
+        Positive.
+    label : str
+    """
+
+    turns: Array
+    error: Array
+    weights: Array
+    label: str
+
+    def part(self, mask: NDArray[np.bool_], label: str) -> ZeroGroupReadings:
+        """The readings where ``mask`` is true."""
+        return ZeroGroupReadings(self.turns[mask], self.error[mask], self.weights[mask], label)
+
+
+def zero_groups(
     runs: Sequence[CalibrationRun], whole: bool
 ) -> tuple[list[ZeroGroupReadings], NDArray[np.intp]]:
     """Units with a zero of their own: runs, split where the mount changes within one.
@@ -65,7 +89,7 @@ def _centred(runs: Sequence[CalibrationRun]) -> Iterator[NDArray[np.float64]]:
     yield from np.split(zero + wrap(error - zero, period), ends[:-1])
 
 
-def angle_blocks(unit: ZeroGroupReadings, positions: Positions) -> list[ZeroGroupReadings]:
+def folds_of_run(unit: ZeroGroupReadings, positions: Positions) -> list[ZeroGroupReadings]:
     """Folds of a single run: blocks of neighbouring positions, dealt in turn."""
     blocks = min(_BLOCKS, len(positions) // 2)
     folds = min(_FOLDS, blocks)

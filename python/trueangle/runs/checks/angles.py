@@ -54,7 +54,7 @@ def angle_ratio(records: list[Record]) -> float | None:
     return float(median(slopes)) if slopes else None
 
 
-def suggestion(ratio: float | None) -> str:
+def ratio_suggestion(ratio: float | None) -> str:
     """What a ratio of indicated to reference suggests.
 
     Examples
@@ -112,7 +112,7 @@ def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
                 labels,
                 (),
                 f"in {which} the indicated angle moves {value:.6g} times as far as the "
-                f"reference: {suggestion(value)}",
+                f"reference: {ratio_suggestion(value)}",
                 f"divide the indicated angle by {value:.6g}, or give the right unit",
             )
 
@@ -217,7 +217,7 @@ def _stays(record: Record, jumps: NDArray[np.intp], slip: Array) -> bool:
     return bool((np.abs(off) <= STAYS * np.abs(slip)).all())
 
 
-def swapped(records: list[Record]) -> Iterator[DataFault]:
+def swapped_channels(records: list[Record]) -> Iterator[DataFault]:
     """A reference that is much noisier than the joint it is to judge."""
     ratios = []
     for record in records:

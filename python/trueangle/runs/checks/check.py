@@ -8,10 +8,17 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from ...errors import ArgumentError
-from ...support.kinds import told_kinds
-from ..run import given_runs
-from ..source import Reading
-from .angles import angle_ratio, mixed_units, suggestion, swapped, wrapped_reference, wrong_ratio
+from ...support.argumentkinds import told_kinds
+from ..run import runs_or_data
+from ..source import ReadingOptions
+from .angles import (
+    angle_ratio,
+    mixed_units,
+    ratio_suggestion,
+    swapped_channels,
+    wrapped_reference,
+    wrong_ratio,
+)
 from .fault import DataFault
 from .record import Record, read_records, records_of
 from .still import stuck_readings
@@ -27,7 +34,7 @@ LEAST_READINGS = 3
 
 
 @told_kinds
-def check(data: Any, **reading: Unpack[Reading]) -> Check:
+def check(data: Any, **reading: Unpack[ReadingOptions]) -> Check:
     """Say whether data are fit to be used before anything is fitted.
 
     Parameters
@@ -83,7 +90,7 @@ def check(data: Any, **reading: Unpack[Reading]) -> Check:
     return Check(
         tuple(data_faults(records)),
         ratio,
-        suggestion(ratio),
+        ratio_suggestion(ratio),
         extent,
         tuple(can),
         tuple(cannot),
@@ -92,7 +99,7 @@ def check(data: Any, **reading: Unpack[Reading]) -> Check:
 
 
 def _records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
-    runs, data = given_runs(data)
+    runs, data = runs_or_data(data)
     if runs is not None:
         return records_of(runs)
     return read_records(data, reading)
@@ -170,7 +177,7 @@ TESTS = (
     mixed_units,
     wrapped_reference,
     wrong_ratio,
-    swapped,
+    swapped_channels,
     duplicate_runs,
     duplicate_rows,
     stuck_readings,
@@ -182,6 +189,6 @@ def data_faults(records: list[Record]) -> list[DataFault]:
     found: list[DataFault] = []
     for test in TESTS:
         mixed = {label for fault in found if fault.fault in UNSURE for label in fault.runs}
-        angles = test in (wrapped_reference, wrong_ratio, swapped, stuck_readings)
+        angles = test in (wrapped_reference, wrong_ratio, swapped_channels, stuck_readings)
         found += test([r for r in records if not (angles and r.label in mixed)])
     return found

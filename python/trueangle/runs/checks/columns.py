@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from ...formats.formats import format_of_content
-from ...support.layout import laid_out
-from ...support.plainresult import PlainResult, counted
+from ...support.layout import counted, laid_out
+from ...support.plainresult import PlainResult
 from ...support.roles import unit_in_name
 
 #: Words of a name that tell its role.

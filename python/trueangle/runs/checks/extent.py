@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...support.arrays import Array
-from ...support.plainresult import counted
+from ...support.layout import counted
 from ...support.quantiles import median, quantile
 from .record import Record
 

@@ -16,7 +16,7 @@ from ...support.roles import offsets_of, unit_in_name
 from ..files import read_columns
 from ..readings import FileReadings
 from ..run import CalibrationRun
-from ..source import checked_reading
+from ..source import checked_reading_options
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
         No table of runs: a missing column, text where a number belongs.
     """
     found: list[Record] = []
-    for table in read_columns(data, checked_reading(reading)):
+    for table in read_columns(data, checked_reading_options(reading)):
         scale = 360.0 / table.period
         columns = {role: (c.name, c.unit) for role, c in table.table.roles.items()}
         for labels, rows in table.groups:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...support.layout import laid_out, wrapped
-from ...support.plainresult import PlainResult, counted
+from ...support.layout import counted, laid_out, wrapped_lines
+from ...support.plainresult import PlainResult
 from .extent import Extent
 from .fault import DataFault
 
@@ -83,8 +83,8 @@ class Check(PlainResult):
         e = self.extent
         lines = []
         for fault in self.data_faults:
-            lines += wrapped(f"{fault.fault}: {fault.says}.", 2)
-            lines += wrapped(f"Remedy: {fault.mend}.", 4, 2)
+            lines += wrapped_lines(f"{fault.fault}: {fault.says}.", 2)
+            lines += wrapped_lines(f"Remedy: {fault.mend}.", 4, 2)
         if not self.data_faults:
             lines.append("No fault found in the data.")
         elif not self.usable:
@@ -94,7 +94,7 @@ class Check(PlainResult):
                 f"{role} is '{name}'" + (f" in {unit}" if unit else "")
                 for role, (name, unit) in self.columns.items()
             ]
-            lines += ["", *wrapped(f"Understood: {'; '.join(told)}.", 2)]
+            lines += ["", *wrapped_lines(f"Understood: {'; '.join(told)}.", 2)]
         ratio = "unknown" if self.ratio is None else f"{self.ratio:.6g}"
         lines += [
             "",
@@ -106,9 +106,9 @@ class Check(PlainResult):
             f"temperatures: {_levels(e.temperatures, 'C')}; mounts: {_levels(e.mounts, 'deg')}.",
             "",
         ]
-        lines += wrapped(f"Can be known: {'; '.join(self.can)}.", 2)
+        lines += wrapped_lines(f"Can be known: {'; '.join(self.can)}.", 2)
         for entry in self.cannot:
-            lines += wrapped(
+            lines += wrapped_lines(
                 f"Cannot be known: {entry['what']} ({entry['because']}). To find out: "
                 f"{entry['measure']}.",
                 2,

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ...errors import ArgumentError, FileError
 from ...formats.columns import matching_column
 from ...support.angles import ARCSEC_PER_TURN
+from ...support.argumentkinds import told_kinds
 from ...support.arrays import Array
-from ...support.kinds import told_kinds
-from ...support.roles import count_turn, signal_code, wanted_columns
+from ...support.roles import checked_count_turn, role_code, wanted_columns
 from ...support.signals import FIELDS
 from ..readings import FileReadings, read_readings
 from ..run import CalibrationRun
@@ -101,8 +101,8 @@ def join(
     if max_gap_s is not None and max_gap_s <= 0.0:
         raise ArgumentError(f"max_gap_s must be positive, got {max_gap_s!r}")
     counts = (
-        count_turn(counts_per_turn, "counts_per_turn"),
-        count_turn(counts_per_turn_reference, "counts_per_turn_reference"),
+        checked_count_turn(counts_per_turn, "counts_per_turn"),
+        checked_count_turn(counts_per_turn_reference, "counts_per_turn_reference"),
     )
     first, second = _assigned((a, b), signals, topic)
     indicated = _Log.read(first, "indicated", counts[0])
@@ -128,7 +128,7 @@ class _Log(NamedTuple):
         if "time" not in roles:
             raise table.error(
                 "no column time_s: joining needs the time of every reading; name it with "
-                + signal_code("time")
+                + role_code("time")
             )
         column = roles[role]._replace(unit=roles[role].unit or table.format.unit)
         angle = table.values(column, 360.0, counts)

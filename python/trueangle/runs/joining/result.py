@@ -1,4 +1,4 @@
-"""What a joining made, and how far it can be trusted."""
+"""Joined runs: what a joining made, its gaps, and how far it can be trusted."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from os import PathLike
 from typing import Any, NamedTuple
 
 from ...support.display_units import ErrorsIn, ErrorUnit, error_unit
-from ...support.layout import laid_out
-from ...support.plainresult import PlainResult, counted
+from ...support.layout import counted, laid_out
+from ...support.plainresult import PlainResult
 from ..run import CalibrationRun
 
 

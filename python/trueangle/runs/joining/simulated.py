@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from ...errors import ArgumentError
 from ...support.angles import ARCSEC_PER_TURN
 from ...support.arrays import Array
-from ...support.layout import wrapped
-from ...support.plainresult import Shown, counted
+from ...support.layout import counted, wrapped_lines
+from ...support.plainresult import ShownResult
 from ...support.signals import FIELDS
 from ..files import runs_of
 from ..run import CalibrationRun
 from .clocks import estimated_clocks
 from .stream import Stream
-from .travel import Travelled
+from .travel import TravelledError
 
 #: How a log may be brought to the readings.
 BY = ("time", "angle")
@@ -37,7 +37,7 @@ _LEAST = 4
 
 
 @dataclass(frozen=True)
-class MeasuredMinusSimulated(Shown):
+class MeasuredMinusSimulated(ShownResult):
     """Measured runs without the error that a simulator's log says.
 
     Attributes
@@ -104,7 +104,7 @@ class MeasuredMinusSimulated(Shown):
             verb = "is" if self.left_out == 1 else "are"
             silent = counted(self.left_out, "reading")
             text += f"; {silent} at which it says nothing {verb} left out"
-        return "\n".join(wrapped(". ".join([text, *self.notes]) + "."))
+        return "\n".join(wrapped_lines(". ".join([text, *self.notes]) + "."))
 
 
 class _Expected(NamedTuple):
@@ -245,7 +245,7 @@ def _expected(run: CalibrationRun, log: CalibrationRun, by: str | None, source: 
         elif by == "time":
             lacks = source if log.time is None else f"run {run.label or '1'}"
             raise ArgumentError(f"{lacks} has no time: give a column time_s, or join by angle")
-    travelled = Travelled(_degrees(log), _error(log), log.direction)
+    travelled = TravelledError(_degrees(log), _error(log), log.direction)
     error, known = travelled.at(_degrees(run), run.direction)
     note = ""
     if by is None and run.time is not None and log.time is not None:

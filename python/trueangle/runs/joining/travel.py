@@ -39,7 +39,7 @@ class _MeanCurve:
 
 
 @dataclass(frozen=True)
-class Travelled:
+class TravelledError:
     """The error of a log over its angle.
 
     Parameters

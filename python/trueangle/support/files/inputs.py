@@ -1,4 +1,4 @@
-"""Reading files: what may be read, and how much of it."""
+"""Reading files: what may be read, and how much of it; hashes, and partitions in their names."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 from urllib.parse import unquote
 
 from ...errors import FileError, KindError
-from .samefile import what_it_is
+from .samefile import irregular_file_kind
 from .workplace import restore
 
 #: Most bytes of files that are read whole. The covariance of a model of 1800 orders, the
@@ -31,7 +31,7 @@ _LOOK_MS: Final = 100
 _NOTHING: Final = "__HIVE_DEFAULT_PARTITION__"
 
 
-class Source(NamedTuple):
+class InputFile(NamedTuple):
     """A file that readings came from: its name and the sha256 of its bytes."""
 
     file: str
@@ -69,13 +69,15 @@ def check_input(path: str | PathLike[str], *, whole: bool = False) -> os.stat_re
         return found
     if whole:
         raise FileError(
-            path, f"is {what_it_is(mode)}, which can be read only once; write it to a file first"
+            path,
+            f"is {irregular_file_kind(mode)}, which can be read only once; write it to a file "
+            "first",
         )
     if stat.S_ISFIFO(mode) or is_null_device(found):
         return found
     if stat.S_ISCHR(mode) and _is_terminal(path):
         return found
-    raise FileError(path, f"is {what_it_is(mode)}, not a file; name a file or a pipe")
+    raise FileError(path, f"is {irregular_file_kind(mode)}, not a file; name a file or a pipe")
 
 
 def read_whole(path: str | PathLike[str], limit: int, what: str) -> bytes:

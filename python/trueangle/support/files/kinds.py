@@ -54,7 +54,7 @@ def log_endings() -> tuple[str, ...]:
     return tuple(ending for endings in _LOGS.values() for ending in endings)
 
 
-class Kind(NamedTuple):
+class FileKind(NamedTuple):
     """A kind of file: what it is called, and the endings it may bear.
 
     Endings that promise no format (``.txt``, ``.dat``, none) fit every kind.
@@ -94,7 +94,7 @@ a model (JSON); name it joint.json
             )
 
 
-def kind_of_log(path: str | PathLike[str]) -> Kind:
+def kind_of_log(path: str | PathLike[str]) -> FileKind:
     """What a corrected copy of a log is: of the log's own format.
 
     Examples
@@ -105,8 +105,8 @@ def kind_of_log(path: str | PathLike[str]) -> Kind:
     ending = Path(path).suffix.lower()
     for name, endings in _LOGS.items():
         if ending in endings and name:
-            return Kind(f"{name}, as the log is", (ending, *endings))
-    return Kind("text, as the log is", (".txt", ".csv", ".tsv", ".tab"))
+            return FileKind(f"{name}, as the log is", (ending, *endings))
+    return FileKind("text, as the log is", (".txt", ".csv", ".tsv", ".tab"))
 
 
 def promised_format(path: str | PathLike[str]) -> str | None:
@@ -116,16 +116,16 @@ def promised_format(path: str | PathLike[str]) -> str | None:
     return next((name for name, endings in known if name and ending in endings), None)
 
 
-MODEL: Final = Kind("a model (JSON)", (".json",))
-FLEET: Final = Kind("a fleet (JSON)", (".json",))
-SIMULATION: Final = Kind("a simulation (TOML)", (".toml",))
+MODEL: Final = FileKind("a model (JSON)", (".json",))
+FLEET: Final = FileKind("a fleet (JSON)", (".json",))
+SIMULATION: Final = FileKind("a simulation (TOML)", (".toml",))
 #: What a simulator takes, by the ending.
-SENSOR: Final = Kind("a sensor of a simulator (MJCF or FMU)", (".xml", ".fmu"))
-RUNS: Final = Kind("a table of runs (CSV)", (".csv",))
-PAGE: Final = Kind("a report (HTML)", (".html", ".htm"))
-PDF: Final = Kind("a report (PDF)", (".pdf",))
+SENSOR: Final = FileKind("a sensor of a simulator (MJCF or FMU)", (".xml", ".fmu"))
+RUNS: Final = FileKind("a table of runs (CSV)", (".csv",))
+PAGE: Final = FileKind("a report (HTML)", (".html", ".htm"))
+PDF: Final = FileKind("a report (PDF)", (".pdf",))
 #: What a picture is written as, by the ending.
-PICTURE: Final = Kind("a picture (PNG, SVG or PDF)", (".png", ".svg", ".pdf"))
-CERTIFICATE: Final = Kind("a certificate (PDF)", (".pdf",))
+PICTURE: Final = FileKind("a picture (PNG, SVG or PDF)", (".png", ".svg", ".pdf"))
+CERTIFICATE: Final = FileKind("a certificate (PDF)", (".pdf",))
 #: What `Report.save` writes, by the ending.
-REPORT: Final = Kind("a report (HTML or PDF)", (*PAGE.endings, *PDF.endings))
+REPORT: Final = FileKind("a report (HTML or PDF)", (*PAGE.endings, *PDF.endings))

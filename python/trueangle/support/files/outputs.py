@@ -1,4 +1,4 @@
-"""Writing files: only regular ones, never an input, complete or not there at all."""
+"""Writing files: only regular ones, never an input; published atomically, or not there at all."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import IO
 
 from ...errors import FileError, KindError
 from .inputs import is_null_device, sha256_of
-from .kinds import Kind, log_endings
-from .samefile import named_again, what_it_is
+from .kinds import FileKind, log_endings
+from .samefile import irregular_file_kind, named_again
 from .workplace import (
     PARTIAL,
     hidden_name,
@@ -37,7 +37,7 @@ __all__ = [
 
 def check_output(
     path: str | PathLike[str],
-    kind: Kind | None = None,
+    kind: FileKind | None = None,
     inputs: Iterable[str | PathLike[str]] = (),
     hashes: Iterable[str] = (),
     *,
@@ -100,7 +100,7 @@ def check_output(
         return target
     elif not stat.S_ISREG(found.st_mode):
         raise FileError(
-            path, f"is {what_it_is(found.st_mode)}: only files are written; name a file"
+            path, f"is {irregular_file_kind(found.st_mode)}: only files are written; name a file"
         )
     elif not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, "is write-protected", text)
@@ -123,7 +123,7 @@ def check_output(
 def written_atomically(
     path: str | PathLike[str],
     *,
-    kind: Kind | None = None,
+    kind: FileKind | None = None,
     inputs: Iterable[str | PathLike[str]] = (),
     hashes: Iterable[str] = (),
 ) -> Iterator[IO[str]]:

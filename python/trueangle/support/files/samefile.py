@@ -1,4 +1,4 @@
-"""Whether two names mean one file."""
+"""Whether two names mean one file, and the kind of what is no regular file."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _files(folder: str | PathLike[str]) -> Iterator[str]:
         yield from (os.path.join(parent, name) for name in names)
 
 
-def what_it_is(mode: int) -> str:
+def irregular_file_kind(mode: int) -> str:
     """What a thing that is no regular file is, as a message says it."""
     names = (
         (stat.S_ISDIR, "a folder"),

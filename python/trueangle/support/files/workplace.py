@@ -1,4 +1,4 @@
-"""Places beside an output in which it is made, and what killed processes left of them.
+"""Hidden places beside an output in which it is made, locks, and leftovers of killed processes.
 
 A place is locked as long as its process lives, and the system takes the lock from one that
 dies: whoever writes to the same name next removes what is locked by nobody.

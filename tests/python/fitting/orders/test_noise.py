@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from trueangle.fitting.orders.noise import pure_error
-from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
+from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 from trueangle.runs.aliasing import Positions
 
 SEED = 46_700

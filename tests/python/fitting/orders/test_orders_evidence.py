@@ -11,12 +11,12 @@ from trueangle.fitting.orders.evidence import (
     OVERDISPERSED,
     choose_forward,
     examine_orders,
-    fit_subset,
-    log_tail,
+    fit_chosen_orders,
+    log_chance,
 )
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
 from trueangle.fitting.orders.noise import neighbour_scatter, pooled_scatter, run_scatter
-from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
+from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 SIGMA = 0.3
 
@@ -82,14 +82,14 @@ def test_an_order_that_differs_between_units_has_its_own_noise_and_freedom():
     scatter = run_scatter(sums, [], range(4))
     noise = (SIGMA**2, 200.0)
     test = examine_orders(sums, [], [0, 2], noise, np.array([SIGMA**2, scatter[2]]))
-    _, _, left = fit_subset(sums, [])
-    gains = [left - fit_subset(sums, [k])[2] for k in (0, 2)]
+    _, _, left = fit_chosen_orders(sums, [])
+    gains = [left - fit_chosen_orders(sums, [k])[2] for k in (0, 2)]
     assert scatter[2] > 50.0 * SIGMA**2
     # Order 3 against its own scatter with 2 (R - 1) degrees of freedom, order 1 against all.
     assert test.statistic == pytest.approx([gains[0] / SIGMA**2, gains[1] / scatter[2]])
-    expected = [log_tail(gains[0] / SIGMA**2, 200.0), log_tail(gains[1] / scatter[2], 4.0)]
+    expected = [log_chance(gains[0] / SIGMA**2, 200.0), log_chance(gains[1] / scatter[2], 4.0)]
     assert test.log_p == pytest.approx([float(x) for x in expected])
-    inverse = fit_subset(sums, [2])[1]
+    inverse = fit_chosen_orders(sums, [2])[1]
     assert test.variance[1] == pytest.approx(scatter[2] * np.trace(inverse) / 2.0)
 
 

@@ -9,8 +9,8 @@ import pytest
 
 import trueangle as ta
 from coarse import Sensor, any_sensor
-from trueangle.fitting.orders.rounding import beyond_rounding
-from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
+from trueangle.fitting.orders.rounding import orders_beyond_rounding
+from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 
 @pytest.mark.parametrize("seed", range(40, 70))
@@ -48,8 +48,8 @@ def test_orders_always_in_the_model_are_not_told_of():
     truth = 2.0 * np.cos(2.0 * x) + 1.5 * np.sin(5.0 * x)
     reading = np.round(7.3 * x + truth) - 7.3 * x
     limits = [math.log(0.005 / 17)] * 3
-    assert beyond_rounding(units(reading), 1.0, [2, 5, 9], limits) == [0, 1]
-    assert beyond_rounding(units(reading), 1.0, [2, 5, 9], limits, forced=1) == [1]
+    assert orders_beyond_rounding(units(reading), 1.0, [2, 5, 9], limits) == [0, 1]
+    assert orders_beyond_rounding(units(reading), 1.0, [2, 5, 9], limits, forced=1) == [1]
 
 
 def test_fine_steps_and_steps_that_are_none_leave_the_orders():
@@ -57,4 +57,4 @@ def test_fine_steps_and_steps_that_are_none_leave_the_orders():
     x = 2.0 * np.pi * np.arange(72) / 72
     reading = 0.3 * np.cos(2.0 * x) + rng.normal(0.0, 0.3, 72)
     for step in (0.1, 100.0):
-        assert beyond_rounding(units(reading), step, [2, 7], [-9.0, -9.0]) == [0, 1]
+        assert orders_beyond_rounding(units(reading), step, [2, 7], [-9.0, -9.0]) == [0, 1]

@@ -6,7 +6,7 @@ import pytest
 import trueangle as ta
 from trueangle.fitting.orders.evidence import examine_orders
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
-from trueangle.fitting.orders.unitgroups import ZeroGroupReadings
+from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 ORDERS = [*range(1, 18), 225.0, 450.0, 675.0, 900.0]
 

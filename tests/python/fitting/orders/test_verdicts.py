@@ -10,8 +10,8 @@ import pytest
 from scipy import stats
 
 import trueangle as ta
-from trueangle.fitting.orders.evidence import log_chi2_tail, log_tail
-from trueangle.fitting.orders.rows import OrderRow
+from trueangle.fitting.orders.evidence import log_chance, log_chi_squared_tail
+from trueangle.fitting.orders.table import OrderRow
 
 SEED = 71_000
 THETA = np.arange(36) * 10.0
@@ -33,8 +33,8 @@ def test_chances_are_those_of_f_and_chi_squared() -> None:
     t, x = np.array([0.5, 3.0, 11.0]), np.array([1.0, 9.0, 40.0])
     for freedom in (3.0, 20.0, math.inf):
         told = stats.f.logsf(t / 2.0, 2, freedom) if freedom < math.inf else stats.chi2.logsf(t, 2)
-        np.testing.assert_allclose(log_tail(t, freedom), told, rtol=1e-9)
-    np.testing.assert_allclose(log_chi2_tail(x, 6), stats.chi2.logsf(x, 6), rtol=1e-9)
+        np.testing.assert_allclose(log_chance(t, freedom), told, rtol=1e-9)
+    np.testing.assert_allclose(log_chi_squared_tail(x, 6), stats.chi2.logsf(x, 6), rtol=1e-9)
 
 
 def test_the_last_run_of_the_paper_tells_what_is_left_of_it() -> None:

@@ -8,8 +8,8 @@ import pytest
 from trueangle.runs.checks.angles import (
     angle_ratio,
     mixed_units,
-    suggestion,
-    swapped,
+    ratio_suggestion,
+    swapped_channels,
     wrapped_reference,
     wrong_ratio,
 )
@@ -47,12 +47,12 @@ def record(reference: np.ndarray, indicated: np.ndarray | None = None, label: st
     ],
 )
 def test_what_a_ratio_suggests(size: float, says: str, sign: float) -> None:
-    found = suggestion(sign * size)
+    found = ratio_suggestion(sign * size)
     near = says.endswith("{}")
     way = "is reduced to the output" if sign > 0 else "counts the other way"
     assert found.startswith("a gear of ratio" if "70/11" in says else says.format(way))
     assert near or ("other way" in found) == (sign < 0)
-    assert suggestion(None) == "the joint hardly moved"
+    assert ratio_suggestion(None) == "the joint hardly moved"
 
 
 def test_the_ratio_is_the_median_of_the_runs() -> None:
@@ -125,16 +125,16 @@ def test_a_reference_much_noisier_than_the_joint() -> None:
     time = np.interp(steps, SWEEP, np.arange(SWEEP.size) * 0.1)
     for factor, told in ((14.0, True), (7.0, False)):
         rough = steps + factor * 0.002 * rng.normal(size=SWEEP.size)
-        found = list(swapped([record(rough, steps + fine, time=time)]))
+        found = list(swapped_channels([record(rough, steps + fine, time=time)]))
         assert bool(found) == told
     assert found == []
     many = steps + 0.1 * rng.normal(size=SWEEP.size)
-    (found,) = swapped([record(many, steps + fine, time=time)])
+    (found,) = swapped_channels([record(many, steps + fine, time=time)])
     assert found.fault == "swapped_channels"
-    assert not list(swapped([record(many[:29], (steps + fine)[:29], time=time[:29])]))
-    assert list(swapped([record(many[:30], (steps + fine)[:30], time=time[:30])]))
+    assert not list(swapped_channels([record(many[:29], (steps + fine)[:29], time=time[:29])]))
+    assert list(swapped_channels([record(many[:30], (steps + fine)[:30], time=time[:30])]))
     # At even counts of the joint nothing is told of its noise.
-    assert not list(swapped([record(SWEEP + 0.1 * rng.normal(size=160), SWEEP)]))
+    assert not list(swapped_channels([record(SWEEP + 0.1 * rng.normal(size=160), SWEEP)]))
 
 
 def test_rows_and_runs_that_are_there_twice() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from trueangle.runs.joining.clocks import Clocks, _inflation, estimated_clocks
 from trueangle.runs.joining.stream import Stream
-from trueangle.runs.joining.travel import Travelled
+from trueangle.runs.joining.travel import TravelledError
 
 
 def curve(time: np.ndarray) -> np.ndarray:
@@ -164,13 +164,13 @@ def test_neighbours_that_are_alike_inflate_a_variance(memory: float) -> None:
     assert _inflation(np.tile([1.0, -1.0], 50)) == 1.0
 
 
-def travelled(low: float, high: float, back: bool = True) -> Travelled:
+def travelled(low: float, high: float, back: bool = True) -> TravelledError:
     angle = np.arange(low, high)
     way = np.ones(angle.size)
     if back:
         angle, way = np.concatenate([angle, angle[::-1]]), np.concatenate([way, -way])
     error = np.sin(np.radians(angle)) + 0.2 * way
-    return Travelled(angle, error, way)
+    return TravelledError(angle, error, way)
 
 
 def test_the_error_of_each_direction_where_the_log_says_one() -> None:
@@ -208,9 +208,11 @@ def test_a_whole_turn_closes_over_its_seam() -> None:
             np.testing.assert_allclose(error, np.sin(np.radians(asked)) + 0.2, atol=0.01)
     for gap, known in ((4.9, True), (5.9, False)):
         angle = np.concatenate([np.arange(0.0, 100.0), 99.0 + gap + np.arange(0.0, 100.0)])
-        log = Travelled(angle, np.zeros(200), np.ones(200))
+        log = TravelledError(angle, np.zeros(200), np.ones(200))
         assert log.at(np.array([101.0]), np.ones(1))[1][0] == known
-    scattered = Travelled(np.repeat(np.arange(50.0), 2), np.tile([1.0, -1.0], 50), np.ones(100))
+    scattered = TravelledError(
+        np.repeat(np.arange(50.0), 2), np.tile([1.0, -1.0], 50), np.ones(100)
+    )
     assert scattered.std == pytest.approx(1.0)
 
 

@@ -1,4 +1,4 @@
-"""What a cause is worth beside what the forms of the larger ones leave: none is exact."""
+"""Form errors: what a cause is worth jointly with what the forms of the larger ones leave."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..support.arrays import Array
-from .unnamed import effect_of, is_named
+from .unnamed import effect_or_unnamed, is_named
 
 #: Share of a cause's energy that its form may leave: one known to 3 %.
 FORM = 1e-3
@@ -38,7 +38,7 @@ def form_error_columns(regression: Regression, exempt: Collection[str] = ()) -> 
     columns = [np.zeros((regression.n, 0))]
     for cause, terms in causes.items():
         size = float(np.std(sum(t.columns @ c for t, c in terms)))
-        found = effect_of(cause).bends(regression.signals, terms)
+        found = effect_or_unnamed(cause).bends(regression.signals, terms)
         spread = np.std(found, axis=0)
         kept = spread > 1e-9 * size
         if np.sqrt(FORM) * size > SLIGHT * np.sqrt(regression.variance):
@@ -46,7 +46,7 @@ def form_error_columns(regression: Regression, exempt: Collection[str] = ()) -> 
     return np.hstack(columns)
 
 
-def beside_bends(regression: Regression, exempt: Collection[str] = ()) -> Regression:
+def beside_form_errors(regression: Regression, exempt: Collection[str] = ()) -> Regression:
     """The regression beside `form_error_columns`, for scores of others; itself without any."""
 
     def build() -> Regression | None:
@@ -58,16 +58,16 @@ def beside_bends(regression: Regression, exempt: Collection[str] = ()) -> Regres
     return regression if made is None else made
 
 
-def told_from_forms(regression: Regression, extension: Extension) -> Extension:
+def told_from_form_errors(regression: Regression, extension: Extension) -> Extension:
     """The extension with the evidence that it has beside bends of the other causes."""
-    beside = beside_bends(regression, {extension.cause})
+    beside = beside_form_errors(regression, {extension.cause})
     if beside is regression:
         return extension
-    share = share_beside(regression, beside, [extension])
+    share = share_beside_form_errors(regression, beside, [extension])
     return replace(extension, deviance=extension.deviance * share)
 
 
-def share_beside(
+def share_beside_form_errors(
     regression: Regression, beside: Regression, extensions: Sequence[Extension]
 ) -> float:
     """Share of the deviance of ``extensions`` together that is left beside the bends."""

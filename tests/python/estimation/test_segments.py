@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trueangle.estimation.stretches import about_level, short_stretches, stretches, within
+from trueangle.estimation.segments import (
+    flagged_segments,
+    less_local_level,
+    short_segments,
+    within_segments,
+)
 
 BOUNDS = [(0, 13), (13, 14), (14, 20), (20, 25), (25, 60)]
 
@@ -27,24 +32,24 @@ def slow(flags: np.ndarray) -> list[tuple[int, int]]:
 @pytest.mark.parametrize("seed", range(30))
 def test_stretches_are_those_of_a_loop(seed: int) -> None:
     flags = np.random.default_rng(seed).random(60) < [0.1, 0.5, 0.9, 1.1][seed % 4]
-    starts, stops = stretches(flags, BOUNDS)
+    starts, stops = flagged_segments(flags, BOUNDS)
     assert list(zip(starts.tolist(), stops.tolist(), strict=True)) == slow(flags)
-    np.testing.assert_array_equal(within(starts, stops, 60), flags)
+    np.testing.assert_array_equal(within_segments(starts, stops, 60), flags)
     expected = np.zeros(60, bool)
     for a, b in slow(flags):
         expected[a:b] = b - a <= 4
-    np.testing.assert_array_equal(short_stretches(flags, BOUNDS), expected)
+    np.testing.assert_array_equal(short_segments(flags, BOUNDS), expected)
 
 
 def test_stretches_that_touch_or_overlap() -> None:
-    found = within(np.array([1, 3, 4]), np.array([3, 6, 5]), 7)
+    found = within_segments(np.array([1, 3, 4]), np.array([3, 6, 5]), 7)
     assert found.tolist() == [False, True, True, True, True, True, False]
-    assert not within(np.zeros(0, int), np.zeros(0, int), 3).any()
+    assert not within_segments(np.zeros(0, int), np.zeros(0, int), 3).any()
 
 
 def test_the_level_is_the_median_of_those_about() -> None:
     values = np.random.default_rng(1).normal(size=60) + np.arange(60)
-    found = about_level(values, BOUNDS)
+    found = less_local_level(values, BOUNDS)
     for start, stop in BOUNDS:
         part = values[start:stop]
         n = part.size

@@ -1,4 +1,4 @@
-"""Arguments of a wrong kind, named after a call has failed of one."""
+"""Arguments of a wrong kind or type, named after a call has failed of one."""
 
 from __future__ import annotations
 

@@ -1,19 +1,15 @@
-"""A model as text: in words, and its file."""
+"""The file of a model or of a robot as it is written: its plain values, its text."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from os import PathLike
 from typing import Any
 
 from ..errors import ArgumentError
-from ..support.angles import arcsec, unit_name
-from ..support.display_units import error_unit, sine_of_rms
 from ..support.files import MODEL, MODEL_BYTES, written_atomically
-from ..support.layout import laid_out, wrapped
-from ..support.plainresult import counted, pretty_json
+from ..support.plainresult import pretty_json
 from .errormodel import ErrorModel
 from .records import FitRecord
 
@@ -21,19 +17,13 @@ FORMAT = "trueangle-model"
 ROBOT_FORMAT = "trueangle-robot"
 VERSION = 1
 
-#: Lines that a summary lists before it says how many more there are.
-_LISTED = 40
-
-#: Names that one line lists, and their letters.
-_NAMED, _LETTERS = 4, 24
-
 
 def model_text(model: ErrorModel) -> str:
     """What the file of a model holds."""
-    return pretty_json(model_content(model)) + "\n"
+    return pretty_json(plain_model(model)) + "\n"
 
 
-def model_content(model: ErrorModel) -> dict[str, Any]:
+def plain_model(model: ErrorModel) -> dict[str, Any]:
     """The object that the file of a model is."""
     return {
         "format": FORMAT,
@@ -81,7 +71,7 @@ def save_robot(
             joint: {role: [*column] for role, column in columns.items()}
             for joint, columns in signals.items()
         }
-    content["joints"] = {joint: model_content(model) for joint, model in models.items()}
+    content["joints"] = {joint: plain_model(model) for joint, model in models.items()}
     text = pretty_json(content) + "\n"
     if len(text) > MODEL_BYTES:
         raise ArgumentError(
@@ -102,51 +92,3 @@ def _record(record: FitRecord) -> dict[str, Any]:
         if not table[name]:
             del table[name]
     return table
-
-
-def one_line(model: ErrorModel) -> str:
-    """What the model is, in one line of a screen."""
-    lines = len(model.orders)
-    parts = [
-        f"{lines} {'order' if lines == 1 else 'orders'}"
-        + (f" of {_listed([shaft.name for shaft in model.shafts])}" if model.shafts else ""),
-        f"period {model.period:g}",
-        f"argument {model.argument}",
-    ]
-    if model.terms:
-        parts.append(f"with {_listed([term.kind for term in model.terms])}")
-    return f"<HarmonicModel: {', '.join(parts)}>"
-
-
-def model_summary(model: ErrorModel) -> str:
-    """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
-    period, unit = model.period, unit_name(model.period)
-    rms = math.sqrt(0.5 * float(model.amplitudes @ model.amplitudes))
-    shown = error_unit("auto", sine_of_rms(arcsec(rms, period)))
-    lines = [
-        *wrapped(one_line(model)[1:-1], 2),
-        f"constant {model.constant:.6g} {unit}, {arcsec(model.constant, period):.6g} arcsec",
-        f"{'shaft':16s} {'order':>10s} {f'amplitude, {shown.name}':>18s} {'phase, deg':>11s}",
-    ]
-    rows = [
-        f"{shaft.name:16.16s} {k:10d} {shown.number(arcsec(c, period)):>18} "
-        f"{math.degrees(p) % 360.0:11.2f}"
-        for shaft in model.shafts
-        for k, c, p in zip(shaft.orders, shaft.amplitudes, shaft.phases, strict=True)
-    ]
-    lines += rows[:_LISTED]
-    if len(rows) > _LISTED:
-        lines.append(f"... and {len(rows) - _LISTED} more")
-    if model.fit is not None:
-        start, stop = model.fit.span
-        lines.append(
-            f"fitted to {counted(model.fit.samples, 'reading')} of "
-            f"{counted(model.fit.runs, 'run')} "
-            f"between {start:.6g} and {stop:.6g} {unit}"
-        )
-    return laid_out(lines)
-
-
-def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return ", ".join(name[:_LETTERS] for name in names[:_NAMED]) + more

@@ -1,4 +1,4 @@
-"""Noise beside the orders: whether what is left of the readings is white where it matters."""
+"""The noise spectrum about the orders: whether what is left is white where it matters."""
 
 from __future__ import annotations
 
@@ -45,7 +45,9 @@ def spectrum_at(theta: Array, values: Array, orders: Array) -> Array:
     return np.asarray((real**2 + imaginary**2) * (2.0 / total))
 
 
-def noise_beside(theta: Array, residuals: Array, orders: Sequence[float], turns: float) -> Array:
+def noise_spectrum_at(
+    theta: Array, residuals: Array, orders: Sequence[float], turns: float
+) -> Array:
     """Noise power around each order relative to white noise; 1 where it is not louder.
 
     Only where there are turns enough to look between orders.

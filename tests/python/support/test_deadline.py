@@ -20,7 +20,13 @@ from trueangle.cli import main
 from trueangle.cli.values import seconds
 from trueangle.errors import ArgumentError
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
-from trueangle.support.deadline import Pace, ending_early, entered, pace, with_pace
+from trueangle.support.deadline import (
+    Deadline,
+    current_deadline,
+    ending_early,
+    under_deadline,
+    with_deadline,
+)
 
 #: Seconds by which a diagnosis may take longer than it was given: what is in hand is ended (one
 #: search), and what is left is tested. Generous, as the machine that runs this may be busy.
@@ -61,7 +67,7 @@ def test_nothing_is_shown_in_the_first_second_nor_off_a_terminal():
         (io.StringIO(), "text", "sums: 2 of 4, at least 2 s left"),
     ):
         now[0] = 0.0
-        work = Pace(style=style, stream=stream, clock=lambda: now[0])
+        work = Deadline(style=style, stream=stream, clock=lambda: now[0])
         work.at("sums", 0, 4)
         now[0] = 0.9
         work.at("sums", 1, 4)
@@ -75,7 +81,7 @@ def test_nothing_is_shown_in_the_first_second_nor_off_a_terminal():
 
 def test_progress_as_json_is_an_object_a_line():
     stream = io.StringIO()
-    work = Pace(10.0, "json", stream, Ticks())
+    work = Deadline(10.0, "json", stream, Ticks())
     for k in range(3):
         work.at("sums", k, 3)
     states = [json.loads(line) for line in stream.getvalue().splitlines()]
@@ -85,7 +91,7 @@ def test_progress_as_json_is_an_object_a_line():
 
 def test_a_part_ends_before_the_whole():
     now = [0.0]
-    work = Pace(10.0, clock=lambda: now[0])
+    work = Deadline(10.0, clock=lambda: now[0])
     now[0] = 6.0
     assert not work.over
     with work.part(0.5):
@@ -98,12 +104,12 @@ def test_a_part_ends_before_the_whole():
 
 
 def test_work_inside_other_work_has_its_pace():
-    with with_pace(5.0) as outer:
-        with with_pace() as inner:
-            assert inner is outer is pace()
-        with with_pace(1.0) as own:
+    with with_deadline(5.0) as outer:
+        with with_deadline() as inner:
+            assert inner is outer is current_deadline()
+        with with_deadline(1.0) as own:
             assert own is not outer
-    assert pace().within is None
+    assert current_deadline().within is None
 
 
 @pytest.mark.parametrize("within", [0.0, -1.0, float("nan"), float("inf")])
@@ -137,7 +143,7 @@ def test_wherever_it_is_ended_the_account_says_so_and_confirms_nothing_unmeasure
     """Ended at many moments: each account is whole as an object, and honest."""
     runs = simulate(TRUE, seed=5)
     clock = Ticks()
-    with entered(Pace(1e9, clock=clock)):
+    with under_deadline(Deadline(1e9, clock=clock)):
         full = ta.diagnose(runs, BELIEVED)
     steps = next(clock.count)
     assert full.complete
@@ -146,7 +152,7 @@ def test_wherever_it_is_ended_the_account_says_so_and_confirms_nothing_unmeasure
     assert names, "the full account must name something for the others to be held against"
     named = set()
     for within in np.unique(np.geomspace(3, 1.8 * steps, 8).astype(int)):
-        with entered(Pace(float(within), clock=Ticks())):
+        with under_deadline(Deadline(float(within), clock=Ticks())):
             result = ta.diagnose(runs, BELIEVED)
         told = result.to_dict()
         assert told["complete"] == result.complete
@@ -166,7 +172,7 @@ def test_wherever_it_is_ended_the_account_says_so_and_confirms_nothing_unmeasure
 
 def test_a_step_that_was_not_finished_names_nothing():
     """The causes tried first must not win for having been tried."""
-    with entered(Pace(40.0, clock=Ticks())):
+    with under_deadline(Deadline(40.0, clock=Ticks())):
         result = ta.diagnose(simulate(TRUE, seed=5), BELIEVED)
     assert "trying causes" in result.notes[0]
     assert result.findings == []
@@ -177,7 +183,7 @@ def test_work_without_a_time_given_is_bounded_by_its_readings():
     now = [0.0]
     for items, allowed in ((0, 5.0), (10_000, 5.0), (40_000, 20.0)):
         now[0] = 0.0
-        work = Pace(processor=lambda: now[0])
+        work = Deadline(processor=lambda: now[0])
         with work.bounded(items):
             work.at("rounds", 0, 9)
             now[0] = allowed - 0.01
@@ -196,8 +202,8 @@ def test_readings_that_are_not_used_bring_no_time(monkeypatch):
     from trueangle.diagnosis import account
 
     bound = []
-    usual = Pace.bounded
-    monkeypatch.setattr(Pace, "bounded", lambda self, n: bound.append(n) or usual(self, n))
+    usual = Deadline.bounded
+    monkeypatch.setattr(Deadline, "bounded", lambda self, n: bound.append(n) or usual(self, n))
     for many in (account.MOST_READINGS, sum(map(len, simulate(TRUE, seed=5))) - 1):
         monkeypatch.setattr(sys.modules["trueangle.diagnosis.diagnose"], "MOST_READINGS", many)
         ta.diagnose(simulate(TRUE, seed=5), BELIEVED, gain=False)
@@ -206,7 +212,7 @@ def test_readings_that_are_not_used_bring_no_time(monkeypatch):
 
 def test_a_time_that_is_given_is_the_only_one():
     now = [0.0]
-    work = Pace(1e3, clock=lambda: 0.0, processor=lambda: now[0])
+    work = Deadline(1e3, clock=lambda: 0.0, processor=lambda: now[0])
     with work.bounded(10):
         now[0] = 1e6
         assert not work.over
@@ -228,12 +234,12 @@ class Busy:
 def test_a_diagnosis_comes_to_an_end_by_itself_and_says_so(command, files, capsys, monkeypatch):
     """So slow a processor that the time is up after the first causes: what is there is told."""
     monkeypatch.chdir(files)
-    usual = Pace.__init__
+    usual = Deadline.__init__
 
     def slow(self, *args, **more):
         usual(self, *args, **{**more, "processor": Busy(1.0)})
 
-    monkeypatch.setattr(Pace, "__init__", slow)
+    monkeypatch.setattr(Deadline, "__init__", slow)
     if command:
         assert main(["diagnose", "r.csv", "--simulation", "believed.toml"]) == 0
         told = capsys.readouterr().out
@@ -249,7 +255,7 @@ def test_a_diagnosis_comes_to_an_end_by_itself_and_says_so(command, files, capsy
 
 def test_a_search_that_was_cut_short_is_not_remembered():
     """What it found so far would stand for its cause when rivals are told."""
-    from trueangle.diagnosis.candidates import extensions
+    from trueangle.diagnosis.candidates import candidate_extensions
     from trueangle.estimation.regression import Regression
     from trueangle.joint.signals import join_runs
 
@@ -258,14 +264,14 @@ def test_a_search_that_was_cut_short_is_not_remembered():
     error = 3600.0 * np.concatenate([run.error for run in runs])
     start = Regression.of(signals, error, BELIEVED.surroundings)
     for within in range(4, 40, 3):
-        with entered(Pace(float(within), clock=Ticks())) as at:
-            found = extensions(start, ["local_defect", "backlash"])
+        with under_deadline(Deadline(float(within), clock=Ticks())) as at:
+            found = candidate_extensions(start, ["local_defect", "backlash"])
             cut = at.over
         if cut:
             assert len(found) < 2
         alone = Regression.of(signals, error, BELIEVED.surroundings)
-        for extension, _, gain in extensions(start, ["local_defect", "backlash"]):
-            fresh = [g for e, _, g in extensions(alone, [extension.cause])]
+        for extension, _, gain in candidate_extensions(start, ["local_defect", "backlash"]):
+            fresh = [g for e, _, g in candidate_extensions(alone, [extension.cause])]
             assert fresh == [gain]
         start = Regression.of(signals, error, BELIEVED.surroundings)
 
@@ -288,7 +294,7 @@ def test_the_same_work_without_a_limit_is_not_changed():
 def test_ctrl_c_asks_first_and_ends_then():
     before = signal.getsignal(signal.SIGINT)
     with ending_early() as interruption:
-        with with_pace(100.0) as work:
+        with with_deadline(100.0) as work:
             os.kill(os.getpid(), signal.SIGINT)
             assert work.over
             assert interruption.happened

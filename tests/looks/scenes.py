@@ -1,19 +1,14 @@
-"""Every command once, on small simulated data, as a terminal of 80 columns shows it."""
+"""Every command once, on small simulated data."""
 
-import contextlib
-import io
-import os
 from dataclasses import replace
 
-from trueangle.cli import COMMANDS, main
+from trueangle.cli import COMMANDS
 from trueangle.effects import Backlash
 from trueangle.reports.demo import demo_simulation
 from trueangle.runs.writing import write_runs
 from trueangle.simulation import Harmonic, RunDesign, Simulation, simulate
 
-__all__ = ["COLUMNS", "furnish", "scenes", "shown"]
-
-COLUMNS = 80
+__all__ = ["furnish", "scenes"]
 
 #: What is typed, in the folder that `furnish` fills; of a command that is not here, its help.
 SCENES = {
@@ -71,23 +66,3 @@ def furnish(folder):
     rotor = Simulation(harmonics=lines, sigma_arcsec=20.0, runs=(coast,))
     write_runs(simulate(rotor, seed=7), folder / "coast.csv")
     (folder / "arm.urdf").write_text(_ARM)
-
-
-def shown(line, folder, columns=COLUMNS):
-    """Exit status, and what such a terminal shows of a command in ``folder``."""
-    out, err = io.StringIO(), io.StringIO()
-    before, width = os.getcwd(), os.environ.get("COLUMNS")
-    os.chdir(folder)
-    os.environ["COLUMNS"] = str(columns)
-    try:
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            try:
-                status = main(line.split())
-            except SystemExit as left:
-                status = int(left.code or 0)
-    finally:
-        os.chdir(before)
-        os.environ.pop("COLUMNS")
-        if width is not None:
-            os.environ["COLUMNS"] = width
-    return status, out.getvalue() + err.getvalue()

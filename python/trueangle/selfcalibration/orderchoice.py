@@ -1,4 +1,4 @@
-"""Which orders the readings show: found in what is left, kept by their significance."""
+"""Choice of orders: found in what is left of the readings, kept by their significance."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..support.distributions import chi_squared_quantile
-from .colour import spectrum_at
+from .noisespectrum import spectrum_at
 from .pattern import ENCODER, pattern_series
 from .projected import Projected
 from .readings import SegmentReadings
@@ -36,7 +36,7 @@ def highest_order(readings: SegmentReadings) -> int:
     return max(1, min(HIGHEST, int(0.45 / (usual * max(step, 1e-12)))))
 
 
-def choose_orders(readings: SegmentReadings) -> tuple[float, ...]:
+def choose_selfcal_orders(readings: SegmentReadings) -> tuple[float, ...]:
     """Orders that stand out of the noise beside them.
 
     The lowest eight are fitted first, then those at which what is left peaks, until none
@@ -64,7 +64,7 @@ def choose_orders(readings: SegmentReadings) -> tuple[float, ...]:
     assert fit is not None
     if fit.orders != orders:
         fit = fit_steady(readings, orders, start=fit, thorough=False, smooth=True)
-    return chosen_orders(
+    return significant_orders(
         fit.projected, fit.unknowns, fit.projected.covariance, orders, ENCODER, most
     )
 
@@ -92,7 +92,7 @@ def _running_mean(values: Array) -> Array:
     )
 
 
-def chosen_orders(
+def significant_orders(
     projected: Projected,
     coefficients: NDArray[np.float64],
     covariance: NDArray[np.float64],

@@ -1,4 +1,4 @@
-"""Stretches of readings that follow each other in a run, and the level about them."""
+"""Segments of readings that follow each other in a run, and the level about them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_IN_ROW = 4
 REACH = MOST_IN_ROW + 1
 
 
-def stretches(
+def flagged_segments(
     flags: NDArray[np.bool_], bounds: list[tuple[int, int]]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """First and one-past-last reading of every stretch of true flags; none goes over two runs.
@@ -35,7 +35,7 @@ def stretches(
     return np.flatnonzero(after & (~before | edges)), np.flatnonzero(before & (~after | edges))
 
 
-def short_stretches(flags: NDArray[np.bool_], bounds: list[tuple[int, int]]) -> NDArray[np.bool_]:
+def short_segments(flags: NDArray[np.bool_], bounds: list[tuple[int, int]]) -> NDArray[np.bool_]:
     """The flags that stand in stretches of at most `MOST_IN_ROW`.
 
     Examples
@@ -46,7 +46,9 @@ def short_stretches(flags: NDArray[np.bool_], bounds: list[tuple[int, int]]) -> 
     return _core.short_stretches(flags, bounds)
 
 
-def within(starts: NDArray[np.int64], stops: NDArray[np.int64], n: int) -> NDArray[np.bool_]:
+def within_segments(
+    starts: NDArray[np.int64], stops: NDArray[np.int64], n: int
+) -> NDArray[np.bool_]:
     """Which of n readings are in one of some stretches.
 
     Examples
@@ -60,7 +62,7 @@ def within(starts: NDArray[np.int64], stops: NDArray[np.int64], n: int) -> NDArr
     return np.asarray(np.cumsum(change[:-1]) > 0)
 
 
-def about_level(values: Array, bounds: list[tuple[int, int]]) -> Array:
+def less_local_level(values: Array, bounds: list[tuple[int, int]]) -> Array:
     """Readings less the median of those about each: a glitch stands out, what is slow does not.
 
     About 5 ms for 10 000 readings.

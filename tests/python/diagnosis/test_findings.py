@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.diagnosis.named import _equals
+from trueangle.diagnosis.findings import _equals
 from trueangle.diagnosis.penalty import NEW_CAUSE
 from trueangle.simulation import (
     Backlash,

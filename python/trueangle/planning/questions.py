@@ -1,4 +1,4 @@
-"""Causes that may be behind what is seen, and as large as the noise where nothing is."""
+"""Questions that further runs are to answer: the causes that may be behind what is seen."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects import EFFECTS, Effect
-from ..effects.blindness import Blindness
-from ..joint.pattern import Surroundings
+from ..effects.ambiguity import Ambiguity
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .evidence import Hypothesis
 
@@ -48,7 +48,7 @@ class Question:
     draws: tuple[Hypothesis, ...] = ()
 
 
-def question_of(spot: Blindness, rich: Signals, around: Surroundings, rms: float) -> Question:
+def question_of(spot: Ambiguity, rich: Signals, around: JointPattern, rms: float) -> Question:
     """What an entry of ``not_identifiable`` asks.
 
     Parameters
@@ -70,7 +70,7 @@ def question_of(spot: Blindness, rich: Signals, around: Surroundings, rms: float
         if any(special.kind in spot.causes for special in EFFECTS[cause].contains):
             effects = ()  # its estimate is the special case, where the runs do not tell them
         if not effects:
-            made = [of_size(cause, rms, rich, around, k * TRIES) for k in range(DRAWS)]
+            made = [effect_of_size(cause, rms, rich, around, k * TRIES) for k in range(DRAWS)]
             drawn = [Hypothesis(cause, (one,)) for one in made if one is not None]
             effects = drawn[0].effects if drawn else ()
             draws += drawn[1:]
@@ -84,13 +84,13 @@ def question_of(spot: Blindness, rich: Signals, around: Surroundings, rms: float
     return Question(spot.causes, tuple(found), spot.supported, tuple(draws))
 
 
-def _rms(one: Hypothesis, rich: Signals, around: Surroundings) -> float:
+def _rms(one: Hypothesis, rich: Signals, around: JointPattern) -> float:
     """Of its error over these readings, without the mean."""
     return float(np.std(one.errors(rich, around)[0]))
 
 
 def _alike(
-    cause: str, known: Mapping[str, Sequence[Effect]], around: Surroundings
+    cause: str, known: Mapping[str, Sequence[Effect]], around: JointPattern
 ) -> tuple[Effect, ...]:
     """The error of another cause that is estimated from this one, where it has such a form."""
     for effects in known.values():
@@ -100,8 +100,8 @@ def _alike(
     return ()
 
 
-def of_size(
-    cause: str, rms: float, signals: Signals, around: Surroundings, first: int = 0
+def effect_of_size(
+    cause: str, rms: float, signals: Signals, around: JointPattern, first: int = 0
 ) -> Effect | None:
     """An effect of this cause whose error has this rms; None where the runs cannot have it.
 

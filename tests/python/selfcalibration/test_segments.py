@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from trueangle.errors import FileError, NoModelError
-from trueangle.selfcalibration.choice import highest_order
+from trueangle.selfcalibration.orderchoice import highest_order
 from trueangle.selfcalibration.readings import SegmentReadings
 from trueangle.selfcalibration.recording import Recording
-from trueangle.selfcalibration.stretches import Segment, cut_stretches, ripple_lead
+from trueangle.selfcalibration.segments import Segment, cut_stretches, ripple_lead
 from trueangle.selfcalibration.verification import _turn_numbers
 
 TURN = 2.0 * math.pi

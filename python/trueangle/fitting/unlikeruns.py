@@ -15,7 +15,7 @@ from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean
 from ..support.arrays import Array
 from ..support.quantiles import median
-from .problem import Fitted, Problem
+from .problem import Problem, SolvedProblem
 
 #: Readings of a run that are looked at, and runs.
 _READINGS: Final = 512
@@ -35,7 +35,7 @@ _SPEAKS: Final = 0.1
 _NAMED: Final = 8
 
 
-def unlike_runs(problem: Problem, fitted: Fitted) -> list[int]:
+def unlike_runs(problem: Problem, fitted: SolvedProblem) -> list[int]:
     """Runs whose own coefficients are far from those of all, in order; see `far_runs`.
 
     Of every run 512 readings at most are looked at; the correlation of neighbours in time
@@ -107,7 +107,7 @@ def run_names(runs: Sequence[CalibrationRun]) -> list[str]:
     ]
 
 
-def unlike_sentence(labels: Sequence[str], count: int) -> str:
+def unlike_runs_sentence(labels: Sequence[str], count: int) -> str:
     """What to tell of runs, out of so many, that are unlike the others."""
     more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
     which = f"run{'s' if len(labels) > 1 else ''} {', '.join(labels[:_NAMED])}{more}"

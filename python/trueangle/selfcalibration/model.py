@@ -16,7 +16,7 @@ from .recording import Recording
 from .result import ARCSEC, OrderEstimate
 
 
-def made_model(
+def reference_free_model(
     orders: Iterable[OrderEstimate],
     method: str,
     blind: Sequence[str],

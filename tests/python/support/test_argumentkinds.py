@@ -12,7 +12,7 @@ import trueangle as ta
 from trueangle import certificate, planning
 from trueangle.errors import TrueAngleError
 from trueangle.simulation import Harmonic, Joint, RunDesign
-from trueangle.support.kinds import told_kinds
+from trueangle.support.argumentkinds import told_kinds
 
 #: Seconds that a call with a wrong argument may take.
 MOST_S = 2.0

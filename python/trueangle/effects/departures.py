@@ -1,4 +1,4 @@
-"""How the form of a cause may bend: no real effect follows its textbook law exactly."""
+"""Departures of an effect from its textbook law, which no real one follows exactly."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def departure_columns(signals: Signals, factor: str, signal: Array) -> Array:
     loop = np.abs(signal) * np.sign(signal - late)
     curved = signal[:, None] * np.column_stack([x, np.abs(x), x**2, np.abs(x) ** 3])
     # What has a part along the error itself is that much more of it, and no bend.
-    return np.column_stack([columns_beyond(curved, signal[:, None]), late - signal, loop])
+    return np.column_stack([departure_beyond(curved, signal[:, None]), late - signal, loop])
 
 
 def spring_transitions(signals: Signals) -> Array:
@@ -57,7 +57,7 @@ def spring_transitions(signals: Signals) -> Array:
     return np.column_stack([signals.presliding(x, start) for start in (0.0, 1.0) for x in LENGTHS])
 
 
-def columns_beyond(columns: Array, own: Array) -> Array:
+def departure_beyond(columns: Array, own: Array) -> Array:
     """What ``columns`` have beside the columns ``own``."""
     return np.asarray(columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0])
 

@@ -8,20 +8,20 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ..effects import EFFECTS, Effect
-from ..effects.blindness import Blindness
+from ..effects.ambiguity import Ambiguity
 from ..effects.missing_order import MissingOrder
 from ..estimation.extension import Extension
 from ..estimation.regression import ROUNDING, Regression
-from ..joint.pattern import Harmonic, Surroundings
+from ..joint.pattern import Harmonic, JointPattern
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array
 from ..support.distributions import normal_tail
 from .beliefs import LEVEL, Belief, judge_line, verdict_of_factor
 from .gain import measure_belief_gains
-from .identifiability import doubts_about, open_origins, with_open_origins
+from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
-from .unnamed import effect_of
+from .unnamed import effect_or_unnamed
 
 #: Fields of effects, beside those in arcsec, that their signal is proportional to.
 LINEAR = ("delay_s", "relative_error", "pattern_per_K", "coefficient")
@@ -33,8 +33,8 @@ PROPORTIONAL = 1e-3
 NOTHING = 0.05
 
 
-def scaled_effect(
-    effect: Effect, factor: float, signals: Signals, around: Surroundings
+def _scaled_effect(
+    effect: Effect, factor: float, signals: Signals, around: JointPattern
 ) -> Effect | None:
     """The effect ``factor`` times as strong; None where its signal is not proportional."""
     changes: dict[str, object] = {}
@@ -50,11 +50,11 @@ def scaled_effect(
     return other if float(np.abs(after - factor * before).max()) <= limit else None
 
 
-def corrected_effects(
+def effects_as_measured(
     regression: Regression,
     believed: Simulation,
     sim: Simulation,
-    spots: Sequence[Blindness] = (),
+    spots: Sequence[Ambiguity] = (),
 ) -> Simulation | None:
     """The simulation with the strength of one refuted effect as measured; None where none is.
 
@@ -80,12 +80,12 @@ def corrected_effects(
         if 2.0 * normal_tail(z) > LEVEL or (worst is not None and z <= worst[0]):
             continue
         total = 1.0 + factor
-        other = scaled_effect(effect, total, signals, around)
+        other = _scaled_effect(effect, total, signals, around)
         if other is None:
             continue
         kept = list(believed.effects)
         if abs(total) < max(NOTHING, 3.0 * std):
-            other = scaled_effect(effect, 0.0, signals, around) or other
+            other = _scaled_effect(effect, 0.0, signals, around) or other
         kept[k] = other
         worst = (z, replace(believed, effects=tuple(kept)))
     return None if worst is None else worst[1]
@@ -106,7 +106,7 @@ def judged_beliefs(
     regression: Regression,
     sim: Simulation,
     believed: Simulation,
-    spots: list[Blindness],
+    spots: list[Ambiguity],
     with_gain: bool,
 ) -> tuple[list[Belief], Simulation]:
     """Verdicts on every line and effect, and the simulation with refuted ones as measured.
@@ -161,10 +161,12 @@ def _effect(regression: Regression, sim: Simulation, old: Effect, new: Effect) -
 
 
 def _lines(
-    regression: Regression, sim: Simulation, spots: list[Blindness], with_gain: bool
+    regression: Regression, sim: Simulation, spots: list[Ambiguity], with_gain: bool
 ) -> tuple[list[Belief], tuple[Harmonic, ...]]:
     pattern, joint = regression.belief.pattern, regression.belief.joint
-    if pattern.orders.size == 0 or any(effect_of(t.cause).changes_lines for t in regression.terms):
+    if pattern.orders.size == 0 or any(
+        effect_or_unnamed(t.cause).changes_lines for t in regression.terms
+    ):
         return [], sim.harmonics
     modulated = {term.shape["carrier"] for term in regression.terms if "carrier" in term.shape}
     found: list[Belief] = []
@@ -194,7 +196,7 @@ def _lines(
 
 
 def _doubt(
-    regression: Regression, order: float, change: Array, spread: Array, spots: list[Blindness]
+    regression: Regression, order: float, change: Array, spread: Array, spots: list[Ambiguity]
 ) -> bool:
     """Whether a line may be another one behind the positions.
 
@@ -204,7 +206,7 @@ def _doubt(
     extension = Extension(
         MissingOrder.kind, {"output_order": order}, np.zeros((regression.n, 0)), 2, log_grid
     )
-    doubt = doubts_about(extension, regression, spots)
+    doubt = ambiguity_of_cause(extension, regression, spots)
     origins = open_origins(extension, regression, spots) if doubt is None else [doubt]
     if not origins:
         return False

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.diagnosis.forms import form_error_columns, with_form_errors
+from trueangle.diagnosis.formerrors import form_error_columns, with_form_errors
 from trueangle.effects import EFFECTS
-from trueangle.effects.bends import departure_columns
+from trueangle.effects.departures import departure_columns
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import RunDesign, Simulation, simulate

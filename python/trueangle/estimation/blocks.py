@@ -26,15 +26,15 @@ class Blocks:
     def __init__(self, blocks: Sequence[Array]) -> None:
         self.count = len(blocks)
         #: The places of the blocks of every width, and their columns.
-        self.groups: list[tuple[NDArray[np.int64], Products]] = []
+        self.groups: list[tuple[NDArray[np.int64], BlockProducts]] = []
         widths = np.array([block.shape[1] for block in blocks])
         for width in sorted({*widths.tolist()}):
             where = np.flatnonzero(widths == width)
             columns = np.ascontiguousarray(np.hstack([blocks[int(k)] for k in where]))
-            self.groups.append((where, Products(columns, width)))
+            self.groups.append((where, BlockProducts(columns, width)))
 
 
-class Products:
+class BlockProducts:
     """Products of the columns within blocks of one width, under any noise.
 
     With X a block and M the map that makes the noise white, ``Xᵀ Mᵀ M X``. Correlated

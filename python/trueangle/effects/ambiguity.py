@@ -1,4 +1,4 @@
-"""What a design of runs cannot tell: the causes in question, why, and what to measure."""
+"""An ambiguity of a design of runs: the causes in question, why, and what to measure."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..estimation.estimate import Parameters
 from ..estimation.factor import orthonormal_basis
+from ..estimation.quantity import Parameters
 from ..estimation.regression import Regression
 from ..support.arrays import Array
-from ..support.plainresult import Shown
+from ..support.plainresult import ShownResult
 
 #: Share of velocity that direction must leave for latency and backlash to be told apart.
 OWN_OF_VELOCITY = 0.10
@@ -27,7 +27,7 @@ RUNS_PER_LEVEL = 3
 
 
 @dataclass(frozen=True)
-class Blindness(Shown):
+class Ambiguity(ShownResult):
     """Causes that this data cannot tell apart, or not see at all.
 
     Attributes

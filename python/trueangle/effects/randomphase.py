@@ -10,7 +10,7 @@ from ..estimation.regression import Regression
 from ..support.arrays import Array
 
 
-class DrawnLine:
+class RandomPhaseLine:
     """A line ``a_r cos f x + b_r sin f x`` in every run r.
 
     Parameters

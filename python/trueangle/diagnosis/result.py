@@ -1,0 +1,80 @@
+"""The `Diagnosis`: what was found, what is left, what could not be seen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..support.display_units import ErrorsIn
+from ..support.plainresult import result_picture
+from .diagnosisdata import DiagnosisData
+from .summary import diagnosis_summary
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+class Diagnosis(DiagnosisData):
+    """What `trueangle.diagnose` found.
+
+    Attributes
+    ----------
+    discrepancy : Discrepancy
+        Measured minus simulated before anything is added.
+    structure : dict of str to float
+        Share of its variance that each cause would explain alone, largest first; shares
+        overlap, and a flexible cause explains much that is not its own.
+    noise : float
+        Scatter of one reading, arcsec: from repeats where there are any, else what the
+        findings leave.
+    findings : list of Finding
+        In the order found; empty where the simulation is enough.
+    not_identifiable : list of Blindness
+        What this data cannot tell, and the measurement that would.
+    extended : Simulation
+        The simulation with every finding.
+    gain : dict
+        rms, peak-to-peak and max abs in arcsec, before and after all findings.
+    readings, readings_used : int
+    correlation : float
+        Of the noise of neighbouring readings.
+    unexplained : Unexplained or None
+        What is left beyond the noise after all findings, by tests that need no name.
+    unexplained_before : Unexplained or None
+        The same tests before anything was added to the simulation.
+    beliefs : list of Belief
+        Verdicts on what the simulation already claims.
+    data_faults : list of DataFault
+        As `trueangle.check` tells them.
+    notes : list of str
+        What else must be known of the account.
+    complete : bool
+        False where it was ended early: by the time given, or by Ctrl-C.
+    simulated : MeasuredMinusSimulated or None
+        The log of another simulator that the simulation stands on.
+    runs : list of CalibrationRun
+        The readings, as given.
+    torque : TorqueAccount or None
+        What the drive's torque lacks, where the readings and the simulator's log have one.
+    """
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Gain of every finding with its interval (needs ``trueangle[plot]``).
+
+        `trueangle.plots.measured_and_simulated` and `trueangle.plots.error_left` show the
+        readings themselves.
+        """
+        axes: Axes = result_picture(self, ax)
+        return axes
+
+    def summary(self, errors_in: ErrorsIn = "auto", *, verbose: bool = False) -> str:
+        """A readable account (`trueangle.diagnosis.summary.diagnosis_summary`).
+
+        Parameters
+        ----------
+        errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+            Unit of the errors; by itself arcsec, or degrees where errors are that large. A
+            number is the counts of a turn.
+        verbose : bool
+            Tell in full what the readings could not have shown and nobody asked.
+        """
+        return diagnosis_summary(self, errors_in, verbose)
