@@ -95,7 +95,7 @@ def test_a_summary_word_by_word():
 
 @pytest.mark.parametrize("more", [-1, 0, 1, 30])
 def test_a_summary_lists_as_many_orders_as_a_screen_holds(more):
-    from trueangle.model.text import _LISTED
+    from trueangle.model.model import _LISTED
 
     count = _LISTED + more
     shaft = ta.Shaft("output", 1, list(range(1, count + 1)), [1e-4] * count, [0.0] * count)

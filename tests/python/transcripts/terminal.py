@@ -48,21 +48,31 @@ ALTERS = (
 def ran(arguments: list[str], folder: Path, columns: int) -> tuple[int, str, str]:
     """Status of a command in ``folder``, and what it prints and tells at so many columns."""
     told, warned = io.StringIO(), io.StringIO()
+    with (
+        _within(folder, columns),
+        contextlib.redirect_stdout(told),
+        contextlib.redirect_stderr(warned),
+    ):
+        try:
+            status = main(arguments)
+        except SystemExit as left:
+            status = int(left.code or 0)
+    return status, told.getvalue(), warned.getvalue()
+
+
+@contextlib.contextmanager
+def _within(folder: Path, columns: int) -> Iterator[None]:
+    """In a folder, on a terminal of so many columns."""
     before, width = os.getcwd(), os.environ.get("COLUMNS")
     os.chdir(folder)
     os.environ["COLUMNS"] = str(columns)
     try:
-        with contextlib.redirect_stdout(told), contextlib.redirect_stderr(warned):
-            try:
-                status = main(arguments)
-            except SystemExit as left:
-                status = int(left.code or 0)
+        yield
     finally:
         os.chdir(before)
         os.environ.pop("COLUMNS")
         if width is not None:
             os.environ["COLUMNS"] = width
-    return status, told.getvalue(), warned.getvalue()
 
 
 class Terminal:
@@ -175,7 +185,11 @@ class Terminal:
         from matplotlib import pyplot
         from matplotlib.axes import Axes
 
-        with self._inside(), warnings.catch_warnings(record=True) as warned:
+        with (
+            _within(self.folder, COLUMNS),
+            self._kept(),
+            warnings.catch_warnings(record=True) as warned,
+        ):
             warnings.simplefilter("always")
             try:
                 found = self._value(code)
