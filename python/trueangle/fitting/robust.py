@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..joint.signals import sensor_lattice
+from ..joint.lattice import sensor_lattice
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array

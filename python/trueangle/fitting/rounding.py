@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ..joint.signals import sensor_lattice
+from ..joint.lattice import sensor_lattice
 from ..runs.aliasing import Positions
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN

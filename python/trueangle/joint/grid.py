@@ -2,45 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..support.arrays import distinct
-
 #: Departure from the grid, in shares of its step, up to which readings lie on it.
 ON_GRID = 0.02
-
-#: Departure of differences from a lattice, in shares of its step; differences below this
-#: share of the largest value are the rounding of sums.
-ON_LATTICE = 0.05
-LEAST_STEP = 1e-9
-
-#: Chance below which moves on a finer lattice are on it for a reason, and steps of it looked for.
-BY_CHANCE, STEPS_TRIED = 1e-3, 200
-
-#: Cells of a turn beyond which digits that were cut off are not looked behind, steps within the
-#: travel from which on they are a lattice, and share of one that a cell may be.
-MOST_CELLS, LEAST_STEPS, WIDEST_CELL = 400_000, 20, 0.3
-
-#: Coherence of readings on a lattice, in shares of what cutting their digits off leaves of it; that
-#: of the true positions from which on it is the design's.
-ON_COUNTS, OF_DESIGN = 0.97, 0.5
-
-#: Difference of coherences that readings do not tell.
-ALIKE = 0.004
 
 #: Positions beyond which a grid is not looked for.
 MOST_POSITIONS = 10_000
 
 #: Positions that part of a grid has at least, and share of those between its ends.
 LEAST_OF_ARC, FILLED = 6, 0.5
-
-#: Share of the moves from reading to reading that stay where they are, as at turning points,
-#: up to which readings are a table: a sensor that rounds lingers at its counts.
-LINGERS = 0.05
 
 
 @dataclass(frozen=True)
@@ -104,166 +78,3 @@ def _lies_on(turns: NDArray[np.float64], positions: int) -> bool:
     shift = np.angle(np.mean(np.exp(2j * np.pi * positions * turns))) / (2.0 * np.pi)
     away = turns * positions - shift
     return float(np.abs(away - np.round(away)).max()) < ON_GRID
-
-
-def lattice_step(values: NDArray[np.float64]) -> float:
-    """Step of the lattice that all values lie on; 0 where they lie on none.
-
-    Examples
-    --------
-    >>> lattice_step(np.array([0.5, 1.25, 3.0, 2.5]))
-    0.25
-    >>> lattice_step(np.array([0.5, 1.25, 3.0, 2.6]))
-    0.0
-    """
-    steps = np.diff(distinct(values))
-    rounding = LEAST_STEP * float(np.abs(values).max(initial=1.0))
-    steps = steps[steps > rounding]
-    if steps.size < 3:
-        return 0.0
-    step = float(steps.min())
-    # The finest difference may be several counts: a whole part of it then.
-    for parts in (1, 2, 3):
-        away = steps * (parts / step)
-        if np.abs(away - np.round(away)).max() < ON_LATTICE:
-            return step / parts
-    return 0.0
-
-
-def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
-    """Step of the lattice that all values lie on to their last digit; 0 where there is none.
-
-    At places of equal steps all counts of a sensor lie near a lattice of those steps, and the
-    moves from count to count tell the step by how they differ: 113 and 114 are no multiples
-    of 113.
-
-    Parameters
-    ----------
-    values : ndarray
-    below : float
-        Step of a design, which is none of the sensor's.
-
-    Examples
-    --------
-    >>> places = np.arange(36) / 36.0
-    >>> counts = np.round(4096 * places) / 4096
-    >>> 1.0 / finer_step(counts, 1.0 / 36.0)
-    4096.0
-    >>> finer_step(places, 1.0 / 36.0)
-    0.0
-    """
-    moves = np.diff(distinct(values))
-    rounding = LEAST_STEP * float(np.abs(values).max(initial=1.0))
-    moves = moves[moves > rounding]
-    some = distinct(moves[:: max(1, moves.size // STEPS_TRIED)])
-    tried = distinct(np.concatenate([some, np.diff(some)]))
-    tried = tried[(tried > rounding) & (tried < 0.5 * below)][::-1]
-    counts = some / tried[:, None]
-    aways = np.abs(counts - np.round(counts)).max(axis=1, initial=0.0)
-    for k in np.flatnonzero(aways < ON_LATTICE).tolist():
-        step, away = float(tried[k]), float(aways[k])
-        told = distinct(np.round(counts[k])).size - 1
-        # That each further move is a whole number of counts, as near as they all are.
-        if tried.size * (2.0 * away) ** told < BY_CHANCE:
-            off = np.abs(moves / step - np.round(moves / step)).max()
-            return step if off < ON_LATTICE else 0.0
-    return 0.0
-
-
-def is_of_design(values: NDArray[np.float64], true: NDArray[np.float64], step: float) -> bool:
-    """Whether readings lie on a lattice because the places do: no error is as large as a step.
-
-    Parameters
-    ----------
-    values, true : ndarray
-        Readings and true angles, turns.
-    step : float
-        Of the lattice that the readings lie near, turns.
-
-    Examples
-    --------
-    >>> places = np.sort(np.append(np.arange(36) / 36.0, np.arange(36) / 36.0 + 1.0 / 180.0))
-    >>> is_of_design(places + 1e-5 * np.sin(np.arange(72)), places, 1.0 / 180.0)
-    True
-    >>> is_of_design(np.round(places * 180.0 + np.sin(np.arange(72))) / 180.0, places, 1.0 / 180.0)
-    False
-    """
-    if step <= 0.0:
-        return False
-    phase = np.angle(np.mean(np.exp(2j * np.pi * true / step))) / (2.0 * np.pi)
-    counts = true / step - phase
-    error = values - true
-    error = error - np.angle(np.mean(np.exp(2j * np.pi * error))) / (2.0 * np.pi)
-    wrapped = (error - np.round(error)) / step
-    return bool(
-        np.abs(counts - np.round(counts)).max() < ON_LATTICE and np.abs(wrapped).max() < 0.5
-    )
-
-
-def step_behind(values: NDArray[np.float64], true: NDArray[np.float64], digit: float) -> float:
-    """Step of the sensor whose readings were cut to a last digit; 0 where none shows.
-
-    ::
-
-        R(N) = |mean exp(2πi N v)| = sinc(N digit)
-
-    for N counts in a turn, and chance, ``exp(-n R²)``, for other N.
-
-    Parameters
-    ----------
-    values, true : ndarray
-        Readings and true angles, turns.
-    digit : float
-        Turns.
-
-    Examples
-    --------
-    >>> places = np.arange(36) / 36.0 + 0.01 * np.sin(np.arange(36))
-    >>> degrees = np.round(np.round(4096 * places) / 4096 * 360.0, 2)
-    >>> 1.0 / step_behind(degrees / 360.0, np.arange(36) / 36.0, 0.01 / 360.0)
-    4096.0
-    """
-    cells = round(1.0 / digit) if digit > 0.0 else 0
-    if not 0 < cells <= MOST_CELLS or abs(cells * digit - 1.0) > LEAST_STEP:
-        return 0.0
-    places = distinct(np.mod(np.round(values * cells).astype(np.int64), cells))
-    marks = np.zeros(cells)
-    marks[places] = 1.0
-    coherence = np.abs(np.fft.rfft(marks)) / places.size
-    counts = np.arange(coherence.size)
-    possible = (counts * float(np.ptp(values)) > LEAST_STEPS) & (counts * digit < WIDEST_CELL)
-    possible &= cells * np.exp(-places.size * coherence**2) < BY_CHANCE
-    told = np.where(possible, coherence / np.sinc(counts * digit), 0.0)
-    top, lattices = int(np.argmax(told)), np.flatnonzero(told > ON_COUNTS)
-    # Its multiples are as coherent as a lattice; on even places aliases nearly are.
-    count = min((c for c in lattices.tolist() if top % c == 0), default=0)
-    if not count or (np.flatnonzero(told > told[count] - ALIKE) % count).any():
-        return 0.0
-    of_design = abs(np.exp(2j * np.pi * count * true).mean()) > OF_DESIGN
-    return 0.0 if of_design else 1.0 / count
-
-
-def table_move(runs: Sequence[NDArray[np.float64]], step: float) -> float:
-    """Move from each reading of a table of equal steps to the next, in turns; 0 for no table.
-
-    Where each reading stands one and the same number of steps from the one before, the design put
-    it there: such a lattice is no property of the sensor.
-
-    ``runs`` are the angles of each run and ``step`` that of their lattice (`lattice_step`), in
-    turns.
-
-    Examples
-    --------
-    >>> round(1.0 / table_move([np.arange(81) / 80.0], 1.0 / 80.0))
-    80
-    >>> table_move([np.array([0.0, 0.1, 0.4, 0.5])], 0.1)
-    0.0
-    """
-    if step <= 0.0:
-        return 0.0
-    moves = np.concatenate([np.diff(run) for run in runs])
-    counts = np.round(np.abs(moves - np.round(moves)) / step)
-    moved = counts[counts > 0.0]
-    if moved.size < max(3.0, (1.0 - LINGERS) * counts.size) or np.ptp(moved) > 0.0:
-        return 0.0
-    return float(moved[0] * step)

@@ -13,19 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..runs.run import CalibrationRun
-from ..support.angles import ARCSEC_PER_TURN
-from ..support.arrays import Array, distinct
+from ..support.arrays import Array
 from ..support.quantiles import median
 from ..support.signals import coupled_joint
-from .grid import (
-    UniformGrid,
-    finer_step,
-    is_of_design,
-    lattice_step,
-    step_behind,
-    table_move,
-    uniform_grid,
-)
+from .grid import UniformGrid, uniform_grid
+from .lattice import CLOSES, sensor_lattice
 from .turning import direction_at_turns, velocity_at_turns
 
 Index = NDArray[np.int64]
@@ -36,9 +28,6 @@ FLICKER = 0.05
 
 #: Sign changes that are taken as they are, however short the run.
 REVERSALS_TRUSTED = 10
-
-#: Share of a step by which the steps of a table may miss to fill a turn, as rounded angles do.
-CLOSES = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,30 +235,6 @@ def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
         table=table,
         labels=tuple(run.label or str(j + 1) for j, run in enumerate(runs)),
     )
-
-
-def sensor_lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float, int]:
-    """Count of the sensor in arcsec and positions of a table in a turn; of each 0 where none.
-
-    A table shows in the moves of the indicated angles, or in the true ones (radians), in any order.
-    """
-    turns = [run.indicated / run.period for run in runs]
-    values = distinct(np.concatenate(turns))
-    step = lattice_step(values)
-    move = table_move(turns, step)
-    if move and abs(1.0 / move - round(1.0 / move)) < CLOSES:
-        return finer_step(values, step) * ARCSEC_PER_TURN, round(1.0 / move)
-    grid = uniform_grid(theta)
-    table = 0 if grid is None else grid.positions
-    # At even places, values that all lie one step apart lie on any lattice of that step.
-    even = grid is not None and np.diff(values).max(initial=0.0) < 1.5 * step
-    if move or even or abs(step * table - 1.0) < CLOSES * step:
-        step = finer_step(values, step)
-    step = step or finer_step(values)
-    true = theta / (2.0 * np.pi)
-    if is_of_design(np.concatenate(turns), true, step):
-        step = finer_step(values, step)
-    return (step_behind(values, true, step) or step) * ARCSEC_PER_TURN, table
 
 
 def _common_table(first: Signals, later: Signals) -> int:

@@ -1,69 +1,13 @@
-"""Lattices: the sensor's own, and those that a design puts there."""
+"""Uniform grids of positions, whole or in part."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-import trueangle as ta
-from trueangle.joint.grid import (
-    UniformGrid,
-    finer_step,
-    lattice_step,
-    step_behind,
-    table_move,
-    uniform_grid,
-)
-from trueangle.joint.signals import join_runs
-from trueangle.simulation import Simulation
+from trueangle.joint.grid import UniformGrid, uniform_grid
 
-LINES = ((1, 60.0, 40.0), (2, 25.0, 100.0))
 SEED = 55_900
-
-
-def table(n: int, runs: int, rng: np.random.Generator, back: bool = False) -> list:
-    """Readings at indicated angles of equal steps, with order 1 and 2 and 2 arcsec of noise."""
-    found = []
-    for _ in range(runs):
-        grid = np.arange(n) * 360.0 / n
-        grid = np.concatenate([grid, grid[::-1]]) if back else grid
-        error = sum(a * np.sin(np.radians(k * grid + p)) for k, a, p in LINES)
-        noise = rng.normal(0.0, 2.0, grid.size)
-        found.append(ta.CalibrationRun(grid - (error + noise) / 3600.0, grid, period=360.0))
-    return found
-
-
-def test_a_table_is_told_from_a_sensor_that_rounds():
-    even = np.arange(73) / 72.0
-    assert table_move([even, even[::-1] + 0.25], 1.0 / 72.0) == pytest.approx(1.0 / 72.0)
-    assert table_move([even * 3.0], 1.0 / 72.0) == pytest.approx(3.0 / 72.0)
-    # A slow sensor lingers at its counts, a fast one skips unevenly.
-    slow = np.floor(np.linspace(0.0, 40.0, 200)) / 72.0
-    fast = np.floor(np.linspace(0.0, 40.0, 15)) / 72.0
-    assert lattice_step(slow) == pytest.approx(1.0 / 72.0)
-    assert table_move([slow], 1.0 / 72.0) == 0.0
-    assert table_move([fast], 1.0 / 72.0) == 0.0
-    assert table_move([even], 0.0) == 0.0
-
-
-@pytest.mark.parametrize(("n", "positions"), [(36, 36), (80, 80), (400, 400)])
-def test_a_lattice_of_the_design_is_no_count(n, positions):
-    signals = join_runs(table(n, 2, np.random.default_rng(n)))
-    assert signals.count == 0.0
-    assert signals.grid is not None
-    assert signals.grid.positions == positions
-
-
-@pytest.mark.parametrize("n", [24, 80, 100, 200, 400])
-@pytest.mark.parametrize(("runs", "back"), [(1, False), (3, True)])
-def test_tables_of_equal_steps_have_low_orders_and_no_counts(n, runs, back):
-    result = ta.diagnose(table(n, runs, np.random.default_rng([n, runs])), Simulation())
-    found = {f.parameters["order"].value: f for f in result.findings if f.cause == "missing_order"}
-    assert [f.cause for f in result.findings] == ["missing_order"] * 2
-    for order, amplitude, _ in LINES:
-        size = found[order].parameters["amplitude_arcsec"]
-        assert abs(size.value - amplitude) < 4.0 * size.std
-    assert result.noise == pytest.approx(2.0, rel=0.4)
 
 
 @pytest.mark.parametrize("n", [3, 7, 36])
@@ -106,125 +50,6 @@ def test_how_far_readings_may_stand_from_a_grid():
         assert (grid and grid.positions) == positions
     # At the places that are left the same orders look alike.
     assert uniform_grid(2.0 * np.pi * np.delete(turns, 3)) == UniformGrid(36)
-
-
-@pytest.mark.parametrize("step", [1.0, 1.0 / 4096.0, 1e-6])
-@pytest.mark.parametrize("counts", [(1, 2, 4), (2, 3, 5), (3, 4, 8), (2, 4, 7), (6, 9, 15)])
-def test_the_step_is_the_largest_that_all_differences_share(step, counts):
-    values = step * np.concatenate([[0], np.cumsum(counts * 3)])
-    expected = step * np.gcd.reduce(counts)
-    for sign in (1.0, -1.0):
-        assert lattice_step(sign * values) == pytest.approx(expected, rel=1e-12)
-    # Differences below the rounding of sums do not count.
-    doubled = np.concatenate([values, values + 0.5e-9 * max(1.0, values.max())])
-    assert lattice_step(doubled) == pytest.approx(expected, rel=1e-3)
-    for away, told in ((0.04, True), (0.06, False)):
-        moved = values.copy()
-        moved[-1] += away * expected
-        assert (lattice_step(moved) > 0.0) == told
-
-
-def test_three_differences_make_a_lattice():
-    assert lattice_step(np.array([0.0, 1.0, 3.0, 4.0])) == 1.0
-    assert lattice_step(np.array([0.0, 1.0, 3.0])) == 0.0
-    assert lattice_step(np.zeros(0)) == 0.0
-    # A quarter would fit: a finest difference of four counts is not looked for.
-    assert lattice_step(np.array([0.0, 4.0, 9.0, 15.0])) == 0.0
-
-
-def test_how_many_readings_of_a_table_may_linger():
-    for lingering, told in ((4, True), (5, False)):
-        run = np.repeat(np.arange(77.0 + (4 - lingering)), 1)
-        run = np.sort(np.concatenate([run, run[5 : 5 + lingering]]))
-        assert run.size == 81
-        assert (table_move([run / 100.0], 0.01) > 0.0) == told
-    assert table_move([np.arange(4) / 10.0], 0.1) == pytest.approx(0.1)
-    assert table_move([np.arange(3) / 10.0], 0.1) == 0.0
-    assert table_move([np.array([0.0, 0.2, 0.4, 0.5, 0.6])], 0.1) == 0.0
-    # The step over the seam is as long as the others.
-    assert table_move([np.array([0.7, 0.8, 0.9, 0.0, 0.1])], 0.1) == pytest.approx(0.1)
-    assert table_move([np.arange(9) / 10.0], -0.1) == 0.0
-
-
-@pytest.mark.parametrize(("steps", "positions"), [(0.0, 20), (0.5, 40), (0.3, None)])
-def test_a_table_in_any_order_keeps_its_positions(steps, positions):
-    rng = np.random.default_rng(20)
-
-    def visited(start: float):
-        grid = (rng.permutation(20) + start) * 18.0
-        return join_runs([ta.CalibrationRun(grid + rng.normal(0.0, 0.01, 20), grid, period=360.0)])
-
-    signals = visited(0.0)
-    assert signals.count == 0.0
-    # Of some positions alone no one could tell.
-    assert signals.take(np.arange(17)).grid == UniformGrid(20)
-    both = signals.followed_by(visited(steps))
-    assert both.grid == (None if positions is None else UniformGrid(positions))
-
-
-@pytest.mark.parametrize("counts", [1024, 4096, 65536])
-@pytest.mark.parametrize("n", [24, 36, 72, 100])
-@pytest.mark.parametrize("back", [False, True])
-def test_counts_of_a_sensor_show_at_places_of_equal_steps(counts, n, back):
-    """The step is read off the moves, and where these leave it open none is told."""
-    places = np.arange(n) * 360.0 / n
-    places = np.concatenate([places, places[::-1]]) if back else places
-    error = 0.13 * np.sin(np.radians(2.0 * places + 7.0))
-    indicated = np.round((places + error) * counts / 360.0) * 360.0 / counts
-    told = join_runs([ta.CalibrationRun(places, indicated, period=360.0)]).count
-    moves = np.unique(np.abs(np.diff(np.round(indicated * counts / 360.0))))
-    if np.gcd.reduce(np.diff(moves).astype(int)) == 1:
-        assert told == pytest.approx(1296000.0 / counts, rel=1e-6)
-    else:
-        assert told == 0.0 or told == pytest.approx(1296000.0 / counts, rel=1e-6)
-
-
-def test_no_finer_step_is_told_of_what_has_none():
-    rng = np.random.default_rng(11)
-    for _ in range(200):
-        n = int(rng.integers(8, 100))
-        for spread in (1e-3, 1e-6):
-            assert finer_step(np.arange(n) / n + rng.normal(0.0, spread / n, n), 1.0 / n) == 0.0
-    # Some places of a table in any order are no counts, however far apart.
-    assert finer_step(np.array([3, 9, 4, 20, 1, 0, 27]) / 36.0, 1.0 / 36.0) == 0.0
-    assert finer_step(np.array([0.25])) == finer_step(np.zeros(0)) == 0.0
-
-
-@pytest.mark.parametrize("digits", [2, 3])
-@pytest.mark.parametrize("seed", range(6))
-def test_counts_show_behind_digits_that_were_cut_off(digits, seed):
-    """4096 counts printed in hundredths of degrees; or nothing is told, of one place or another."""
-    rng = np.random.default_rng([seed, 12])
-    for n in (36, 72, 150):
-        places = np.sort(rng.uniform(0.0, 1.0, n)) if seed % 2 else np.arange(n) / n
-        error = 0.002 * np.sin(2.0 * np.pi * places + seed)
-        degrees = np.round(np.round(4096 * (places + error)) / 4096 * 360.0, digits)
-        found = step_behind(degrees / 360.0, places, 10.0**-digits / 360.0)
-        assert found in (0.0, pytest.approx(1.0 / 4096))
-        if seed % 2:
-            assert found > 0.0
-
-
-def test_nothing_shows_behind_digits_of_what_has_no_counts():
-    rng = np.random.default_rng(13)
-    for k in range(60):
-        n = int(rng.choice([24, 36, 100, 400]))
-        places = np.sort(rng.uniform(0.0, 1.0, n)) if k % 2 else np.arange(n) / n
-        degrees = np.round(360.0 * places + rng.normal(0.0, 0.02, n), 2)
-        assert step_behind(degrees / 360.0, places, 0.01 / 360.0) == 0.0
-    # No digit, one that does not divide a turn, one too fine to look behind.
-    for digit in (0.0, 0.0123, 1e-7):
-        assert step_behind(places, places, digit) == 0.0
-
-
-@pytest.mark.parametrize("readings", [3000, 12_000])
-def test_counts_that_are_all_read_are_counts(readings):
-    """A sweep past each count of a sensor moves by one count or by none."""
-    rng = np.random.default_rng(readings)
-    places = (np.arange(readings) + rng.uniform(size=readings)) * 360.0 / readings
-    indicated = np.round((places + 0.1 * np.sin(np.radians(places))) * 1024 / 360.0) * 360.0 / 1024
-    told = join_runs([ta.CalibrationRun(places, indicated, period=360.0)]).count
-    assert told == pytest.approx(1296000.0 / 1024)
 
 
 @pytest.mark.parametrize("positions", [12, 36, 360])
