@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import ArgumentError, NoModelError, NotInvertibleError, RankError, TrueAngleError
 from ..support.display_units import ErrorsIn
-from .signal_options import signal_argument, signals_by_joint
+from .signal_options import signal_option, signals_by_joint
 
 if TYPE_CHECKING:
     from ..model.model import HarmonicModel
@@ -100,7 +100,7 @@ def _indicated(robot: Any, entries: list[Any]) -> dict[str, Any]:
     found = {}
     for joint in robot.joints:
         if "indicated" in joint.signals:
-            found[joint.name] = signal_argument(f"indicated={joint.signals['indicated']}")
+            found[joint.name] = signal_option(f"indicated={joint.signals['indicated']}")
     return found | {e[0]: e for e in entries if e[0] is not None and e[1] == "indicated"}
 
 
@@ -115,7 +115,7 @@ def _asked(
 
     own = {_key(e): e for e in entries if e[0] == joint.name}
     for role, column in joint.signals.items():
-        own.setdefault(role, signal_argument(f"{role}={column}"))
+        own.setdefault(role, signal_option(f"{role}={column}"))
     for entry in entries:
         if entry[0] is None:
             own.setdefault(_key(entry), entry)

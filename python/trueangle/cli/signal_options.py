@@ -27,7 +27,7 @@ def add_signals(
     signal = add(
         "--signal",
         action="append",
-        type=signal_argument,
+        type=signal_option,
         metavar="[JOINT.]ROLE=NAME[:UNIT]",
         help=f"column that holds a role, and its unit (deg, rad, turn, count, arcsec, arcmin; "
         f"s, ms, us, ns; deg/s, rad/s, turn/s); may be repeated; -NAME is a reversed sensor. "
@@ -73,12 +73,12 @@ class _Entry(tuple[str | None, str, str, str | None]):
     text: str
 
 
-def signal_argument(text: str) -> _Entry:
+def signal_option(text: str) -> _Entry:
     """What argparse makes of one ``[JOINT.]ROLE=NAME[:UNIT]``; mistakes are of usage.
 
     Examples
     --------
-    >>> signal_argument("arm.torque=tau"), signal_argument("reference=IOC:m1.RBV")
+    >>> signal_option("arm.torque=tau"), signal_option("reference=IOC:m1.RBV")
     (('arm', 'torque', 'tau', None), (None, 'reference', 'IOC:m1.RBV', None))
     """
     from ..support.roles import role_kind, wanted_unit  # takes numpy, which a help does without

@@ -104,7 +104,7 @@ class ChannelSkew(Effect):
     def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         """Column whose coefficient is the delay; without a phase the pair of the line alone."""
         half = 0.5 * ARCSEC_PER_DEG * 360.0 * signals.turns_per_s[:, None]
-        line = line_columns(signals.theta, sensor_order(around.joint))
+        line = line_columns(signals.theta, skewed_order(around.joint))
         if "phase" not in shape:
             return np.asarray(half * line)
         turned = line @ np.array([np.sin(shape["phase"]), np.cos(shape["phase"])])
@@ -116,7 +116,7 @@ class ChannelSkew(Effect):
     ) -> tuple[Parameters, list[Effect]]:
         extension, (delay,), covariance = terms[0]
         phase = float(np.degrees(extension.shape["phase"]) % 360.0)
-        order = sensor_order(regression.around.joint)
+        order = skewed_order(regression.around.joint)
         rest = regression.with_terms(t for t in regression.terms if t is not extension)
         pair = rest.projected(cls.columns(regression.signals, regression.around, {}))[0]
         spread = np.asarray(regression.variance * np.linalg.pinv(pair.T @ pair), dtype=np.float64)
@@ -148,11 +148,11 @@ def _is_part_of_a_line(regression: Regression) -> bool:
     """The line times the velocity is not told from the line."""
     signals = regression.signals
     assert signals.velocity is not None
-    line = line_columns(signals.theta, sensor_order(regression.belief.joint))
+    line = line_columns(signals.theta, skewed_order(regression.belief.joint))
     return bool(share_left(regression, signals.velocity[:, None] * line, line) < OWN_POWER)
 
 
-def sensor_order(joint: Joint) -> float:
+def skewed_order(joint: Joint) -> float:
     """Twice the electrical periods of the sensor in one turn of the output."""
     cycles = joint.shafts.get("motor", 1.0) if joint.encoder_side == "motor" else 1.0
     return 2.0 * joint.pole_pairs * cycles

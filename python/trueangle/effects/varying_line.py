@@ -16,7 +16,7 @@ from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.motion import VaryingLineTerm
 from .ambiguity import Ambiguity
-from .channel_skew import ChannelSkew, sensor_order
+from .channel_skew import ChannelSkew, skewed_order
 from .drawing import drawn_carrier, drawn_free_line, drawn_phase
 from .effect import ALWAYS, Effect
 from .filter_lag import FilterLag
@@ -102,7 +102,7 @@ class VaryingLine(Effect):
             shapes += [
                 {"order": float(m), "follows": follows}
                 for m in orders
-                if not (follows == "velocity" and m == sensor_order(around.joint))
+                if not (follows == "velocity" and m == skewed_order(around.joint))
                 and not (follows == "torque" and (m == 1.0 or is_gear_order(around, float(m))))
             ]
         log_grid = float(np.log(BROAD * max(len(shapes), 1)))

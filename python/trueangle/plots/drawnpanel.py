@@ -23,7 +23,7 @@ def draw_panel(ax: Axes, panel: Panel) -> None:
     """Readings, model and medians, with titles of the axes."""
     draw_clouds(ax, panel.clouds)
     if panel.model is not None:
-        draw_curve(ax, panel.model, panel.dense)
+        draw_panel_curve(ax, panel.model, panel.dense)
     if panel.medians is not None:
         x, y = panel.medians
         ink = palette.ink(ax)
@@ -70,7 +70,7 @@ def _style(ax: Axes, cloud: Cloud, dense: bool) -> dict[str, Any]:
     return {"marker": marker, "markersize": size, "color": colour, **faint}
 
 
-def draw_curve(ax: Axes, curve: Curve, dense: bool) -> None:
+def draw_panel_curve(ax: Axes, curve: Curve, dense: bool) -> None:
     """A model's curve with its band; its envelope where gear orders fill the picture."""
     if dense:
         ax.fill_between(

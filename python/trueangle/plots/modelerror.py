@@ -10,7 +10,7 @@ from ..support.display_units import ErrorsIn, error_unit, significant_digits, si
 from ..support.layout import counted
 from .canvas import described, legend, new_axes, turn_axis
 from .curves import fitted_degrees, model_curve, strong_gear_order
-from .drawnpanel import draw_curve
+from .drawnpanel import draw_panel_curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +54,7 @@ def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsI
     curve = curve.scaled(unit.per_arcsec)
     low, high = fitted_degrees(model)
     dense = strong_gear_order(pattern.orders, pattern.amplitudes, high - low) is not None
-    draw_curve(ax, curve, dense)
+    draw_panel_curve(ax, curve, dense)
     turn_axis(ax, low, high)
     ax.set_xlabel(f"{model.argument} angle / deg")
     ax.set_ylabel(f"error / {unit.name}")
