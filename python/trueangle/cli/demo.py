@@ -151,7 +151,7 @@ def _letter_chart(place: NDArray[Any], errors: Mapping[str, NDArray[Any]], unit:
     Examples
     --------
     >>> import numpy as np
-    >>> letter_chart(np.array([0.0, 180.0]), {"o": np.array([9.0, -9.0])}, "arcsec")[1]
+    >>> _letter_chart(np.array([0.0, 180.0]), {"o": np.array([9.0, -9.0])}, "arcsec")[1]
     '      +9 |o'
     """
     import numpy as np

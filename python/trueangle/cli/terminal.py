@@ -32,7 +32,7 @@ def printable_text(text: str) -> str:
 
     Examples
     --------
-    >>> printable("run \x1b[31mred")
+    >>> printable_text("run \x1b[31mred")
     'run \\x1b[31mred'
     """
     if text.isascii() and text.translate(_LAID_OUT).isprintable():

@@ -103,7 +103,7 @@ def levels_of_runs(signals: Signals, factor: str) -> tuple[NDArray[np.int64], li
     --------
     >>> from trueangle.simulation import RunDesign, Simulation, join_runs, simulate
     >>> runs = tuple(RunDesign(samples=50, speed_deg_s=v) for v in (5.0, 30.0, 5.0))
-    >>> level, values = run_levels(join_runs(simulate(Simulation(runs=runs))), "velocity")
+    >>> level, values = levels_of_runs(join_runs(simulate(Simulation(runs=runs))), "velocity")
     >>> level[::50].tolist(), [round(v) for v in values]
     ([0, 1, 0], [5, 30])
     """

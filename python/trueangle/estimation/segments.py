@@ -24,7 +24,8 @@ def flagged_segments(
 
     Examples
     --------
-    >>> starts, stops = stretches(np.array([True, True, False, True, True]), [(0, 4), (4, 5)])
+    >>> flags = np.array([True, True, False, True, True])
+    >>> starts, stops = flagged_segments(flags, [(0, 4), (4, 5)])
     >>> starts.tolist(), stops.tolist()
     ([0, 3, 4], [2, 4, 5])
     """
@@ -40,7 +41,7 @@ def short_segments(flags: NDArray[np.bool_], bounds: list[tuple[int, int]]) -> N
 
     Examples
     --------
-    >>> short_stretches(np.array([True, False, *[True] * 5]), [(0, 7)]).astype(int).tolist()
+    >>> short_segments(np.array([True, False, *[True] * 5]), [(0, 7)]).astype(int).tolist()
     [1, 0, 0, 0, 0, 0, 0]
     """
     return _core.short_stretches(flags, bounds)
@@ -53,7 +54,7 @@ def within_segments(
 
     Examples
     --------
-    >>> within(np.array([1]), np.array([3]), 5).astype(int).tolist()
+    >>> within_segments(np.array([1]), np.array([3]), 5).astype(int).tolist()
     [0, 1, 1, 0, 0]
     """
     change = np.zeros(n + 1, dtype=np.int64)

@@ -44,7 +44,8 @@ def filled_code(text: str, **values: object) -> str:
 
     Examples
     --------
-    >>> print(filled("{\n    @body@\n    @more@\n    return @x@;\n}", body="1;\n2;", more="", x=3))
+    >>> text = "{\n    @body@\n    @more@\n    return @x@;\n}"
+    >>> print(filled_code(text, body="1;\n2;", more="", x=3))
     {
         1;
         2;

@@ -49,7 +49,7 @@ def repeated_rounding_variance(step: float, scatter: float) -> float:
 
     Examples
     --------
-    >>> [round(repeated_variance(1.0, scatter), 3) for scatter in (0.0, 0.05, 0.2)]
+    >>> [round(repeated_rounding_variance(1.0, scatter), 3) for scatter in (0.0, 0.05, 0.2)]
     [0.083, 0.041, 0.0]
     """
     k = np.arange(1, _TERMS + 1)

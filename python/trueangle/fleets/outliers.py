@@ -68,7 +68,7 @@ def level_by_order(orders: Array) -> Array:
 
     Examples
     --------
-    >>> weights_of(np.array([1.0, 2.0, 5.0, 8.0])).round(3).tolist()
+    >>> level_by_order(np.array([1.0, 2.0, 5.0, 8.0])).round(3).tolist()
     [0.4, 0.2, 0.2, 0.2]
     """
     given = np.array([_DAMAGE.get(float(order), 0.0) for order in orders])

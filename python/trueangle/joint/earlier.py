@@ -27,7 +27,7 @@ def earlier_signals(signals: Signals, delay_s: float) -> Signals:
     >>> from trueangle.simulation import RunDesign, Simulation, simulate
     >>> design = RunDesign(samples=100, speed_deg_s=10.0)
     >>> signals = join_runs(simulate(Simulation(runs=(design,))))
-    >>> moved = signals.degrees - earlier(signals, 0.02).degrees
+    >>> moved = signals.degrees - earlier_signals(signals, 0.02).degrees
     >>> float(moved.min().round(6)), float(moved.max().round(6))
     (0.2, 0.2)
     """

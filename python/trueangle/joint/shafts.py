@@ -122,9 +122,9 @@ def limited_orders(orders: Iterable[T], what: str = "orders") -> list[T]:
 
     Examples
     --------
-    >>> counted_orders(range(1, 4))
+    >>> limited_orders(range(1, 4))
     [1, 2, 3]
-    >>> counted_orders(range(1, 10**9))
+    >>> limited_orders(range(1, 10**9))
     Traceback (most recent call last):
     ...
     trueangle.errors.ArgumentError: orders are too many: 4096 at a time, at most

@@ -21,7 +21,7 @@ class _Velocity:
 
     Examples
     --------
-    >>> velocity = Velocity(360.0)
+    >>> velocity = _Velocity(360.0)
     >>> velocity([358.0, 359.0, 1.0], [0.0, 0.5, 1.0])
     array([2., 2., 4.])
     >>> velocity([2.0, 2.0], [1.5, 1.5])

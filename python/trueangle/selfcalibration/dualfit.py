@@ -224,8 +224,8 @@ def estimate_dual_ratio(
     --------
     >>> theta = np.linspace(0.0, 5.0, 1500)
     >>> noise = 1e-5 * np.random.default_rng(1).normal(size=theta.size)
-    >>> channels = Channels([101.0 * theta], [theta + 2e-3 * np.sin(theta) + noise], [None])
-    >>> found = estimate_ratio(channels, 101.2, "auto", 0.8)
+    >>> channels = GearedChannels([101.0 * theta], [theta + 2e-3 * np.sin(theta) + noise], [None])
+    >>> found = estimate_dual_ratio(channels, 101.2, "auto", 0.8)
     >>> abs(found.value - 101.0) < 4.0 * found.std < 0.1
     True
     """

@@ -153,7 +153,7 @@ def near_reversal(way: Array) -> NDArray[np.bool_]:
 
     Examples
     --------
-    >>> turning(np.repeat([1.0, -1.0], 6)).astype(int)
+    >>> near_reversal(np.repeat([1.0, -1.0], 6)).astype(int)
     array([0, 0, 0, 1, 1, 1, 1, 1, 1, 0, 0, 0])
     """
     near = np.zeros(way.size, dtype=bool)

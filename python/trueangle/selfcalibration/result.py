@@ -268,7 +268,7 @@ def order_ranges(orders: Sequence[float]) -> str:
 
     Examples
     --------
-    >>> ranges([1, 2, 3, 4, 8, 7.3])
+    >>> order_ranges([1, 2, 3, 4, 8, 7.3])
     '1-4, 7.3, 8'
     """
     parts: list[str] = []

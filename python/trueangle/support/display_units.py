@@ -155,7 +155,7 @@ def rounded_phase(phase_deg: float, std_deg: float | None) -> tuple[str, str]:
 
     Examples
     --------
-    >>> phase_pair(-0.001, 0.14), phase_pair(-95.72, 0.7514)
+    >>> rounded_phase(-0.001, 0.14), rounded_phase(-95.72, 0.7514)
     (('0.00', '0.14'), ('264.28', '0.75'))
     """
     spread = math.nan if std_deg is None else min(std_deg, 180.0)
@@ -170,8 +170,8 @@ def significant_digits(value: float, digits: int = _DIGITS) -> str:
 
     Examples
     --------
-    >>> significant(0.012345), significant(123456.0), significant(0.0), significant(9.9996)
-    ('0.01235', '123456', '0', '10.00')
+    >>> [significant_digits(value) for value in (0.012345, 123456.0, 0.0, 9.9996)]
+    ['0.01235', '123456', '0', '10.00']
     """
     if not math.isfinite(value):
         return "-"
@@ -183,7 +183,7 @@ def brief_number(value: float) -> str:
 
     Examples
     --------
-    >>> brief(0.301), brief(7.25), brief(103.6)
+    >>> brief_number(0.301), brief_number(7.25), brief_number(103.6)
     ('0.3', '7.2', '104')
     """
     return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"

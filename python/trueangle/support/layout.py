@@ -31,7 +31,7 @@ def unfolded_text() -> Iterator[None]:
     Examples
     --------
     >>> with unfolded_text():
-    ...     len(wrapped("a word and " * 50))
+    ...     len(wrapped_lines("a word and " * 50))
     1
     """
     before = _UNFOLDED.set(True)
@@ -62,7 +62,7 @@ def wrapped_lines(text: str, indent: int = 0, first: int = 0) -> list[str]:
 
     Examples
     --------
-    >>> wrapped("a word and " * 8 + "an end", indent=2)[1]
+    >>> wrapped_lines("a word and " * 8 + "an end", indent=2)[1]
     '  word and an end'
     """
     return textwrap.wrap(

@@ -36,7 +36,7 @@ def notebook_html(result: object) -> str:
     >>> class Result:
     ...     def __str__(self):
     ...         return "noise   3 arcsec"
-    >>> print(as_html(Result()))
+    >>> print(notebook_html(Result()))
     <div class="trueangle"><table><tr><th style="text-align:left">noise</th>\
 <td style="text-align:left">3 arcsec</td></tr></table></div>
     """

@@ -112,7 +112,7 @@ def role_code(role: str, name: str = "NAME", unit: str | None = "UNIT") -> str:
 
     Examples
     --------
-    >>> signal_code("torque", "tau", None), signal_code("reference", "pos act", "rad")
+    >>> role_code("torque", "tau", None), role_code("reference", "pos act", "rad")
     ("`signals={'torque': 'tau'}`", "`signals={'reference': ('pos act', 'rad')}`")
     """
     column = name if unit is None else (name, unit)

@@ -60,7 +60,7 @@ def coupled_joint(name: str) -> str | None:
 
     Examples
     --------
-    >>> coupled_with("coupled_wrist2"), coupled_with("torque")
+    >>> coupled_joint("coupled_wrist2"), coupled_joint("torque")
     ('wrist2', None)
     """
     return (name.startswith(COUPLED) and name.removeprefix(COUPLED)) or None

@@ -59,9 +59,9 @@ def ratio_suggestion(ratio: float | None) -> str:
 
     Examples
     --------
-    >>> suggestion(1.0002)
+    >>> ratio_suggestion(1.0002)
     'the indicated angle is reduced to the output'
-    >>> suggestion(7.3)
+    >>> ratio_suggestion(7.3)
     'a gear of ratio 73/10 between the two that is not reduced'
     """
     if ratio is None:
