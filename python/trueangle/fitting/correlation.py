@@ -13,7 +13,7 @@ import trueangle._core as _core
 from ..estimation.linear import NormalEquations, scatter_statistic, total
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail
-from .problem import Fitted, Problem
+from .problem import Problem, SolvedProblem
 
 #: Most clusters: of more runs several are taken together.
 _MOST_CLUSTERS: Final = 128
@@ -44,7 +44,7 @@ _MOST_STRETCHES: Final = 64
 FEWEST_STRETCHES: Final = 8
 
 
-def coefficients_of(fitted: Fitted) -> Array:
+def coefficients_of(fitted: SolvedProblem) -> Array:
     """``A, B`` of every order of every shaft in turn."""
     solution = fitted.solution
     a, b = (np.concatenate([np.zeros(0), *part]) for part in (solution.cosine, solution.sine))
@@ -57,7 +57,7 @@ def weight_sum(weights: Array | None, size: int) -> float:
 
 
 def clusters_of(
-    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], index: int, count: int
+    problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], index: int, count: int
 ) -> list[NormalEquations]:
     """Sums of a run in so many segments of readings in a row, about the run's mean and the fit."""
     sums = problem.products(weights, index, count)
@@ -74,7 +74,7 @@ def runs_together(clusters: list[NormalEquations]) -> list[NormalEquations]:
 
 
 def _in_time(
-    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], used: Sequence[int]
+    problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], used: Sequence[int]
 ) -> list[Array]:
     """Weighted residuals of the first readings of every run, in the order they were taken."""
     most = max(64, _LOOKED_AT // len(used))
@@ -90,7 +90,7 @@ def _in_time(
 
 def correlation_found(
     problem: Problem,
-    fitted: Fitted,
+    fitted: SolvedProblem,
     weights: Sequence[Array | None],
     used: Sequence[int],
     between: tuple[float, float] | None,
@@ -129,7 +129,7 @@ def correlation_found(
 
 
 def scatter_between(
-    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], used: Sequence[int]
+    problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], used: Sequence[int]
 ) -> tuple[float, float] | None:
     """Chi-squared of the runs' own coefficients and its freedom; None for fewer than three."""
     solution = fitted.solution
@@ -155,7 +155,7 @@ def white_variance_share(between: tuple[float, float] | None, runs: int) -> floa
 
 
 def residual_memory(
-    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], used: Sequence[int]
+    problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], used: Sequence[int]
 ) -> tuple[float, list[int]]:
     """Readings that the residuals remember, and stretches to cut each run into."""
     parts = _in_time(problem, fitted, weights, used)

@@ -112,10 +112,6 @@ def _series(solution: PlainSolution, shafts: Sequence[ShaftOrders], period: floa
     )
 
 
-#: The former name, which `uncertainty` and `correlation` take.
-Fitted = SolvedProblem
-
-
 class Problem:
     """The readings of several runs and the regressors asked for.
 

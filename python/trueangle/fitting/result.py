@@ -26,7 +26,7 @@ class FitResult(FittedCoefficients):
     ----------
     problem : Problem
         The readings, shafts and orders that were put in.
-    fitted : Fitted
+    fitted : SolvedProblem
         The core's solution.
     weighted : Weighted
         What the loss did to the weights.

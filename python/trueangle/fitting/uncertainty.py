@@ -25,7 +25,7 @@ from .correlation import (
     weight_sum,
     white_variance_share,
 )
-from .problem import Fitted, Problem
+from .problem import Problem, SolvedProblem
 from .ridge import bias_covariance, pattern_variances
 
 CovarianceKind: TypeAlias = Literal["auto", "white", "cluster", "hac"]
@@ -90,7 +90,7 @@ def check_covariance(kind: str, runs: int) -> None:
 
 def coefficient_uncertainty(
     problem: Problem,
-    fitted: Fitted,
+    fitted: SolvedProblem,
     weights: Sequence[Array | None],
     penalty: float,
     kind: CovarianceKind,
@@ -112,7 +112,7 @@ def coefficient_uncertainty(
 
 def _noise(
     problem: Problem,
-    fitted: Fitted,
+    fitted: SolvedProblem,
     weights: Sequence[Array | None],
     penalty: float,
     kind: CovarianceKind,
@@ -192,7 +192,7 @@ def _thinned(
 
 
 def _bias(
-    problem: Problem, fitted: Fitted, weights: Sequence[Array | None], penalty: float
+    problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], penalty: float
 ) -> Array:
     """What a penalty may have taken from the coefficients, as a covariance (see `penalty`)."""
     from .ridge import REACH, error_range
