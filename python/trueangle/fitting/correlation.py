@@ -63,7 +63,9 @@ def clusters_of(
     """Sums of a run in so many segments of readings in a row, about the run's mean and the fit."""
     sums = problem.products(weights, index, count)
     whole = np.sum(sums, axis=0)
-    mean, coefficients = whole[0] / whole[0, 0], coefficients_of(fitted)
+    mean, found = whole[0] / whole[0, 0], coefficients_of(fitted)
+    # Of nuisances nothing is left in the readings.
+    coefficients = np.concatenate([found, np.zeros(mean.size - 2 - found.size)])
     return [NormalEquations.of_products(one, mean).about(coefficients) for one in sums]
 
 

@@ -62,13 +62,13 @@ class ResidualSpace:
         width = problem.unknowns + len(used)
         if not problem.unknowns or problem.summed or sum(sizes) * width > _MOST:
             return None
-        cycles = [s.cycles_per_turn * order for s in problem.shafts for order in s.orders]
+        own = [problem.private(i) for i in used]
+        starts = np.cumsum([0, *(part.shape[1] for part in own)])
         rows = []
         for place, i in enumerate(used):
-            x = np.outer(problem.angles[i] * (2.0 * math.pi / problem.period), cycles)
-            zero = np.zeros((len(x), len(used)))
-            zero[:, place] = 1.0
-            columns = np.hstack([zero, np.cos(x), np.sin(x)])
+            alone = np.zeros((sizes[place], starts[-1]))
+            alone[:, starts[place] : starts[place + 1]] = own[place]
+            columns = np.hstack([alone, problem.columns(i)])
             weight = weights[i]
             rows.append(columns if weight is None else np.sqrt(weight)[:, None] * columns)
         columns = np.vstack(rows)
