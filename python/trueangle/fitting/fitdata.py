@@ -139,7 +139,13 @@ class FitData(PlainResult):
             )
         weights = self.weights or self.problem.base
         found = coefficient_uncertainty(
-            self.problem, self.fitted, weights, self.ridge, self.covariance_asked, self.nuisance
+            self.problem,
+            self.fitted,
+            weights,
+            self.ridge,
+            self.covariance_asked,
+            self.nuisance,
+            self.loss,
         )
         found = beside_repeated(
             found, self.problem, self.fitted, weights, self.ridge, self.covariance_asked

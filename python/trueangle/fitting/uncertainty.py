@@ -28,6 +28,7 @@ from .correlation import (
 )
 from .problem import Fitted, Problem
 from .ridge import bias_covariance, pattern_variances
+from .sandwich import Sandwich, sandwich
 
 if TYPE_CHECKING:
     from .nuisance import Nuisance
@@ -105,11 +106,13 @@ def coefficient_uncertainty(
     penalty: float,
     kind: CovarianceKind,
     nuisance: Nuisance | None = None,
+    loss: str = "linear",
 ) -> Uncertainty:
     """Covariance of this kind; ``"auto"``: white unless correlation is found.
 
     A ``nuisance`` that was taken out of the runs is fitted beside the pattern
-    (`trueangle.fitting.beside`).
+    (`trueangle.fitting.beside`). What a robust ``loss`` weighs down is no less known for it
+    (`trueangle.fitting.sandwich`).
 
     Where eight runs and more repeat better than white noise of the residual lets expect, their
     scatter pooled over the coefficients is the noise. Whole runs are the clusters where there are
@@ -118,12 +121,13 @@ def coefficient_uncertainty(
     says it. What a penalty takes from the coefficients is added to either
     (`trueangle.fitting.ridge`).
     """
+    bent = sandwich(problem, fitted, weights, loss)
     beside = None if nuisance is None else BesideProblem.of(problem, nuisance)
     if beside is None:
-        noise = _noise(problem, fitted, weights, penalty, kind)
+        noise = _noise(problem, fitted, weights, penalty, kind, bent)
     else:
         jointly = beside.jointly(fitted, weights, penalty)
-        noise = _noise(beside, jointly, weights, penalty, kind).among(1 + problem.unknowns)
+        noise = _noise(beside, jointly, weights, penalty, kind, bent).among(1 + problem.unknowns)
     if not penalty > 0.0 or not np.isfinite(noise.covariance).all():
         return noise
     return noise.beside(_bias(problem, fitted, weights, penalty))
@@ -135,16 +139,19 @@ def _noise(
     weights: Sequence[Array | None],
     penalty: float,
     kind: CovarianceKind,
+    bent: Sandwich,
 ) -> Uncertainty:
     """What noise makes of the estimate."""
     solution = fitted.solution
-    white = np.asarray(solution.covariance)
+    white = bent.white * np.asarray(solution.covariance)
     freedom = np.full(len(white), solution.degrees_of_freedom)
     if kind == "white" or not np.isfinite(white).all() or len(white) == 1:
         return Uncertainty("white", white, freedom)
     used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
     if kind == "auto":
         between = scatter_between(problem, fitted, weights, used)
+        if between is not None:
+            between = between[0] / bent.scores, between[1]
         found = correlation_found(problem, fitted, weights, used, between)
         if not found:
             share = white_variance_share(between, len(used))
@@ -181,10 +188,10 @@ def _noise(
         weight = sum(
             weight_sum(w, len(problem.runs[i])) for i, w in enumerate(weights) if i in used
         )
-        robust = cluster_covariance(clusters, penalty * weight)
+        covariance, freedom = cluster_covariance(clusters, penalty * weight)
     except np.linalg.LinAlgError:
         return Uncertainty("white", white, freedom, _CANCEL)
-    return Uncertainty(kind, *_with_constant(white, *robust), note)
+    return Uncertainty(kind, *_with_constant(white, bent.bread * covariance, freedom), note)
 
 
 _SHORT: Final = "The runs are too short for their memory"
