@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -19,7 +20,8 @@ from ..runs.aliasing import distinct_positions
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
-from .budget import Contribution
+from ..support.distributions import f_tail
+from .budget import LEVEL, Contribution
 from .propagation import propagated
 
 if TYPE_CHECKING:
@@ -34,7 +36,7 @@ _MOST_POSITIONS: Final = 720
 #: Places of a turn among which errors that the series lacks are looked for.
 _PLACES: Final = 360
 
-#: Standard errors beyond which what is left counts as seen. Below it is noise, and adding
+#: Standard errors beyond which a reversal counts as seen. Below it is noise, and adding
 #: noise to the budget would make every U too wide.
 _SEEN: Final = 3.0
 
@@ -126,7 +128,14 @@ def left_at_places(fit: FitResult) -> Contribution:
 
         s² = mean_p [((Σ_r m_pr)² - Σ_r m_pr²) / (R_p (R_p - 1))]
 
-    It counts where it exceeds three of its standard errors; one run alone cannot show it.
+    It counts where the places scatter more than noise makes them at the level of U,
+
+    ::
+
+        F = [Σ_p R_p m̄_p² / ν_1] / [Σ_pr (m_pr - m̄_p)² / ν_2],
+
+    with ν_1 the places less the coefficients of the fit and ν_2 the readings again of places
+    less the zeros of further runs (a test of lack of fit). One run alone cannot show it.
     """
     name = "error that the series does not hold"
     places, runs, sizes, rest = _by_place(fit)
@@ -137,15 +146,18 @@ def left_at_places(fit: FitResult) -> Contribution:
     np.add.at(squares, places, means**2)
     np.add.at(count, places, 1.0)
     repeated = count > 1.0
-    if len(set(runs.tolist())) < 2 or repeated.sum() < 2:
+    total, squares, count = total[repeated], squares[repeated], count[repeated]
+    unknowns = 1 + 2 * sum(len(shaft.orders) for shaft in fit.model.shafts)
+    freedom = float(count.size - unknowns)
+    again = float((count - 1.0).sum() - len(set(runs.tolist())) + 1)
+    if freedom < 1.0 or again < 1.0:
         return Contribution(name, 0.0, "A", "t")
-    pairs = (count * (count - 1.0))[repeated]
-    products = (total**2 - squares)[repeated] / pairs
-    variance = float(products.mean())
-    error = float(products.std(ddof=1) / np.sqrt(products.size))
-    seen = variance > _SEEN * error
+    variance = float(((total**2 - squares) / (count * (count - 1.0))).mean())
+    of_places = float((total**2 / count).sum())
+    noise = max(float(squares.sum()) - of_places, 1e-20 * of_places)
+    seen = f_tail(of_places / freedom * again / noise, freedom, again) < 1.0 - LEVEL
     return Contribution(
-        name, float(np.sqrt(variance)) if seen else 0.0, "A", "t", float(products.size)
+        name, math.sqrt(max(variance, 0.0)) if seen else 0.0, "A", "t", float(count.size)
     )
 
 

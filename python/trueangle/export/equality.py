@@ -8,6 +8,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from ..model.model import HarmonicModel
+from ..support.arrays import Array
 from ..support.distributions import f_tail
 
 #: Chance that two calibrations of one pattern are told to differ.
@@ -15,6 +16,9 @@ FALSE_ALARMS: Final = 0.01
 
 #: Orders of which one stands out by chance: those that a selection looks at in two models.
 _LOOKED_AT: Final = 220
+
+#: Degrees of freedom of a scatter at least: so few tell nothing.
+_FEWEST: Final = 0.1
 
 #: Least pivot of the covariance, its rows scaled, with which it is inverted.
 _TOLD: Final = 1e-10
@@ -36,7 +40,15 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
 
         T² = (b₂ - b₁)' (S₁ + S₂)⁻¹ (b₂ - b₁),    T² / 2K ~ F(2K, ν)
 
-    with the degrees of freedom of both residual variances together (Satterthwaite). An order that
+    with the degrees of freedom of both residual variances together (Satterthwaite). Where a
+    covariance comes from the scatter of few runs none of its numbers is known, not only their
+    size: each order then stands for itself,
+
+    ::
+
+        T_k² (ν - 1) / 2ν ~ F(2, ν - 1),    p = 1 - (1 - min_k p_k)^K
+
+    (Hotelling 1931; Sidak 1967). An order that
     one of them lacks was chosen by its size in the other: it is tested by itself, with twice its
     covariance (the other's readings know it as well) and its chance multiplied by the orders that
     a selection looks at. The zero, which mounting moves, is kept out.
@@ -83,15 +95,42 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
     freedom = every / doubt if doubt > 0.0 else math.inf
     # Beyond this F is chi-squared to rounding.
     freedom = min(freedom, 1e9)
-    p = f_tail(statistic / apart.size, float(apart.size), freedom)
+    scattered = any(m.fit is not None and m.fit.freedom is not None for m in (first, second))
+    if scattered:
+        p = _by_orders(apart, scaled, freedom)
+    else:
+        p = f_tail(statistic / apart.size, float(apart.size), freedom)
     for model, places in zip((first, second), sides, strict=True):
         for order in places.keys() - set(common):
             rows, pair = places[order]
             spread = np.asarray(model.covariance)[np.ix_(rows, rows)]
             if float(np.linalg.det(spread)) > 0.0:
                 alone = float(np.array(pair) @ np.linalg.solve(2.0 * spread, np.array(pair)))
-                p = min(p, _LOOKED_AT * f_tail(alone / 2.0, 2.0, freedom))
+                chance = _pair_tail if scattered else _known_tail
+                p = min(p, _LOOKED_AT * chance(alone, freedom))
     return Equality("changed" if p <= FALSE_ALARMS else "same", p, statistic, len(common))
+
+
+def _by_orders(apart: Array, scaled: Array, freedom: float) -> float:
+    """Chance of the order that differs most, of a covariance of which nothing is known."""
+    least = 1.0
+    for i in range(0, apart.size, 2):
+        pair = apart[i : i + 2]
+        alone = float(pair @ np.linalg.solve(scaled[i : i + 2, i : i + 2], pair))
+        least = min(least, _pair_tail(alone, freedom))
+    orders = apart.size // 2
+    return -math.expm1(orders * math.log1p(-least)) if least < 1.0 else 1.0
+
+
+def _pair_tail(squares: float, freedom: float) -> float:
+    """Chance of Hotelling's T² of two numbers whose covariance has so many degrees of freedom."""
+    left = max(freedom - 1.0, _FEWEST)
+    return f_tail(squares * left / (2.0 * freedom), 2.0, left)
+
+
+def _known_tail(squares: float, freedom: float) -> float:
+    """The same of a covariance that is known but for its size."""
+    return f_tail(squares / 2.0, 2.0, freedom)
 
 
 def _coefficients(model: HarmonicModel) -> dict[float, tuple[tuple[int, int], tuple[float, float]]]:
@@ -110,8 +149,10 @@ def _coefficients(model: HarmonicModel) -> dict[float, tuple[tuple[int, int], tu
 
 
 def _freedom(model: HarmonicModel) -> float:
-    """Readings less unknowns; infinite where the model does not say how it was fitted."""
+    """Of the covariance, or readings less unknowns; infinite where the model does not say."""
     if model.fit is None:
         return math.inf
+    if model.fit.freedom is not None:
+        return model.fit.freedom
     unknowns = np.asarray(model.covariance).shape[0] - 1
     return max(float(model.fit.samples - model.fit.wild - model.fit.runs - unknowns), 1.0)

@@ -14,6 +14,7 @@ from ..estimation.linear import NormalEquations, scatter_statistic, total
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail
 from .problem import Problem, SolvedProblem
+from .residualform import ResidualSpace, Share
 
 #: Most clusters: of more runs several are taken together.
 _MOST_CLUSTERS: Final = 128
@@ -62,7 +63,9 @@ def clusters_of(
     """Sums of a run in so many segments of readings in a row, about the run's mean and the fit."""
     sums = problem.products(weights, index, count)
     whole = np.sum(sums, axis=0)
-    mean, coefficients = whole[0] / whole[0, 0], coefficients_of(fitted)
+    mean, found = whole[0] / whole[0, 0], coefficients_of(fitted)
+    # Of nuisances nothing is left in the readings.
+    coefficients = np.concatenate([found, np.zeros(mean.size - 2 - found.size)])
     return [NormalEquations.of_products(one, mean).about(coefficients) for one in sums]
 
 
@@ -109,16 +112,22 @@ def correlation_found(
     if power <= 0.0 or pairs < 20:
         return ""
     near = sum(float(part[1:] @ part[:-1]) for part in parts) / power
+    space = ResidualSpace.of(problem, weights, used)
     # Low orders that were taken out leave white noise a little anticorrelated.
-    if near + (problem.unknowns + 1.0) / count > _FOUND / math.sqrt(pairs):
-        return f"neighbours in time correlate by {near:.2f}"
+    white = Share(-(problem.unknowns + 1.0) / count, 1.0 / math.sqrt(pairs))
+    white = white if space is None else space.neighbours()
+    if near - white.expected > _FOUND * white.deviation:
+        return f"neighbours in time correlate by {near - white.expected:.2f}"
     for length in _STRETCHES:
         blocks = [part[: part.size // length * length].reshape(-1, length) for part in parts]
         means = np.concatenate([block.mean(axis=1) for block in blocks])
         if means.size < 20:
             break
-        ratio = length * float((means**2).mean()) * count / power
-        if ratio - 1.0 > _FOUND * math.sqrt(2.0 / means.size):
+        share = length * float((means**2).sum()) / power
+        white = Share(means.size / count, math.sqrt(2.0 * means.size) / count)
+        white = white if space is None else space.means(length)
+        ratio = share / white.expected
+        if share - white.expected > _FOUND * white.deviation:
             return (
                 f"means of {length} neighbours in time scatter {math.sqrt(ratio):.2g} times as much"
             )
@@ -172,19 +181,23 @@ def residual_memory(
     sizes = [len(problem.runs[i]) for i in used]
     stretches = [max(2, min(_MOST_STRETCHES, size // long)) for size in sizes]
     if min(stretches) < FEWEST_STRETCHES:
-        memory = max(memory, _of_neighbours(parts, power, problem.unknowns + len(used)))
+        space = ResidualSpace.of(problem, weights, used)
+        count = sum(part.size for part in parts)
+        white = -(problem.unknowns + len(used)) / count
+        white = white if space is None else space.neighbours().expected
+        memory = max(memory, _of_neighbours(parts, power, white))
     return memory, stretches
 
 
-def _of_neighbours(parts: list[Array], power: float, unknowns: int) -> float:
+def _of_neighbours(parts: list[Array], power: float, white: float) -> float:
     """Memory of noise that forgets by the same share from reading to reading.
 
-    The correlation of neighbours in few residuals is too low by what the fit took from them,
-    and that of readings further apart is lost in it.
+    The correlation of neighbours in few residuals is off by what the fit took from them, as that
+    of ``white`` noise is, and that of readings further apart is lost in it.
     """
     if power <= 0.0:
         return 1.0
     count = sum(part.size for part in parts)
     near = sum(float(part[1:] @ part[:-1]) for part in parts) / power
-    near = max(near + (1.0 + near) * unknowns / count, 0.0)
+    near = max(near - (1.0 + near) * white, 0.0)
     return min((1.0 + near) / (1.0 - near), float(count)) if near < 1.0 else float(count)

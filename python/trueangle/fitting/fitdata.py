@@ -14,6 +14,7 @@ from ..runs.run import CalibrationRun
 from ..runs.travel import Span
 from ..support.arrays import Array
 from ..support.plainresult import PlainResult
+from .beside import BesideProblem
 from .problem import Problem, SolvedProblem
 from .repeated import covariance_with_repeats
 from .robust import RobustFit
@@ -138,12 +139,20 @@ class FitData(PlainResult):
             )
         weights = self.weights or self.problem.base
         found = coefficient_uncertainty(
-            self.problem, self.fitted, weights, self.ridge, self.covariance_asked
+            self.problem,
+            self.fitted,
+            weights,
+            self.ridge,
+            self.covariance_asked,
+            self.nuisance,
+            self.loss,
         )
         found = covariance_with_repeats(
             found, self.problem, self.fitted, weights, self.ridge, self.covariance_asked
         )
-        if self.nuisance is None or not self.nuisance.inflation:
+        if self.nuisance is None or BesideProblem.of(self.problem, self.nuisance) is not None:
+            return found
+        if not self.nuisance.inflation:
             return found
         wider = np.array([1.0, *self.nuisance.inflation])
         return found._replace(covariance=found.covariance * np.outer(wider, wider))

@@ -100,7 +100,18 @@ def _record(fit: FittedCoefficients) -> FitRecord:
         offset_spread=float(around.std(ddof=1)) if used.size > 1 else 0.0,
         positions=None if verified is None else verified[0],
         note=" ".join(fit.notes),
+        freedom=_scattered(fit),
     )
+
+
+def _scattered(fit: FittedCoefficients) -> float | None:
+    """Degrees of freedom of a covariance by scatter; None of white noise, and where there is none.
+
+    Of white noise they are readings less unknowns.
+    """
+    found = fit.uncertainty
+    known = found.kind != "white" and math.isfinite(found.fewest)
+    return float(found.fewest) if known else None
 
 
 def _verified(fit: FittedCoefficients) -> tuple[int, str] | None:

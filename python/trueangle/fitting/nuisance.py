@@ -229,6 +229,33 @@ def take_out_nuisance(
     return [_without(run, i, nuisance, drifts) for i, run in enumerate(runs)], nuisance
 
 
+def taken_columns(
+    runs: Sequence[CalibrationRun], nuisance: Nuisance
+) -> tuple[list[Array], list[Array]] | None:
+    """Columns of each run that were taken out: what runs share, and what each has for itself.
+
+    Each about its run's mean and of size 1. None where there are none, and where they came from
+    a part of the readings.
+    """
+    if not nuisance.kinds or sum(map(len, runs)) > _LOOKED_AT:
+        return None
+    lines = [order for order, *_ in (*nuisance.reference, *nuisance.turned)]
+    plain = [replace(run, weights=None) for run in runs]
+    kinds = tuple(kind for kind in nuisance.kinds if kind in KINDS)
+    groups = _columns(plain, (), "reference", 1, kinds, lines).groups
+    named = [f"drift{nuisance.intervals}" if k == "drift" else k for k in nuisance.kinds]
+    ends = np.cumsum([len(run) for run in runs])[:-1]
+    shared, own = [np.zeros((sum(map(len, runs)), 0))], [np.zeros((sum(map(len, runs)), 0))]
+    for name in named:
+        columns = groups[name] / np.sqrt(np.maximum((groups[name] ** 2).mean(axis=0), 1e-300))
+        (own if name.startswith(("drift", "turned")) else shared).append(columns)
+    alone = np.split(np.hstack(own), ends)
+    return (
+        np.split(np.hstack(shared), ends),
+        [part[:, np.abs(part).max(axis=0) > 0.0] for part in alone],
+    )
+
+
 def _lines_of_reference(rows: FoldRows) -> str:
     """Whether the lines of the reference are the same in every run, or are new in each.
 

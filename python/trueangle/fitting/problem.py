@@ -207,6 +207,16 @@ class Problem:
             for run, weight in zip(self.runs, weights, strict=True)
         )
 
+    def columns(self, index: int) -> Array:
+        """Cosine and sine of every order at the readings of a run."""
+        cycles = [s.cycles_per_turn * order for s in self.shafts for order in s.orders]
+        x = np.outer(self.angles[index] * (2.0 * math.pi / self.period), cycles)
+        return np.stack([np.cos(x), np.sin(x)], axis=2).reshape(len(x), -1)
+
+    def private(self, index: int) -> Array:
+        """Columns that a run has for itself: its zero."""
+        return np.ones((len(self.runs[index]), 1))
+
     def products(self, weights: Sequence[Array | None], index: int, count: int) -> list[Array]:
         """Sums of products of ``[1, columns, error]`` of a run, in so many segments in a row."""
         run, weight = self.runs[index], weights[index]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..estimation.linear import NormalEquations, cluster_covariance, total
 from ..support.arrays import Array
 from ..support.quantiles import median
 from ..support.suggestions import check_choice
+from .beside import BesideProblem
 from .correlation import (
     ENOUGH_RUNS,
     FEWEST_RUNS,
@@ -27,6 +28,10 @@ from .correlation import (
 )
 from .problem import Problem, SolvedProblem
 from .ridge import bias_covariance, pattern_variances
+from .sandwich import Sandwich, sandwich
+
+if TYPE_CHECKING:
+    from .nuisance import Nuisance
 
 CovarianceKind: TypeAlias = Literal["auto", "white", "cluster", "hac"]
 COVARIANCES: tuple[CovarianceKind, ...] = ("auto", "white", "cluster", "hac")
@@ -52,6 +57,12 @@ class Uncertainty(NamedTuple):
     def fewest(self) -> float:
         """Fewest degrees of freedom of a variance in which noise is all there is."""
         return float(self.freedom.min()) if self.noise_freedom is None else self.noise_freedom
+
+    def among(self, count: int) -> Uncertainty:
+        """Of the constant and the first coefficients alone."""
+        return self._replace(
+            covariance=self.covariance[:count, :count], freedom=self.freedom[:count]
+        )
 
     def beside(self, bias: Array, known: float = math.inf) -> Uncertainty:
         """The same with the covariance of a bias of so many degrees of freedom.
@@ -94,8 +105,14 @@ def coefficient_uncertainty(
     weights: Sequence[Array | None],
     penalty: float,
     kind: CovarianceKind,
+    nuisance: Nuisance | None = None,
+    loss: str = "linear",
 ) -> Uncertainty:
     """Covariance of this kind; ``"auto"``: white unless correlation is found.
+
+    A ``nuisance`` that was taken out of the runs is fitted beside the pattern
+    (`trueangle.fitting.beside`). What a robust ``loss`` weighs down is no less known for it
+    (`trueangle.fitting.sandwich`).
 
     Where eight runs and more repeat better than white noise of the residual lets expect, their
     scatter pooled over the coefficients is the noise. Whole runs are the clusters where there are
@@ -104,7 +121,13 @@ def coefficient_uncertainty(
     says it. What a penalty takes from the coefficients is added to either
     (`trueangle.fitting.ridge`).
     """
-    noise = _noise(problem, fitted, weights, penalty, kind)
+    bent = sandwich(problem, fitted, weights, loss)
+    beside = None if nuisance is None else BesideProblem.of(problem, nuisance)
+    if beside is None:
+        noise = _noise(problem, fitted, weights, penalty, kind, bent)
+    else:
+        jointly = beside.jointly(fitted, weights, penalty)
+        noise = _noise(beside, jointly, weights, penalty, kind, bent).among(1 + problem.unknowns)
     if not penalty > 0.0 or not np.isfinite(noise.covariance).all():
         return noise
     return noise.beside(_bias(problem, fitted, weights, penalty))
@@ -116,16 +139,19 @@ def _noise(
     weights: Sequence[Array | None],
     penalty: float,
     kind: CovarianceKind,
+    bent: Sandwich,
 ) -> Uncertainty:
     """What noise makes of the estimate."""
     solution = fitted.solution
-    white = np.asarray(solution.covariance)
+    white = bent.white * np.asarray(solution.covariance)
     freedom = np.full(len(white), solution.degrees_of_freedom)
     if kind == "white" or not np.isfinite(white).all() or len(white) == 1:
         return Uncertainty("white", white, freedom)
     used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
     if kind == "auto":
         between = scatter_between(problem, fitted, weights, used)
+        if between is not None:
+            between = between[0] / bent.scores, between[1]
         found = correlation_found(problem, fitted, weights, used, between)
         if not found:
             share = white_variance_share(between, len(used))
@@ -162,10 +188,10 @@ def _noise(
         weight = sum(
             weight_sum(w, len(problem.runs[i])) for i, w in enumerate(weights) if i in used
         )
-        robust = cluster_covariance(clusters, penalty * weight)
+        covariance, freedom = cluster_covariance(clusters, penalty * weight)
     except np.linalg.LinAlgError:
         return Uncertainty("white", white, freedom, _CANCEL)
-    return Uncertainty(kind, *_with_constant(white, *robust), note)
+    return Uncertainty(kind, *_with_constant(white, bent.bread * covariance, freedom), note)
 
 
 _SHORT: Final = "The runs are too short for their memory"

@@ -43,9 +43,11 @@ class FitRecord:
     deviation, all in the unit of the model's period. ``positions`` counts the distinct
     angles within a turn; ``note`` says where the model is verified and where not.
     ``calibrated_without_reference`` marks a model of `trueangle.selfcal`, and ``blind`` what
-    such a model cannot know, one sentence each. ``signals`` holds the range of each signal that
-    the terms of the model were found over, ``(name, lowest, highest)``, and ``table`` is there
-    where the model was read from a machine.
+    such a model cannot know, one sentence each. ``freedom`` is there where the covariance was taken
+    from how runs or stretches of readings scatter: its degrees of freedom, the fewest of any
+    coefficient, which are far fewer than readings less unknowns. ``signals`` holds the range of
+    each signal that the terms of the model were found over, ``(name, lowest, highest)``, and
+    ``table`` is there where the model was read from a machine.
     """
 
     samples: int
@@ -62,6 +64,7 @@ class FitRecord:
     note: str = ""
     calibrated_without_reference: bool = False
     blind: tuple[str, ...] = ()
+    freedom: float | None = None
     signals: tuple[tuple[str, float, float], ...] = ()
     table: TableRecord | None = None
 
@@ -115,6 +118,8 @@ class RecordReader(Decoder):
                 checked[key] = None
             else:
                 checked[key] = self.number(entry, name)
+        if checked.get("freedom", 1.0) <= 0.0:
+            raise self.error(f"must be positive, got {checked['freedom']:g}", "fit.freedom")
         span = checked["span"]
         if len(span) != 2 or span[0] > span[1] or max(map(abs, span)) > MOST_TURNS * period:
             raise self.error(

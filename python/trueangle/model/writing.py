@@ -88,7 +88,7 @@ def _record(record: FitRecord) -> dict[str, Any]:
     table = asdict(record)
     if not record.calibrated_without_reference:
         del table["calibrated_without_reference"], table["blind"]
-    for name in ("signals", "table"):
+    for name in ("freedom", "signals", "table"):
         if not table[name]:
             del table[name]
     return table

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import trueangle as ta
 from trueangle.certificate import (
@@ -39,7 +40,7 @@ def fit_of(parts, ways, period=360.0, places=None, weights=None):
         x = period * np.asarray(angle)
         runs.append(ta.CalibrationRun(x, x, period, velocity=np.asarray(way, float)))
     residuals = np.concatenate(parts) * (period / ARCSEC)
-    model = SimpleNamespace(period=period)
+    model = SimpleNamespace(period=period, shafts=())
     return SimpleNamespace(
         model=model, runs=runs, residuals=residuals, weights=weights, nuisance=None
     )
@@ -72,18 +73,23 @@ def test_of_one_or_two_runs_it_is_the_scatter_of_their_readings(runs):
 
 
 def by_loops(parts, places, kept):
-    """Mean over the places of the mean product of two runs' means there; places; its error."""
+    """Mean over the places of the mean product of two runs' means there; places; chance of F."""
     means = {}
     for run, (rest, turn, keep) in enumerate(zip(parts, places, kept, strict=True)):
         for value, place in zip(rest[keep], np.floor(360.0 * turn[keep]).astype(int), strict=True):
             means.setdefault(place, {}).setdefault(run, []).append(value)
-    products = []
+    products, between, within, again = [], 0.0, 0.0, 1 - len(parts)
     for of_runs in means.values():
         m = [np.mean(values) for values in of_runs.values()]
         pairs = [a * b for i, a in enumerate(m) for j, b in enumerate(m) if i != j]
         if pairs:
             products.append(np.mean(pairs))
-    return np.mean(products), len(products), np.std(products, ddof=1) / np.sqrt(len(products))
+            between += len(m) * np.mean(m) ** 2
+            within += sum((a - np.mean(m)) ** 2 for a in m)
+            again += len(m) - 1
+    freedom = len(products) - 1
+    chance = stats.f.sf(between / freedom / (within / again), freedom, again)
+    return np.mean(products), len(products), chance
 
 
 @pytest.mark.parametrize("period", UNITS)
@@ -103,13 +109,56 @@ def test_what_places_keep_is_the_mean_product_of_runs_there(period):
         weights = [keep.astype(float) for keep in kept]
         fit = fit_of(parts, [np.ones(40)] * len(parts), period, places, weights)
         found = left_at_places(fit)
-        variance, count, error = by_loops(parts, places, kept)
-        is_seen = variance > 3.0 * error
+        variance, count, chance = by_loops(parts, places, kept)
+        is_seen = chance < 1.0 - 0.9545
         seen += is_seen
-        wanted = np.sqrt(variance) if is_seen else 0.0
+        wanted = np.sqrt(max(variance, 0.0)) if is_seen else 0.0
         assert found.standard == pytest.approx(wanted, rel=1e-9), draw
         assert found.degrees_of_freedom == count
     assert 40 < seen < 160
+
+
+@pytest.mark.parametrize(
+    ("count", "runs", "size"), [(9, 4, 3.0), (10, 2, 6.0), (14, 5, 2.0), (30, 3, 1.0)]
+)
+def test_of_few_places_it_is_seen_as_well(count, runs, size):
+    """Of twelve places what each errs by had never been three of its standard errors."""
+    print("seed", SEED + count)
+    places = 360.0 / count * np.arange(count)
+    inside, wide = [], []
+    for draw in range(40):
+        rng = np.random.default_rng([SEED + count, draw])
+        error = 20.0 * np.cos(np.radians(places)) + size * rng.normal(size=count)
+        taken = [
+            ta.CalibrationRun(
+                places, places + (error + 0.4 * rng.normal(size=count) + zero) / 3600.0, 360.0
+            )
+            for zero in rng.normal(0.0, 5.0, runs)
+        ]
+        rows = certify(taken, Identity("1", "joint"), orders=[1]).content["positions"]
+        off = [row["error_arcsec"] for row in rows] - (error - error.mean())
+        inside += [abs(e) <= row["expanded_arcsec"] for e, row in zip(off, rows, strict=True)]
+        wide.append(rows[0]["expanded_arcsec"] / np.sqrt(np.mean(off**2)))
+    # Few places have no tails: not one of nine is beyond three times their root mean square.
+    assert np.mean(inside) > 0.93
+    assert 1.8 < np.median(wide) < 3.5
+
+
+@pytest.mark.parametrize("runs", [2, 6])
+def test_of_noise_alone_it_is_seen_as_seldom_as_the_level_says(runs):
+    """Once in 22, of 300 certificates 14 with a standard deviation of 3.6."""
+    print("seed", SEED + runs)
+    places = 24.0 * np.arange(15)
+    seen = 0
+    for draw in range(300):
+        rng = np.random.default_rng([SEED, runs, draw])
+        taken = [
+            ta.CalibrationRun(places, places + rng.normal(size=15) / 3600.0, 360.0)
+            for _ in range(runs)
+        ]
+        fit = ta.fit(taken, orders=[1, 2], covariance="white")
+        seen += left_at_places(fit).standard > 0.0
+    assert 3 <= seen <= 27
 
 
 def test_one_run_alone_cannot_show_it():
