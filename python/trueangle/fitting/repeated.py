@@ -85,6 +85,8 @@ def covariance_with_repeats(
     if not np.isfinite(found.covariance).all():
         return found
     positions = distinct_positions(problem.runs)
+    if len(positions) == kept:
+        return found
     sums = _repeats(problem, fitted, positions, weights, penalty)
     if sums is None:
         return found

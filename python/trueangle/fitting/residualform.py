@@ -25,9 +25,11 @@ import numpy as np
 from ..support.arrays import Array
 from .problem import Problem
 
-#: Readings times columns up to which the columns are written out: of more readings the fit
-#: takes a share of the noise that changes no such form.
+#: Readings times columns up to which the columns are written out.
 _MOST: Final = 4_000_000
+#: Columns in square roots of readings below which the fit changes no such form by a tenth of
+#: what is looked for: its share of the noise is then far below the form's own deviation.
+_SLIGHT: Final = 0.3
 #: Part of the largest eigenvalue below which columns tell nothing new.
 _RANK: Final = 1e-10
 
@@ -57,10 +59,12 @@ class ResidualSpace:
     def of(
         cls, problem: Problem, weights: Sequence[Array | None], used: Sequence[int]
     ) -> ResidualSpace | None:
-        """That of a fit of these runs; None of sums, of no orders and of very many readings."""
+        """That of a fit of these runs; None of sums, of no orders, and where readings abound."""
         sizes = [len(problem.runs[i]) for i in used]
         width = problem.unknowns + len(used)
         if not problem.unknowns or problem.summed or sum(sizes) * width > _MOST:
+            return None
+        if width < _SLIGHT * math.sqrt(sum(sizes)):
             return None
         own = [problem.private(i) for i in used]
         starts = np.cumsum([0, *(part.shape[1] for part in own)])
