@@ -57,16 +57,24 @@ class UniformGrid:
         >>> UniformGrid(36).folded(202)
         14
         """
-        n = self.positions
-        rest = order % n
-        return min(rest, n - rest)
+        return folded_order(order, self.positions)
 
     def aliases(self, order: float, count: int) -> list[float]:
         """Further orders with the same values, ascending."""
-        n = self.positions
-        low = self.folded(order)
-        found = sorted({abs(s * low + k * n) for k in range(count + 2) for s in (1, -1)})
-        return [m for m in found if m != order][:count]
+        return aliases_of(order, self.positions, count)
+
+
+def folded_order(order: float, rate: float) -> float:
+    """The lowest order with the same values at so many equal steps a turn."""
+    rest = order % rate
+    return min(rest, rate - rest)
+
+
+def aliases_of(order: float, rate: float, count: int) -> list[float]:
+    """Further orders with the same values, ascending."""
+    low = folded_order(order, rate)
+    found = sorted({abs(s * low + k * rate) for k in range(count + 2) for s in (1, -1)})
+    return [m for m in found if m != order][:count]
 
 
 def uniform_grid(theta: NDArray[np.float64]) -> UniformGrid | None:
@@ -128,6 +136,25 @@ def lattice_step(values: NDArray[np.float64]) -> float:
         if np.abs(away - np.round(away)).max() < ON_LATTICE:
             return step / parts
     return 0.0
+
+
+def even_rate(runs: Sequence[NDArray[np.float64]]) -> float:
+    """Equal steps in a turn that all runs keep to, each from a place of its own; 0 for none.
+
+    A line whose phase every run draws anew is there the same numbers as one that turns so many
+    times more or less, whether the steps close after a turn or not.
+
+    ``runs`` are the angles of each run, in turns.
+
+    Examples
+    --------
+    >>> round(even_rate([np.arange(20) * 0.8 / 98.0, 0.3 - np.arange(30) * 0.8 / 98.0]), 6)
+    122.5
+    >>> even_rate([np.array([0.0, 0.11, 0.43, 0.5, 0.58])])
+    0.0
+    """
+    step = lattice_step(np.concatenate([run - run[0] for run in runs]))
+    return 1.0 / step if step > 0.0 else 0.0
 
 
 def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:

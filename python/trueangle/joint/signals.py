@@ -19,6 +19,7 @@ from ..support.quantiles import median
 from ..support.signals import coupled_with
 from .grid import (
     UniformGrid,
+    even_rate,
     finer_step,
     is_of_design,
     lattice_step,
@@ -119,6 +120,11 @@ class Signals:
     def grid(self) -> UniformGrid | None:
         """Equal steps of a turn on which the design put the readings, or None."""
         return UniformGrid(self.table) if self.table else None
+
+    @cached_property
+    def even_rate(self) -> float:
+        """Equal steps in a turn that every run keeps to, or 0 (`trueangle.joint.grid`)."""
+        return even_rate([self.theta[a:b] / (2.0 * np.pi) for a, b in self.run_bounds()])
 
     def take(self, rows: NDArray[np.bool_] | Index) -> Signals:
         """The readings ``rows``; runs keep their index and stretches their history."""
