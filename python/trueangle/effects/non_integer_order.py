@@ -27,6 +27,7 @@ from .search import (
     Array,
     Fitted,
     grid_doubt,
+    known_orders,
 )
 
 #: Trial orders per resolution cell (one order over the turns of a run).
@@ -176,9 +177,12 @@ class NonIntegerOrder(Effect):
         if sizes.min() < 8 or usual <= 0.0:  # most runs stand still
             return np.zeros(0), np.zeros(0)
         top = float(regression.lines.orders.max()) * 0.75
-        # At equal steps higher orders are the same numbers: the lowest is meant.
-        rate = regression.signals.even_rate
-        top = min(top, 0.5 * rate) if rate else top
+        # At equal steps higher orders are the same numbers: the lowest is meant. But where the
+        # gear's own lines look like low ones it may be one of those, and is doubted (`grid_doubt`).
+        rate, grid = regression.signals.even_rate, regression.signals.grid
+        known = max(known_orders(regression.belief), default=0.0)
+        hides = grid is not None and 2.0 * known > grid.positions
+        top = min(top, 0.5 * rate) if rate and not hides else top
         low = max(LOWEST, LEAST_CYCLES / usual)
         # Half the mean rate of readings is as far as a run can tell.
         step = 1.0 / (OVERSAMPLING * usual)
