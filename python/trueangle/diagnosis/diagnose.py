@@ -252,6 +252,8 @@ def _ratio_finding(ratio: GearedLinesRatio) -> Finding:
         "believed_gear_ratio": quantity(ratio.believed),
         "share_found": quantity(ratio.found),
     }
+    if ratio.alike:
+        parameters["aliases"] = quantity(list(ratio.alike))
     z = (ratio.gear_ratio - ratio.believed) / max(ratio.std, 1e-300)
     return Finding(WrongGearRatio.kind, parameters, {"bic_gain": min(z * z, 1e12)}, None, [])
 

@@ -59,6 +59,8 @@ class GearedLinesRatio:
         Share of the believed power of the geared lines at this ratio, and at the believed.
     simulation : Simulation
         The simulation with this ratio.
+    alike : tuple of float
+        Other ratios that explain as much, as at even steps.
     """
 
     gear_ratio: float
@@ -67,6 +69,7 @@ class GearedLinesRatio:
     found: float
     left: float
     simulation: Simulation
+    alike: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

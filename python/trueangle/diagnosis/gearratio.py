@@ -16,7 +16,7 @@ from ..joint.pattern import Pattern
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array
-from .gearedlines import GearedLines, GearedLinesRatio, gear_denominators
+from .gearedlines import OVERSAMPLING, PLAIN, GearedLines, GearedLinesRatio, gear_denominators
 
 #: Share of the believed lines up to which they are missing at the believed ratio, and share of
 #: their power that must be found at another one for that to be the ratio: where less is found,
@@ -40,17 +40,41 @@ ANOTHER_TURN = 9.0
 def find_ratio(geared: GearedLines) -> GearedLinesRatio | None:
     """The gear ratio at which the believed lines are, where they are not at the believed one.
 
-    None where the believed lines are where they should be, or nowhere.
+    None where the believed lines are where they should be, or nowhere. At even steps several
+    ratios give the same numbers: the nearest to the believed one is meant, and the others are told.
     """
     believed = geared.sim.joint.gear_ratio
     # Each line counts alike: where one is believed another may stand, of the wave generator where
-    # the motor's is believed if the ratio is a tooth less.
-    if np.mean(geared.shares(believed)) > MISSING:
+    # the motor's is believed if the ratio is a tooth less. Next to a large line a small one is
+    # found in any case: the large one tells.
+    there = float(np.mean(geared.shares(believed)))
+    if there > MISSING and geared.together(believed) > MISSING:
         return None
-    trials = np.arange(believed * (1.0 - REACH), believed * (1.0 + REACH), geared.step)
-    best = max(trials.tolist(), key=geared.share)
-    found = geared.at(geared.refined(best, common=False), common=False)
-    return found if found.found >= FOUND else None
+    low, high, step = believed * (1.0 - REACH), believed * (1.0 + REACH), geared.step
+    # From beyond either end, where there may be a peak.
+    trials = np.arange(low - step, high + 2.0 * step, step)
+    shares = np.array([geared.share(trial) for trial in trials.tolist()])
+    best = geared.refined(float(trials[np.argmax(shares)]), common=False)
+    alike = _alike(geared, trials, shares, best)
+    nearest = min([best, *alike], key=lambda ratio: abs(ratio - believed))
+    found = geared.at(nearest, common=False)
+    if found.found < FOUND or float(np.mean(geared.shares(nearest))) < there:
+        return None
+    return replace(found, alike=tuple(sorted({best, *alike} - {nearest})))
+
+
+def _alike(geared: GearedLines, trials: Array, shares: Array, best: float) -> list[float]:
+    """Ratios of other peaks that explain as much as the best."""
+    inner = shares[1:-1]
+    tops = (inner >= shares[:-2]) & (inner >= shares[2:]) & (inner > FOUND * shares.max())
+    limit = geared.left(best, common=False) * (1.0 + PLAIN / max(geared.y.size, 1))
+    found: list[float] = []
+    for trial in trials[1:-1][tops].tolist():
+        ratio = geared.refined(trial, common=False)
+        is_new = min(abs(ratio - other) for other in (best, *found)) > OVERSAMPLING * geared.step
+        if is_new and geared.left(ratio, common=False) <= limit:
+            found.append(ratio)
+    return found
 
 
 def near_ratio(geared: GearedLines) -> GearedLinesRatio | None:

@@ -24,7 +24,7 @@ from .ambiguity import Ambiguity
 from .argument_error import ArgumentShift
 from .effect import Effect
 from .missing_order import MissingOrder
-from .search import Array, Fitted, tangent_covariance
+from .search import SAME_CORRELATION, Array, Fitted, tangent_covariance
 from .sidebands import Sidebands
 
 #: Places per turn of a shaft at which a defect is searched, and its widths in degrees.
@@ -43,9 +43,9 @@ PEAKS = 2
 
 Waves: TypeAlias = NDArray[np.complex128]
 
-#: Times that a bump whose top was clipped is refined, and its height from which on a reading
-#: is one of its own.
-UNCLIPPED = 3
+#: Times that a bump whose top was clipped is refined at most, the deviance that is no gain, and its
+#: height from which on a reading is one of its own.
+MOST_ROUNDS, SETTLED = 6, 0.01
 ON_BUMP = 0.1
 
 #: Readings' worth of power that a bump must rest on.
@@ -136,7 +136,7 @@ class LocalDefect(Effect):
                     or cls._is_beaten(regression, shape, log_grid)
                 ):
                     shape = cls._refined(regression, shaft, place, width)
-                    shape = cls._unclipped(regression, shape)
+                    shape = cls._settled(regression, shape)
                     place, width = shape["place_deg"], shape["width_deg"]
                     reached.append((place, width))
                 columns = cls.columns(regression.signals, regression.around, shape)
@@ -195,22 +195,30 @@ class LocalDefect(Effect):
         return {"shaft": shaft, "place_deg": float(place % 360.0), "width_deg": float(width)}
 
     @classmethod
-    def _unclipped(cls, regression: Regression, shape: dict[str, Any]) -> dict[str, Any]:
-        """Refined again with a tall bump in the model: its top was taken for outliers.
+    def _settled(cls, regression: Regression, shape: dict[str, Any]) -> dict[str, Any]:
+        """Refined again with a tall bump in the model, until that saves no more.
 
-        Clipped at so many standard deviations it has a flat top, and looks wide.
+        Without it its top is clipped at so many standard deviations and looks flat and wide, and
+        the noise seems to be correlated over the bump. The readings on it are taken as they are,
+        once; from then on outliers among them are told from the bump.
         """
-        for _ in range(UNCLIPPED):
-            if current_deadline().over:
-                return shape
+        best, least = shape, np.inf
+        for k in range(MOST_ROUNDS):
             columns = cls.columns(regression.signals, regression.around, shape)
-            if not regression.outlying[columns[:, 0] > ON_BUMP].any():
-                return shape
+            on_bump = columns[:, 0] > ON_BUMP
             bump = regression.propose(cls.kind, shape, columns)
-            full = regression.with_terms([*regression.terms, bump], regression.whiten.rho)
-            seen = regression.of_target(full.target)
+            full = regression.with_terms([*regression.terms, bump])
+            if full.deviance > least - SETTLED:
+                break
+            best, least = shape, full.deviance
+            is_clipped = regression.outlying[on_bump].any()
+            correlated = abs(full.whiten.rho - regression.whiten.rho)
+            if current_deadline().over or not (is_clipped or correlated > SAME_CORRELATION):
+                break
+            target = full.target if k else np.where(on_bump, full.residual, full.target)
+            seen = regression.with_terms(regression.terms, full.whiten.rho).of_target(target)
             shape = cls._refined(seen, shape["shaft"], shape["place_deg"], shape["width_deg"])
-        return shape
+        return best
 
     @classmethod
     def _tangents(cls, regression: Regression, shape: dict[str, Any], height: float) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from ..estimation.extension import Extension
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
+from ..joint.grid import aliases_of
 from ..joint.pattern import JointPattern, line_columns, lines_columns
 from ..joint.signals import Signals
 from ..support.deadline import current_deadline
@@ -19,13 +20,14 @@ from .ambiguity import (
 )
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect
-from .missing_order import MissingOrder
+from .missing_order import HIGHEST, MissingOrder
 from .orderspectrum import OrderSpectrum
 from .randomphase import RandomPhaseLine
 from .search import (
     Array,
     Fitted,
     grid_ambiguity,
+    known_orders,
 )
 
 #: Trial orders per resolution cell (one order over the turns of a run).
@@ -175,6 +177,12 @@ class NonIntegerOrder(Effect):
         if sizes.min() < 8 or usual <= 0.0:  # most runs stand still
             return np.zeros(0), np.zeros(0)
         top = float(regression.lines.orders.max()) * 0.75
+        # At equal steps higher orders are the same numbers: the lowest is meant. But where the
+        # gear's own lines look like low ones it may be one of those, and is doubted (`grid_doubt`).
+        rate, grid = regression.signals.even_rate, regression.signals.grid
+        known = max(known_orders(regression.belief), default=0.0)
+        hides = grid is not None and 2.0 * known > grid.positions
+        top = min(top, 0.5 * rate) if rate and not hides else top
         low = max(LOWEST, LEAST_CYCLES / usual)
         # Half the mean rate of readings is as far as a run can tell.
         step = 1.0 / (OVERSAMPLING * usual)
@@ -217,6 +225,11 @@ class NonIntegerOrder(Effect):
             "order": quantity(extension.shape["order"], order_std),
             "amplitude_arcsec": quantity(amplitude, amplitude_std),
         }
+        rate = regression.signals.even_rate
+        if rate:
+            most = max(HIGHEST, float(regression.lines.orders.max()))
+            alike = [m for m in aliases_of(extension.shape["order"], rate, 3) if m <= most]
+            parameters |= {"aliases": quantity(alike)} if alike else {}
         known = regression.around.joint.bearing_lines(extension.shape["order"])
         if known:
             parameters["explanations"] = quantity(known)

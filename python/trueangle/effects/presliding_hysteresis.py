@@ -16,12 +16,20 @@ from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.travel import PreslidingHysteresisTerm
 from ..support.angles import from_arcsec
+from ..support.deadline import current_deadline
 from .ambiguity import Ambiguity, share_left
 from .backlash import ONE_WAY, Backlash, goes_both_ways
 from .departures import spring_transitions
 from .effect import Effect
 from .latency import TWO_SPEEDS, Latency
-from .search import Array, Fitted, golden_maximum, is_of_one_sign, tangent_covariance
+from .search import (
+    Array,
+    Fitted,
+    golden_maximum,
+    is_of_one_sign,
+    seen_beside,
+    tangent_covariance,
+)
 
 _AFTER_REVERSAL = (
     "record the first 10 to 30 deg after each reversal in steps of 0.3 deg or less, "
@@ -42,6 +50,9 @@ APART = 2.5
 
 #: Transition lengths searched, degrees.
 LENGTHS = np.geomspace(0.15, 60.0, 15)
+
+#: Times that a length is refined at most, each under the noise that the last one left.
+ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -119,13 +130,17 @@ class PreslidingHysteresis(Effect):
             return None
         step = np.log(LENGTHS[1] / LENGTHS[0])
         log_length = float(np.log(length))
-        if not regression.is_dominated(gain, 2, float(np.log(2.0))):
-            log_length, _ = golden_maximum(
-                lambda x: float(regression.gains(signals.presliding(np.exp(x), start)[:, None])[0]),
-                log_length - step,
-                log_length + step,
-            )
-        shape = {"length_deg": float(np.exp(log_length)), "start_state": start}
+        shape = {"length_deg": length, "start_state": start}
+        seen: Regression | None = regression
+        if regression.is_dominated(gain, 2, float(np.log(2.0))):
+            seen = None
+        for _ in range(ROUNDS):
+            if seen is None or current_deadline().over:
+                break
+            log_length = cls._refined(seen, log_length, step, start)
+            shape = {"length_deg": float(np.exp(log_length)), "start_state": start}
+            columns = cls.columns(signals, regression.around, shape)
+            seen = seen_beside(regression, regression.propose(cls.kind, shape, columns))
         columns = cls.columns(signals, regression.around, shape)
         extension = regression.propose(cls.kind, shape, columns, parameters=2, log_grid=np.log(2.0))
         if not regression.has(cls.kind):
@@ -142,6 +157,17 @@ class PreslidingHysteresis(Effect):
         further.sort(key=lambda p: -p.bic_gain)
         alike = (p for p in further if p.bic_gain > 0.0 and is_of_one_sign(regression, p))
         return next(alike, None)
+
+    @staticmethod
+    def _refined(regression: Regression, log_length: float, step: float, start: float) -> float:
+        """Logarithm of the length within a step that explains most."""
+        signals = regression.signals
+        found, _ = golden_maximum(
+            lambda x: float(regression.gains(signals.presliding(np.exp(x), start)[:, None])[0]),
+            log_length - step,
+            log_length + step,
+        )
+        return float(found)
 
     @classmethod
     def _play(cls, regression: Regression) -> Extension:

@@ -97,10 +97,12 @@ class ReferenceLines(Effect):
         mount = regression.signals.mount
         if mount is None or np.ptp(mount) == 0.0:
             return None
+        # Which way the mount counts is one convention for all lines of the reference.
+        signs = {t.shape["mount_sign"] for t in regression.terms if t.cause == cls.kind}
         shapes = [
             {"order": float(h), "mount_sign": sign}
             for h in REFERENCE_ORDERS
-            for sign in (1.0, -1.0)
+            for sign in (signs or (1.0, -1.0))
         ]
         # Low orders are likelier by far, as of any rotary part.
         return best_shape(

@@ -18,6 +18,9 @@ Array: TypeAlias = NDArray[np.float64]
 #: A chosen term with its coefficients and their covariance.
 Fitted: TypeAlias = tuple[Extension, Array, Array]
 
+#: Correlations of the noise that are one.
+SAME_CORRELATION = 0.02
+
 _GOLDEN = (5.0**0.5 - 1.0) / 2.0
 
 
@@ -90,6 +93,18 @@ def grid_ambiguity(regression: Regression, spots: Sequence[Ambiguity]) -> Ambigu
     return next((spot for spot in spots if spot.factor == "grid"), None)
 
 
+def seen_beside(regression: Regression, extension: Extension) -> Regression | None:
+    """The regression under the noise, and of the readings, that there are beside an extension.
+
+    Without a large one its form is taken for correlated noise and its ends for outliers: what it
+    looks like there is not what it is. None where the noise is the same.
+    """
+    full = regression.with_terms([*regression.terms, extension])
+    if abs(full.whiten.rho - regression.whiten.rho) < SAME_CORRELATION:
+        return None
+    return regression.with_terms(regression.terms, full.whiten.rho).of_target(full.target)
+
+
 def tangent_covariance(regression: Regression, terms: Sequence[Fitted], tangents: Array) -> Array:
     """Covariance of coefficients and shape parameters that are estimated jointly.
 
@@ -100,7 +115,8 @@ def tangent_covariance(regression: Regression, terms: Sequence[Fitted], tangents
     """
     own = [extension for extension, _, _ in terms]
     others = [term for term in regression.terms if all(term is not one for one in own)]
-    x, _ = regression.with_terms(others).projected(tangents)
+    # Under the noise beside these terms: without them what they explain looks correlated.
+    x, _ = regression.with_terms(others, regression.whiten.rho).projected(tangents)
     information = x.T @ x
     count = sum(len(coefficients) for _, coefficients, _ in terms)
     given = sum(float(np.trace(covariance)) for _, _, covariance in terms)

@@ -27,6 +27,9 @@ LEAST_LINES = 2
 #: Share of the power of the believed lines that may be left at their own places.
 ABSENT = 0.3
 
+#: Share by which what ratios explain at even steps may differ: by rounding.
+SAME = 1e-6
+
 
 @dataclass(frozen=True)
 class WrongGearRatio(Effect):
@@ -97,9 +100,13 @@ class WrongGearRatio(Effect):
 
         if not ratios:
             return None
-        ratio = max(ratios, key=score)
+        scores = np.array([score(ratio) for ratio in ratios])
+        # At even steps several are the same numbers: the nearest to the believed one is meant.
+        alike = [ratios[k] for k in np.flatnonzero(scores > (1.0 - SAME) * scores.max())]
+        ratio = min(alike, key=lambda ratio: abs(ratio - joint.gear_ratio))
         orders = np.array(_moved(joint, pattern, ratio))[geared]
-        shape = {"gear_ratio": ratio, "orders": orders.tolist()}
+        others = [other for other in alike if other != ratio]
+        shape = {"gear_ratio": ratio, "orders": orders.tolist(), "alike": others}
         columns = cls.columns(regression.signals, regression.around, shape)
         log_grid = float(np.log(len(ratios)))
         return regression.propose(cls.kind, shape, columns, columns.shape[1] + 1, log_grid)
@@ -123,10 +130,13 @@ class WrongGearRatio(Effect):
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:
         shape = terms[0][0].shape
-        return (
-            {"gear_ratio": quantity(shape["gear_ratio"]), "orders": quantity(shape["orders"])},
-            [WrongGearRatio(shape["gear_ratio"])],
-        )
+        parameters = {
+            "gear_ratio": quantity(shape["gear_ratio"]),
+            "orders": quantity(shape["orders"]),
+        }
+        if shape["alike"]:
+            parameters["aliases"] = quantity(shape["alike"])
+        return parameters, [WrongGearRatio(shape["gear_ratio"])]
 
 
 def _geared(joint: Joint, pattern: Pattern) -> np.ndarray[Any, np.dtype[np.int64]]:

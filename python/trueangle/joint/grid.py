@@ -31,16 +31,24 @@ class UniformGrid:
         >>> UniformGrid(36).folded(202)
         14
         """
-        n = self.positions
-        rest = order % n
-        return min(rest, n - rest)
+        return folded_order(order, self.positions)
 
     def aliases(self, order: float, count: int) -> list[float]:
         """Further orders with the same values, ascending."""
-        n = self.positions
-        low = self.folded(order)
-        found = sorted({abs(s * low + k * n) for k in range(count + 2) for s in (1, -1)})
-        return [m for m in found if m != order][:count]
+        return aliases_of(order, self.positions, count)
+
+
+def folded_order(order: float, rate: float) -> float:
+    """The lowest order with the same values at so many equal steps a turn."""
+    rest = order % rate
+    return min(rest, rate - rest)
+
+
+def aliases_of(order: float, rate: float, count: int) -> list[float]:
+    """Further orders with the same values, ascending."""
+    low = folded_order(order, rate)
+    found = sorted({abs(s * low + k * rate) for k in range(count + 2) for s in (1, -1)})
+    return [m for m in found if m != order][:count]
 
 
 def uniform_grid(theta: NDArray[np.float64]) -> UniformGrid | None:

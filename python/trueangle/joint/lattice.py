@@ -87,6 +87,25 @@ def lattice_step(values: NDArray[np.float64]) -> float:
     return 0.0
 
 
+def even_rate(runs: Sequence[NDArray[np.float64]]) -> float:
+    """Equal steps in a turn that all runs keep to, each from a place of its own; 0 for none.
+
+    A line whose phase every run draws anew is there the same numbers as one that turns so many
+    times more or less, whether the steps close after a turn or not.
+
+    ``runs`` are the angles of each run, in turns.
+
+    Examples
+    --------
+    >>> round(even_rate([np.arange(20) * 0.8 / 98.0, 0.3 - np.arange(30) * 0.8 / 98.0]), 6)
+    122.5
+    >>> even_rate([np.array([0.0, 0.11, 0.43, 0.5, 0.58])])
+    0.0
+    """
+    step = lattice_step(np.concatenate([run - run[0] for run in runs]))
+    return 1.0 / step if step > 0.0 else 0.0
+
+
 def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
     """Step of the lattice that all values lie on to their last digit; 0 where there is none.
 

@@ -17,7 +17,7 @@ from ..support.arrays import Array
 from ..support.quantiles import median
 from ..support.signals import coupled_joint
 from .grid import UniformGrid, uniform_grid
-from .lattice import CLOSES, sensor_lattice
+from .lattice import CLOSES, even_rate, sensor_lattice
 from .turning import direction_at_turns, velocity_at_turns
 
 Index = NDArray[np.int64]
@@ -108,6 +108,11 @@ class Signals:
     def grid(self) -> UniformGrid | None:
         """Equal steps of a turn on which the design put the readings, or None."""
         return UniformGrid(self.table) if self.table else None
+
+    @cached_property
+    def even_rate(self) -> float:
+        """Equal steps in a turn that every run keeps to, or 0 (`trueangle.joint.grid`)."""
+        return even_rate([self.theta[a:b] / (2.0 * np.pi) for a, b in self.run_bounds()])
 
     def take(self, rows: NDArray[np.bool_] | Index) -> Signals:
         """The readings ``rows``; runs keep their index and stretches their history."""

@@ -117,13 +117,16 @@ def test_likelihoods_of_runs_count_how_noise_is_correlated(signals: Signals) -> 
 
 
 def test_a_ratio_is_told_with_its_distance_in_standard_errors() -> None:
-    found = _ratio_finding(SimpleNamespace(gear_ratio=100.5, std=0.1, believed=100.0, found=0.97))
+    ratio = SimpleNamespace(gear_ratio=100.5, std=0.1, believed=100.0, found=0.97, alike=())
+    found = _ratio_finding(ratio)
     assert {n: (q.value, q.std) for n, q in found.parameters.items()} == {
         "gear_ratio": (100.5, 0.1),
         "believed_gear_ratio": (100.0, None),
         "share_found": (0.97, None),
     }
     assert found.evidence["bic_gain"] == pytest.approx(25.0)
+    ratio.alike = (90.0, 110.5)
+    assert _ratio_finding(ratio).parameters["aliases"].value == [90.0, 110.5]
 
 
 def stale(seed: int, tau: float, sign: float, noise: float = 60.0) -> Signals:

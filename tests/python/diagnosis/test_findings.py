@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.diagnosis.findings import _equals
+from trueangle.diagnosis.discrepancy import unfolded_error
+from trueangle.diagnosis.findings import _equals, _rivals
 from trueangle.diagnosis.penalty import NEW_CAUSE
+from trueangle.effects import EFFECTS
+from trueangle.estimation.regression import Regression
+from trueangle.joint.signals import join_runs
 from trueangle.simulation import (
     Backlash,
     Harmonic,
@@ -15,6 +21,8 @@ from trueangle.simulation import (
     MissedCounts,
     RunDesign,
     Simulation,
+    ThermalDrift,
+    TorsionalCompliance,
     ZeroSlip,
     simulate,
 )
@@ -111,3 +119,40 @@ def test_a_step_inside_a_run_is_one(row):
     )
     found = ta.diagnose(simulate(base.with_effects([MissedCounts(20.0, 1, row)]), seed=1), base)
     assert [finding.cause for finding in found.findings if finding.confirmed] == ["missed_counts"]
+
+
+@pytest.mark.parametrize("hidden", [ThermalDrift(50.0), TorsionalCompliance(25.0)])
+@pytest.mark.parametrize("seed", range(20, 23))
+def test_causes_that_are_one_column_are_named_together_however_large(hidden, seed):
+    """One run of four is loaded and cooler, by so much that without a cause its noise is another.
+
+    The spring was confirmed, whichever of the two was hidden.
+    """
+    sweep = RunDesign(
+        samples=72, turns=6.0, reversals=(0.25, 0.5, 0.75), gravity_Nm=4.0, temperature_C=31.0
+    )
+    loaded = replace(sweep, samples=60, torque_Nm=8.0, temperature_C=27.0)
+    runs = (loaded, sweep, replace(sweep, start_deg=70.0), replace(sweep, samples=45))
+    lines = (Harmonic("output", 1, 18.0), Harmonic("output", 4, 20.0))
+    base = Simulation(sigma_arcsec=3.0, harmonics=lines, runs=runs)
+    measured = simulate(base.with_effects([hidden]), seed)
+    found = ta.diagnose([replace(run, time=None, velocity=None) for run in measured], base)
+    assert not [finding.cause for finding in found.findings if finding.confirmed]
+    seen = [spot for spot in found.not_identifiable if spot.supported]
+    (spot,) = [spot for spot in seen if hidden.kind in spot.causes]
+    assert {"thermal_drift", "torsional_compliance"} <= set(spot.causes)
+    name = next(iter(hidden.to_table().keys() - {"kind"}))
+    size = spot.estimates[hidden.kind][name]
+    assert abs(size.value - getattr(hidden, name)) < 4.0 * size.std
+
+
+def test_a_rival_is_as_far_behind_as_its_own_account():
+    """Both fitted with all else: a line that varies in time instead of one that stays."""
+    base = Simulation(sigma_arcsec=1.0, runs=(RunDesign(samples=150, turns=2.0),) * 3)
+    runs = simulate(base.with_effects([MissedCounts(60.0, 1, 70)]), seed=5)
+    signals = join_runs(runs)
+    start = Regression.of(signals, unfolded_error(runs), base.surroundings)
+    chosen = start.with_terms([MissedCounts.propose(start)])
+    for cause, gap in _rivals(chosen, [0]):
+        instead = start.with_terms([EFFECTS[cause].propose(start)])
+        assert gap == pytest.approx(instead.bic - chosen.bic, abs=1e-6), cause
