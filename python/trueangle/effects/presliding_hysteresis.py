@@ -233,7 +233,8 @@ class PreslidingHysteresis(Effect):
         length_std = None
         if strongest in curved:
             at = n + curved.index(strongest)
-            length_std = float(np.sqrt(covariance[at, at]))
+            # Not known by more than was searched, where readings lie too far apart to show it.
+            length_std = min(float(np.sqrt(covariance[at, at])), float(LENGTHS[-1]))
         return float(np.sqrt(covariance[:n, :n].sum())), length_std
 
     @classmethod

@@ -113,12 +113,15 @@ def tangent_covariance(regression: Regression, terms: Sequence[Fitted], tangents
     projected out. What widens the given covariance of the coefficients (runs that differ, form
     errors) widens that of the shapes in the same measure.
     """
-    own = [extension for extension, _, _ in terms]
-    others = [term for term in regression.terms if all(term is not one for one in own)]
+    chosen = [extension for extension, _, _ in terms]
+    others = [term for term in regression.terms if all(term is not one for one in chosen)]
     # Under the noise beside these terms: without them what they explain looks correlated.
     x, _ = regression.with_terms(others, regression.whiten.rho).projected(tangents)
-    information = x.T @ x
+    # Each of length 1: what the readings hardly tell has a large variance, and not none.
+    sizes = np.maximum(np.sqrt(np.einsum("ij,ij->j", x, x)), 1e-150)
+    information = (x / sizes).T @ (x / sizes)
     count = sum(len(coefficients) for _, coefficients, _ in terms)
     given = sum(float(np.trace(covariance)) for _, _, covariance in terms)
-    alone = float(np.trace(np.linalg.pinv(information[:count, :count])))
-    return np.asarray(given / alone * np.linalg.pinv(information), dtype=np.float64)
+    own = np.linalg.pinv(information[:count, :count]) / np.outer(sizes[:count], sizes[:count])
+    joint = np.linalg.pinv(information) / np.outer(sizes, sizes)
+    return np.asarray(given / float(np.trace(own)) * joint, dtype=np.float64)

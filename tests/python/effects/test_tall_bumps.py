@@ -80,3 +80,22 @@ def test_shapes_are_known_by_the_noise_beside_them(seed):
     wanted = np.linalg.inv(x.T @ x)
     # The variance is that of the fit, and the noise may be correlated by a little.
     assert np.sqrt(np.diag(found)) == pytest.approx(np.sqrt(np.diag(wanted)), rel=0.15)
+
+
+@pytest.mark.parametrize("length", [0.15, 0.25])
+def test_a_length_between_two_readings_is_not_known_exactly(length):
+    """The first reading after the reversal stands 3.4 deg from it: the error was told as 0."""
+    run = RunDesign(samples=105, turns=2.0, reversals=(0.5,), spacing="uniform")
+    sim = Simulation(sigma_arcsec=2.0, harmonics=BASE.harmonics, runs=(run,) * 2)
+    hidden = PreslidingHysteresis(25.0, 0.5)
+    signals = join_runs(measured := simulate(sim.with_effects([hidden]), 7))
+    left = unfolded_error(measured) - sim.predict(signals)
+    start = Regression.of(signals, left, sim.surroundings)
+    shape = {"length_deg": length, "start_state": 1.0}
+    columns = PreslidingHysteresis.columns(signals, start.around, shape)
+    fitted = start.with_terms([start.propose(hidden.kind, shape, columns)])
+    term, coefficients = fitted.fitted()[0]
+    told, _ = PreslidingHysteresis.report(fitted, [(term, coefficients, fitted.covariance(0))])
+    assert told["length_deg"].std == 60.0  # the longest that is looked for
+    size = told["amplitude_arcsec"]
+    assert abs(size.value - hidden.amplitude_arcsec) < 4.0 * size.std
