@@ -21,6 +21,9 @@ Fitted: TypeAlias = tuple[Extension, Array, Array]
 #: Correlations of the noise that are one.
 SAME_CORRELATION = 0.02
 
+#: Share of the largest derivative below which one is rounding, and the variance of what that tells.
+ROUNDED, UNKNOWN = 1e-12, 1e24
+
 _GOLDEN = (5.0**0.5 - 1.0) / 2.0
 
 
@@ -118,10 +121,15 @@ def tangent_covariance(regression: Regression, terms: Sequence[Fitted], tangents
     # Under the noise beside these terms: without them what they explain looks correlated.
     x, _ = regression.with_terms(others, regression.whiten.rho).projected(tangents)
     # Each of length 1: what the readings hardly tell has a large variance, and not none.
-    sizes = np.maximum(np.sqrt(np.einsum("ij,ij->j", x, x)), 1e-150)
-    information = (x / sizes).T @ (x / sizes)
+    sizes = np.sqrt(np.einsum("ij,ij->j", x, x))
+    seen = sizes > ROUNDED * sizes.max(initial=0.0)
+    x = np.where(seen, x / np.where(seen, sizes, 1.0), 0.0)
+    sizes = np.where(seen, sizes, np.inf)
+    information = x.T @ x
     count = sum(len(coefficients) for _, coefficients, _ in terms)
     given = sum(float(np.trace(covariance)) for _, _, covariance in terms)
     own = np.linalg.pinv(information[:count, :count]) / np.outer(sizes[:count], sizes[:count])
     joint = np.linalg.pinv(information) / np.outer(sizes, sizes)
-    return np.asarray(given / float(np.trace(own)) * joint, dtype=np.float64)
+    found = np.asarray(given / float(np.trace(own)) * joint, dtype=np.float64)
+    found[~seen, ~seen] = UNKNOWN
+    return found
