@@ -345,3 +345,20 @@ def test_a_joint_that_rests_does_not_stop_the_others(tmp_path, capsys, monkeypat
     page = (tmp_path / "arm.html").read_text()
     assert "There is none, as said above." in page
     assert "The orders that were looked for" not in page
+
+
+@pytest.mark.parametrize("joint", SIZES)
+def test_one_joint_without_usable_data_is_told_by_the_status(arm, tmp_path, joint, capsys):
+    """Its indicated angle runs against its reference; those of the others are sound."""
+    assert asked(arm, "check", capsys=capsys)[0] == 0
+    lines = (arm / "arm.csv").read_text().splitlines()
+    column = lines[0].split(",").index(f"q_{joint}")
+    rows = [line.split(",") for line in lines[1:]]
+    for row in rows:
+        row[column] = f"{-float(row[column]):.12f}"
+    (tmp_path / "arm.csv").write_text("\n".join([lines[0], *map(",".join, rows)]))
+    (tmp_path / "robot.toml").write_text((arm / "robot.toml").read_text())
+    status, out, _ = asked(tmp_path, "check", "--json", capsys=capsys)
+    usable = {name: found["usable"] for name, found in json.loads(out)["joints"].items()}
+    assert usable == {name: name != joint for name in SIZES}
+    assert status == 1

@@ -246,3 +246,16 @@ def test_the_page_of_a_watched_joint_draws_its_sums_and_sizes(drawn):
     first = next(one for one in windows if one.alarm)
     alarms = f"{len(told)} alarm{'s' * (len(told) > 1)}"
     assert page.summary() == f"59 windows, {alarms}\nwindow {first.window}: {first.because}"
+
+
+def test_a_watched_joint_is_told_by_its_first_alarm():
+    """Order 2 grows from window 30 on, and again from 45 on."""
+    angle, error = readings(60)
+    error[PER * 30 :] += 0.004 * np.sin(2.0 * np.radians(angle[PER * 30 :]))
+    error[PER * 45 :] += 0.02 * np.sin(4.0 * np.radians(angle[PER * 45 :]))
+    windows = ta.Monitor(model()).windows_of(angle, error)
+    first, *more = (one for one in windows if one.alarm)
+    assert more
+    assert more[-1].because != first.because
+    said = WatchReport(windows, 360.0, errors_in="arcsec").summary()
+    assert said.endswith(f"\nwindow {first.window}: {first.because}")

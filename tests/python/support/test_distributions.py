@@ -75,3 +75,9 @@ def test_what_is_no_probability_is_refused() -> None:
             ours.student_quantile(wrong, 3.0)
     with pytest.raises(ArgumentError, match="degrees_of_freedom must be positive"):
         ours.student_tail(1.0, 0.0)
+
+
+@pytest.mark.parametrize("chance", [1e-9, 1e-3, 0.05, 0.3173, 0.9])
+def test_a_normal_number_exceeds_this_size_on_either_side(chance: float) -> None:
+    size = ours.two_sided_quantile(chance)
+    assert 2.0 * stats.norm.sf(size) == pytest.approx(chance, rel=1e-6)
