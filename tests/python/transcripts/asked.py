@@ -179,8 +179,8 @@ class Asked:
 #: What must not be said but for a reason.
 NOTHING = "changes nothing"
 
-#: Said by every command alike.
-UNASKED = ("help", "debug")
+#: Said by every command alike, and what another machine lacks: a PDF needs a browser.
+UNASKED = ("help", "debug", "pdf")
 
 
 def _spread(signature: inspect.Signature, args: Any, kwargs: Any) -> dict[str, str]:
