@@ -99,22 +99,24 @@ def test_a_blind_design_is_not_guessed_from(design: str) -> None:
     assert answer.reasons
 
 
+@pytest.fixture(scope="module")
+def seeds() -> list[int]:
+    first = int(os.environ.get("TRUEANGLE_SEED") or secrets.randbelow(10**6))
+    print(f"TRUEANGLE_SEED={first}")
+    return list(range(first, first + 20))
+
+
+@pytest.fixture(scope="module")
+def singles(seeds: list[int]) -> list[Answer]:
+    jobs = int(os.environ.get("TRUEANGLE_JOBS", "1"))
+    found = exam.answers(exam.singles(CAUSES, NAMED_FIRST, seeds), jobs)
+    print(told(found), exam.save(found, exam.artefacts()))
+    return found
+
+
 @pytest.mark.skipif(not NIGHTLY, reason="set TRUEANGLE_NIGHTLY=1: an hour of diagnoses")
 class TestNightly:
     """20 fresh seeds of everything."""
-
-    @pytest.fixture(scope="class")
-    def seeds(self) -> list[int]:
-        first = int(os.environ.get("TRUEANGLE_SEED") or secrets.randbelow(10**6))
-        print(f"TRUEANGLE_SEED={first}")
-        return list(range(first, first + 20))
-
-    @pytest.fixture(scope="class")
-    def singles(self, seeds: list[int]) -> list[Answer]:
-        jobs = int(os.environ.get("TRUEANGLE_JOBS", "1"))
-        found = exam.answers(exam.singles(CAUSES, NAMED_FIRST, seeds), jobs)
-        print(told(found), exam.save(found, exam.artefacts()))
-        return found
 
     @pytest.mark.parametrize("scale", NAMED_FIRST)
     def test_causes_are_named_first(self, singles: list[Answer], scale: float) -> None:
