@@ -178,7 +178,7 @@ class NonIntegerOrder(Effect):
             return np.zeros(0), np.zeros(0)
         top = float(regression.lines.orders.max()) * 0.75
         # At equal steps higher orders are the same numbers: the lowest is meant. But where the
-        # gear's own lines look like low ones it may be one of those, and is doubted (`grid_doubt`).
+        # gear's own lines look like low ones it may be one of those, in doubt (`grid_ambiguity`).
         rate, grid = regression.signals.even_rate, regression.signals.grid
         known = max(known_orders(regression.belief), default=0.0)
         hides = grid is not None and 2.0 * known > grid.positions

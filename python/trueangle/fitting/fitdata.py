@@ -14,7 +14,6 @@ from ..runs.run import CalibrationRun
 from ..runs.travel import Span
 from ..support.arrays import Array
 from ..support.plainresult import PlainResult
-from .beside import BesideProblem
 from .problem import Problem, SolvedProblem
 from .repeated import covariance_with_repeats
 from .robust import RobustFit
@@ -147,15 +146,9 @@ class FitData(PlainResult):
             self.nuisance,
             self.loss,
         )
-        found = covariance_with_repeats(
+        return covariance_with_repeats(
             found, self.problem, self.fitted, weights, self.ridge, self.covariance_asked
         )
-        if self.nuisance is None or BesideProblem.of(self.problem, self.nuisance) is not None:
-            return found
-        if not self.nuisance.inflation:
-            return found
-        wider = np.array([1.0, *self.nuisance.inflation])
-        return found._replace(covariance=found.covariance * np.outer(wider, wider))
 
     @cached_property
     def residuals(self) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 import trueangle._core as _core
 
 from ..errors import ArgumentError, RankError
+from ..estimation.reference import design_matrix
 from ..joint.shafts import ShaftOrders
 from ..model.model import Argument
 from ..runs.run import CalibrationRun
@@ -209,9 +210,8 @@ class Problem:
 
     def columns(self, index: int) -> Array:
         """Cosine and sine of every order at the readings of a run."""
-        cycles = [s.cycles_per_turn * order for s in self.shafts for order in s.orders]
-        x = np.outer(self.angles[index] * (2.0 * math.pi / self.period), cycles)
-        return np.stack([np.cos(x), np.sin(x)], axis=2).reshape(len(x), -1)
+        shafts = zip(*self.design, strict=True)
+        return design_matrix(self.angles[index], shafts, self.period, constant=False)
 
     def private(self, index: int) -> Array:
         """Columns that a run has for itself: its zero."""

@@ -26,6 +26,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.reference import design_matrix
 from ..joint.grid import UniformGrid, uniform_grid
 from ..runs.aliasing import Positions, distinct_positions
 from ..runs.run import CalibrationRun
@@ -125,9 +126,8 @@ def _repeats(
     run = np.repeat(np.arange(len(sizes)), sizes)
     given = zip(problem.runs, weights, strict=True)
     w = np.concatenate([np.ones(len(run)) if w is None else w for run, w in given])
-    cycles = [s.cycles_per_turn * order for s in problem.shafts for order in s.orders]
-    turned = 2.0 * math.pi * np.outer(positions.turns, cycles)
-    x = np.stack([np.cos(turned), np.sin(turned)], axis=2).reshape(len(positions), -1)
+    columns = design_matrix(positions.turns, zip(*problem.design, strict=True), 1.0)
+    x = columns[:, 1:]
     of_run = _added(run, w, len(sizes))
     used = of_run > 0.0
     whole = np.where(used, of_run, 1.0)
@@ -152,7 +152,6 @@ def _repeats(
     solve = np.zeros((len(inverse) + 1, len(inverse) + 1))
     solve[0, 0], solve[1:, 1:] = 1.0, inverse
     solve[0, 1:] = -means[used].mean(axis=0) @ inverse
-    columns = np.column_stack([np.ones(len(x)), x])
     weight = _added(place, w, len(positions))
     of = (pair_run, pair_place)
     return _Repeats(columns, at, scores, of, of_pair, residual, solve, weight, w.size)

@@ -128,9 +128,12 @@ def coefficient_uncertainty(
     else:
         jointly = beside.jointly(fitted, weights, penalty)
         noise = _noise(beside, jointly, weights, penalty, kind, bent).among(1 + problem.unknowns)
-    if not penalty > 0.0 or not np.isfinite(noise.covariance).all():
+    if penalty > 0.0 and np.isfinite(noise.covariance).all():
+        noise = noise.beside(_bias(problem, fitted, weights, penalty))
+    if beside is not None or nuisance is None or not nuisance.inflation:
         return noise
-    return noise.beside(_bias(problem, fitted, weights, penalty))
+    wider = np.array([1.0, *nuisance.inflation])
+    return noise._replace(covariance=noise.covariance * np.outer(wider, wider))
 
 
 def _noise(
