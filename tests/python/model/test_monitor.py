@@ -138,6 +138,37 @@ def test_a_joint_that_is_not_the_models_from_the_start_is_told():
     assert "order 1 is not the model's since the start" in found[0].because
 
 
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("half", [0, 1])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_growing_coefficient_raises_its_upper_sum_and_no_other(order, half, sign):
+    """Cosine before sine; below its lines the sum that is called lower."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 203)
+    angle, error = readings(rng, 100)
+    wave = (np.cos, np.sin)[half](order * np.radians(angle[PER * 90 :]))
+    error[PER * 90 :] += sign * 0.0003 * wave
+    watched = ta.Monitor(model(), run_length=1e9)
+
+    def sums():
+        return {
+            (rows["order"], k, name): rows[name][k]
+            for rows in watched.state["orders"]
+            for k in (0, 1)
+            for name in ("upper", "lower")
+        }
+
+    assert watched.update(angle[: PER * 90], error[: PER * 90]) == []
+    before = sums()
+    watched.windows_of(angle[PER * 90 : PER * 93], error[PER * 90 : PER * 93])
+    after = sums()
+    # Of three windows at 2.3 standard deviations, each less half of one: 5.4 and noise of 1.7.
+    grown = {which: value - before[which] for which, value in after.items()}
+    most = max(grown, key=grown.__getitem__)
+    assert most == (order, half, "upper" if sign > 0 else "lower")
+    assert grown[most] == pytest.approx(5.4, abs=4.0)
+
+
 def test_it_does_not_depend_on_how_readings_arrive():
     rng = np.random.default_rng(SEED + 202)
     angle, error = readings(rng, 40)

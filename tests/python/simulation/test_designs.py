@@ -122,3 +122,19 @@ def test_friction_wanders_by_its_size_and_forgets_in_its_memory():
     lag = round(2.0 / step)
     found = np.corrcoef(pushed[lag:], pushed[:-lag])[0, 1]
     assert found == pytest.approx(np.exp(-1.0), abs=0.2)
+
+
+def test_the_current_is_what_turns_the_shaft():
+    """Speed changes by what cogging, imbalance and the current push: degrees throughout."""
+    design = RunDesign(samples=6_000, speed_deg_s=30.0, spacing="clock", turns=1.3,
+                       start_deg=40.0, cogging_deg_s2=25.0, cogging_order=3.0,
+                       cogging_phase_deg=20.0, imbalance_deg_s2=8.0, imbalance_phase_deg=70.0,
+                       loop_bandwidth_hz=3.0, deg_s2_per_A=50.0, current_A=0.7)  # fmt: skip
+    run = only(design)
+    x = np.radians(run.reference)
+    driven = 50.0 * (run.signals["current"] - 0.7)
+    pushed = driven + 25.0 * np.sin(3.0 * x + np.radians(20.0)) + 8.0 * np.sin(x + np.radians(70.0))
+    slope = np.gradient(run.velocity, run.time)
+    # Central differences err by a sixth of a step squared times the third derivative.
+    np.testing.assert_allclose(slope[5:-5], pushed[5:-5], atol=0.02)
+    assert np.abs(driven).max() > 5.0

@@ -1,0 +1,168 @@
+"""What a check says to do, done word for word: then it has nothing more to say of it."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trueangle.runs.checks.check import data_faults
+from trueangle.runs.checks.record import Record
+
+SEED = 28_411
+
+
+def sound(seed=SEED):
+    """Three runs that are right, of unlike length and travel."""
+    rng = np.random.default_rng(seed)
+    runs = []
+    for k, (count, span) in enumerate(((400, 340.0), (300, 350.0), (360, 330.0))):
+        angle = 5.0 * k + np.sort(rng.uniform(0.0, span, count))
+        error = 0.1 * np.cos(np.radians(angle)) + 0.002 * rng.normal(size=count)
+        rows = np.arange(1, count + 1)
+        runs.append(Record(f"run {k}", angle, angle + error, rows, time=angle / 20.0))
+    return runs
+
+
+def chosen(record, rows):
+    """The record with some of its readings, in their order."""
+    names = ("reference", "indicated", "rows", "time")
+    return replace(record, **{name: getattr(record, name)[rows] for name in names})
+
+
+def scaled(record, by):
+    return replace(record, reference=record.reference * by, indicated=record.indicated * by)
+
+
+def without(record, fault):
+    return chosen(record, ~np.isin(record.rows, fault.rows))
+
+
+def renumbered(record):
+    return replace(record, rows=np.arange(1, len(record) + 1))
+
+
+# Each damage of a record, as it happens at a rig.
+
+
+def in_radians(record):
+    return scaled(record, np.pi / 180.0)
+
+
+def turned_round(record):
+    return replace(record, indicated=-record.indicated)
+
+
+def geared(record):
+    return replace(record, indicated=record.indicated * 7.3)
+
+
+def partly_twice(record):
+    twice = np.sort(np.concatenate([np.arange(len(record)), [20, 21, 90]]))
+    return renumbered(chosen(record, twice))
+
+
+def out_of_order(record):
+    rows = np.arange(len(record))
+    rows[100:140] = rows[100:140][::-1]
+    return renumbered(chosen(record, rows))
+
+
+def wrapped(record):
+    return replace(record, reference=np.mod(record.reference, 180.0))
+
+
+def exchanged(record):
+    """The column of the joint, which is good, under the name of a reference that is not."""
+    rough = np.random.default_rng(SEED).normal(size=len(record))
+    return replace(record, reference=record.indicated + 0.1 * rough, indicated=record.reference)
+
+
+def standing(record):
+    ends = record.indicated.copy()
+    ends[-60:] = ends[-61]
+    return replace(record, indicated=ends)
+
+
+# Each thing that is said, done to the record it is said of.
+
+
+def multiplied(record, fault):
+    number, _, below = re.fullmatch(r"multiply its angles by (\S+?)(/(pi))?", fault.mend).groups()
+    return scaled(record, float(number) / (np.pi if below else 1.0))
+
+
+def sign_changed(record, fault):
+    assert fault.mend == "change the sign of one of the two columns"
+    return replace(record, indicated=-record.indicated)
+
+
+def divided(record, fault):
+    (number,) = re.match(r"divide the indicated angle by (\S+), or", fault.mend).groups()
+    return replace(record, indicated=record.indicated / float(number))
+
+
+def dropped(record, fault):
+    assert fault.mend.startswith(("drop ", "leave these rows out"))
+    return without(record, fault)
+
+
+def sorted_by_time(record, fault):
+    assert fault.mend.startswith("sort the rows by time")
+    return renumbered(chosen(record, np.argsort(record.time)))
+
+
+def unwrapped(record, fault):
+    assert "unwrap it before" in fault.mend
+    (period,) = re.search(r"wraps after (\S+) deg", fault.says).groups()
+    return replace(record, reference=np.unwrap(record.reference, period=float(period)))
+
+
+def exchanged_back(record, fault):
+    assert fault.mend.startswith("exchange the columns")
+    return replace(record, reference=record.indicated, indicated=record.reference)
+
+
+CASES = {
+    "mixed_units": (in_radians, multiplied),
+    "wrong_sign": (turned_round, sign_changed),
+    "wrong_gear_ratio": (geared, divided),
+    "duplicate_rows": (partly_twice, dropped),
+    "unsorted_time": (out_of_order, sorted_by_time),
+    "wrapped_reference": (wrapped, unwrapped),
+    "saturated_travel": (standing, dropped),
+}
+
+
+def told(records):
+    return [fault.fault for fault in data_faults(records)]
+
+
+@pytest.mark.parametrize("place", range(3))
+@pytest.mark.parametrize("fault", CASES)
+def test_what_it_says_to_do_mends_it(fault, place):
+    print("seed", SEED)
+    damaged, mended = CASES[fault]
+    records = sound()
+    assert told(records) == []
+    records[place] = damaged(records[place])
+    (found,) = [f for f in data_faults(records) if f.fault == fault]
+    assert found.runs == (f"run {place}",)
+    records[place] = mended(records[place], found)
+    assert told(records) == []
+
+
+def test_channels_of_all_runs_that_are_exchanged_are_exchanged_back():
+    records = [exchanged(record) for record in sound()]
+    (found,) = data_faults(records)
+    assert found.fault == "swapped_channels"
+    assert told([exchanged_back(record, found) for record in records]) == []
+
+
+def test_of_runs_that_are_there_twice_one_is_kept():
+    records = sound()
+    records.append(replace(records[1], label="run 1 again"))
+    (found,) = data_faults(records)
+    assert found.mend == "keep one of them"
+    for label in found.runs:
+        assert told([r for r in records if r.label == label or r.label not in found.runs]) == []
