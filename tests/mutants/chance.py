@@ -13,10 +13,7 @@ from __future__ import annotations
 import argparse
 import ast
 import dataclasses
-import itertools
 import random
-import sqlite3
-import subprocess
 import sys
 import tempfile
 import time
@@ -28,10 +25,10 @@ from typing import NamedTuple
 
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator
-from coverage.numbits import numbits_to_nums
 
 from copies import LATE, Copy, Verdict
 from faults import Fault
+from linetests import LineTests, reaching, rooms_of_tests
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "trueangle"
@@ -75,11 +72,11 @@ OPERATORS = (
 #: What stops at lengths that never differ; no test can notice that it is gone.
 GUARD = "strict=True"
 
-#: How pytest begins the line of a test that fails.
-ENDED = ("FAILED ", "ERROR ")
-
 #: Tests of one fault at most, the ones that reach least first: they are the narrowest.
 MOST_TESTS = 60
+
+#: The broadest, in whose approved texts stands whatever is told; asked last.
+TEXTS = "tests/python/transcripts/"
 
 
 class Drawn(NamedTuple):
@@ -139,68 +136,6 @@ def mutation(path: Path, operator: str, occurrence: int, code: str, changed: str
     )
 
 
-def recorded(copy: Copy, tests: list[str], data: Path) -> None:
-    """Record which test reaches which line, and beside it which tests fail without a fault."""
-    command = [
-        sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider", "--tb=line",
-        f"--cov={copy.folder / 'python' / 'trueangle'}", "--cov-context=test", "--cov-report=",
-        *tests,
-    ]  # fmt: skip
-    environment = copy.environment() | {"COVERAGE_FILE": str(data)}
-    done = subprocess.run(
-        command, cwd=copy.folder, env=environment, check=False, text=True, stdout=subprocess.PIPE
-    )
-    # A test that fails by itself, as in a copy without history, would notice every fault.
-    failed = [n.split(" - ")[0] for n in done.stdout.splitlines() if n.startswith(ENDED)]
-    print(*failed, done.stdout[-300:], sep="\n", flush=True)
-    beside(data).write_text("\n".join(n.split(" ", 1)[1] for n in failed), "utf-8")
-
-
-def beside(data: Path) -> Path:
-    """Where the tests that fail without a fault are kept."""
-    return data.with_name(data.name + ".failing")
-
-
-def failing(data: Path) -> set[str]:
-    """Tests that fail without a fault."""
-    return set(beside(data).read_text("utf-8").splitlines())
-
-
-def reached(copy: Copy, tests: list[str], data: Path) -> dict[str, dict[int, list[str]]]:
-    """Tests that reach each line of each file of the package, the narrowest first."""
-    if not data.exists():
-        recorded(copy, tests, data)
-    unfit = failing(data)
-    base = sqlite3.connect(data)
-    breadth: Counter[str] = Counter()
-    rows = base.execute(
-        "select file.path, context.context, numbits from line_bits"
-        " join file on file.id = file_id join context on context.id = context_id"
-    ).fetchall()
-    lines: dict[str, dict[int, list[str]]] = {}
-    for path, context, bits in rows:
-        test = context.rpartition("|")[0]  # a parameter may hold that sign, too
-        if not test or test in unfit:
-            continue
-        name = "python/trueangle/" + path.partition("python/trueangle/")[2]
-        for number in numbits_to_nums(bits):
-            lines.setdefault(name, {}).setdefault(number, []).append(test)
-            breadth[test] += 1
-    for places in lines.values():
-        for number, names in places.items():
-            places[number] = sorted(set(names), key=lambda t: (breadth[t], t))
-    return lines
-
-
-def reaching(places: dict[int, list[str]], line: int) -> list[str]:
-    """Tests that reach a line; of one that runs at import alone, those of the module."""
-    if line in places:
-        return places[line]
-    # The narrowest of every line first: a constant may matter to any of them.
-    turns = itertools.zip_longest(*(places[number] for number in sorted(places)))
-    return list(dict.fromkeys(name for turn in turns for name in turn if name is not None))
-
-
 def excused(fault: Drawn) -> str:
     """Why nobody can notice it, where `equivalent.toml` says so."""
     path = Path(__file__).with_name("equivalent.toml")
@@ -225,7 +160,7 @@ def judged(copy: Copy, fault: Drawn, tests: list[str], unfit: set[str]) -> Itera
     planted = Fault("chance", fault.file, whole, fault.text, tuple(tests[:MOST_TESTS]))
     verdict = copy.tried(planted, -1)
     if verdict.outcome == "survived":
-        verdict = asked_again(copy, planted, unfit)
+        verdict = asked_again(copy, planted, tests, unfit)
     # Tests that cannot even be collected have noticed, if they can without the fault.
     if verdict.outcome == "broken" and copy.run(planted.tests).outcome == "broken":
         yield from ("broken", verdict.told)
@@ -234,18 +169,21 @@ def judged(copy: Copy, fault: Drawn, tests: list[str], unfit: set[str]) -> Itera
     yield verdict.by
 
 
-def asked_again(copy: Copy, planted: Fault, unfit: set[str]) -> Verdict:
-    """What the whole files of the tests say.
+def asked_again(copy: Copy, planted: Fault, tests: list[str], unfit: set[str]) -> Verdict:
+    """What the whole files of the tests say, and the approved texts where they reach the line.
 
     What a fixture of a module or a cache computes, the first test that asks for it reaches alone.
     """
-    files = dict.fromkeys(test.split("::")[0] for test in planted.tests)
+    files = [*dict.fromkeys(test.split("::")[0] for test in planted.tests)]
+    texts = {test.split("::")[0] for test in tests if test.startswith(TEXTS)} - set(files)
     left = [f"--deselect={test}" for test in unfit]
-    again = dataclasses.replace(planted, tests=(*files, "-m", "not slow", *left))
-    verdict = copy.tried(again, -1)
-    # Many files may take their time; a loop without an end has been noticed before.
-    noticed = verdict.outcome == "killed" and verdict.by != LATE
-    return verdict if noticed else Verdict("survived")
+    for asked in filter(None, (files, sorted(texts))):
+        again = dataclasses.replace(planted, tests=(*asked, "-m", "not slow", *left))
+        verdict = copy.tried(again, -1)
+        # Many files may take their time; a loop without an end has been noticed before.
+        if verdict.outcome == "killed" and verdict.by != LATE:
+            return verdict
+    return Verdict("survived")
 
 
 def main() -> int:
@@ -265,7 +203,9 @@ def main() -> int:
     )
     parser.add_argument("--least", type=float, default=0.0, help="share killed, else status 1")
     parser.add_argument("--seconds", type=float, default=300.0, help="for the tests of a fault")
-    parser.add_argument("--coverage", type=Path, help="where it is kept for another time")
+    parser.add_argument(
+        "--coverage", type=Path, metavar="FOLDER", help="where it is kept for another time"
+    )
     args = parser.parse_args()
     seed = int(time.time()) // 86400 if args.seed is None else args.seed
     rooms = args.room or list(ROOMS)
@@ -279,12 +219,12 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copy = Copy(ROOT, Path(folder), args.seconds)
         data = args.coverage or Path(folder) / "coverage"
-        asked = [*(args.tests or ["tests/python"]), *(["-m", "not slow"] if args.quick else [])]
-        lines = reached(copy, asked, data.resolve())
-        unfit = failing(data.resolve())
+        lines = LineTests(data.resolve())
+        lines.record(copy, args.tests or rooms_of_tests(), quick=args.quick)
+        reached, unfit = lines.reached(), lines.failing()
         for fault in faults:
             start = time.monotonic()
-            tests = reaching(lines.get(fault.file, {}), fault.line)
+            tests = reaching(reached.get(fault.file, {}), fault.line)
             outcome, said = judged(copy, fault, tests, unfit)
             scores.setdefault(fault.file.split("/")[2], Counter())[outcome] += 1
             print(

@@ -133,6 +133,8 @@ class RecordReader(Decoder):
         if len(found) != 3:
             raise self.error(f"a name and two numbers are needed, got {shown_value(found)}", key)
         low, high = (self.number(end, key) for end in found[1:])
+        if low > high:
+            raise self.error(f"the least value comes first, got {shown_value(found)}", key)
         return self.text(found[0], key), low, high
 
     def provenance(self, value: Any) -> Provenance:

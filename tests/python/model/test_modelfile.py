@@ -86,6 +86,10 @@ REFUSED = {
     ),
     "too many lines": ({"change": lambda c: c["shafts"][0].update(MANY)}, "too many"),
     "an overflow": ({"text": lambda s: s.replace("0.5", "1e308")}, r"sine\[0\].*turns"),
+    "the greatest value of a signal first": (
+        {"change": lambda c: c.update(fit={**FIT, "signals": [["torque", 2.0, 1.0]]})},
+        r"fit\.signals\[0\].*the least value comes first",
+    ),
     "a span backwards": (
         {"change": lambda c: c.update(fit={**FIT, "span": [5e300, -5e300]})},
         r"fit\.span",

@@ -1,0 +1,104 @@
+"""Which tests reach a line, as coverage.py records it: each room of tests in a run of its own.
+
+In one run of everything with two workers a part of the contexts is lost; a room takes a minute.
+"""
+
+from __future__ import annotations
+
+import itertools
+import sqlite3
+import subprocess
+import sys
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+from coverage.numbits import numbits_to_nums
+
+from copies import Copy
+
+#: How pytest begins the line of a test that fails.
+ENDED = ("FAILED ", "ERROR ")
+
+#: Rooms that are recorded at a time.
+JOBS = 2
+
+#: Endings of what is kept of a room: which lines are reached, and which tests fail by themselves.
+LINES, FAILING = ".coverage", ".failing"
+
+
+def rooms_of_tests() -> list[str]:
+    """Folders below ``tests/python`` that hold tests."""
+    root = Path(__file__).resolve().parents[2]
+    folders = sorted((root / "tests" / "python").iterdir())
+    return [f.relative_to(root).as_posix() for f in folders if [*f.rglob("test_*.py")]]
+
+
+class LineTests(NamedTuple):
+    """What was recorded, in a folder that may be kept for another time."""
+
+    folder: Path
+
+    def record(self, copy: Copy, rooms: list[str], *, quick: bool) -> None:
+        """Record what is not there yet."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        wanted = [room for room in rooms if not self._of(room, FAILING).exists()]
+        with ThreadPoolExecutor(JOBS) as pool:
+            for told in pool.map(lambda room: self._record(copy, room, quick=quick), wanted):
+                print(told, flush=True)
+
+    def _record(self, copy: Copy, room: str, *, quick: bool) -> str:
+        command = [
+            sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=line",
+            f"--cov={copy.folder / 'python' / 'trueangle'}", "--cov-context=test", "--cov-report=",
+            room, *(["-m", "not slow"] if quick else []),
+        ]  # fmt: skip
+        environment = copy.environment() | {"COVERAGE_FILE": str(self._of(room, LINES))}
+        done = subprocess.run(
+            command, cwd=copy.folder, env=environment, check=False, text=True, capture_output=True
+        )
+        # A test that fails by itself, as in a copy without history, would notice every fault.
+        lines = done.stdout.splitlines()
+        failed = [line.split(" - ")[0].split(" ", 1)[1] for line in lines if line.startswith(ENDED)]
+        self._of(room, FAILING).write_text("\n".join(failed), "utf-8")
+        return "\n".join([f"{room}: {lines[-1] if lines else done.stderr[-300:]}", *failed])
+
+    def _of(self, room: str, ending: str) -> Path:
+        return self.folder / (room.strip("/").replace("/", "-") + ending)
+
+    def failing(self) -> set[str]:
+        """Tests that fail without a fault."""
+        kept = self.folder.glob("*" + FAILING)
+        return {name for path in kept for name in path.read_text("utf-8").splitlines()}
+
+    def reached(self) -> dict[str, dict[int, list[str]]]:
+        """Tests that reach each line of each file of the package, the narrowest first."""
+        unfit = self.failing()
+        breadth: Counter[str] = Counter()
+        lines: dict[str, dict[int, list[str]]] = {}
+        for data in sorted(self.folder.glob("*" + LINES)):
+            for path, context, bits in sqlite3.connect(data).execute(
+                "select file.path, context.context, numbits from line_bits"
+                " join file on file.id = file_id join context on context.id = context_id"
+            ):
+                test = context.rpartition("|")[0]  # a parameter may hold that sign, too
+                if not test or test in unfit:
+                    continue
+                name = "python/trueangle/" + path.partition("python/trueangle/")[2]
+                for number in numbits_to_nums(bits):
+                    lines.setdefault(name, {}).setdefault(number, []).append(test)
+                    breadth[test] += 1
+        for places in lines.values():
+            for number, names in places.items():
+                places[number] = sorted(set(names), key=lambda t: (breadth[t], t))
+        return lines
+
+
+def reaching(places: dict[int, list[str]], line: int) -> list[str]:
+    """Tests that reach a line; of one that runs at import alone, those of the module."""
+    if line in places:
+        return places[line]
+    # The narrowest of every line first: a constant may matter to any of them.
+    turns = itertools.zip_longest(*(places[number] for number in sorted(places)))
+    return list(dict.fromkeys(name for turn in turns for name in turn if name is not None))
