@@ -15,7 +15,7 @@ from ..fitting.prior import Prior, fleet_prior
 from ..joint.shafts import limited_orders
 from ..planning.arc import COVERAGE
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.arrays import Array
+from ..support.arrays import Array, first_largest
 
 Places = NDArray[np.int64]
 
@@ -93,7 +93,7 @@ class Spread:
                 )
             # Not beyond a per cent at a time: each but shifts where the next belongs.
             for _ in range(max(int(GROWS * len(places)), 1)):
-                k = int(np.argmax(variances))
+                k = first_largest(variances)
                 places.append(k)
                 covariance = self._with(covariance, k, 1.0)
                 variances = self._variances(covariance)
@@ -110,7 +110,8 @@ class Spread:
         last = self.grid.size - 1
         even = (np.linspace(0.0, last, places.size, endpoint=ends) for ends in (True, False))
         starts = (places, *(np.asarray(np.rint(one), dtype=np.int64) for one in even))
-        return min((self._exchanged(one) for one in starts), key=self.uncertainty)
+        tried = [self._exchanged(one) for one in starts]
+        return tried[first_largest(-np.array([self.uncertainty(one) for one in tried]))]
 
     def uncertainty(self, places: Places) -> float:
         """Expanded, of the curve at the worst place."""
@@ -136,7 +137,7 @@ class Spread:
             covariance = self.covariance(tried)
             for i, k in enumerate(tried):
                 covariance = self._with(covariance, int(k), -1.0)
-                tried[i] = int(np.argmax(self._variances(covariance)))
+                tried[i] = first_largest(self._variances(covariance))
                 covariance = self._with(covariance, int(tried[i]), 1.0)
             now = self.uncertainty(tried)
             if now >= reached:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..support.arrays import Array
+from ..support.arrays import Array, first_largest
 from .doptimal import OrthonormalColumns
 
 #: Passes of exchanges of single readings.
@@ -31,7 +31,7 @@ def exchanged(columns: OrthonormalColumns, places: Array) -> Array:
             mixed = grid @ (inverse @ rows[i])
             own = float(rows[i] @ inverse @ rows[i])
             gains = (1.0 + np.einsum("ij,ij->i", grid @ inverse, grid)) * (1.0 - own) + mixed**2
-            k = int(np.argmax(gains))
+            k = first_largest(gains)
             if gains[k] > 1.0 + _GAIN:
                 places[i] = columns.grid[k]
         if columns.log_det(places, np.ones(places.size)) < before + 1e-4:

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..support.arrays import first_largest
 from .noisefactors import facet_noise_factor, mount_noise_factors
 
 Array = NDArray[np.floating[Any]]
@@ -51,15 +52,15 @@ def search_offsets(positions: int, mounts: int, orders: Sequence[float]) -> list
     if mounts == 2:
         trial = np.stack([np.zeros_like(steps), steps], axis=1)
         # Mirror images are equally good: take the smaller offset.
-        best = [trial[int(np.argmin(np.round(_worst(positions, trial, orders), 9)))]]
+        best = [trial[first_largest(-_worst(positions, trial, orders))]]
     else:
         random = np.random.default_rng(0)
         starts: Array = np.zeros((_STARTS, mounts))
         starts[:, 1:] = random.choice(steps, size=(_STARTS, mounts - 1))
         ranked = np.argsort(_worst(positions, starts, orders), kind="stable")[:_REFINED]
         best = [_refine(positions, starts[i], steps, orders) for i in ranked]
-    scores = np.round([float(_worst(positions, o[None], orders)[0]) for o in best], 6)
-    chosen = best[int(np.argmin(scores))]
+    scores = np.array([float(_worst(positions, o[None], orders)[0]) for o in best])
+    chosen = best[first_largest(-scores)]
     return sorted(round(float(o), 9) for o in chosen)
 
 
@@ -71,7 +72,7 @@ def _refine(positions: int, start: Array, steps: Array, orders: Sequence[float])
         for j in range(1, offsets.size):
             trial = np.repeat(offsets[None], steps.size, axis=0)
             trial[:, j] = steps
-            offsets = trial[int(np.argmin(_worst(positions, trial, orders)))]
+            offsets = trial[first_largest(-_worst(positions, trial, orders))]
         if (offsets == before).all():
             break
     return offsets
@@ -85,10 +86,10 @@ def search_shifts(positions: int, mounts: int) -> tuple[tuple[int, ...], float]:
     head = min(head, mounts, positions)
     combinations = itertools.combinations(range(1, positions), head - 1)
     trial = np.array([(0, *rest) for rest in combinations], dtype=np.int64)
-    best = trial[int(np.argmin(np.round(facet_noise_factor(positions, trial), 9)))]
+    best = trial[first_largest(-facet_noise_factor(positions, trial))]
     while best.size < mounts:
         more = np.array([[*best, s] for s in range(1, positions)])
-        best = more[int(np.argmin(np.round(facet_noise_factor(positions, more), 9)))]
+        best = more[first_largest(-facet_noise_factor(positions, more))]
     return tuple(int(s) for s in best), float(facet_noise_factor(positions, best))
 
 

@@ -1,8 +1,9 @@
-"""Arrays as annotations name them, and their distinct values."""
+"""Arrays as annotations name them, their distinct values, and the first of the largest."""
 
 from __future__ import annotations
 
-from typing import TypeAlias, TypeVar
+import math
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,20 @@ from numpy.typing import NDArray
 Array: TypeAlias = NDArray[np.float64]
 
 _Kind = TypeVar("_Kind", bound=np.generic)
+
+
+#: Share of the largest value within which others are as large: rounding is far below.
+_ALIKE = 1e-7
+
+
+def first_largest(values: NDArray[np.floating[Any]]) -> int:
+    """Where the first value stands that is as large as the largest, to 1e-7 of it.
+
+    Mirror images are equally good; which of them wins would else be up to the last digit, and
+    differ between processors.
+    """
+    most = float(values.max())
+    return int(np.argmax(values >= (most - _ALIKE * abs(most) if math.isfinite(most) else most)))
 
 
 def distinct(values: NDArray[_Kind]) -> NDArray[_Kind]:
