@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import trueangle._core as _core
+from trueangle.estimation.readings import Readings
 from trueangle.estimation.rounded import LEAST_NOISE, fit_rounded
 
 N = 240
@@ -111,3 +113,13 @@ def test_the_unit_of_the_readings_does_not_matter():
     assert other.sigma == pytest.approx(316.4 * one.sigma, rel=1e-9)
     assert other.log_likelihood == pytest.approx(one.log_likelihood, rel=1e-9)
     np.testing.assert_allclose(other.fitted, 316.4 * one.fitted, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("scatter", [0.02, 3.0, 400.0])
+def test_steps_wider_than_all_residuals_are_none_of_the_sensor(scatter):
+    """Two variances at most, whatever the unit; of even steps the variance is a twelfth."""
+    for share, told in ((1.98, True), (2.02, False), (0.1, True)):
+        step = scatter * np.sqrt(12.0 * share)
+        readings = SimpleNamespace(signals=SimpleNamespace(count=step), scatter=scatter)
+        found = Readings.rounding.func(readings)
+        assert found == (pytest.approx(scatter * np.sqrt(share)) if told else 0.0)

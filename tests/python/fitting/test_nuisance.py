@@ -9,6 +9,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.cli.values import declared_shafts
 from trueangle.errors import ArgumentError
+from trueangle.fitting.nuisance import Nuisance
 
 SIGMA = 0.002
 LINES = ((1, 0.05, 30.0), (3, 0.02, 200.0))
@@ -249,3 +250,23 @@ def test_the_commands_take_nuisances_and_shafts(tmp_path, capsys):
     assert {1, 3} <= {row["order"] for row in printed["orders"] if row["retained"]}
     assert main(["fit", str(path), "-o", str(model), "--nuisance", "wind"]) == 1
     assert "wind" in capsys.readouterr().err
+
+
+def test_what_was_taken_out_is_said_with_its_size_and_unit():
+    taken = Nuisance(("ramp", "direction", "velocity", "drift", "reference", "turned"),
+                     slope=3.14e-6, half_width=0.002, delay=-0.0005, intervals=1,
+                     reference=((2.0, 0.1, 0.2), (5.0, 0.3, 0.4)),
+                     turned=((3.0, 0.001, (0.1, 0.2)),), shares=(("drift", 0.25),))  # fmt: skip
+    beside = "fitted jointly with the pattern, and not in the model: "
+    assert [s.removeprefix(beside) for s in taken.sentences(360.0)] == [
+        "a ramp of 3.14 ppm of the angle (a wrong scale or ratio)",
+        "a reversal error of +-7.2 arcsec with the direction",
+        "an error of -0.5 ms times the velocity (a delay)",
+        "a drift in time (cubic spline of 1 interval in every run), 25 % of the held-out error",
+        "2 lines of the reference",
+        "lines of the reference with a phase of their own in every run, because its zero is new "
+        "in each (order 3: 3.6 arcsec)",
+    ]
+    assert "of 2 intervals in" in next(iter(Nuisance(("drift",), intervals=2).sentences(360.0)))
+    turn = Nuisance(("direction",), half_width=0.002 / 360.0)
+    assert next(iter(turn.sentences(1.0))).endswith("of +-7.2 arcsec with the direction")

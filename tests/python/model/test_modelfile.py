@@ -118,6 +118,17 @@ def test_damaged_files_are_refused_with_file_and_key(case, tmp_path):
     assert str(path) in str(caught.value)
 
 
+def test_what_a_file_does_not_say_of_its_fit_is_nothing(tmp_path):
+    least = {**FIT, "samples": 7, "runs": 3}
+    record = ta.load_model(written(tmp_path, lambda c: c.update(fit=least))).fit
+    assert (record.samples, record.runs, record.residual) == (7, 3, 0.1)
+    assert (record.method, record.loss) == ("plain", "linear")
+    assert (record.wild, record.ridge, record.offset_spread) == (0, 0.0, 0.0)
+    assert (record.positions, record.freedom, record.table) == (None, None, None)
+    assert record.offsets == record.blind == record.signals == ()
+    assert (record.note, record.calibrated_without_reference) == ("", False)
+
+
 def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
     path = written(tmp_path)
     before = path.read_bytes()

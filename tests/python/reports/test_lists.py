@@ -24,7 +24,8 @@ def test_hundreds_of_rows_are_not_printed() -> None:
 @pytest.mark.parametrize(
     ("low", "high", "shown"),
     [(-93.0, 100.0, (-93.0, 100.0)), (20.0, 200.0, (20.0, 200.0)), (0.0, 350.0, (0.0, 360.0)),
-     (170.0, 350.0, (170.0, 350.0))],
+     (170.0, 350.0, (170.0, 350.0)), (300.0, 420.0, (-60.0, 60.0)), (200.0, 440.0, (-160.0, 80.0)),
+     (100.0, 359.0, (100.0, 359.0))],
 )  # fmt: skip
 def test_a_travel_without_a_model_is_drawn_in_one_piece(low, high, shown) -> None:
     theta = np.linspace(low, high, 200)

@@ -6,7 +6,7 @@ from scipy import stats
 
 from trueangle.diagnosis.goodness import Leftover
 from trueangle.diagnosis.goodness.noise import _independent, _PatternProducts, _refined, _Sums
-from trueangle.diagnosis.goodness.periodogram import periodogram
+from trueangle.diagnosis.goodness.periodogram import _whitened, periodogram
 from trueangle.diagnosis.goodness.place import _smallest, unit_sums
 from trueangle.diagnosis.goodness.scatter import normal_kurtosis
 
@@ -148,3 +148,14 @@ def test_of_noise_alone_the_power_is_one_and_p_no_less_than_its_chance():
     # Four standard deviations of a binomial count beyond a tenth of 60.
     assert np.sum(p < 0.1) <= 6 + 4.0 * np.sqrt(60 * 0.1 * 0.9)
     assert 2 <= np.sum(p < 0.5) <= 30 + 4.0 * np.sqrt(60 * 0.5 * 0.5)
+
+
+@pytest.mark.parametrize("correlation", [-0.6, 0.3, 0.95])
+def test_readings_are_whitened_as_the_covariance_of_neighbours_says(correlation):
+    """The triangle of its inverse, row by row: the first reading stands for itself."""
+    e = rng().normal(size=40)
+    lags = np.abs(np.subtract.outer(np.arange(40), np.arange(40)))
+    over = np.linalg.inv(np.linalg.cholesky(correlation**lags))
+    white = np.sqrt(1.0 - correlation**2) * over @ e
+    np.testing.assert_allclose(_whitened(e, correlation), white - white.mean(), atol=1e-9)
+    assert _whitened(e, 0.0) is e
