@@ -84,3 +84,18 @@ def test_a_list_that_is_there_is_told_by_its_distance(tmp_path) -> None:
     said = float(re.findall(r"is (\S+) arcsec", note)[0])
     # Whole tenths of a count are 2 arcsec.
     assert said == pytest.approx(300.0 / np.sqrt(2.0), rel=0.02)
+
+
+@pytest.mark.parametrize("zero", [-47.0, 0.5, 123.0])
+def test_the_zero_of_a_lookup_that_is_kept_is_told_in_degrees(zero, tmp_path) -> None:
+    places = np.arange(16384) * (360.0 / 16384)
+    table = np.mod(places - model(o1=700.0).error(places) + zero, 360.0)
+    path = tmp_path / "Parameters.cpp"
+    body = ", ".join(f"{value:.3f}" for value in table)
+    path.write_text(f"const PROGMEM float lookup[16384] = {{\n{body}\n}};\n")
+    made = ta.export_model(model(o1=700.0), "mechaduino", existing=str(path))
+    (note,) = [n for n in made.notes if "is kept" in n]
+    told = re.search(r"is kept: (\S+) deg", note)
+    assert told is not None
+    # An error at the reading is not one at the reference: 700 arcsec times its slope.
+    assert float(told[1]) == pytest.approx(zero, abs=1e-3)

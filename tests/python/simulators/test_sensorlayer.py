@@ -308,3 +308,23 @@ def test_a_coupled_joint_takes_the_reading_of_the_other():
     nobody = ta.HarmonicModel([], terms=[T.JointCoupling("q9", 0.1)])
     with pytest.raises(ArgumentError, match="no joint 'q9'"):
         SensorLayer(mj, {"q0": nobody})
+
+
+@pytest.mark.parametrize("environments", [None, 3])
+def test_each_joint_has_a_temperature_of_its_own(environments):
+    mj = robot()
+    grows = {"elbow": 2.0, "wrist": 5.0}
+    models = {
+        name: ta.HarmonicModel([], terms=[T.ThermalDrift(a * A)]) for name, a in grows.items()
+    }
+    layer = SensorLayer(mj, models)
+    warm = np.array([30.0, 45.0])
+    if environments is None:
+        found = layer.read(mujoco.MjData(mj), temperature=warm)
+        np.testing.assert_allclose(found, np.array([2.0 * 10.0, 5.0 * 25.0]) * A, rtol=1e-12)
+        return
+    all_of_it = warm + np.arange(environments)[:, None]
+    data = [mujoco.MjData(mj) for _ in range(environments)]
+    found = layer.read(data, temperature=all_of_it)
+    wanted = np.array([2.0, 5.0]) * (all_of_it - 20.0) * A
+    np.testing.assert_allclose(found, wanted, rtol=1e-12)

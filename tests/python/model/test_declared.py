@@ -1,0 +1,53 @@
+"""What a model says of itself, that it repeats and what it needs, against what it does."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle import errors
+from trueangle.model.terms import DirectionalPattern, VaryingLine
+
+A = 1e-3
+ORDERS = ((1.0, 2.0), (1.0, 2.5), (2.5, 1.0), (3.0, 0.5, 2.0), (4.0,), (0.25,))
+PLACES = np.linspace(1.0, 340.0, 40)
+SIGNALS = {"direction": 1.0, "velocity": 3.0, "temperature": 31.0, "torque": 2.0, "current": 1.0}
+
+
+def lines(orders):
+    return {"orders": orders, "cosine": [A] * len(orders), "sine": [0.5 * A] * len(orders)}
+
+
+TERMS = {
+    "backlash": lambda o: ta.Backlash(0.02, **lines(o)),
+    "pattern of the direction": lambda o: DirectionalPattern(**lines(o)),
+    "warmth": lambda o: ta.ThermalDrift(A, 0.0, *lines(o).values(), 20.0),
+    "compliance": lambda o: ta.TorsionalCompliance(A, *lines(o).values()),
+    "a gear under load": lambda o: ta.LoadDependentGearError(*lines(o).values(), "absolute"),
+    "a line of the speed": lambda o: VaryingLine(**lines(o), follows="speed"),
+}
+
+
+@pytest.mark.parametrize("period", [360.0, 1.0])
+@pytest.mark.parametrize("orders", ORDERS)
+@pytest.mark.parametrize("name", TERMS)
+def test_a_term_repeats_after_a_turn_where_all_its_orders_are_whole(name, orders, period):
+    model = ta.HarmonicModel([], period=period, terms=[TERMS[name](orders)])
+    places = PLACES * period / 360.0
+    given = {name: np.full(places.size, value) for name, value in SIGNALS.items()}
+    first, later = (model.error(places + k * period, **given) for k in (0, 1))
+    assert model.is_periodic == np.allclose(first, later, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("half_width", [-0.5, 0.5, 3.0])
+@pytest.mark.parametrize("sizes", [(), (0.4,), (2.0, 2.0), (-2.0, 0.9), (0.3, -0.1)])
+def test_a_direction_is_needed_where_play_may_be_negative(half_width, sizes):
+    """Somewhere on the turn lines of any phase all point one way."""
+    orders = tuple(range(1, len(sizes) + 1))
+    play = ta.Backlash(half_width, orders, sizes, (0.0,) * len(sizes))
+    model = ta.HarmonicModel([], period=360.0, terms=[play])
+    assert ("direction" in model.signals) == (half_width < sum(map(abs, sizes)))
+    if "direction" in model.signals:
+        with pytest.raises(errors.MissingSignalError, match="needs direction"):
+            model.correct([1.0, 2.0])
+    else:
+        model.correct([1.0, 2.0])
