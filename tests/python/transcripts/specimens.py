@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 from unittest.mock import patch
@@ -34,8 +35,7 @@ from trueangle.reports.robot import RobotReport
 from trueangle.simulation import Joint, Simulation
 from trueangle.support.arrays import Array
 
-ARCSEC = 1.0 / 3600.0
-
+from .desk import ARCSEC, write_table
 
 #: Runs by label, readings and what was recorded; a speed gives times and the way.
 _RUNS: Final[tuple[tuple[str | None, int, dict[str, Any]], ...]] = (
@@ -190,6 +190,25 @@ def given(record: FitRecord | None, **more: Any) -> ta.HarmonicModel:
     a = 20.0 * ARCSEC * np.exp(1j * np.radians(10.0))
     shaft = ta.Shaft("output", 1, [1], [float(a.imag)], [float(a.real)])
     return ta.HarmonicModel([shaft], period=360.0, fit=record, **more)
+
+
+def arm(folder: Path) -> None:
+    """A log of five joints and their robot file: two sound, one without a pattern, two unusable."""
+    rng, time = np.random.default_rng(66), np.arange(0.0, 18.0, 0.05)
+    columns, text = {"time_s": time}, '[robot]\nname = "leg"\n'
+    for name, speed, size, ratio in (
+        ("hip", 41.0, 30.0, 100.0), ("knee", -53.0, 70.0, 50.5), ("ankle", 67.0, 0.0, None),
+        ("heel", 47.0, 45.0, 80.0), ("toe", 0.0, 0.0, None),
+    ):  # fmt: skip
+        true = 5.0 + speed * time
+        lines = size * (np.sin(np.radians(true)) + 0.2 * np.sin(np.radians(3.0 * true)))
+        seen = true + ARCSEC * (lines + rng.normal(0.0, 1.0, time.size) * (name != "toe"))
+        columns |= {f"{name}_ref": true, f"{name}_enc": -seen if name == "heel" else seen}
+        text += f'\n[[joint]]\nname = "{name}"\n'
+        text += f"gear_ratio = {ratio}\n" if ratio is not None else ""
+        text += f'[joint.signals]\nindicated = "{name}_enc:deg"\nreference = "{name}_ref:deg"\n'
+    write_table(folder / "leg.csv", columns)
+    (folder / "leg.toml").write_text(text, encoding="utf-8")
 
 
 def robot(*verdicts: str) -> RobotReport:
