@@ -15,6 +15,7 @@ import numpy as np
 
 import trueangle._core as _core
 
+from ..support.angles import unit_name
 from ..support.arrays import Array
 from .run import CalibrationRun
 
@@ -57,19 +58,18 @@ class Span(NamedTuple):
     full: bool
 
     def describe(self, period: float) -> str:
-        """The stretch in degrees, a turn off where it ends beyond the first.
+        """The stretch with its unit, a turn off where it ends beyond the first.
 
         Examples
         --------
-        >>> Span(200.0, 500.0, False).describe(360.0), Span(0.0, 0.25, False).describe(1.0)
-        ('-160 to 140 deg', '0 to 90 deg')
+        >>> Span(200.0, 500.0, False).describe(360.0)
+        '-160 to 140 deg'
         """
         within_a_turn = self.stop - self.start < period
         turn = period if within_a_turn and self.stop > period else 0.0
         finest = _TOLD * (self.stop - self.start)
-        ends = (x if abs(x) > finest else 0.0 for x in (self.start - turn, self.stop - turn))
-        low, high = (x * 360.0 / period for x in ends)
-        return f"{low:.4g} to {high:.4g} deg"
+        low, high = (x if abs(x) > finest else 0.0 for x in (self.start - turn, self.stop - turn))
+        return f"{low:.4g} to {high:.4g} {unit_name(period)}"
 
 
 def covered_span(angles: Sequence[Array], period: float) -> Span:
