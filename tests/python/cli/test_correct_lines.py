@@ -32,7 +32,7 @@ def log(number, status, rows):
 def batches():
     """Batches of unlike numbers of logs of each kind."""
     rng = np.random.default_rng(SEED)
-    for counts in itertools.product((0, 1, 2, 7), (0, 1, 3), (0, 1, 2, 9), (0, 2)):
+    for counts in itertools.product((0, 1, 2, 7), (0, 1, 3), (0, 1, 2, 6, 9), (0, 2)):
         if sum(counts) < 2:
             continue
         kinds = [s for s, n in zip(STATUS, counts, strict=True) for _ in range(n)]
