@@ -71,7 +71,8 @@ def runs(size: float = 1.0, pattern: float = 1.0) -> list[ta.CalibrationRun]:
         error = 20.0 * np.sin(np.radians(theta + 10.0)) + 8.0 * np.cos(np.radians(3.0 * theta))
         error = size * (pattern * error + rng.normal(0.0, 1.0 + 0.2 * k, count)) + 30.0 * k
         if speed:
-            signals["time"] = np.cumsum(np.abs(np.diff(theta, prepend=theta[0])) * (1 + early)) / abs(speed)
+            step = np.abs(np.diff(theta, prepend=theta[0])) * (1 + early)
+            signals["time"] = np.cumsum(step) / abs(speed)
         found.append(
             ta.CalibrationRun(theta, theta + ARCSEC * error, 360.0, label=label, **signals)
         )
@@ -134,7 +135,8 @@ def findings() -> list[Finding]:
         _finding(2, "backlash", _gain(2, 0.5, by_level=open_level, note="of both directions"),
                  place_deg=(91.5, 2.5), half_width_arcsec=(6.05, 0.045)),
         _finding(3, "latency", _gain(3, 0.25), delay_s=(4.25e-4, 1.5e-5)),
-        _finding(4, "missing_order", _gain(4), shaft="motor", order=2, amplitude_arcsec=2.75, turns=7),
+        _finding(4, "missing_order", _gain(4), shaft="motor", order=2, amplitude_arcsec=2.75,
+                 turns=7),
         _finding(5, "sidebands", _gain(5, 0.125), carrier=25.0, orders=[24.0, 26.0, 27.5],
                  amplitudes=([3.5, -2.25, 1.125], [0.25, 0.5, 0.0625]), rate=(0.5, 0.03)),
         _finding(7, "thermal_drift", _gain(7, -0.0625), "the interval holds zero",
