@@ -20,7 +20,7 @@ from trueangle import planning, plots
 from trueangle.cli import main
 from trueangle.export import TARGETS
 
-from . import specimens
+from . import groups, specimens
 from .arguments import argument_lines
 from .asked import Asked
 from .charts import chart_lines
@@ -87,7 +87,7 @@ class Terminal:
     small file (``\\t`` and ``\\xff`` are what they are in Python), and ``hide KEY=VALUE ...``
     ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it. ``options`` tells
     every argument of every command, ``asked ...`` what each further option changes (`asked`).
-    `specimens` are results that pages are shown of. Further commands follow after ``&&``.
+    `specimens` and `groups` are what pages are shown of. Further commands follow after ``&&``.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -96,6 +96,7 @@ class Terminal:
         self._known: set[str] = set()
         self._names: dict[str, Any] = {"__name__": "transcript", "np": np, "plots": plots}
         self._names |= {"planning": planning, "specimens": specimens, "ta": trueangle}
+        self._names |= {"groups": groups}
 
     def lines(self, command: str) -> list[str]:
         """What the terminal shows of a command; a status other than 0 at the end, as ``[1]``."""
