@@ -95,8 +95,8 @@ class Terminal:
         self._figures: list[str] = []
         self._known: set[str] = set()
         self._names: dict[str, Any] = {"__name__": "transcript", "np": np, "plots": plots}
-        self._names |= {"planning": planning, "specimens": specimens, "ta": trueangle}
-        self._names |= {"groups": groups}
+        self._names |= {"groups": groups, "planning": planning, "specimens": specimens}
+        self._names |= {"ta": trueangle}
 
     def lines(self, command: str) -> list[str]:
         """What the terminal shows of a command; a status other than 0 at the end, as ``[1]``."""
