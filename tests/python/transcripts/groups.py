@@ -57,7 +57,7 @@ def fleet(count: int, dates: tuple[str | None, ...] = (None,), **options: Any) -
     """Units: the third grows, the sixth has another pattern, the ninth has moved its zero."""
 
     def changed(unit: int, date: int, own: Array) -> tuple[Array, float]:
-        own[1] += 9.0 * date * (unit == 2)
+        own[1] += 5.0 * date * (unit == 2)
         own[0] += 400.0 * (unit == 5)
         return own, 90.0 * (unit == 8 and date > 0)
 
