@@ -71,12 +71,12 @@ def windows(count: int, orders: int, alarms: tuple[int, ...] = ()) -> list[Watch
     found = []
     for k in range(1, count + 1):
         rows = tuple(
-            WatchedOrder(float(m), 1e-4 * (m + 0.1 * (k * m % 5)), 10.0 * m, m * 5 % 14 + 0.01 * k)
+            WatchedOrder(float(m), 1e-4 * (m + 0.1 * (k * m % 5)), 10.0 * m, (m * 5 % 14 + 0.01 * k) * (k % 3 > 0))
             for m in range(1, orders + 1)
         )
         alarm = k in alarms
         why = f"order {k} moved by {k + 0.5} arcsec" if alarm else ""
-        time = None if k % 2 else 12.5 * k
+        time = None if k % 2 else 12.5 * (k - 4)
         found.append(
             WatchedWindow(k, 0.0, time, 90, rows, 5.0 + 0.75 * k, 6.0 + 0.05 * k, alarm, why)
         )

@@ -99,6 +99,12 @@ class Account(Diagnosis):
     next_runs = SimpleNamespace(runs=[1], summary=lambda: "Measure next: one run at 30 deg/s.")  # type: ignore[assignment]
 
 
+class Idle(Diagnosis):
+    """One whose plan is that no run tells more."""
+
+    next_runs = SimpleNamespace(runs=[], summary=lambda: "No run tells more.")  # type: ignore[assignment]
+
+
 def _gain(k: int, share: float | None = None, **more: Any) -> Gain:
     interval = None if share is None else (share - 0.0625, share + 0.125)
     before, after = (9.0 - k, 40.0 - k, 21.0 - k), (2.0 + 0.25 * k, 11.0 + k, 6.0 + k)
@@ -163,7 +169,7 @@ def _measured() -> Diagnosis:
     return ta.diagnose(runs(), believed(), gain=False)
 
 
-def diagnosis(planned: bool = True, **changed: Any) -> Diagnosis:
+def diagnosis(kind: type[Diagnosis] = Account, **changed: Any) -> Diagnosis:
     """What was found of `runs`, as no readings would have it."""
     base = _measured()
     assert base.unexplained is not None
@@ -180,7 +186,7 @@ def diagnosis(planned: bool = True, **changed: Any) -> Diagnosis:
         "findings": findings(), "not_identifiable": spots(), "beliefs": beliefs,
         "unexplained": replace(base.unexplained, found=True, rms=3.5, evidence=tests),
     }  # fmt: skip
-    return (Account if planned else Diagnosis)(**(held | changed))
+    return kind(**(held | changed))
 
 
 def report(
