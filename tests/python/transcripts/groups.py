@@ -71,7 +71,12 @@ def windows(count: int, orders: int, alarms: tuple[int, ...] = ()) -> list[Watch
     found = []
     for k in range(1, count + 1):
         rows = tuple(
-            WatchedOrder(float(m), 1e-4 * (m + 0.1 * (k * m % 5)), 10.0 * m, (m * 5 % 14 + 0.01 * k) * (k % 3 > 0))
+            WatchedOrder(
+                float(m),
+                1e-4 * (m + 0.1 * (k * m % 5)),
+                10.0 * m,
+                (m * 5 % 14 + 0.01 * k) * (k % 3 > 0),
+            )
             for m in range(1, orders + 1)
         )
         alarm = k in alarms

@@ -82,12 +82,13 @@ class Terminal:
     ``trueangle ...`` is the command itself, in this process, and ``python ...`` a line of Python:
     what it gives, draws, warns of or raises. ``show FILE [PATTERN]`` shows what a file holds
     (`views`), or what of it matches, ``markup FILE [PATTERN]`` what its tags say beside its words,
-    ``charts FILE`` what a page draws (`charts`), ``stills FILE`` on paper, ``figures`` what the pictures drawn since show
-    (`figures`), ``targets`` what an export can be asked for. ``write FILE LINE ...`` writes a
-    small file (``\\t`` and ``\\xff`` are what they are in Python), and ``hide KEY=VALUE ...``
-    ``hidden.toml``: what ``believed.toml`` believes, and one effect beside it. ``options`` tells
-    every argument of every command, ``asked ...`` what each further option changes (`asked`).
-    `specimens` and `groups` are what pages are shown of. Further commands follow after ``&&``.
+    ``charts FILE`` what a page draws (`charts`), ``stills FILE`` what it draws on paper,
+    ``figures`` what the pictures drawn since show (`figures`), ``targets`` what an export can be
+    asked for. ``write FILE LINE ...`` writes a small file (``\\t`` and ``\\xff`` are what they are
+    in Python), and ``hide KEY=VALUE ...`` ``hidden.toml``: what ``believed.toml`` believes, and
+    one effect beside it. ``options`` tells every argument of every command, ``asked ...`` what
+    each further option changes (`asked`). `specimens` and `groups` are what pages are shown of.
+    Further commands follow after ``&&``.
     """
 
     def __init__(self, folder: Path) -> None:
