@@ -74,6 +74,7 @@ def test_what_is_not_done_is_counted_and_named():
         assert named + sum(int(part.split()[0]) for part in more) == failed
         assert (named == failed) == (not more)
         assert ("not started: " in text) == (waiting > 0)
+        assert text.endswith("; run the same command again to go on")
 
 
 @pytest.mark.parametrize(("largest", "unit"), [(3590.0, "arcsec"), (3610.0, "deg")])

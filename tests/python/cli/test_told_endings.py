@@ -13,7 +13,7 @@ from trueangle.cli import main
 from trueangle.cli.terminal import Ending
 from trueangle.errors import ArgumentError, TrueAngleError
 
-DEFECT = "this is a defect of trueangle: please report this line and what --debug prints"
+DEFECT = "; this is a defect of trueangle: please report this line and what --debug prints"
 
 
 class Panic(BaseException):
@@ -37,8 +37,8 @@ TOLD = {
     "error: 7: Bad number": OSError(9, "Bad number", 7),
     "error: [Errno 28] No space left": OSError(28, "No space left"),
     "error: none of it": OSError("none of it"),
-    f"error: unexpected Panic: lost; {DEFECT}": Panic("lost"),
-    f"error: unexpected ZeroDivisionError: by 0; {DEFECT}": ZeroDivisionError("by 0"),
+    f"error: unexpected Panic: lost{DEFECT}": Panic("lost"),
+    f"error: unexpected ZeroDivisionError: by 0{DEFECT}": ZeroDivisionError("by 0"),
     "interrupted": KeyboardInterrupt(),
     "interrupted: 3 of 7 are done": KeyboardInterrupt("3 of 7 are done"),
 }

@@ -195,7 +195,8 @@ def report(
     """The page of the first `runs`, or of all, with this diagnosis of them."""
     found = diagnosis() if found is None else found
     with patch("trueangle.diagnosis.diagnose", lambda *_: found):
-        made: Report = ta.report(runs(size)[:last], simulation=believed(), **options)
+        options = {"simulation": believed(), **options}
+        made: Report = ta.report(runs(size)[:last], **options)
     return made
 
 
