@@ -70,7 +70,7 @@ def test_a_ripple_alone_is_a_file_of_mujoco(exported, capsys):
         "nothing to correct; a torque ripple is for MuJoCo: --extend-into sensor.xml"
     )
     for path in ("s.xml", "s.fmu"):
-        with pytest.raises(NoModelError, match="^nothing to correct$"):
+        with pytest.raises(NoModelError, match=r"^nothing to correct$"):
             written(capsys, nothing=True, extend_into=path)
 
 
