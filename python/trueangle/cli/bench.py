@@ -114,9 +114,11 @@ def _scaling(args: argparse.Namespace) -> int:
     except ValueError:
         workers = [0]
     if not 1e3 <= args.largest <= 1e10 or args.rounds < 1 or any(w < 1 for w in workers):
+        given = f"--largest {args.largest:g} --rounds {args.rounds}"
+        given += f" --workers {args.workers}" if args.workers else ""
         raise ArgumentError(
             "--largest must lie between 1e3 and 1e10, --rounds and --workers must be whole numbers "
-            f"from 1, got {args.largest:g}, {args.rounds} and {args.workers}"
+            f"from 1, got {given}"
         )
     size = int(args.largest)
     grown = scaling.scaling_by_readings(size, args.rounds)

@@ -139,7 +139,8 @@ def _in_memory(args: argparse.Namespace, runs: list[CalibrationRun]) -> FitResul
     from ..fitting.fit import fit
 
     if args.prior is not None and (args.one_pass or args.scheduler):
-        raise ArgumentError("--prior goes with readings in memory: leave --one-pass out")
+        option = "--one-pass" if args.one_pass else "--scheduler"
+        raise ArgumentError(f"--prior goes with readings in memory: leave {option} out")
     return fit(
         runs,
         orders=orders_by_shaft(args.orders, declared_shafts(args.shaft)),

@@ -30,9 +30,8 @@ class ModelInput(Input):
 
     @property
     def file(self) -> str:
-        """The path behind the joint's name."""
-        first, equals, rest = self.partition("=")
-        return rest if equals else first
+        """The path behind the joint's name; without one, what was typed."""
+        return self.partition("=")[2] or str(self)
 
 
 class Output(str):

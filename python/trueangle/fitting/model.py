@@ -48,7 +48,10 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
     """What not to trust and why, one sentence each."""
     span, weighted = fit.span, fit.weighted
     if not span.full:
-        yield f"Fitted on {span.describe(fit.problem.period)} only: outside it is extrapolated."
+        # In degrees, as zeros and positions are told beside it.
+        turn = 360.0 / fit.problem.period
+        travel = span._replace(start=span.start * turn, stop=span.stop * turn)
+        yield f"Fitted on {travel.describe(360.0)} only: outside it is extrapolated."
     if fit.missing:
         rows = "row" if fit.missing == 1 else "rows"
         yield f"{fit.missing} {rows} with an empty cell left out."

@@ -209,8 +209,9 @@ def _thinned(
     The scatter of a few stretches has fewer directions than there are coefficients: its
     standard errors may come out as small as they like.
     """
+    some = "the" if round(memory) == 1 else f"one in {memory:.0f}"
     note = (
-        f"{said}standard errors as if one in {memory:.0f} readings were independent (the memory "
+        f"{said}standard errors as if {some} readings were independent (the memory "
         f"of the residuals). {why}, and the covariance is not known: measure "
         f"{ENOUGH_RUNS} runs and more"
     )

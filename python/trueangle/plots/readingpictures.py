@@ -130,7 +130,7 @@ def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> PanelP
     rest = np.concatenate([part.y for part in scaled])
     told = (
         f"What the model leaves of {rest.size} readings against {against}: "
-        f"{significant_digits(float(rest.std()), 3)} {unit.name} standard deviation."
+        f"{significant_digits(float(np.sqrt(np.mean(rest * rest))), 3)} {unit.name} rms."
     )
     return PanelPicture((panel,), told)
 

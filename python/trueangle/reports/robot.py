@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..diagnosis.confirmation import CONFIRMED
 from ..runs.checks.result import Check
 from ..runs.run import CalibrationRun
 from ..support.angles import arcsec
@@ -110,7 +111,7 @@ def ranking_text(title: str, rows: Sequence[JointRank], errors_in: ErrorsIn = "a
             row.joint,
             shown(row.peak_to_peak_before_arcsec),
             shown(row.rms_left_arcsec),
-            row.verdict,
+            row.verdict.partition(":")[0],  # why there is no model is told beside the table
             row.first_cause or "-",
         ]
         for row in rows
@@ -199,11 +200,12 @@ def _rank(joint: str, content: dict[str, Any]) -> JointRank:
     elif content["model"] is not None:
         left = content["model"]["residual_std_arcsec"]
     verdict = wording.gain_verdict(content)
-    findings = (content["diagnosis"] or {}).get("findings") or [{}]
+    findings = (content["diagnosis"] or {}).get("findings", ())
+    causes = (finding["cause"] for finding in findings if finding["status"] == CONFIRMED)
     return JointRank(
         joint,
         content["measured"]["error"]["peak_to_peak_arcsec"],
         left,
         _VERDICTS.get(verdict, verdict),
-        findings[0].get("cause"),
+        next(causes, None),
     )

@@ -201,7 +201,8 @@ def _effect(path: str | Path, where: str, table: dict[str, Any]) -> Effect:
     if not isinstance(kind, str) or kind not in EFFECTS:
         raise FileError(
             path,
-            f"{where}: kind must be one of {', '.join(EFFECTS)}, got {shown_value(kind)}"
+            f"{where}: kind must be one of {', '.join(EFFECTS)}, got "
+            f"{'none' if kind is None else shown_value(kind)}"
             f"{did_you_mean(kind, EFFECTS) if isinstance(kind, str) else ''}",
         )
     for name, value in parameters.items():

@@ -23,7 +23,15 @@ MAX_LINE_ORDERS = 1e7
 
 
 def shown_value(value: Any, most: int = 60) -> str:
-    """``value`` as it is told in a message: in one piece, of bounded length."""
+    """``value`` as it is told in a message: in one piece, of bounded length, as files have it.
+
+    Examples
+    --------
+    >>> shown_value(None), shown_value(True), shown_value([1, "a"])
+    ('null', 'true', "[1, 'a']")
+    """
+    if value is None or isinstance(value, bool):
+        return json.dumps(value)
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # whole numbers of thousands of digits

@@ -32,7 +32,7 @@ def log(number, status, rows):
 def batches():
     """Batches of unlike numbers of logs of each kind."""
     rng = np.random.default_rng(SEED)
-    for counts in itertools.product((0, 1, 2, 7), (0, 1, 3), (0, 1, 2, 9), (0, 2)):
+    for counts in itertools.product((0, 1, 2, 7), (0, 1, 3), (0, 1, 2, 6, 9), (0, 2)):
         if sum(counts) < 2:
             continue
         kinds = [s for s, n in zip(STATUS, counts, strict=True) for _ in range(n)]
@@ -74,6 +74,7 @@ def test_what_is_not_done_is_counted_and_named():
         assert named + sum(int(part.split()[0]) for part in more) == failed
         assert (named == failed) == (not more)
         assert ("not started: " in text) == (waiting > 0)
+        assert text.endswith("; run the same command again to go on")
 
 
 @pytest.mark.parametrize(("largest", "unit"), [(3590.0, "arcsec"), (3610.0, "deg")])

@@ -1,6 +1,7 @@
 """The rank of a joint: its verdict in every case, its sizes as they were measured."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import trueangle as ta
 from trueangle.joint.pattern import Harmonic
 from trueangle.reports.robot import (
     JointRank,
+    checked_rank,
     diagnosed_rank,
     fitted_rank,
     ranked,
@@ -55,6 +57,16 @@ def test_the_rank_of_a_fit_is_in_arcsec_whatever_the_unit(period):
     assert rank.rms_left_arcsec == pytest.approx(np.sqrt(720.0 / 715.0), rel=1e-6)
     assert rank.peak_to_peak_before_arcsec == pytest.approx(np.ptp(error) * 1_296_000.0, rel=1e-6)
     assert (rank.verdict, rank.first_cause) == ("calibrated", "order 3 of output")
+
+
+@pytest.mark.parametrize("faults", [(), ("stale_samples",), ("wrong_sign", "mixed_units")])
+@pytest.mark.parametrize("usable", [False, True])
+def test_the_rank_of_a_check_is_its_first_fault(faults, usable):
+    found = SimpleNamespace(data_faults=[SimpleNamespace(fault=f) for f in faults], usable=usable)
+    verdict = "usable" if usable else "not usable"
+    cause = faults[0] if faults else None
+    assert checked_rank("hip", found, None) == JointRank("hip", None, None, verdict, cause)
+    assert checked_rank("hip", found, []) == JointRank("hip", None, None, verdict, cause)
 
 
 def test_what_cannot_be_used_stands_first_then_the_largest():

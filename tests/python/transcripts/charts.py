@@ -30,7 +30,7 @@ def chart_lines(page: str) -> Iterator[str]:
     """Every chart of a page, or where it has none every still picture."""
     packed = re.search(r'<script[^>]*id="figures">([^<]*)</script>', page)
     if packed is None:
-        yield from _still_lines(page)
+        yield from still_lines(page)
         return
     whole = base64.b85decode(packed[1].translate(_SIGNS))
     length = int.from_bytes(whole[:4], "big")
@@ -86,7 +86,8 @@ def _column(values: Any) -> str:
     return few_numbers(np.frombuffer(gzip.decompress(packed), dtype=values["dtype"]), DRAWN)
 
 
-def _still_lines(page: str) -> Iterator[str]:
+def still_lines(page: str) -> Iterator[str]:
+    """Every still picture of a page."""
     for picture in re.findall(r"<svg.*?</svg>", page, re.S):
         yield "still picture " + re.search(r'viewBox="([^"]*)"', picture)[1]  # type: ignore[index]
         for path in re.findall(r"<path ([^>]*)/>", picture):

@@ -20,11 +20,12 @@ from trueangle import planning, plots
 from trueangle.cli import main
 from trueangle.export import TARGETS
 
+from . import groups, specimens
 from .arguments import argument_lines
 from .asked import Asked
-from .charts import chart_lines
+from .charts import chart_lines, still_lines
 from .figures import figure_lines
-from .views import file_lines, pdf_lines
+from .views import file_lines, markup_lines, pdf_lines
 
 COLUMNS = 100
 
@@ -80,12 +81,14 @@ class Terminal:
 
     ``trueangle ...`` is the command itself, in this process, and ``python ...`` a line of Python:
     what it gives, draws, warns of or raises. ``show FILE [PATTERN]`` shows what a file holds
-    (`views`), or what of it matches, ``charts FILE`` what a page draws (`charts`), ``figures`` what
-    the pictures drawn since show (`figures`), ``targets`` what an export can be asked for.
-    ``write FILE LINE ...`` writes a small file (``\\t`` and ``\\xff`` are what they are in Python),
-    and ``hide KEY=VALUE ...`` ``hidden.toml``: what ``believed.toml`` believes, and one effect
-    beside it. ``options`` tells every argument of every command, ``asked ...`` what each further
-    option changes (`asked`). Further commands follow after ``&&``.
+    (`views`), or what of it matches, ``markup FILE [PATTERN]`` what its tags say beside its words,
+    ``charts FILE`` what a page draws (`charts`), ``stills FILE`` what it draws on paper,
+    ``figures`` what the pictures drawn since show (`figures`), ``targets`` what an export can be
+    asked for. ``write FILE LINE ...`` writes a small file (``\\t`` and ``\\xff`` are what they are
+    in Python), and ``hide KEY=VALUE ...`` ``hidden.toml``: what ``believed.toml`` believes, and
+    one effect beside it. ``options`` tells every argument of every command, ``asked ...`` what
+    each further option changes (`asked`). `specimens` and `groups` are what pages are shown of.
+    Further commands follow after ``&&``.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -93,7 +96,8 @@ class Terminal:
         self._figures: list[str] = []
         self._known: set[str] = set()
         self._names: dict[str, Any] = {"__name__": "transcript", "np": np, "plots": plots}
-        self._names |= {"planning": planning, "ta": trueangle}
+        self._names |= {"groups": groups, "planning": planning, "specimens": specimens}
+        self._names |= {"ta": trueangle}
 
     def lines(self, command: str) -> list[str]:
         """What the terminal shows of a command; a status other than 0 at the end, as ``[1]``."""
@@ -102,7 +106,8 @@ class Terminal:
             return self._settled(self._python(rest))
         run = {
             "asked": self._asked, "charts": self._charts, "figures": self._drawn,
-            "hide": self._hide, "options": self._options, "show": self._show,
+            "hide": self._hide, "markup": self._markup, "options": self._options,
+            "show": self._show, "stills": self._stills,
             "targets": self._targets, "trueangle": self._trueangle, "write": self._write,
         }  # fmt: skip
         found: list[str] = []
@@ -142,6 +147,14 @@ class Terminal:
 
     def _charts(self, arguments: list[str]) -> str:
         return "\n".join(chart_lines((self.folder / arguments[0]).read_text(encoding="utf-8")))
+
+    def _stills(self, arguments: list[str]) -> str:
+        return "\n".join(still_lines((self.folder / arguments[0]).read_text(encoding="utf-8")))
+
+    def _markup(self, arguments: list[str]) -> str:
+        path, wanted = self.folder / arguments[0], " ".join(arguments[1:])
+        lines = markup_lines(path.read_text(encoding="utf-8"))
+        return "\n".join(line for line in lines if re.search(wanted, line))
 
     def _targets(self, arguments: list[str]) -> str:
         lines = []

@@ -21,7 +21,7 @@ pytest.importorskip("matplotlib").use("Agg")
 
 #: Half a second and more each.
 SLOW = re.compile(
-    "asked|causes|certificate|charts|demo|diagnose|export|pictures|plan|report|targets"
+    "asked|causes|certificate|charts|demo|diagnose|export|joints|pages|pictures|plan|report|targets|words"
 )
 
 #: Why an option of a command may change nothing, of all that `asked` gives.

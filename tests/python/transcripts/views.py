@@ -186,3 +186,38 @@ def _page_lines(text: str) -> list[str]:
     page.feed(text)
     lines = (re.sub(r" +", " ", line).strip() for line in page.words.splitlines())
     return [line for line in lines if line]
+
+
+#: Attributes that say something a reader sees, and classes that do.
+_TELLING = ("class", "colspan", "data-run", "href", "open", "rowspan", "srcdoc", "style")
+_CLASSES = frozenset(
+    {"doubtful", "gain", "kept", "no-gain", "no-model", "no-print", "on-paper", "unchecked"}
+)
+
+
+class _Markup(HTMLParser):
+    """Tags whose attributes mark, colour, join or open something, with what they say."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:
+        told = []
+        for name, text in attrs:
+            if name == "class":
+                text = " ".join(word for word in text.split() if word in _CLASSES)
+            elif name == "srcdoc":
+                text = " | ".join(_page_lines(text)[2:4])
+            if name in _TELLING and (text or name == "open"):
+                told.append(f"{name} {text or ''}".rstrip())
+        if told:
+            self.lines.append(f"{tag} {', '.join(told)}")
+
+
+def markup_lines(text: str) -> list[str]:
+    """What the tags of a page say beside its words; the same line once, with how often."""
+    page = _Markup()
+    page.feed(text)
+    found = [(line, len(list(group))) for line, group in groupby(page.lines)]
+    return [line if count == 1 else f"{line} ({count} times)" for line, count in found]

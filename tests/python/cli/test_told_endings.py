@@ -1,0 +1,176 @@
+"""The last line of a command, to the letter: what went wrong, what an interruption left undone."""
+
+import contextlib
+import signal
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import trueangle as ta
+from trueangle.cli import main
+from trueangle.cli.terminal import Ending
+from trueangle.errors import ArgumentError, TrueAngleError
+
+DEFECT = "; this is a defect of trueangle: please report this line and what --debug prints"
+
+
+class Panic(BaseException):
+    """As a panic of the core arrives."""
+
+
+#: Errors of a command and the line that is told of each.
+TOLD = {
+    "error: of two parts": TrueAngleError("of two  \n  parts"),
+    "error: --errors-in must be one": ArgumentError("errors_in must be one"),
+    "error: give --joint arm": ArgumentError("give `joint=arm`"),
+    "error: first is none": TrueAngleError("first is none"),
+    "error: out of memory (no more is given); take fewer readings at a time, or --one-pass where "
+    "the command has it": MemoryError(),
+    "error: out of memory (1 GiB); take fewer readings at a time, or --one-pass where the command "
+    "has it": MemoryError("1 GiB"),
+    "error: a library cannot be loaded: libx; is there memory enough for it?": ImportError("libx"),
+    "error: a.csv: No such file": OSError(2, "No such file", "a.csv"),
+    "error: b.csv: No such file": OSError(2, "No such file", b"b.csv"),
+    "error: -: No such file; name /dev/stdin to read a pipe": OSError(2, "No such file", "-"),
+    "error: 7: Bad number": OSError(9, "Bad number", 7),
+    "error: [Errno 28] No space left": OSError(28, "No space left"),
+    "error: none of it": OSError("none of it"),
+    f"error: unexpected Panic: lost{DEFECT}": Panic("lost"),
+    f"error: unexpected ZeroDivisionError: by 0{DEFECT}": ZeroDivisionError("by 0"),
+    "interrupted": KeyboardInterrupt(),
+    "interrupted: 3 of 7 are done": KeyboardInterrupt("3 of 7 are done"),
+}
+
+
+@pytest.fixture
+def models(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shaft = ta.Shaft("output", 1, [1], [0.0], [0.1])
+    ta.HarmonicModel([shaft], period=360.0).save("m.json")
+    return ["compare", "m.json", "m.json"]
+
+
+@pytest.mark.parametrize("line", TOLD)
+def test_an_error_is_one_line(line, models, monkeypatch, capsys):
+    def broken(*_):
+        raise TOLD[line]
+
+    monkeypatch.setattr("trueangle.export.compare", broken)
+    assert main(models) == (130 if line.startswith("interrupted") else 1)
+    assert capsys.readouterr().err == f"trueangle: {line}\n"
+
+
+@pytest.mark.parametrize(("name", "status"), [("SIGTERM", 143), ("SIGHUP", 129), ("SIGINT", 130)])
+def test_a_signal_is_told_with_its_status(name, status, models, monkeypatch, capsys):
+    if not hasattr(signal, name):
+        pytest.skip(f"no {name}")
+
+    def ended(*_):
+        signal.raise_signal(getattr(signal, name))
+
+    monkeypatch.setattr("trueangle.export.compare", ended)
+    before = signal.getsignal(getattr(signal, name))
+    assert main(models) == status
+    by = "" if name == "SIGINT" else f" by {name}"
+    assert capsys.readouterr().err == f"trueangle: interrupted{by}\n"
+    assert signal.getsignal(getattr(signal, name)) == before
+    assert (Ending().status, Ending().text) == (130, "interrupted")
+
+
+def test_a_reader_that_has_gone_is_told_nothing(models, monkeypatch, capsys):
+    def gone(_):
+        raise BrokenPipeError(32, "Broken pipe")
+
+    monkeypatch.setattr(sys.stdout, "write", gone)
+    assert main(models) == 141
+    assert capsys.readouterr().err == ""
+
+
+@pytest.fixture
+def interrupted(monkeypatch):
+    """Commands that were ended early find that their account is what it is."""
+
+    @contextlib.contextmanager
+    def ending():
+        yield SimpleNamespace(happened=True)
+
+    found = SimpleNamespace(
+        to_json=lambda *_: "{}", summary=lambda *_, **__: "What is known.", complete=False
+    )
+    for module in ("rehearse", "diagnose"):
+        monkeypatch.setattr(f"trueangle.cli.{module}.ending_early", ending)
+    monkeypatch.setattr("trueangle.rehearsal.rehearse", lambda *_, **__: found)
+    monkeypatch.setattr("trueangle.diagnosis.diagnose", lambda *_, **__: found)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("more", "complete", "told"),
+    [
+        ([], False, "the account so far is incomplete"),
+        ([], True, "the account is complete"),
+        (["--extend", "e.toml"], True, "the account is complete, and e.toml not written"),
+        (["--plan", "p.toml", "--extend", "e.toml", "--corrected-model", "c.json"], False,
+         "the account so far is incomplete, and e.toml and p.toml and c.json not written"),
+    ],
+)  # fmt: skip
+def test_a_diagnosis_that_was_interrupted_tells_what_it_left(
+    more, complete, told, interrupted, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    interrupted.complete = complete
+    (tmp_path / "a.csv").write_text("reference_deg,indicated_deg\n0,0\n90,90\n180,180\n")
+    assert main(["diagnose", "a.csv", "--gear-ratio", "3", *more]) == 130
+    out, err = capsys.readouterr()
+    assert (out, err) == ("What is known.\n", f"trueangle: interrupted: {told}\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+
+
+@pytest.mark.parametrize("plot", [[], ["--plot", "p.svg"]])
+def test_a_rehearsal_that_was_interrupted_tells_what_it_left(
+    plot, interrupted, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.toml").write_text("[joint]\ngear_ratio = 3.0\n[[run]]\nsamples = 9\n")
+    assert main(["rehearse", "s.toml", *plot]) == 130
+    more = ", and p.svg not written" if plot else ""
+    told = f"trueangle: interrupted: the account so far is incomplete{more}\n"
+    assert capsys.readouterr() == ("What is known.\n", told)
+
+
+@pytest.mark.parametrize("runs", [0, 2])
+def test_a_plan_without_runs_is_told_and_not_written(runs, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.csv").write_text("reference_deg,indicated_deg\n0,0\n90,90\n180,180\n")
+    (tmp_path / "s.toml").write_text("[joint]\ngear_ratio = 3.0\n[[run]]\nsamples = 9\n")
+    plan = SimpleNamespace(
+        runs=[1] * runs, summary=lambda: "What next.", save=lambda path: print(f"saved {path}")
+    )
+    monkeypatch.setattr("trueangle.rehearsal.after.plan_after", lambda *_, **__: plan)
+    line = ["plan", "--after", "a.csv", "--simulation", "s.toml", "-o", "n.toml"]
+    assert main(line) == (0 if runs else 1)
+    no = "trueangle: error: no run within the limits tells more: n.toml is not written\n"
+    wanted = ("What next.\nsaved n.toml\n", "") if runs else ("What next.\n", no)
+    assert capsys.readouterr() == wanted
+
+
+@pytest.mark.parametrize(
+    ("more", "terminal", "asked"),
+    [([], True, "auto"), (["--json"], True, "json"), (["--json"], False, "auto"),
+     (["--json", "--progress", "text"], True, "text")],
+)  # fmt: skip
+def test_progress_is_json_where_a_terminal_is_told_json(more, terminal, asked, models, monkeypatch):
+    given = {}
+
+    def corrected(*_, progress, **__):
+        given["progress"] = progress
+        raise ArgumentError("enough")
+
+    monkeypatch.setattr("trueangle.logs.batch.correct_logs", corrected)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
+    (_, model, _) = models
+    Path("a.csv").write_text("indicated_deg\n1\n")
+    assert main(["correct", "a.csv", "-m", model, "-o", "b.csv", *more]) == 1
+    assert given == {"progress": asked}
