@@ -1,6 +1,7 @@
 """What a help tells of limits is what the command goes by; options of one use only are refused."""
 
 import argparse
+import os
 import re
 from types import SimpleNamespace
 
@@ -59,3 +60,14 @@ def test_readings_from_which_on_one_pass_is_made_are_those_that_the_help_tells(
     )  # fmt: skip
     assert not onepass.wants_one_pass(args)
     assert limits == [1 << by_itself]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes have no names here")
+def test_a_pipe_is_read_once_and_into_memory(tmp_path):
+    """It is not opened to see how much it holds, which would take from it."""
+    os.mkfifo(tmp_path / "pipe")
+    args = SimpleNamespace(
+        one_pass=False, scheduler=None, runs=[str(tmp_path / "pipe")], topic=None, nuisance="none",
+        reference_orders=None, run=None,
+    )  # fmt: skip
+    assert not onepass.wants_one_pass(args)

@@ -89,6 +89,7 @@ def _is_same_line(was: str, now: str) -> bool:
 def is_same_number(was: str, now: str) -> bool:
     """Whether ``now`` is within a unit of the last digit of ``was``; counts are exact.
 
+    The same number with more zeros, or fewer, is told otherwise: its digits were meant.
     Sums are rounded another way on another processor, so a last digit may be another; where
     two digits are all there are it is not, for a unit of them is no rounding. Of numbers that
     are written to all their digits six count; of those of a view, whose six digits may stand at
@@ -97,6 +98,8 @@ def is_same_number(was: str, now: str) -> bool:
     if was == now:
         return True
     a, b = Decimal(was), Decimal(now)
+    if a == b:
+        return False  # with more digits, or fewer
     least, digits = sorted((len(a.as_tuple().digits), len(b.as_tuple().digits)))
     if least > DIGITS + 2:
         return abs(a - b) * 10**DIGITS <= abs(a)
