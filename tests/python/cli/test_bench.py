@@ -113,6 +113,8 @@ def test_the_model_of_cost_is_found():
     assert one.call == pytest.approx(2e-6, rel=1e-9)
     assert one.reading == pytest.approx(3e-9, rel=1e-9)
     assert one.spread < 1e-9 < two.spread < 0.11
+    costs = {m.readings: two.seconds(m.readings) / m.timing.median for m in off}
+    assert two.spread == pytest.approx(max(abs(cost - 1.0) for cost in costs.values()))
     assert one.seconds(1e12) == pytest.approx(3000.0, rel=1e-6)
     # A call that comes out below nothing is none.
     (bare,) = scaling.work_costs(

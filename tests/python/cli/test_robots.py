@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.cli import main
+from trueangle.cli import build_parser, main
+from trueangle.cli.robots import joints_asked
 
 #: Order 1 of the error of each joint, arcsec.
 SIZES = {"shoulder": 40.0, "elbow": 90.0, "wrist": 5.0}
@@ -363,3 +364,23 @@ def test_one_joint_without_usable_data_is_told_by_the_status(arm, tmp_path, join
     usable = {name: found["usable"] for name, found in json.loads(out)["joints"].items()}
     assert usable == {name: name != joint for name in SIZES}
     assert status == 1
+
+
+def test_columns_that_are_typed_go_before_those_of_the_robot_file(arm):
+    """Of the joint named before those of every joint; what is not typed is the file's."""
+    robot = ["--robot", str(arm / "robot.toml"), "--joint", "elbow"]
+
+    def columns(*typed):
+        options = [word for each in typed for word in ("--signal", each)]
+        words = ["check", str(arm / "arm.csv"), *robot, *options]
+        args = build_parser(words, words[:1]).parse_args(words)
+        ((_, joint),) = [(j.name, j.args.signal) for j in joints_asked(args)[1]]
+        return {entry[1]: entry[2] for entry in joint if not entry[1].startswith("coupled")}
+
+    of_file = {"indicated": "q_elbow", "reference": "laser elbow [deg]"}
+    assert columns() == of_file
+    assert columns("elbow.indicated=other") == {**of_file, "indicated": "other"}
+    assert columns("indicated=all") == of_file
+    assert columns("torque=tau") == {**of_file, "torque": "tau"}
+    both = columns("torque=tau", "elbow.torque=own", "wrist.torque=not")
+    assert both == {**of_file, "torque": "own"}

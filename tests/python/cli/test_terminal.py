@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from trueangle.cli import main
-from trueangle.cli.terminal import PlainStream, coloured_text, has_colours
+from trueangle.cli.terminal import PlainStream, coloured_text, has_colours, printable_text
 from trueangle.support.layout import laid_out, text_columns, wrapped_lines
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "looks"))
@@ -146,3 +146,10 @@ def test_what_is_written_is_as_long_as_what_was_given(colours, encoding, monkeyp
         shown = re.sub(r"\x1b\[[\d;]*m", "", held.getvalue()[before:].decode(encoding))
         plain = f"<{text}>".replace("\x1b", "\\x1b")
         assert shown == plain.encode(encoding, "backslashreplace").decode(encoding)
+
+
+@pytest.mark.parametrize("byte", [0x80, 0x9B, 0xE9, 0xFF])
+def test_a_byte_of_a_name_that_is_no_text_is_shown_as_that_byte(byte):
+    name = bytes([0x61, byte, 0x62]).decode("utf-8", "surrogateescape")
+    assert printable_text(f"{name}.csv") == f"a\\x{byte:02x}b.csv"
+    assert printable_text(chr(0x85) + chr(0x202E)) == "\\x85\\u202e"
