@@ -107,18 +107,19 @@ def _indicated(robot: Any, entries: list[Any]) -> dict[str, Any]:
 def _asked(
     joint: Any, args: argparse.Namespace, entries: list[Any], angles: dict[str, Any]
 ) -> JointAsked:
-    """The arguments as for this joint alone: what was typed stands before what the file says.
+    """The arguments as for this joint alone: what was typed stands before what the file says,
+    and what was typed of this joint before what was typed of all.
 
     The angles of the others are signals that it may be coupled to.
     """
     from ..support.signals import COUPLED
 
     own = {_key(e): e for e in entries if e[0] == joint.name}
-    for role, column in joint.signals.items():
-        own.setdefault(role, signal_option(f"{role}={column}"))
     for entry in entries:
         if entry[0] is None:
             own.setdefault(_key(entry), entry)
+    for role, column in joint.signals.items():
+        own.setdefault(role, signal_option(f"{role}={column}"))
     for other, entry in angles.items():
         if other != joint.name:
             own.setdefault(COUPLED + other, type(entry)((None, COUPLED + other, *entry[2:])))

@@ -380,7 +380,8 @@ def test_columns_that_are_typed_go_before_those_of_the_robot_file(arm):
     of_file = {"indicated": "q_elbow", "reference": "laser elbow [deg]"}
     assert columns() == of_file
     assert columns("elbow.indicated=other") == {**of_file, "indicated": "other"}
-    assert columns("indicated=all") == of_file
+    assert columns("indicated=all") == {**of_file, "indicated": "all"}
+    assert columns("indicated=all", "elbow.indicated=own") == {**of_file, "indicated": "own"}
     assert columns("torque=tau") == {**of_file, "torque": "tau"}
     both = columns("torque=tau", "elbow.torque=own", "wrist.torque=not")
     assert both == {**of_file, "torque": "own"}
