@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, f_tail
+from .dense import DenseFit
 from .readings import SegmentReadings
 from .result import ARCSEC, HeldOutPattern
 from .steady import SteadyFit, fit_steady
@@ -23,11 +24,11 @@ _TURNS: Final = 4.0
 
 
 def judged_patterns(
-    first: Array, second: Array, covariance: Array, noise: float, names: tuple[str, str]
+    first: Array, second: Array, chance: float, noise: float, names: tuple[str, str]
 ) -> HeldOutPattern:
     """Two patterns (cosine and sine in turn, radians) of two parts of the readings.
 
-    ``covariance`` is that of ``second - first``.
+    ``chance`` is that of so great a difference by noise alone.
     """
     gap = second - first
     return HeldOutPattern(
@@ -35,7 +36,17 @@ def judged_patterns(
         judged_on=names[1],
         rms_before=math.hypot(noise, math.sqrt(0.5 * float(second @ second))) * ARCSEC,
         rms_after=math.hypot(noise, math.sqrt(0.5 * float(gap @ gap))) * ARCSEC,
-        p=chance_of_difference(gap, covariance),
+        p=chance,
+    )
+
+
+def chance_of_parts(fit: DenseFit) -> float:
+    """Of so great a difference between the patterns of two parts (`patterns_apart`)."""
+    m = fit.patterns.size // 2
+    told = fit.projected.told[:m] & fit.projected.told[m:]
+    turn = np.concatenate([-np.eye(m)[told], np.eye(m)[told]], axis=1)
+    return chance_of_difference(
+        turn @ fit.patterns, turn @ fit.covariance @ turn.T, fit.projected.freedom
     )
 
 
@@ -132,5 +143,9 @@ def _compare(
     )
     noise = math.sqrt(parts.projected.variance)
     return judged_patterns(
-        parts.unknowns[rows], parts.unknowns[rows + m], colour * difference, noise, names
+        parts.unknowns[rows],
+        parts.unknowns[rows + m],
+        chance_of_difference(parts.unknowns[rows + m] - parts.unknowns[rows], colour * difference),
+        noise,
+        names,
     )

@@ -84,24 +84,18 @@ def test_orders_with_the_errors_of_their_amplitudes() -> None:
 def test_halves_are_judged_by_chi_squared() -> None:
     rng = np.random.default_rng(2)
     half = np.tril(rng.normal(size=(4, 4))) + 2.0 * np.eye(4)
-    first = rng.normal(size=4)
-    ps = [
-        judged_patterns(first, first + half @ rng.normal(size=4), half @ half.T, 1.0, ("a", "b")).p
-        for _ in range(500)
-    ]
+    ps = [chance_of_difference(half @ rng.normal(size=4), half @ half.T) for _ in range(500)]
     # Kolmogorov's distance of 500 uniform numbers: 1.95 / sqrt(500) once in a thousand.
     away = np.abs(np.sort(ps) - (np.arange(500) + 0.5) / 500).max()
     assert away < 1.95 / math.sqrt(500)
-    found = judged_patterns(
-        np.array([1e-5, 0.0]), np.array([1e-5, 2e-5]), np.eye(2), 3e-5, ("a", "b")
-    )
+    found = judged_patterns(np.array([1e-5, 0.0]), np.array([1e-5, 2e-5]), 0.25, 3e-5, ("a", "b"))
+    assert found.p == 0.25
     assert found.rms_before == pytest.approx(math.sqrt(9.0 + 0.5 * 5.0) * 1e-5 * ARCSEC)
     assert found.rms_after == pytest.approx(math.sqrt(9.0 + 0.5 * 4.0) * 1e-5 * ARCSEC)
     assert (found.fitted_on, found.judged_on) == ("a", "b")
     assert HeldOutPattern("a", "b", 1.0, 2.0, 0.0011).to_dict()["agrees"]
     assert not HeldOutPattern("a", "b", 1.0, 2.0, 0.001).to_dict()["agrees"]
-    none = judged_patterns(np.zeros(0), np.zeros(0), np.zeros((0, 0)), 1e-5, ("a", "b"))
-    assert none.p == 1.0
+    assert chance_of_difference(np.zeros(0), np.zeros((0, 0))) == 1.0
 
 
 def test_so_great_a_difference_is_as_frequent_as_its_chance_says() -> None:
