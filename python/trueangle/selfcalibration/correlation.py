@@ -30,6 +30,11 @@ _ROUNDS: Final = 4
 #: Points of frequency over which a spectrum is averaged.
 _GRID: Final = 8192
 
+#: Frequency below which fitted motion may take all, at most; and cycles of a series over which the
+#: power beside it is averaged, at least.
+_HIGHEST_CUT: Final = 0.15
+_LEAST_BAND: Final = 10.0
+
 #: A series is continued by so many readings of nothing: beyond, noise remembers it no more.
 _BEYOND: Final = 1024
 
@@ -136,6 +141,39 @@ def correlation_of(
         if before.terms.size == found.terms.size == 0:
             break
     return found
+
+
+def correlation_above(series: Sequence[Array], cut: float) -> Correlation:
+    """As `correlation_of`, where slow motion was fitted that took all below a frequency.
+
+    There the power is taken for what it is above, up to twice of it; white where that is most of
+    the frequencies.
+
+    Parameters
+    ----------
+    series : sequence of ndarray
+    cut : float
+        Cycles per reading.
+    """
+    count = sum(one.size for one in series)
+    most = min(_MOST, count // _PER_TERM, max((one.size for one in series), default=1) - 1)
+    if most < 1 or cut > _HIGHEST_CUT:
+        return WHITE
+    left, pairs = np.zeros(most + 1), np.zeros(most + 1)
+    for one in series:
+        n = 1 << (2 * one.size - 1).bit_length()
+        power = np.abs(np.fft.rfft(one, n)) ** 2
+        frequency = np.fft.rfftfreq(n)
+        above = (frequency >= cut) & (frequency <= max(2.0 * cut, cut + _LEAST_BAND / one.size))
+        if cut > 0.0 and above.any():
+            power[frequency < cut] = power[above].mean()
+        found = np.fft.irfft(power, n)[: most + 1]
+        left[: found.size] += found
+        pairs += np.maximum(one.size - np.arange(most + 1), 0)
+    if not left[0] > 0.0:
+        return WHITE
+    lags = left / np.maximum(pairs, 1.0)
+    return _autoregression(lags / lags[0], count)
 
 
 def _autoregression(lags: Array, count: int) -> Correlation:

@@ -68,7 +68,7 @@ def chance_of_difference(gap: Array, covariance: Array, freedom: float = math.in
 
 
 def held_out_patterns(
-    fit: SteadyFit, tested: Sequence[float], colour: float = 1.0
+    fit: SteadyFit, tested: Sequence[float], colour: Array
 ) -> dict[str, HeldOutPattern]:
     """Odd turns against even ones, fast against slow, one direction against the other.
 
@@ -117,7 +117,7 @@ def _compare(
     groups: NDArray[np.int64],
     tested: Sequence[float],
     names: tuple[str, str],
-    colour: float,
+    colour: Array,
     *,
     ripple: bool = True,
 ) -> HeldOutPattern:
@@ -134,7 +134,9 @@ def _compare(
     rows = np.array(
         [2 * i + j for i, k in enumerate(fit.orders) if k in tested for j in (0, 1)], dtype=np.int64
     )
-    covariance = parts.projected.covariance
+    scale = np.ones(len(parts.unknowns))
+    scale[: 2 * m] = np.sqrt(np.tile(np.repeat(colour, 2), 2))
+    covariance = parts.projected.covariance * np.outer(scale, scale)
     difference = (
         covariance[np.ix_(rows, rows)]
         + covariance[np.ix_(rows + m, rows + m)]
@@ -145,7 +147,7 @@ def _compare(
     return judged_patterns(
         parts.unknowns[rows],
         parts.unknowns[rows + m],
-        chance_of_difference(parts.unknowns[rows + m] - parts.unknowns[rows], colour * difference),
+        chance_of_difference(parts.unknowns[rows + m] - parts.unknowns[rows], difference),
         noise,
         names,
     )
