@@ -146,13 +146,18 @@ def _places(
 def _fit(readings: Sequence[Array], orders: Sequence[float]) -> DenseFit:
     """Fixed point over the places: patterns at corrected readings."""
     columns = harmonic_unknowns(ENCODER, orders)
-    lost = float(sum(h.shape[1] for h in readings))
+    lost = _common(readings)
 
     def at(coefficients: Array, _settled: bool) -> DenseFit:
         parts = list(_rows(readings, orders, coefficients))
         return fit_dense(parts, columns, freedom_lost=lost)
 
     return dense_fixed_point(at, len(columns))
+
+
+def _common(readings: Sequence[Array]) -> float:
+    """Rows that say nothing of their own: one of each place, for the mean of the heads."""
+    return float(sum(h.shape[1] for h in readings))
 
 
 def _rows(
@@ -259,8 +264,7 @@ def _held_out(
     groups = [
         np.tile(turn[a : a + _CHUNK], heads) for turn in odd for a in range(0, turn.size, _CHUNK)
     ]
-    lost = float(sum(h.shape[1] for h in readings))
-    fit = patterns_apart(rows, groups, harmonic_unknowns(ENCODER, orders), lost)
+    fit = patterns_apart(rows, groups, harmonic_unknowns(ENCODER, orders), _common(readings))
     first, second = np.split(fit.patterns, 2)
     noise = math.sqrt(whole.projected.variance)
     names = ("odd turns", "even turns")
