@@ -202,8 +202,8 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
 
     A reading is a spike when it lies more than 8 robust standard deviations off the
     median of its neighbours in angle; an error that changes as much from neighbour to
-    neighbour widens the limit itself, and so does noise on a slope. For choosing orders; `fit_robustly` looks again with the
-    model in hand.
+    neighbour widens the limit itself, and so does noise on a slope. For choosing orders;
+    `fit_robustly` looks again with the model in hand.
     """
     if len(run) < 4 * _NEIGHBOURS:
         return run
