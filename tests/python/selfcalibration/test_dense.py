@@ -110,11 +110,11 @@ def test_the_covariance_is_that_of_least_squares_in_noise_of_that_correlation() 
     assert low_frequency_inflation(found) >= 0.999 * slow / level
 
 
-@pytest.mark.parametrize("size", [0.0, 3.0])
-def test_a_random_term_has_the_variance_that_the_likelihood_says(size: float) -> None:
+@pytest.mark.parametrize(("size", "runs"), [(0.0, 12), (3.0, 12), (3.0, 4)])
+def test_a_random_term_has_the_variance_that_the_likelihood_says(size: float, runs: int) -> None:
     """Runs with a slope of their own: by the evidence of the dense covariance."""
     rng = np.random.default_rng(4)
-    runs, n = 12, 10
+    n = 10
     patterns, _, y = rows(5, runs * n)
     ramp = np.tile(np.linspace(-1.0, 1.0, n), runs)
     nuisances = np.zeros((runs * n, 1 + runs))
@@ -123,7 +123,7 @@ def test_a_random_term_has_the_variance_that_the_likelihood_says(size: float) ->
         part = slice(j * n, (j + 1) * n)
         nuisances[part, 1 + j] = ramp[part]
         y[part] += size * rng.normal() * ramp[part]
-    found = fit_dense(parts(patterns, nuisances, y, [50]), COLUMNS, random=range(1, 1 + runs))
+    found = fit_dense(parts(patterns, nuisances, y, [30]), COLUMNS, random=range(1, 1 + runs))
     fixed = np.column_stack([np.ones(runs * n), patterns])
 
     def restricted(variance: float) -> float:
@@ -139,7 +139,7 @@ def test_a_random_term_has_the_variance_that_the_likelihood_says(size: float) ->
     if size:
         assert 0.5 < found.random_variance / best < 2.0
         # Averages over the variance, each as probable as the likelihood says, per octave.
-        tried = np.geomspace(0.03, 300.0, 81)
+        tried = np.geomspace(1e-3, 1e6, 181)
         weights = np.exp([restricted(one) - restricted(best) for one in tried])
         weights /= weights.sum()
         means, covariances = [], []

@@ -64,9 +64,11 @@ def geared(rng: np.random.Generator, memory: float) -> Log:
     }
 
 
-def coasting(rng: np.random.Generator, memory: float, wander: float = 0.0) -> Log:
+def coasting(
+    rng: np.random.Generator, memory: float, wander: float = 0.0, size: float = 20.0
+) -> Log:
     t, theta = coast(8.0, 2.5, 6.0, 200.0, wander=wander, rng=rng, steps=1)
-    reading = theta + encoder(theta, LINES) + 20.0 * ARCSEC * noise(rng, t.size, memory)
+    reading = theta + encoder(theta, LINES) + size * ARCSEC * noise(rng, t.size, memory)
     return {"time_s": t, "indicated_rad": np.mod(reading, 2.0 * np.pi)}
 
 
@@ -90,7 +92,7 @@ DESIGNS: dict[str, tuple[Callable[[np.random.Generator], Log], dict, int]] = {
     "coasting": (lambda rng: coasting(rng, 0.0), OPEN, 20),
     "coasting, remembers": (lambda rng: coasting(rng, 0.7), OPEN, 20),
     "coasting, alternates": (lambda rng: coasting(rng, -0.5), OPEN, 20),
-    "coasting, wanders": (lambda rng: coasting(rng, 0.0, 0.3), OPEN, 20),
+    "coasting, wanders": (lambda rng: coasting(rng, 0.0, 0.2, 5.0), OPEN, 20),
 }
 
 
