@@ -202,8 +202,8 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
 
     A reading is a spike when it lies more than 8 robust standard deviations off the
     median of its neighbours in angle; an error that changes as much from neighbour to
-    neighbour widens the limit itself. For choosing orders; `fit_robustly` looks again with the
-    model in hand.
+    neighbour widens the limit itself, and so does noise on a slope. For choosing orders;
+    `fit_robustly` looks again with the model in hand.
     """
     if len(run) < 4 * _NEIGHBOURS:
         return run
@@ -215,8 +215,13 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
     deviation = np.empty_like(error)
     deviation[order] = error[order] - median(windows, axis=1)
     distance = np.abs(deviation)
+    # On a slope most readings are the median of their neighbours: what they scatter by is what
+    # they are off the line between the next two, 3/2 of the variance.
+    inner = around[half - 1 : around.size - half + 1]
+    between = inner[1:-1] - 0.5 * (inner[:-2] + inner[2:])
     # Readings in counts: most deviations may be exactly 0, the rest one count.
-    wild = distance > WILD * max(robust_scale(deviation), float(quantile(distance, 0.8)))
+    scale = max(robust_scale(deviation), float(quantile(distance, 0.8)))
+    wild = distance > WILD * max(scale, robust_scale(between) / math.sqrt(1.5))
     if wild.any():
         turns = run.unwrapped_reference * (2.0 * math.pi / run.period)
         count = sensor_lattice([run], turns)[0] * run.period / ARCSEC_PER_TURN

@@ -87,13 +87,20 @@ class CalibrationSums:
         self.means += other.means
         self.when = self.when or other.when
 
-    def repeats(self, every: Array) -> tuple[Array, float]:
-        """Squares of each order's coefficients of single runs about those of all, and freedom."""
+    def repeats(self, every: Array, inverse: Array) -> tuple[Array, float, Array]:
+        """Squares of each order's coefficients of single runs about those of all, and freedom.
+
+        Then the squares that independent readings of unit variance make of them.
+        """
         models = [run.solved() for run in self.runs] if len(self.runs) > 1 else []
         if not models or any(model.rank < every.size for model in models):
-            return np.zeros(every.size // 2), 0.0
+            return np.zeros(every.size // 2), 0.0, np.zeros(every.size // 2)
         apart = np.array([model.coefficients[:, 0] - every for model in models])
-        return (apart**2).sum(axis=0).reshape(-1, 2).sum(axis=1), 2.0 * (len(models) - 1.0)
+        white = np.sum([np.diag(np.asarray(m.inverse)) - np.diag(inverse) for m in models], axis=0)
+        squares, alike = (
+            values.reshape(-1, 2).sum(axis=1) for values in ((apart**2).sum(axis=0), white)
+        )
+        return squares, 2.0 * (len(models) - 1.0), np.maximum(alike, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +129,10 @@ class Calibration:
         Squares of cosine and sine of single runs about `coefficients`, summed.
     repeat_freedom : float
         Of each of these sums; 0 of a single run.
+    repeat_white : ndarray, shape (K,)
+        These sums of independent readings of unit variance.
+    louder : ndarray, shape (K,) or float
+        Variance of each order's coefficients over that of independent readings.
     """
 
     unit: str
@@ -136,6 +147,8 @@ class Calibration:
     runs: int
     repeat_squares: Array
     repeat_freedom: float
+    repeat_white: Array
+    louder: Array | float = 1.0
 
     @classmethod
     def of(cls, unit: str, sums: CalibrationSums, period: float) -> Calibration | None:
@@ -163,12 +176,16 @@ class Calibration:
             freedom,
             round(every.readings),
             len(sums.runs),
-            *sums.repeats(found),
+            *sums.repeats(found, inverse),
         )
 
     def blocks(self) -> Array:
-        """Covariance of each order's cosine and sine for readings of unit variance, (K, 2, 2)."""
+        """Covariance of each order's cosine and sine for readings of unit variance, (K, 2, 2).
+
+        Where runs tell that the readings are not independent, that of such readings.
+        """
         k = 2 * np.arange(self.coefficients.size // 2)
         rows = np.array([[k, k], [k + 1, k + 1]]).transpose(2, 0, 1)
         columns = np.array([[k, k + 1], [k, k + 1]]).transpose(2, 0, 1)
-        return np.asarray(self.inverse[rows, columns])
+        louder = np.broadcast_to(self.louder, self.coefficients.size // 2)
+        return np.asarray(louder[:, None, None] * self.inverse[rows, columns])

@@ -78,8 +78,8 @@ def fleet(
     Notes
     -----
     Sums of ``(2 K)^2`` numbers are kept of each unit and day, K being the orders. Units that
-    outlie: 1 % of fleets in which none does. A unit's readings are taken for independent; what
-    they correlate by is counted as a difference between units.
+    outlie: 1 % of fleets in which none does. What readings of a run have in common is known where
+    units have several runs; else it is counted as a difference between units.
 
     Examples
     --------

@@ -99,7 +99,7 @@ def deviates(
     the smallest of its orders', each over its share of the level (weighted Bonferroni), or of all
     together (Fisher's sum of logarithms). The
     farthest unit is set aside again and again; as many are outliers as the last whose chance,
-    times the units then left, is below the level.
+    times the units then left, is below the level, but those that are none beside the units left.
 
     Parameters
     ----------
@@ -143,9 +143,15 @@ def deviates(
         inside[worst] = False
     outlying = np.zeros(n, dtype=bool)
     outlying[aside[:last]] = True
-    chance, size = _chances(values, weights, ~outlying, aligned)
-    limit = (1.0 - _HIDDEN) * level / float((~outlying).sum())
-    return Deviates(chance, size, _combined(chance, share_of), outlying, variances, limit)
+    while True:
+        chance, size = _chances(values, weights, ~outlying, aligned)
+        unit = _combined(chance, share_of)
+        limit = (1.0 - _HIDDEN) * level / float((~outlying).sum())
+        # What was set aside before one that hid is an outlier by itself, or none.
+        back = outlying & (unit > limit)
+        if not back.any():
+            return Deviates(chance, size, unit, outlying, variances, limit)
+        outlying &= ~back
 
 
 def _variance(values: Array, own: Array, aligned: bool) -> float:

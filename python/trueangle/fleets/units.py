@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..joint.shafts import ShaftOrders
 from ..support.arrays import Array
-from ..support.distributions import chi_squared_tail
+from ..support.distributions import chi_squared_quantile, chi_squared_tail
 from .calibration import Calibration, order_columns, output_orders
 from .outliers import Deviates, deviates, level_by_order
 from .variance import BetweenUnits, held_out_score, reml
@@ -38,8 +39,12 @@ class Units:
         self.noise: UnitNoise = noise_of(
             np.array([one.squares for one in every]), np.array([one.freedom for one in every])
         )
-        spread = dict(zip(map(id, every), self.noise.units.tolist(), strict=True))
-        self.dated = [[(one, spread[id(one)]) for one in dates] for dates in dated]
+        louder = louder_orders(every, self.noise.units)
+        known = {
+            id(one): (replace(one, louder=louder), noise)
+            for one, noise in zip(every, self.noise.units.tolist(), strict=True)
+        }
+        self.dated = [[known[id(one)] for one in dates] for dates in dated]
         self.last = [dates[-1] for dates in self.dated]
         coefficients = np.array([one.coefficients for one, _ in self.last])
         self.coefficients = coefficients
@@ -85,6 +90,25 @@ def shared_pattern(units: Units, aligned: bool) -> SharedPattern:
 
 #: Level at which units are found to differ in their noise.
 _LEVEL: Final = 0.01
+
+
+def louder_orders(calibrations: Sequence[Calibration], noise: Array) -> Array:
+    """Variance of coefficients between runs of one unit over that of independent readings.
+
+    Of all units together, by order; 1 where it is no greater at 1 %. What drifts within a run, or
+    correlates along it, differs between runs, and is not in what single readings scatter by.
+    """
+    squares = np.sum([one.repeat_squares for one in calibrations], axis=0)
+    white = np.sum(
+        [s * one.repeat_white for s, one in zip(noise.tolist(), calibrations, strict=True)], axis=0
+    )
+    freedom = sum(one.repeat_freedom for one in calibrations)
+    found = np.ones(squares.size)
+    if not freedom:
+        return found
+    limit = chi_squared_quantile(1.0 - _LEVEL / found.size, freedom) / freedom
+    ratio = np.divide(squares, white, out=np.ones(squares.size), where=white > 0.0)
+    return np.where(ratio > limit, ratio, found)
 
 
 class UnitNoise(NamedTuple):

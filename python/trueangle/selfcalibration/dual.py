@@ -22,14 +22,14 @@ import numpy as np
 from ..errors import ArgumentError, NoModelError
 from ..runs.travel import Span, travelled_span
 from ..support.arrays import Array
-from .dense import fit_dense
+from .dense import patterns_apart
 from .dualfit import (
     BESIDE_RATIO,
     DualFit,
     DualSample,
     RatioEstimate,
     choose_dual_lines,
-    dual_fit_with_slow_orders,
+    dual_groups,
     dual_rows,
     estimate_dual_ratio,
     fit_dual_lines,
@@ -54,7 +54,7 @@ from .result import (
     blind_words,
     order_estimates,
 )
-from .verification import chance_of_difference
+from .verification import chance_of_parts
 
 #: A ratio is taken for another than the given or a whole one beyond so many standard errors:
 #: a chance of 6e-5.
@@ -76,11 +76,6 @@ _BLOCKS: Final = 20
 
 #: Readings from which parts of them predict each other.
 _READINGS: Final = 200
-
-#: Degrees of freedom of a covariance that 40 blocks of each of two parts tell, and coefficients
-#: up to which they do.
-_FREEDOM: Final = 78.0
-_FEW: Final = 32
 
 
 class _UsedRatio(NamedTuple):
@@ -309,37 +304,22 @@ def _held_out(channels: GearedChannels, ratio: float, fit: DualFit) -> dict[str,
     halves = all(_same_places(m) for m in channels.motor)
     blocks = 2 if halves else _BLOCKS
     columns = [c for line in fit.lines for c in harmonic_unknowns(line.of, [line.order])]
-    trained, judged = (
-        list(dual_rows(channels, ratio, fit.lines, fit.zeros, DualSample(blocks, first)))
-        for first in (0, 1)
-    )
-    many = len(columns) > _FEW
-    first, own = (
-        dual_fit_with_slow_orders(fit_dense(rows, columns), fit.lines, motor=many)
-        for rows in (trained, judged)
-    )
-    nuisances = np.concatenate([p.nuisances for p in judged])
-    plain = np.concatenate([p.target for p in judged])
-    predicted = plain - np.concatenate([p.patterns @ first.patterns for p in judged])
+    rows = list(dual_rows(channels, ratio, fit.lines, fit.zeros))
+    groups = list(dual_groups(channels, ratio, DualSample(blocks, 0)))
+    both = patterns_apart(rows, groups, columns)
+    first = np.split(both.patterns, 2)[0]
+    judged = ~np.concatenate(groups)
+    nuisances = np.concatenate([p.nuisances for p in rows])[judged]
+    plain = np.concatenate([p.target for p in rows])[judged]
+    predicted = plain - np.concatenate([p.patterns @ first for p in rows])[judged]
     before, after = (
         math.sqrt(float(np.mean((y - nuisances @ np.linalg.lstsq(nuisances, y, 1e-12)[0]) ** 2)))
         for y in (plain, predicted)
     )
-    seen = first.projected.seen & own.projected.seen
-    freedom = first.projected.freedom + own.projected.freedom
-    if first.correlated or own.correlated:
-        freedom = math.inf if many else _FREEDOM
     names = ("the first half", "the second half") if halves else ("odd blocks", "even blocks")
     return {
         "halves" if halves else "blocks": HeldOutPattern(
-            *names,
-            before * ARCSEC,
-            after * ARCSEC,
-            chance_of_difference(
-                (own.patterns - first.patterns)[seen],
-                (own.covariance + first.covariance)[np.ix_(seen, seen)],
-                freedom,
-            ),
+            *names, before * ARCSEC, after * ARCSEC, chance_of_parts(both)
         )
     }
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -90,23 +89,7 @@ def fit_dual_lines(
         at = tuple(zeros)
         dense = fit_dense(list(dual_rows(channels, ratio, lines, at, slope=slope)), columns)
         zeros = [z + float(dz) for z, dz in zip(at, dense.nuisances[-len(at) :], strict=True)]
-    return DualFit(dual_fit_with_slow_orders(dense, lines, slope=slope), tuple(lines), at)
-
-
-def dual_fit_with_slow_orders(
-    fit: DenseFit, lines: Sequence[SharedLine], *, slope: bool = False, motor: bool = False
-) -> DenseFit:
-    """The fit with the covariance of slow patterns: blocks hold too few of their waves.
-
-    With ``motor`` those of the motor too: more coefficients than blocks can tell apart.
-    """
-    slow = [2 * i + j for i, line in enumerate(lines) if motor or not line.motor for j in (0, 1)]
-    slow += [2 * len(lines)] * slope
-    if not fit.correlated or not slow:
-        return fit
-    covariance, at = fit.covariance.copy(), np.ix_(slow, slow)
-    covariance[at] = fit.projected.covariance[at] * low_frequency_inflation(fit)
-    return replace(fit, covariance=covariance)
+    return DualFit(dense, tuple(lines), at)
 
 
 def dual_rows(
@@ -137,14 +120,31 @@ def dual_rows(
         if slope:
             rows[:, -1] = theta - float(np.mean(theta))
         target = o - place
-        sampled = (sample or DualSample()).of(o.size)
-        known = ~near_reversal(way)
-        if reversing and np.mean(known) > 0.5:  # else it is noise that turns
-            sampled &= known
-        used = np.flatnonzero(sampled)
-        for a in range(0, used.size, _CHUNK):
-            part = used[a : a + _CHUNK]
+        for part in _used(way, (sample or DualSample()).of(o.size), bool(reversing)):
             yield DenseRows(rows[part], nuisances[part], target[part])
+
+
+def _used(
+    way: NDArray[np.float64], sampled: NDArray[np.bool_], reversing: bool
+) -> Iterator[NDArray[np.int64]]:
+    """Readings of a run that take part, some thousand after the other."""
+    known = ~near_reversal(way)
+    if reversing and np.mean(known) > 0.5:  # else it is noise that turns
+        sampled = sampled & known
+    used = np.flatnonzero(sampled)
+    return (used[a : a + _CHUNK] for a in range(0, used.size, _CHUNK))
+
+
+def dual_groups(
+    channels: GearedChannels, ratio: float, sample: DualSample
+) -> Iterator[NDArray[np.bool_]]:
+    """Which rows of `dual_rows` a sample holds."""
+    reversing = bool(motion_varies(channels, ratio)[0])
+    for m, o, t in zip(*channels, strict=True):
+        way, _ = gear_motion(m / ratio, t)
+        sampled = sample.of(o.size)
+        for part in _used(way, np.ones(o.size, bool), reversing):
+            yield sampled[part]
 
 
 def choose_dual_lines(

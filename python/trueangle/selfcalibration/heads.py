@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import ArgumentError, NoModelError
 from ..support.angles import wrap
 from ..support.arrays import Array
-from .dense import DenseFit, DenseRows, dense_fixed_point, fit_dense
+from .dense import DenseFit, DenseRows, dense_fixed_point, fit_dense, patterns_apart
 from .model import reference_free_model
 from .orderchoice import significant_orders
 from .pattern import ENCODER, pattern_model
@@ -33,7 +33,7 @@ from .result import (
     blind_words,
     order_estimates,
 )
-from .verification import judged_patterns
+from .verification import chance_of_parts, judged_patterns
 
 #: Orders tried by default.
 _HIGHEST: Final = 32
@@ -104,7 +104,7 @@ def head_patterns(
         orders=tuple(table),
         sums=(),
         blind=tuple(blind),
-        held_out=_held_out(readings, kept, noise),
+        held_out=_held_out(readings, kept, fit),
         notes=tuple(notes),
         noise_arcsec=noise * ARCSEC,
         readings=count,
@@ -146,13 +146,18 @@ def _places(
 def _fit(readings: Sequence[Array], orders: Sequence[float]) -> DenseFit:
     """Fixed point over the places: patterns at corrected readings."""
     columns = harmonic_unknowns(ENCODER, orders)
-    lost = float(sum(h.shape[1] for h in readings))
+    lost = _common(readings)
 
-    def at(coefficients: Array) -> DenseFit:
+    def at(coefficients: Array, _settled: bool) -> DenseFit:
         parts = list(_rows(readings, orders, coefficients))
-        return fit_dense(parts, columns, freedom_lost=lost, floor=_LEAST)
+        return fit_dense(parts, columns, freedom_lost=lost)
 
     return dense_fixed_point(at, len(columns))
+
+
+def _common(readings: Sequence[Array]) -> float:
+    """Rows that say nothing of their own: one of each place, for the mean of the heads."""
+    return float(sum(h.shape[1] for h in readings))
 
 
 def _rows(
@@ -184,6 +189,7 @@ def _rows(
                     nuisances.reshape(n * size, -1),
                     gap.ravel(),
                     alone,
+                    n,
                 )
             )
     return parts
@@ -246,24 +252,20 @@ def _notes(
 
 
 def _held_out(
-    readings: Sequence[Array], orders: Sequence[float], noise: float
+    readings: Sequence[Array], orders: Sequence[float], whole: DenseFit
 ) -> dict[str, HeldOutPattern]:
     """Odd turns against even ones."""
-    odd, even = [], []
-    for h in readings:
-        turn = np.floor(np.unwrap(h[0]) / (2.0 * math.pi)).astype(np.int64) & 1
-        odd.append(h[:, turn == 1])
-        even.append(h[:, turn == 0])
+    odd = [np.floor(np.unwrap(h[0]) / (2.0 * math.pi)).astype(np.int64) % 2 == 1 for h in readings]
+    heads = len(readings[0])
     enough = 8 * len(orders)
-    if min(sum(h.shape[1] for h in part) for part in (odd, even)) < enough:
+    if min(sum(int((turn == which).sum()) for turn in odd) for which in (True, False)) < enough:
         return {}
-    first, second = (_fit([h for h in part if h.shape[1]], orders) for part in (odd, even))
-    return {
-        "odd_even_turns": judged_patterns(
-            first.patterns,
-            second.patterns,
-            first.covariance + second.covariance,
-            noise,
-            ("odd turns", "even turns"),
-        )
-    }
+    rows = _rows(readings, orders, whole.patterns)
+    groups = [
+        np.tile(turn[a : a + _CHUNK], heads) for turn in odd for a in range(0, turn.size, _CHUNK)
+    ]
+    fit = patterns_apart(rows, groups, harmonic_unknowns(ENCODER, orders), _common(readings))
+    first, second = np.split(fit.patterns, 2)
+    noise = math.sqrt(whole.projected.variance)
+    names = ("odd turns", "even turns")
+    return {"odd_even_turns": judged_patterns(first, second, chance_of_parts(fit), noise, names)}

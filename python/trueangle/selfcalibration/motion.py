@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,9 @@ _MEMORIES = (0.1, 0.01)
 #: Stiffnesses of evidence within this of the best are still possible (log likelihood).
 _DOUBT = 4.0
 
+#: Waves of a log that its smooth trends and lines take.
+_ENDS: Final = 4.0
+
 #: Stiffness is found to this power of ten: standard errors change by less than 1 %.
 _STIFFNESS_STEP = 0.2
 
@@ -74,6 +78,20 @@ class MotionFit:
     def roughness(self) -> float:
         """Spectral density of the drift: variance of the third differences by spacing^5."""
         return self.projected.variance / (self.stiffness * self.knots.spacing**5)
+
+    @property
+    def fastest(self) -> float:
+        """Frequency (Hz) from which on motion takes less than a tenth of the noise.
+
+        Of a wave a smoothing spline takes ``1 / (1 + λ (ωh)^6 / n)``, with n readings to a knot,
+        until knots are too far apart for it.
+        """
+        intervals = sum(self.knots.intervals)
+        fixed = 2 * len(self.knots.intervals) + len(self.projected.columns)
+        per_knot = (self.projected.freedom + fixed) / max(intervals, 1)
+        turned = math.pow(10.0 * per_knot / self.stiffness, 1.0 / 6.0) / self.knots.spacing
+        slowest = _ENDS / (intervals * self.knots.spacing)
+        return max(min(turned / (2.0 * math.pi), 0.5 / self.knots.spacing), slowest)
 
 
 class _Grid:

@@ -9,13 +9,20 @@ import numpy as np
 
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail
+from .correlation import correlation_above
+from .pattern import pattern_series
 from .projected import harmonic_rows
+from .steady import SteadyFit
 
 #: Distances from an order at which its neighbourhood is looked at.
 _BESIDE: Final = (-0.5, -0.41, -0.32, -0.23, 0.23, 0.32, 0.41, 0.5)
 
 #: A louder neighbourhood is believed where chance would make it once in so many orders.
 _CHANCE: Final = 1e-3
+
+#: Turns from which it is looked at, and readings over which a spectrum in time is averaged.
+_TURNS: Final = 6.0
+_LOOKED_AT: Final = 4096
 
 #: Readings that are looked at: enough to see 10 %.
 _MOST: Final = 200_000
@@ -45,23 +52,39 @@ def spectrum_at(theta: Array, values: Array, orders: Array) -> Array:
     return np.asarray((real**2 + imaginary**2) * (2.0 / total))
 
 
-def noise_spectrum_at(
-    theta: Array, residuals: Array, orders: Sequence[float], turns: float
-) -> Array:
-    """Noise power around each order relative to white noise; 1 where it is not louder.
+def noise_spectrum_at(fit: SteadyFit, orders: Sequence[float]) -> Array:
+    """Noise power at each order relative to white noise.
 
-    Only where there are turns enough to look between orders.
+    An order passes at a frequency that follows the speed: there what the residuals' correlation in
+    time says, on average. Where there are turns enough to look between orders, and noise beside an
+    order is louder than that, as loud as it is there.
     """
-    factors = np.ones(len(orders))
-    if turns < 6.0:
+    readings = fit.readings
+    x = readings.angle - pattern_series(fit.orders, fit.pattern, readings.angle)
+    left = np.where(fit.valid, fit.residuals, 0.0)
+    series, steps = [], np.zeros(readings.size)
+    for i in range(len(readings.stretches)):
+        rows = readings.stretch == i
+        series.append(left[rows][:_MOST])
+        steps[rows] = np.median(np.diff(readings.time[rows]))
+    cut = fit.motion.fastest * float(np.median(steps))
+    correlation = correlation_above(series, cut)
+    part = slice(None, None, max(1, readings.size // _LOOKED_AT))
+    passing = readings.speed[part] * steps[part]
+    factors = np.array([float(correlation.spectrum(k * passing).mean()) for k in orders])
+    if sum(stretch.turns for stretch in readings.stretches) < _TURNS:
         return factors
-    part = slice(0, _MOST)
-    x, e = theta[part], residuals[part]
+    few = slice(0, _MOST)
+    return louder_beside(x[few], left[few], orders, factors)
+
+
+def louder_beside(theta: Array, residuals: Array, orders: Sequence[float], factors: Array) -> Array:
+    """``factors``, and of orders beside which noise is louder than these what it is there."""
+    found = factors.copy()
     near = np.add.outer(np.asarray(orders, dtype=np.float64), _BESIDE)
-    power = spectrum_at(x, e, near.ravel()).reshape(near.shape)
+    power = spectrum_at(theta, residuals, near.ravel()).reshape(near.shape)
     for i, there in enumerate(near > 0.3):
-        beside = power[i, there]
-        mean = float(beside.mean()) / 2.0
+        beside = power[i, there] / factors[i]
         if chi_squared_tail(float(beside.sum()), 2.0 * beside.size) < _CHANCE:
-            factors[i] = max(mean, 1.0)
-    return factors
+            found[i] *= max(float(beside.mean()) / 2.0, 1.0)
+    return found

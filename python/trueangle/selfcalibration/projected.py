@@ -19,6 +19,9 @@ from ..support.arrays import Array
 NOT_SEEN = 1e-9
 
 
+#: A column of which less is left is not told: its standard error is 30 times that of it alone.
+TOLD = 1e-3
+
 #: A column that has more of its square in combinations that are not seen is not seen.
 _SHARE = 0.01
 
@@ -101,26 +104,33 @@ class Projected:
     freedom: float
     floor: float = NOT_SEEN
     """Combinations of which less is left count as not seen."""
+    design: Projected | None = None
+    """What decides which combinations are seen, where noise of these columns' own hides them."""
 
     @cached_property
-    def _eigen(self) -> tuple[Array, Array, Array]:
+    def _eigen(self) -> tuple[Array, Array, Array, Array]:
+        """Columns' scale; what is left of combinations that are seen, these; and the others."""
         scale = 1.0 / np.sqrt(np.where(self.alone > 0.0, self.alone, 1.0))
-        values, vectors = np.linalg.eigh(self.information * np.outer(scale, scale))
-        return scale, values, vectors
+        scaled = self.information * np.outer(scale, scale)
+        if self.design is None:
+            values, vectors = np.linalg.eigh(scaled)
+            kept = values >= self.floor
+            return scale, values[kept], vectors[:, kept], vectors[:, ~kept]
+        _, _, basis, lost = self.design._eigen
+        values, vectors = np.linalg.eigh(basis.T @ scaled @ basis)
+        return scale, np.maximum(values, np.finfo(float).tiny), basis @ vectors, lost
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
         """Columns that take part in no combination that is not seen."""
-        _, values, vectors = self._eigen
-        lost = (vectors[:, values < self.floor] ** 2).sum(axis=1)
+        lost = (self._eigen[3] ** 2).sum(axis=1)
         return np.asarray(lost < _SHARE)
 
     @cached_property
     def inverse(self) -> Array:
         """Pseudo-inverse of the information over the combinations that are seen."""
-        scale, values, vectors = self._eigen
-        kept = values >= self.floor
-        half = (scale[:, None] * vectors[:, kept]) / np.sqrt(values[kept])
+        scale, values, vectors, _ = self._eigen
+        half = (scale[:, None] * vectors) / np.sqrt(values)
         return np.asarray(half @ half.T)
 
     @property
@@ -143,10 +153,15 @@ class Projected:
         share = np.where(self.seen, np.minimum(share, 1.0), 0.0)
         return share if among is None else share[list(among)]
 
+    @cached_property
+    def told(self) -> NDArray[np.bool_]:
+        """Columns of which the design leaves a thousandth and more."""
+        return np.asarray((self.design or self).retained() >= TOLD)
+
     @property
     def rank(self) -> int:
         """Combinations that are seen."""
-        return int((self._eigen[1] >= self.floor).sum())
+        return int(self._eigen[1].size)
 
     def index(self, source: str, order: float) -> tuple[int, int]:
         """Places of the cosine and sine columns."""

@@ -25,7 +25,7 @@ from .dense import DenseFit, DenseRows, dense_fixed_point, fit_dense
 from .model import reference_free_model
 from .orderchoice import significant_orders
 from .pattern import ENCODER, pattern_model
-from .projected import Unknown, harmonic_rows, harmonic_unknowns
+from .projected import NOT_SEEN, Unknown, harmonic_rows, harmonic_unknowns
 from .recording import Recording
 from .result import (
     ARCSEC,
@@ -44,6 +44,9 @@ _HIGHEST: Final = 32
 
 #: Share of an order that is left beside the other pattern, below which it is refused.
 _LEAST: Final = 1e-3
+
+#: Directions of columns below this share of the greatest are none.
+_RANK: Final = 1e-8
 
 #: Orders of a coupling that changes with the clamping.
 _COUPLING: Final = (1.0, 2.0)
@@ -149,13 +152,14 @@ def _fit(design: Clampings, orders: Sequence[float], runs: Sequence[int] | None 
     columns = _columns(design, orders)
     coupling = len(runs) >= 3
 
-    def at(coefficients: Array) -> DenseFit:
+    def at(coefficients: Array, settled: bool) -> DenseFit:
         parts = [
-            _rows(design, j, i, len(runs), orders, coefficients, coupling)
+            _rows(design, j, i, len(runs), orders, coefficients, coupling and settled)
             for i, j in enumerate(runs)
         ]
         random = list(range(len(runs), parts[0].nuisances.shape[1]))
-        return fit_dense(parts, columns, random, floor=_LEAST)
+        # A lattice shows a combination or does not; free places show some of them hardly.
+        return fit_dense(parts, columns, random, floor=_LEAST if design.facets else NOT_SEEN)
 
     return dense_fixed_point(at, len(columns))
 
@@ -198,12 +202,10 @@ def _rows(
 
 
 def _lost(fit: DenseFit, orders: Sequence[float]) -> tuple[float, ...]:
-    retained = fit.projected.retained()
-    lost = []
+    projected, told, lost = fit.projected, fit.projected.told, []
     for k in orders:
-        i, j = fit.projected.index(ENCODER, k)
-        both = [n for n in (i, j) if fit.projected.alone[n] > 0.0]
-        if not both or min(float(retained[n]) for n in both) < _LEAST:
+        both = [n for n in projected.index(ENCODER, k) if projected.alone[n] > 0.0]
+        if not both or not told[both].all():
             lost.append(k)
     return tuple(lost)
 
@@ -269,13 +271,13 @@ def _held_out(
     runs = len(design.joint)
     if runs < 3:
         return {}
-    before = after = expected = 0.0
+    before = after = 0.0
     count = 0
     for j in range(runs):
         fit = _fit(design, orders, [i for i in range(runs) if i != j])
         rows = _rows(design, j, 0, 1, orders, whole.patterns, False)
         # What the others cannot tell is fitted here: it is not theirs to predict.
-        seen = fit.projected.seen
+        seen = fit.projected.told
         here = np.concatenate([rows.patterns[:, ~seen], rows.nuisances], axis=1)
         basis = np.linalg.svd(here, full_matrices=False)
         basis_rows = basis[0][:, basis[1] > 1e-6 * basis[1].max()]
@@ -285,23 +287,70 @@ def _held_out(
             return np.asarray(values - basis_rows @ (basis_rows.T @ values))
 
         plain, left = clear(rows.target), clear(rows.target - told @ fit.patterns[seen])
-        cleared = clear(told)
-        spread = fit.covariance[np.ix_(seen, seen)]
         before += float(plain @ plain)
         after += float(left @ left)
         count += plain.size - basis_rows.shape[1]
-        # A prediction is off by the errors of the patterns as well.
-        expected += float(np.einsum("ij,jk,ik->", cleared, spread, cleared))
-    if count < runs:
+    p = _chance_of_one_pattern(design, orders, whole)
+    if count < runs or p is None:
         return {}
-    variance = whole.projected.variance
-    ratio = after / (count * variance + expected)
     return {
         "clampings": HeldOutPattern(
             "all clampings but one",
             "the one left out",
             math.sqrt(before / count) * ARCSEC,
             math.sqrt(after / count) * ARCSEC,
-            f_tail(ratio, float(count), whole.projected.freedom),
+            p,
         )
     }
+
+
+def _chance_of_one_pattern(
+    design: Clampings, orders: Sequence[float], whole: DenseFit
+) -> float | None:
+    """Fisher's test of one pattern for all clampings against one for each.
+
+    Beside both stand the other's pattern and the couplings, of the variance that was found; the
+    rows are those of white noise. None where a pattern for each leaves nothing.
+    """
+    runs, m = len(design.joint), 2 * len(orders)
+    scale = math.sqrt(whole.random_variance)
+    common, apart = [], []
+    for j in range(runs):
+        rows = _rows(design, j, j, runs, orders, whole.patterns, True)
+        block = np.concatenate(
+            [rows.nuisances, rows.patterns[:, m:], rows.patterns[:, :m], rows.target[:, None]],
+            axis=1,
+        )
+        block[:, runs : 5 * runs] *= scale
+        block = whole.correlation.whitened(block)
+        own = np.zeros((len(block), (runs - 1) * m))
+        if j:
+            own[:, (j - 1) * m : j * m] = block[:, -m - 1 : -1]
+        common.append(block)
+        apart.append(own)
+    design_rows, more = np.concatenate(common), np.concatenate(apart)
+    prior = np.zeros((4 * runs, design_rows.shape[1]))
+    prior[:, runs : 5 * runs] = np.eye(4 * runs)
+    one = np.concatenate([design_rows, prior])
+    basis = _basis(one[:, :-1], _RANK)
+    left = one[:, -1] - basis @ (basis.T @ one[:, -1])
+    extra = np.vstack([more, np.zeros((4 * runs, more.shape[1]))])
+    size = np.sqrt((extra**2).sum(axis=0))
+    extra = extra / np.where(size > 0.0, size, 1.0)
+    # What the other's pattern and the coupling leave of them by chance of the places is none.
+    own = _basis(extra - basis @ (basis.T @ extra), math.sqrt(_LEAST), 1.0)
+    between = float(((own.T @ left) ** 2).sum())
+    few, freedom = float(own.shape[1]), float(len(one) - basis.shape[1] - own.shape[1])
+    rest = float(left @ left) - between
+    if few < 1.0 or freedom < 1.0 or not rest > 0.0:
+        return None
+    return f_tail(between / few / (rest / freedom), few, freedom)
+
+
+def _basis(columns: Array, least: float, size: float | None = None) -> Array:
+    """Orthonormal directions of columns, those below a share of the greatest (or a size) none."""
+    if size is None:
+        lengths = np.sqrt((columns**2).sum(axis=0))
+        columns = columns / np.where(lengths > 0.0, lengths, 1.0)
+    u, values, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(u[:, values > least * (values.max(initial=0.0) if size is None else size)])

@@ -20,7 +20,7 @@ from .loop import followed_orders, followed_share, widened_by_loop
 from .model import reference_free_model
 from .noisespectrum import noise_spectrum_at
 from .orderchoice import choose_selfcal_orders, highest_order
-from .pattern import ENCODER, pattern_series
+from .pattern import ENCODER
 from .readings import SegmentReadings
 from .recording import Recording
 from .result import (
@@ -73,7 +73,11 @@ def spin_down(
     with_current = _add_current(readings, loop)
     rippling, separable = _ripple_orders(readings, chosen, ripple)
     fit = fit_steady(readings, chosen, rippling)
-    unknowns, covariance = fit.unknowns, fit.projected.covariance
+    colour = noise_spectrum_at(fit, (*chosen, *rippling))
+    scale = np.ones(fit.unknowns.size)
+    scale[: 2 * colour.size] = np.sqrt(np.repeat(colour, 2))
+    unknowns, white = fit.unknowns, fit.projected.covariance
+    covariance = white * np.outer(scale, scale)
     beside: dict[str, Any] = {}
     if rippling and ripple == "auto":
         unknowns, covariance, probable = averaged_over_ripple(
@@ -81,16 +85,15 @@ def spin_down(
         )
     else:
         probable = np.ones(len(rippling))
-    theta = readings.angle - pattern_series(chosen, fit.pattern, readings.angle)
-    colour = noise_spectrum_at(theta, fit.residuals, chosen, sum(s.turns for s in stretches))
     m = 2 * len(chosen)
-    scale = np.sqrt(np.repeat(colour, 2))
-    pattern_covariance = covariance[:m, :m] * np.outer(scale, scale)
+    colour = colour[: len(chosen)]
+    pattern_covariance = covariance[:m, :m]
     noise = math.sqrt(fit.projected.variance)
     limit = noise * math.sqrt(2.0 / float(fit.valid.sum()))
     alone = fit.projected.alone[:m]
     with np.errstate(divide="ignore"):
-        retained = np.minimum(fit.projected.variance / (np.diagonal(covariance)[:m] * alone), 1.0)
+        spread = np.diagonal(covariance)[:m] / scale[:m] ** 2
+        retained = np.minimum(fit.projected.variance / (spread * alone), 1.0)
     retained = np.where(fit.projected.seen[:m], retained, 0.0)
     table = order_estimates(chosen, unknowns[:m], pattern_covariance, retained, limit)
     if rippling:
@@ -119,7 +122,7 @@ def spin_down(
             f"{first:g} and less of those above: the standard errors allow for it"
         )
     notes += _notes(fit, readings, colour, chosen, given, sums, separable, ripple)
-    tests = held_out_patterns(fit, [o.order for o in given or sums or table], float(colour.max()))
+    tests = held_out_patterns(fit, [o.order for o in given or sums or table], colour)
     notes += _test_notes(tests, rippling)
     in_model = list(given)
     if loop == "open":

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, f_tail
+from .dense import DenseFit
 from .readings import SegmentReadings
 from .result import ARCSEC, HeldOutPattern
 from .steady import SteadyFit, fit_steady
@@ -23,11 +24,11 @@ _TURNS: Final = 4.0
 
 
 def judged_patterns(
-    first: Array, second: Array, covariance: Array, noise: float, names: tuple[str, str]
+    first: Array, second: Array, chance: float, noise: float, names: tuple[str, str]
 ) -> HeldOutPattern:
     """Two patterns (cosine and sine in turn, radians) of two parts of the readings.
 
-    ``covariance`` is that of ``second - first``.
+    ``chance`` is that of so great a difference by noise alone.
     """
     gap = second - first
     return HeldOutPattern(
@@ -35,7 +36,17 @@ def judged_patterns(
         judged_on=names[1],
         rms_before=math.hypot(noise, math.sqrt(0.5 * float(second @ second))) * ARCSEC,
         rms_after=math.hypot(noise, math.sqrt(0.5 * float(gap @ gap))) * ARCSEC,
-        p=chance_of_difference(gap, covariance),
+        p=chance,
+    )
+
+
+def chance_of_parts(fit: DenseFit) -> float:
+    """Of so great a difference between the patterns of two parts (`patterns_apart`)."""
+    m = fit.patterns.size // 2
+    told = fit.projected.told[:m] & fit.projected.told[m:]
+    turn = np.concatenate([-np.eye(m)[told], np.eye(m)[told]], axis=1)
+    return chance_of_difference(
+        turn @ fit.patterns, turn @ fit.covariance @ turn.T, fit.projected.freedom
     )
 
 
@@ -57,7 +68,7 @@ def chance_of_difference(gap: Array, covariance: Array, freedom: float = math.in
 
 
 def held_out_patterns(
-    fit: SteadyFit, tested: Sequence[float], colour: float = 1.0
+    fit: SteadyFit, tested: Sequence[float], colour: Array
 ) -> dict[str, HeldOutPattern]:
     """Odd turns against even ones, fast against slow, one direction against the other.
 
@@ -106,7 +117,7 @@ def _compare(
     groups: NDArray[np.int64],
     tested: Sequence[float],
     names: tuple[str, str],
-    colour: float,
+    colour: Array,
     *,
     ripple: bool = True,
 ) -> HeldOutPattern:
@@ -123,7 +134,9 @@ def _compare(
     rows = np.array(
         [2 * i + j for i, k in enumerate(fit.orders) if k in tested for j in (0, 1)], dtype=np.int64
     )
-    covariance = parts.projected.covariance
+    scale = np.ones(len(parts.unknowns))
+    scale[: 2 * m] = np.sqrt(np.tile(np.repeat(colour, 2), 2))
+    covariance = parts.projected.covariance * np.outer(scale, scale)
     difference = (
         covariance[np.ix_(rows, rows)]
         + covariance[np.ix_(rows + m, rows + m)]
@@ -132,5 +145,9 @@ def _compare(
     )
     noise = math.sqrt(parts.projected.variance)
     return judged_patterns(
-        parts.unknowns[rows], parts.unknowns[rows + m], colour * difference, noise, names
+        parts.unknowns[rows],
+        parts.unknowns[rows + m],
+        chance_of_difference(parts.unknowns[rows + m] - parts.unknowns[rows], difference),
+        noise,
+        names,
     )

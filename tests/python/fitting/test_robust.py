@@ -86,6 +86,25 @@ def test_spikes_are_found_without_a_model():
     assert without_spikes(clean) is clean
 
 
+@pytest.mark.parametrize("noise", [1.0, 0.5, 0.1])
+def test_noise_on_a_slope_is_no_spike(noise):
+    """On a slope most readings are the median of their neighbours: one in 17 was set aside."""
+    print("seeds 21 to 40")
+    theta = np.arange(0.0, 360.0, 3.0)
+    turn = np.radians(theta)
+    for seed in range(21, 41):
+        rng = np.random.default_rng(seed)
+        error = 80.0 * np.cos(turn - rng.uniform(0.0, 6.0)) + noise * rng.normal(size=theta.size)
+        run = ta.CalibrationRun(theta, theta + error / 3600.0, 360.0)
+        assert without_spikes(run) is run
+        error[50] += 40.0
+        told = without_spikes(ta.CalibrationRun(theta, theta + error / 3600.0, 360.0))
+        aside = np.flatnonzero(told.weights == 0.0)
+        # On a slope of eight times the noise its neighbours are off the median beside it.
+        assert 50 in aside
+        assert set(aside) <= set(range(47, 54))
+
+
 @pytest.mark.parametrize("loss", ["huber", "tukey"])
 def test_given_weights_multiply_those_of_a_robust_loss(loss):
     """Readings given four times count as one of weight 4, whatever the loss."""

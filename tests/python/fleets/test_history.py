@@ -26,7 +26,19 @@ def turned(rng, size):
 def calibration():
     """Of one order, its coefficients known to a variance of 0.5 for readings of variance 1."""
     return Calibration(
-        "u", None, np.zeros(2), 0.5 * np.eye(2), 0.0, 0.1, 1.0, 9.0, 12, 1, np.zeros(1), 0.0
+        "u",
+        None,
+        np.zeros(2),
+        0.5 * np.eye(2),
+        0.0,
+        0.1,
+        1.0,
+        9.0,
+        12,
+        1,
+        np.zeros(1),
+        0.0,
+        np.zeros(1),
     )
 
 

@@ -161,7 +161,19 @@ def test_a_zero_that_moved_has_its_own_limit_and_statistic():
 def blank(when=None):
     """A calibration of one order, known well."""
     return Calibration(
-        "u", when, np.zeros(2), 1e-6 * np.eye(2), 0.0, 1e-6, 1.0, 9.0, 12, 1, np.zeros(1), 0.0
+        "u",
+        when,
+        np.zeros(2),
+        1e-6 * np.eye(2),
+        0.0,
+        1e-6,
+        1.0,
+        9.0,
+        12,
+        1,
+        np.zeros(1),
+        0.0,
+        np.zeros(1),
     )
 
 

@@ -49,6 +49,24 @@ def test_an_eccentric_unit_is_found(orders):
     assert others <= 6
 
 
+def test_a_unit_set_aside_before_a_hidden_outlier_is_none_by_that():
+    """Five far off in one order hide one in another; before, half of the fleets had a sixth."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 2)
+    own, found, others = [np.zeros((24, 2, 2))] * 4, 0, 0
+    for _ in range(100):
+        values = drawn(rng, 24, 4)
+        values[1][:5] += 60.0 * np.array([[np.cos(u), np.sin(u)] for u in range(5)])
+        values[0][5] += [9.0, 0.0]
+        told = deviates(values, own, True, shares=level_by_order(np.arange(1.0, 5.0)))
+        found += told.outlying[:6].all()
+        others += told.outlying[6:].any()
+        assert (told.unit[told.outlying] <= told.limit).all()
+    print(found, others)
+    assert found >= 75
+    assert others <= 4
+
+
 def test_several_outliers_do_not_hide_each_other():
     print("seed", SEED)
     rng = np.random.default_rng(SEED + 1)

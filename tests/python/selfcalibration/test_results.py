@@ -17,7 +17,7 @@ from trueangle.selfcalibration.loop import (
     widened_by_loop,
 )
 from trueangle.selfcalibration.model import reference_free_model
-from trueangle.selfcalibration.noisespectrum import noise_spectrum_at, spectrum_at
+from trueangle.selfcalibration.noisespectrum import louder_beside, spectrum_at
 from trueangle.selfcalibration.pattern import pattern_model, pattern_series, pattern_steepness
 from trueangle.selfcalibration.projected import harmonic_rows, harmonic_sum
 from trueangle.selfcalibration.recording import Recording
@@ -84,24 +84,18 @@ def test_orders_with_the_errors_of_their_amplitudes() -> None:
 def test_halves_are_judged_by_chi_squared() -> None:
     rng = np.random.default_rng(2)
     half = np.tril(rng.normal(size=(4, 4))) + 2.0 * np.eye(4)
-    first = rng.normal(size=4)
-    ps = [
-        judged_patterns(first, first + half @ rng.normal(size=4), half @ half.T, 1.0, ("a", "b")).p
-        for _ in range(500)
-    ]
+    ps = [chance_of_difference(half @ rng.normal(size=4), half @ half.T) for _ in range(500)]
     # Kolmogorov's distance of 500 uniform numbers: 1.95 / sqrt(500) once in a thousand.
     away = np.abs(np.sort(ps) - (np.arange(500) + 0.5) / 500).max()
     assert away < 1.95 / math.sqrt(500)
-    found = judged_patterns(
-        np.array([1e-5, 0.0]), np.array([1e-5, 2e-5]), np.eye(2), 3e-5, ("a", "b")
-    )
+    found = judged_patterns(np.array([1e-5, 0.0]), np.array([1e-5, 2e-5]), 0.25, 3e-5, ("a", "b"))
+    assert found.p == 0.25
     assert found.rms_before == pytest.approx(math.sqrt(9.0 + 0.5 * 5.0) * 1e-5 * ARCSEC)
     assert found.rms_after == pytest.approx(math.sqrt(9.0 + 0.5 * 4.0) * 1e-5 * ARCSEC)
     assert (found.fitted_on, found.judged_on) == ("a", "b")
     assert HeldOutPattern("a", "b", 1.0, 2.0, 0.0011).to_dict()["agrees"]
     assert not HeldOutPattern("a", "b", 1.0, 2.0, 0.001).to_dict()["agrees"]
-    none = judged_patterns(np.zeros(0), np.zeros(0), np.zeros((0, 0)), 1e-5, ("a", "b"))
-    assert none.p == 1.0
+    assert chance_of_difference(np.zeros(0), np.zeros((0, 0))) == 1.0
 
 
 def test_so_great_a_difference_is_as_frequent_as_its_chance_says() -> None:
@@ -250,16 +244,19 @@ def test_loud_noise_beside_an_order_is_told() -> None:
     rng = np.random.default_rng(7)
     theta = np.linspace(0.0, 2.0 * np.pi * 40.0, 8000)
     white = rng.normal(size=8000)
-    for turns, loud in ((40.0, True), (5.9, False)):
-        band = sum(
-            rng.normal() * np.cos(k * theta) + rng.normal() * np.sin(k * theta)
-            for k in np.arange(4.5, 5.5, 0.025)
-        )
-        found = noise_spectrum_at(theta, white + 0.3 * band, [2.0, 5.0], turns)
-        assert found[0] < 3.0
-        assert (found[1] > 20.0) == loud
+    band = sum(
+        rng.normal() * np.cos(k * theta) + rng.normal() * np.sin(k * theta)
+        for k in np.arange(4.5, 5.5, 0.025)
+    )
+    loud = white + 0.3 * band
+    found = louder_beside(theta, loud, [2.0, 5.0], np.ones(2))
+    assert found[0] < 3.0
+    assert found[1] > 20.0
+    # What is known already is not counted twice.
+    assert louder_beside(theta, loud, [2.0, 5.0], found)[1] == found[1]
     # Once in a thousand orders, as the level says: of 300 more than four once in a million.
-    assert (noise_spectrum_at(theta, white, list(range(1, 301)), 40.0) != 1.0).sum() <= 4
+    every = list(range(1, 301))
+    assert (louder_beside(theta, white, every, np.ones(300)) != 1.0).sum() <= 4
 
 
 def test_patterns_are_their_sines() -> None:

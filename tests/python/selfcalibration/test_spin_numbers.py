@@ -193,17 +193,23 @@ def test_louder_noise_beside_the_orders_widens_errors_by_its_root(
     assert any("9.0 times the white noise near order 4" in note for note in louder.notes)
 
 
-@pytest.mark.parametrize("place", [0, 2])
-def test_parts_are_held_against_the_loudest_neighbourhood(log, found, place, monkeypatch) -> None:
-    """T^2 of two parts is less by as much as the noise is louder, beside whichever order."""
-    colour = np.ones(3)
-    colour[place] = 5.0
-    monkeypatch.setattr("trueangle.selfcalibration.spindown.noise_spectrum_at", lambda *_: colour)
-    loud = ta.selfcal(log, **OPTIONS)
-    assert loud.held_out.keys() == found.held_out.keys()
+def test_parts_are_held_against_the_noise_beside_their_orders(log, found, monkeypatch) -> None:
+    """T^2 of two parts is less by as much as the noise is louder, that of each order by its own."""
+    sizes = {}
+    for loud in ((5.0, 5.0, 5.0), (5.0, 1.0, 1.0), (1.0, 5.0, 1.0), (1.0, 1.0, 5.0)):
+        monkeypatch.setattr(
+            "trueangle.selfcalibration.spindown.noise_spectrum_at",
+            lambda *_, colour=loud: np.array(colour),
+        )
+        wide = ta.selfcal(log, **OPTIONS).held_out
+        assert wide.keys() == found.held_out.keys()
+        sizes[loud] = {name: stats.chi2.isf(test.p, 6.0) for name, test in wide.items()}
     for name, test in found.held_out.items():
-        plain, wide = (stats.chi2.isf(one.p, 6.0) for one in (test, loud.held_out[name]))
-        assert plain == pytest.approx(5.0 * wide, rel=1e-6), name
+        plain = stats.chi2.isf(test.p, 6.0)
+        every, *single = (one[name] for one in sizes.values())
+        assert plain == pytest.approx(5.0 * every, rel=1e-6), name
+        # Orders hardly correlate: each takes off four fifths of its own part.
+        assert sum(plain - one for one in single) == pytest.approx(0.8 * plain, rel=0.1), name
 
 
 def test_turns_and_readings_of_two_logs_add_up() -> None:

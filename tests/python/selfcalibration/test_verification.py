@@ -47,19 +47,20 @@ def test_a_difference_is_worth_what_both_patterns_and_their_link_say(
         fits.append(_fit(*given, **more))
         return fits[-1]
 
-    def judged(first, second, covariance, *rest, _judged=verification.judged_patterns):
-        taken.append((second - first, covariance))
-        return _judged(first, second, covariance, *rest)
+    def chance(gap, covariance, _chance=verification.chance_of_difference):
+        taken.append((gap, covariance))
+        return _chance(gap, covariance)
 
     monkeypatch.setattr(verification, "fit_steady", fitted)
-    monkeypatch.setattr(verification, "judged_patterns", judged)
+    monkeypatch.setattr(verification, "chance_of_difference", chance)
     monkeypatch.setattr(spindown, "noise_spectrum_at", lambda *_: np.array([4.0, 1.0]))
     assert set(selfcal(log_of(SEED)).held_out) == {"odd_even_turns", "speeds"}
     contrast = np.hstack([-np.eye(4), np.eye(4)])
     for fit, (gap, covariance) in zip(fits, taken, strict=True):
         np.testing.assert_allclose(gap, contrast @ fit.unknowns[:8], rtol=1e-9)
         whole = contrast @ fit.projected.covariance[:8, :8] @ contrast.T
-        np.testing.assert_allclose(covariance, 4.0 * whole, rtol=1e-9, atol=1e-9 * whole.max())
+        whole *= np.outer([2.0, 2.0, 1.0, 1.0], [2.0, 2.0, 1.0, 1.0])
+        np.testing.assert_allclose(covariance, whole, rtol=1e-9, atol=1e-9 * whole.max())
 
 
 @pytest.mark.parametrize(("part", "size"), [("slow", 400.0), ("fast", 0.0)])

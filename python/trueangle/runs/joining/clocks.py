@@ -26,8 +26,9 @@ _ONE_SPEED = 0.02
 _ORDERS = (1, 2, 3, 4)
 #: Rounds of refining; each is linear, and the third changes nothing measurable.
 _ROUNDS = 8
-#: Standard errors that a rate must differ from zero by.
+#: Standard errors from which a rate is taken as it is, and what two quartzes may differ by, in ppm.
 _SIGNIFICANT = 5.0
+_QUARTZ = 100.0
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ class Clocks:
 
     with ``t₀`` the first reading of A; standard errors in ``offset_std``, ``rate_std``
     (None where it was declared or the motion does not tell), that of a time on the other
-    clock, root mean square over the log, in ``timing_std``.
+    clock, root mean square over the log, in ``timing_std``, and the covariance of offset and rate
+    in ``shared``.
     """
 
     start: float
@@ -49,6 +51,7 @@ class Clocks:
     offset_std: float | None = None
     rate_std: float | None = None
     timing_std: float = 0.0
+    shared: float = 0.0
     notes: tuple[str, ...] = ()
 
     def to_other(self, time: Array) -> Array:
@@ -150,16 +153,45 @@ def _refined(indicated: Stream, reference: Stream, clocks: Clocks, wanted: list[
     """Least squares over the readings of A, beside a zero, a ramp and the lowest orders."""
     if "rate" in wanted:
         found = _solved(indicated, reference, clocks, wanted)
-        if (
-            found is not None
-            and found.rate_std is not None
-            and abs(found.rate) > _SIGNIFICANT * found.rate_std
-        ):
-            return found
+        if found is not None and found.rate_std is not None:
+            time = indicated.time - clocks.start
+            # Of a rate that stands out nothing is assumed.
+            is_sure = abs(found.rate) > _SIGNIFICANT * found.rate_std
+            return found if is_sure else _as_quartzes(found, time)
     if "offset" not in wanted:
         return clocks
     only = _solved(indicated, reference, clocks, ["offset"])
     return clocks if only is None else only
+
+
+def _as_quartzes(found: Clocks, time: Array) -> Clocks:
+    """Offset and rate where two clocks run as two quartzes do: T is the variance of their rates.
+
+    The estimate c of covariance C, its row r that of the rate, becomes
+
+    ::
+
+        c - C_r rate / (C_rr + T),    C - C_r C_r' / (C_rr + T)
+
+    An offset of clocks that were taken as equal would be told better than it is known.
+    """
+    std = found.rate_std
+    assert std is not None
+    joint = np.array([[(found.offset_std or 0.0) ** 2, found.shared], [found.shared, std**2]])
+    spread = std**2 + _QUARTZ**2
+    offset, rate = np.array([found.offset, found.rate]) - joint[1] * found.rate / spread
+    covariance = joint - np.outer(joint[1], joint[1]) / spread
+    timed = np.column_stack([np.ones_like(time), 1e-6 * time])
+    timing = float(np.mean(np.einsum("ij,jk,ik->i", timed, covariance, timed)))
+    return replace(
+        found,
+        offset=float(offset),
+        rate=float(rate),
+        offset_std=None if found.offset_std is None else math.sqrt(max(covariance[0, 0], 0.0)),
+        rate_std=math.sqrt(covariance[1, 1]),
+        shared=float(covariance[0, 1]),
+        timing_std=math.sqrt(max(timing, 0.0)),
+    )
 
 
 def _solved(
@@ -220,6 +252,7 @@ def _solved(
         offset_std=std.get("offset"),
         rate_std=std.get("rate"),
         timing_std=timing,
+        shared=float(inner[0, 1] / (scale[0] * scale[1])) if len(wanted) == 2 else 0.0,
     )
 
 

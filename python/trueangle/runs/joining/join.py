@@ -57,7 +57,8 @@ def join(
         ``reference_*``, both with ``time_s`` (or another unit of time).
     offset_s, rate_ppm : float, optional
         Of the reference's clock against the indicated one, where it is known (0 and 0 for
-        one clock); else estimated from the motion, as far as that tells.
+        one clock); else estimated from the motion, as far as that tells: a rate that is hardly
+        known is taken for one of two quartzes, 0 +- 100 ppm beforehand.
     max_gap_s : float, optional
         Longest pause of the reference that is interpolated over (default: five times its
         typical step).
