@@ -28,7 +28,13 @@ from .delay import delay_finding
 from .discrepancy import discrepancy_of, unfolded_error
 from .drive import diagnose_drive
 from .finding import Finding
-from .findings import findings_of, reconsidered_findings, scatter_doubt, scatter_finding
+from .findings import (
+    equal_scatter,
+    findings_of,
+    reconsidered_findings,
+    scatter_doubt,
+    scatter_finding,
+)
 from .gates import many_causes
 from .gearedlines import GearedLinesRatio
 from .goodness import Unexplained, goodness_of_fit
@@ -191,6 +197,8 @@ def _diagnosis(
     for item in account.choice.scatter:
         if spoilt is not None or (in_doubt and item.size < OUTLYING_ANYWAY):
             spots.append(scatter_doubt(item, spoilt))
+        elif equal := equal_scatter(item):
+            spots.append(equal)
         else:
             findings.append(scatter_finding(item, rest))
     if seen.ratio is not None:

@@ -253,7 +253,26 @@ def scatter_finding(item: ScatterFinding, unexplained: Unexplained) -> Finding:
     """Finding of a cause of the scatter."""
     evidence = {"bic_gain": item.bic_gain}
     status, reason = confirmation_status(item.cause, None, None, (), unexplained)
-    return Finding(item.cause, item.parameters, evidence, None, [], item.effects, status, reason)
+    if item.doubt:
+        status, reason = NOT_CONFIRMED, item.doubt
+    rivals = [*item.rivals]
+    return Finding(
+        item.cause, item.parameters, evidence, None, rivals, item.effects, status, reason
+    )
+
+
+def equal_scatter(item: ScatterFinding) -> Ambiguity | None:
+    """That other causes of the scatter explain as much as one, where they do."""
+    equal = [(other, gap) for other, gap in item.rivals if gap < NEW_CAUSE]
+    if not equal:
+        return None
+    less = ", ".join(f"{other} {gap:.1f} less" for other, gap in equal)
+    return replace(
+        _alike(EFFECTS[item.cause], [other for other, _ in equal]),
+        because=f"they explain the scatter of these readings alike (BIC: {less} than {item.cause})",
+        evidence=item.bic_gain,
+        estimates={item.cause: item.parameters, **item.alternatives},
+    )
 
 
 def scatter_doubt(item: ScatterFinding, fault: DataFault | None = None) -> Ambiguity:

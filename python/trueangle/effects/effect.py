@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -296,6 +296,14 @@ class ScatterFinding:
         Inverse variances, of mean 1 (uneven noise), or 0 for outliers.
     size : float
         Of the scatter, in standard deviations of one reading.
+    blocks : tuple of str
+        What uneven noise follows, of what its cause knows.
+    rivals : tuple of (str, float)
+        Other causes of the scatter in its place, and how much less each explains (BIC).
+    alternatives : dict of str to Parameters
+        What those would be.
+    doubt : str
+        Why it is not confirmed, whatever else there is.
     """
 
     cause: str
@@ -304,6 +312,10 @@ class ScatterFinding:
     effects: list[Effect]
     weights: Array
     size: float = 1.0
+    blocks: tuple[str, ...] = ()
+    rivals: tuple[tuple[str, float], ...] = ()
+    alternatives: Mapping[str, Parameters] = field(default_factory=dict)
+    doubt: str = ""
 
 
 def telling_apart(one: type[Effect], other: type[Effect]) -> str | None:
