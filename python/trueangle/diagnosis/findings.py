@@ -32,6 +32,9 @@ RIVALS = 3
 #: Findings, in the order found, for which rivals are tried.
 RIVALLED = 4
 
+#: Columns whose causes are no ramp in angle, where they make one in these runs.
+RECORDED = {"torque", "temperature", "current", "coupled"}
+
 #: Why a finding of an account that was ended early is not confirmed.
 NOT_HELD_OUT = "the account was ended before its gain on the readings held out was measured"
 
@@ -83,7 +86,7 @@ def findings_of(
             if len(findings) < RIVALLED and not current_deadline().over
             else []
         )
-        if equal := _equals(cause, rivals):
+        if equal := _equals(cause, rivals, spots):
             evidence = sum(regression.terms[k].bic_gain for k in group)
             spots.append(replace(_in_doubt(equal, regression, group), evidence=evidence))
             continue
@@ -187,7 +190,11 @@ def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, flo
         best = best_of(candidates)
         return best[-1][2] if len(best) == RIVALS else 0.0
 
-    best = best_of(candidate_extensions(rest, others, least))
+    tried = candidate_extensions(rest, others, least)
+    # A special case that is not named itself is no simpler form either.
+    hidden = (EFFECTS[name].imitate(rest) for name in others if not _is_form(cause, name))
+    tried += [(found, rest, found.bic_gain) for found in hidden if found is not None]
+    best = best_of(tried)
     gaps = [(candidate[0].cause, own - _settled_gain(candidate)) for candidate in best]
     return sorted(gaps, key=lambda item: item[1])
 
@@ -205,17 +212,24 @@ def _settled_gain(candidate: Candidate) -> float:
     return gain - extension.bic_gain + start.bic - settled.bic
 
 
-def _equals(cause: str, rivals: Sequence[tuple[str, float]]) -> Ambiguity | None:
+def _equals(
+    cause: str, rivals: Sequence[tuple[str, float]], spots: Sequence[Ambiguity]
+) -> Ambiguity | None:
     """That other causes explain as much as one, where they do; none strongly less.
 
     What contains it or is contained in it is the same cause in another form, and explains for it
     where noise that follows a misfit makes the simpler form the better one; what takes up
-    anything is no cause; a line and a ramp are what is seen, whatever makes them. A step so near
-    an end of its run that the run's own zero explains as much is no step.
+    anything is no cause; a line is what is seen, whatever makes it, and so is a ramp among those
+    that share its form for the design alone (``spots``). What follows a load or a temperature
+    that was recorded is not seen to follow the angle: in motion under others it is no ramp. A step
+    so near an end of its run that the run's own zero explains as much is no step.
     """
     effect = EFFECTS[cause]
-    if cause in (MissingOrder.kind, ScaleError.kind):
+    if cause == MissingOrder.kind:
         return None
+    shared = {other for spot in spots if spot.common == cause for other in spot.causes}
+    if cause == ScaleError.kind:
+        shared |= {other for other, _ in rivals if not RECORDED & {*EFFECTS[other].needs}}
     if is_flexible(effect):
         steps = effect.draws_zeros
         equal = [
@@ -224,12 +238,12 @@ def _equals(cause: str, rivals: Sequence[tuple[str, float]]) -> Ambiguity | None
             if steps and gap < NEW_CAUSE and effect in EFFECTS[other].confused_with
         ]
         return _alike(effect, equal) if equal else None
-    forms = {other for other, _ in rivals if _is_another_form(effect, EFFECTS[other])}
+    forms = {other for other, _ in rivals if _is_form(cause, other)}
     own = min([0.0, *(gap for other, gap in rivals if other in forms)])
     equal = [
         other
         for other, gap in rivals
-        if gap - own < NEW_CAUSE and other not in forms and not is_flexible(EFFECTS[other])
+        if gap - own < NEW_CAUSE and other not in forms | shared and not is_flexible(EFFECTS[other])
     ]
     return _alike(effect, equal) if equal else None
 
@@ -245,8 +259,10 @@ def _alike(effect: type[Effect], equal: Sequence[str]) -> Ambiguity:
     )
 
 
-def _is_another_form(effect: type[Effect], other: type[Effect]) -> bool:
-    return effect in other.contains or other in effect.contains
+def _is_form(cause: str, other: str) -> bool:
+    """One of two causes contains the other one."""
+    one, two = EFFECTS[cause], EFFECTS[other]
+    return one in two.contains or two in one.contains
 
 
 def scatter_finding(item: ScatterFinding, unexplained: Unexplained) -> Finding:

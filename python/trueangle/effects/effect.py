@@ -165,6 +165,14 @@ class Effect(TabledParameters):
         return None
 
     @classmethod
+    def imitate(cls, regression: Regression) -> Extension | None:
+        """What it would explain in the place of another cause, where it is not named itself.
+
+        None where `propose` has all of it.
+        """
+        return None
+
+    @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
         """Evidence of this cause in the scatter about what is known, or None."""
         return None

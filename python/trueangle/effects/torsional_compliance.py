@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..estimation.extension import Extension
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns, line_sum
@@ -18,7 +19,7 @@ from ..support.angles import from_arcsec
 from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .effect import Effect
 from .factor import FactorEffect
-from .search import Array, Fitted
+from .search import Array, Fitted, shows_line
 
 
 @dataclass(frozen=True)
@@ -60,10 +61,22 @@ class TorsionalCompliance(FactorEffect):
     @classmethod
     def shapes(cls, regression: Regression) -> list[dict[str, Any]]:
         torque = regression.signals.torque
-        # Where its columns are those of a line, a line is what the readings show.
-        if torque is None or not torque.any() or cls._is_line(regression):
+        if torque is None or not torque.any():
             return []
-        return [{"what": "zero"}, {"what": "line", "order": 1.0}]
+        if not cls._is_line(regression):
+            return [{"what": "zero"}, {"what": "line", "order": 1.0}]
+        # Where its columns are those of a line, a line is what the readings show: but on an arc on
+        # which none is looked for.
+        shown = bool(shows_line(regression.signals, np.ones(1))[0])
+        return [] if shown else [{"what": "zero"}]
+
+    @classmethod
+    def imitate(cls, regression: Regression) -> Extension | None:
+        if not (unloaded(regression.signals) or cls.shapes(regression)):
+            columns = torque_of(regression.signals)[:, None]
+            shape = {"what": "zero"}
+            return regression.propose(cls.kind, shape, columns, log_grid=float(np.log(2.0)))
+        return None
 
     @classmethod
     def report(
