@@ -32,6 +32,9 @@ RIVALS = 3
 #: Findings, in the order found, for which rivals are tried.
 RIVALLED = 4
 
+#: Share of the evidence of a finding by which what another one leaves may differ, and be the same.
+SAME = 3e-4
+
 #: Columns whose causes are no ramp in angle, where they make one in these runs.
 RECORDED = {"torque", "temperature", "current", "coupled"}
 
@@ -195,21 +198,27 @@ def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, flo
     hidden = (EFFECTS[name].imitate(rest) for name in others if not _is_form(cause, name))
     tried += [(found, rest, found.bic_gain) for found in hidden if found is not None]
     best = best_of(tried)
-    gaps = [(candidate[0].cause, own - _settled_gain(candidate)) for candidate in best]
+    gaps = [(candidate[0].cause, _gap(regression, own, candidate)) for candidate in best]
     return sorted(gaps, key=lambda item: item[1])
 
 
-def _settled_gain(candidate: Candidate) -> float:
-    """Net gain of a candidate once all else is fitted beside it, as it is beside a finding.
+def _gap(regression: Regression, own: float, candidate: Candidate) -> float:
+    """How much less a candidate explains once all else is fitted beside it, as beside a finding.
 
     Without either cause readings are clipped, and the noise is larger, than with one: what a
-    candidate gains there is less than the finding that is one column with it has gained.
+    candidate gains there is less than the finding that is one column with it has gained. One that
+    leaves the same with as many parameters is that column: how far each was searched for is no
+    reason to name one.
     """
     extension, start, gain = candidate
     if current_deadline().over:
-        return gain
+        return own - gain
     settled = start.with_terms([*start.terms, extension])
-    return gain - extension.bic_gain + start.bic - settled.bic
+    gap = own - (gain - extension.bic_gain + start.bic - settled.bic)
+    apart = abs(settled.deviance - regression.deviance)
+    freedom = [sum(term.parameters for term in each.terms) for each in (settled, regression)]
+    is_same = apart < SAME * abs(own) and freedom[0] == freedom[1]
+    return min(gap, 0.0) if is_same else gap
 
 
 def _equals(

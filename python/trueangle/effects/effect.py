@@ -72,6 +72,8 @@ class Effect(TabledParameters):
         Its form leaves nothing of it, however large it is: steps of a zero, ratios of teeth.
     changes_lines : bool
         It takes or gives a part of the pattern's own lines on average.
+    form_follows : bool
+        Its form follows what else is fitted, and is asked for again when that has changed.
     is_doubted : bool
         A blind spot that names it is reason enough not to name it.
     weighs : bool
@@ -105,6 +107,7 @@ class Effect(TabledParameters):
     draws_zeros: ClassVar[bool] = False
     has_exact_form: ClassVar[bool] = False
     changes_lines: ClassVar[bool] = False
+    form_follows: ClassVar[bool] = False
     is_doubted: ClassVar[bool] = True
     weighs: ClassVar[bool] = False
     rounds: ClassVar[bool] = False
