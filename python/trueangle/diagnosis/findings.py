@@ -186,8 +186,11 @@ def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, flo
     others = [name for name in EFFECTS if name != cause]
 
     def best_of(candidates: Sequence[Candidate]) -> list[Candidate]:
-        found = [candidate for candidate in candidates if candidate[0].deviance > 0.0]
-        return sorted(found, key=lambda candidate: -candidate[2])[:RIVALS]
+        found: dict[str, Candidate] = {}
+        for candidate in sorted(candidates, key=lambda candidate: -candidate[2]):
+            if candidate[0].deviance > 0.0:
+                found.setdefault(candidate[0].cause, candidate)
+        return [*found.values()][:RIVALS]
 
     def least(candidates: Sequence[Candidate]) -> float:
         best = best_of(candidates)
