@@ -9,8 +9,8 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis.discrepancy import unfolded_error
-from trueangle.diagnosis.findings import _equals, _rivals
 from trueangle.diagnosis.penalty import NEW_CAUSE
+from trueangle.diagnosis.rivals import equal_causes, rivals_of
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
@@ -52,7 +52,7 @@ ALMOST, ENOUGH = NEW_CAUSE - 0.1, NEW_CAUSE + 0.1
     ],
 )  # fmt: skip
 def test_what_explains_as_much_is_named_beside_it(cause, rivals, causes) -> None:
-    found = _equals(cause, rivals, [])
+    found = equal_causes(cause, rivals, [])
     assert (found and found.causes) == causes
     if found:
         assert found.supported
@@ -157,7 +157,7 @@ def test_a_rival_is_as_far_behind_as_its_own_account():
     signals = join_runs(runs)
     start = Regression.of(signals, unfolded_error(runs), base.surroundings)
     chosen = start.with_terms([MissedCounts.propose(start)])
-    for cause, gap in _rivals(chosen, [0]):
+    for cause, gap in rivals_of(chosen, [0]):
         forms = (EFFECTS[cause].propose(start), EFFECTS[cause].imitate(start))
         told = [start.with_terms([form]).bic - chosen.bic for form in forms if form is not None]
         assert gap == pytest.approx(min(told), abs=1e-6), cause
