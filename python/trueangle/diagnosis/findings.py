@@ -71,6 +71,7 @@ def findings_of(
         terms = [(*fitted[k], widened.robust_covariance(k)) for k in group]
         cause = terms[0][0].cause
         parameters, effects = EFFECTS[cause].report(widened, terms)
+        parameters |= EFFECTS[cause].form_limits(regression, terms)
         if origins[group[0]]:
             parameters["explanations"] = _explanations(parameters, cause, origins[group[0]])
         rivals = (

@@ -205,6 +205,11 @@ class Effect(TabledParameters):
         raise NotImplementedError
 
     @classmethod
+    def form_limits(cls, regression: Regression, terms: Sequence[Fitted]) -> Parameters:
+        """How far its error may depart from its form, by what the readings tell of that."""
+        return {}
+
+    @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         """What the design of the runs cannot tell of it; the readings are not looked at.
 

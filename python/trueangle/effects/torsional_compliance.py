@@ -97,6 +97,30 @@ class TorsionalCompliance(FactorEffect):
         return parameters, [effect]
 
     @classmethod
+    def form_limits(cls, regression: Regression, terms: Sequence[Fitted]) -> Parameters:
+        """``departure_arcsec``: of a cube of the torque from proportion, where that is largest.
+
+        A spring that stiffens too little to be seen is a linear one to within so much.
+        """
+        torque = torque_of(regression.signals)
+        top = float(np.abs(torque).max())
+        if top == 0.0 or cls.single(terms, "zero") is None:
+            return {}
+        share = torque / top
+        low = np.hstack([line_columns(regression.signals.theta, k) for k in (1, 2, 3)])
+        cube = (share**3)[:, None]
+        if share_left(regression, cube, low, share[:, None]) < OWN_POWER:
+            return {}  # too few loads to tell
+        column, _ = regression.projected(cube)
+        power = float(column[:, 0] @ column[:, 0])
+        cubic = float(column[:, 0] @ regression.r) / power
+        # What proportion cannot take of the cube.
+        slope = float(share @ share**3) / float(share @ share)
+        most = float(np.abs(share**3 - slope * share).max())
+        std = float(np.sqrt(regression.variance / power))
+        return {"departure_arcsec": quantity(cubic * most, std * most)}
+
+    @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         because = unloaded(regression.signals)
         if because:
