@@ -26,6 +26,7 @@ from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
 from .remainder import unexplained_remainder
 from .rounding import account_beyond_rounding, is_rounding_only, unrounded
 from .selection import select_causes
+from .unevennoise import uneven_noise
 from .unnamed import is_named
 
 #: Readings used at most: beyond, one of every so many in a row is drawn at random.
@@ -218,40 +219,41 @@ def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:
     scatter: list[ScatterFinding] = []
     if current_deadline().over:
         return CauseSelection(start, chosen, scatter, spots)  # what is left is no scatter yet
-    uneven = _uneven(start, chosen)
-    if uneven is not None and uneven.bic_gain > NEW_SCATTER + misfit_of_scatter(start, chosen):
-        scatter.append(uneven)
-        start = start.weighted(uneven.weights)
+    least = NEW_SCATTER + misfit_of_scatter(start, chosen)
+    uneven = [item for item in _uneven(start, chosen) if item.bic_gain > least]
+    if uneven:
+        scatter += uneven
+        start = start.weighted(uneven[0].weights)
         chosen = select_causes(start, chosen.terms)
     if not all(map(is_named, chosen.terms)) and not unexplained_remainder(chosen).found:
         chosen = select_causes(start, unnamed=False)
     chosen = account_beyond_rounding(start, in_common_form(exchanged_causes(chosen), spots))
-    scatter += [i for i in _scatter(chosen, weighs=False) if i.bic_gain > NEW_CAUSE]
+    scatter += [i for i in _unweighing(chosen) if i.bic_gain > NEW_CAUSE]
     return CauseSelection(start, chosen, scatter, spots)
 
 
-def _uneven(start: Regression, chosen: Regression) -> ScatterFinding | None:
-    """The strongest cause of uneven noise, with outliers (bursts above all) put aside."""
-    found = next(iter(_scatter(chosen, weighs=True)), None)
-    if found is None:
-        return None
-    others = _scatter(chosen, weighs=False)
-    aside = [i.weights < ASIDE for i in others if i.bic_gain > max(found.bic_gain, NEW_CAUSE)]
+def _uneven(start: Regression, chosen: Regression) -> list[ScatterFinding]:
+    """Causes of uneven noise, strongest first, with outliers (bursts above all) put aside."""
+    found = uneven_noise(unrounded(chosen))
+    if not found:
+        return []
+    limit = max(found[0].bic_gain, NEW_CAUSE)
+    aside = [i.weights < ASIDE for i in _unweighing(chosen) if i.bic_gain > limit]
     rows = np.any(aside, axis=0)
     if not rows.any():
         return found
     cleaned = start.of_readings(start.readings.less(np.where(rows, chosen.left, 0.0)))
-    return next(iter(_scatter(cleaned.with_terms(chosen.terms), weighs=True)), None)
+    return uneven_noise(unrounded(cleaned.with_terms(chosen.terms)))
 
 
-def _scatter(regression: Regression, weighs: bool) -> list[ScatterFinding]:
-    """Causes of the scatter, of those that weigh readings or not, strongest first."""
-    asked = [effect for effect in EFFECTS.values() if effect.weighs == weighs]
+def _unweighing(regression: Regression) -> list[ScatterFinding]:
+    """Causes of the scatter of those that give readings no weights, strongest first."""
     before = unrounded(regression)
     found = [
         item
-        for effect in asked
-        if (item := effect.find_scatter(regression if effect.rounds else before)) is not None
+        for effect in EFFECTS.values()
+        if not effect.weighs
+        and (item := effect.find_scatter(regression if effect.rounds else before)) is not None
     ]
     return sorted(found, key=lambda item: -item.bic_gain)
 

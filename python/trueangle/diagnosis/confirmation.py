@@ -19,6 +19,7 @@ from .formerrors import FORM
 from .gain import Gain
 from .goodness import FREE_PATH, Unexplained
 from .goodness.periodogram import order_test, time_test
+from .goodness.zeros import ZEROS
 from .penalty import NEW_CAUSE, regression_without
 from .remainder import free_paths, remainder_of
 from .runzeros import CHANCE, chance_between_runs
@@ -109,6 +110,9 @@ def _of_scattered_zeros(
     chance = chance_between_runs(regression, group, unexplained)
     if chance <= CHANCE:
         return ""
+    if not any(item.test == ZEROS and item.p < CHANCE for item in unexplained.evidence):
+        runs = regression.signals.runs
+        return f"it shows in the zeros of {runs} runs alone, and each may have one of its own"
     return (
         "the zeros of the runs scatter beyond the noise, which makes as much of it in "
         f"{regression.signals.runs} runs by chance (p {chance:.2g})"

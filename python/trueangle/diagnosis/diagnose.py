@@ -24,12 +24,19 @@ from ..support.blas import one_blas_thread
 from ..support.deadline import Deadline, current_deadline, with_deadline
 from .account import MOST_READINGS, account_of
 from .candidates import candidates_above
+from .confirmation import NOT_CONFIRMED
 from .delay import delay_finding
 from .discrepancy import discrepancy_of, unfolded_error
 from .drive import diagnose_drive
 from .finding import Finding
-from .findings import findings_of, reconsidered_findings, scatter_doubt, scatter_finding
-from .gates import many_causes
+from .findings import (
+    equal_scatter,
+    findings_of,
+    reconsidered_findings,
+    scatter_doubt,
+    scatter_finding,
+)
+from .gates import many_causes, not_the_only_ratio
 from .gearedlines import GearedLinesRatio
 from .goodness import Unexplained, goodness_of_fit
 from .judgedbeliefs import judged_beliefs
@@ -162,13 +169,13 @@ def _diagnosis(
     gain: bool,
 ) -> Diagnosis:
     at = current_deadline()
-    found = measured if log is None else log.runs
-    every = join_runs(found)
+    runs = measured if log is None else log.runs
+    every = join_runs(runs)
     if len(every) < LEAST_READINGS:
         raise ArgumentError(
             f"{len(every)} readings cannot support a diagnosis: give at least {LEAST_READINGS}"
         )
-    error = unfolded_error(found)
+    error = unfolded_error(runs)
     with at.part(FOR_CHOICE):
         account = account_of(every, error, stated)
     seen = account.seen
@@ -191,10 +198,15 @@ def _diagnosis(
     for item in account.choice.scatter:
         if spoilt is not None or (in_doubt and item.size < OUTLYING_ANYWAY):
             spots.append(scatter_doubt(item, spoilt))
+        elif equal := equal_scatter(item):
+            spots.append(equal)
         else:
             findings.append(scatter_finding(item, rest))
     if seen.ratio is not None:
-        findings.append(_ratio_finding(seen.ratio))
+        found = _ratio_finding(seen.ratio)
+        findings.append(found)
+        if not found.confirmed:
+            corrected = replace(corrected, joint=stated.joint)
     if seen.delay is not None:
         findings.append(delay_finding(seen.delay, chosen, first, gain and not at.over, rest))
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
@@ -255,7 +267,10 @@ def _ratio_finding(ratio: GearedLinesRatio) -> Finding:
     if ratio.alike:
         parameters["aliases"] = quantity(list(ratio.alike))
     z = (ratio.gear_ratio - ratio.believed) / max(ratio.std, 1e-300)
-    return Finding(WrongGearRatio.kind, parameters, {"bic_gain": min(z * z, 1e12)}, None, [])
+    evidence = {"bic_gain": min(z * z, 1e12)}
+    found = Finding(WrongGearRatio.kind, parameters, evidence, None, [])
+    reason = not_the_only_ratio(found)
+    return replace(found, status=NOT_CONFIRMED, reason=reason) if reason else found
 
 
 def _structure(start: Regression) -> dict[str, float]:

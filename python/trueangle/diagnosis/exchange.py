@@ -10,7 +10,7 @@ from __future__ import annotations
 from ..effects import EFFECTS
 from ..estimation.regression import Regression
 from ..support.deadline import current_deadline
-from .candidates import CandidateScores, candidate_extensions
+from .candidates import CandidateScores, candidate_extensions, propose_candidates
 from .overlap import finding_overlaps
 from .penalty import finding_groups, regression_without, total_penalty
 from .selection import is_flexible, select_again
@@ -71,12 +71,18 @@ def _better_pair(regression: Regression) -> Regression | None:
 
 def _better(regression: Regression) -> Regression | None:
     limit = total_penalty(regression) - BETTER
+    reshaped = _reshaped(regression)
+    if total_penalty(reshaped) < limit:
+        return reshaped
     groups = [g for g in finding_groups(regression.terms) if is_named(regression.terms[g[0]])]
     groups.sort(key=lambda group: sum(regression.terms[k].bic_gain for k in group))
     for group in groups:
         rest = regression_without(regression, group)
         if total_penalty(rest) < limit:
             return rest
+        reshaped = _reshaped(rest)
+        if reshaped is not rest and total_penalty(reshaped) < limit:
+            return reshaped
         if len(groups) > LOOKED_AT:
             continue
         own = regression.terms[group[0]].cause
@@ -93,3 +99,20 @@ def _better(regression: Regression) -> Regression | None:
         if total_penalty(tried) < limit:
             return tried
     return None
+
+
+def _reshaped(regression: Regression) -> Regression:
+    """With causes whose form follows what is beside them in the form that they have now.
+
+    What was chosen, or dropped, since may have stood for a part of one: a delay for the constant
+    part of channels that are read one after the other, which leaves their line with another sign.
+    """
+    for term in regression.terms:
+        if current_deadline().over or not (is_named(term) and EFFECTS[term.cause].form_follows):
+            continue
+        rest = regression.with_terms(other for other in regression.terms if other is not term)
+        again = propose_candidates(EFFECTS[term.cause], rest)
+        if again is not None and again.shape != term.shape:
+            tried = rest.with_terms([*rest.terms, again])
+            regression = min(regression, tried, key=total_penalty)
+    return regression

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..effects import EFFECTS, Effect
+from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
-from ..effects.effect import ScatterFinding, telling_apart
-from ..effects.missing_order import MissingOrder
-from ..effects.scale_error import ScaleError
+from ..effects.effect import ScatterFinding
 from ..estimation.quantity import Parameters, Quantity, quantity
 from ..estimation.regression import Regression
 from ..runs.checks.fault import DataFault
 from ..support.deadline import current_deadline
-from .candidates import Candidate, candidate_extensions, propose_candidates
 from .confirmation import CONFIRMED, NOT_CONFIRMED, confirmation_status
 from .finding import Finding
 from .formerrors import with_form_errors
@@ -22,12 +19,9 @@ from .gain import Gain, measure_gain
 from .gates import gated_findings
 from .goodness import Unexplained
 from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
-from .penalty import NEW_CAUSE, finding_groups, regression_without
-from .selection import is_flexible
+from .penalty import NEW_CAUSE, finding_groups
+from .rivals import alike_causes, ambiguity_in_doubt, dependence, equal_causes, rivals_of
 from .unnamed import is_named
-
-#: Rivals reported for each finding.
-RIVALS = 3
 
 #: Findings, in the order found, for which rivals are tried.
 RIVALLED = 4
@@ -59,33 +53,36 @@ def findings_of(
             cause = regression.terms[group[0]].cause
             spots = [spot for spot in spots if not (spot.common and spot.hides(cause))]
             origins[group[0]] = [
-                replace(_in_doubt(spot, regression, group), estimates={})
+                replace(ambiguity_in_doubt(spot, regression, group), estimates={})
                 for spot in open_origins(regression.terms[group[0]], regression, spots)
             ]
             spots = with_open_origins(spots, origins[group[0]], evidence)
             continue
         spots = [spot for spot in spots if spot != doubt]
-        spots.append(replace(_in_doubt(doubt, regression, group), evidence=evidence))
+        spots.append(replace(ambiguity_in_doubt(doubt, regression, group), evidence=evidence))
     gains: Sequence[Gain | None] = [None] * len(named)
     if with_gain and named:
         gains = measure_gain(regression, named) or gains
     fitted = regression.fitted()
     widened = with_form_errors(regression)
     findings: list[Finding] = []
+    exchanged: list[tuple[list[int], Ambiguity]] = []
     for group, gain in zip(named, gains, strict=True):
         terms = [(*fitted[k], widened.robust_covariance(k)) for k in group]
         cause = terms[0][0].cause
         parameters, effects = EFFECTS[cause].report(widened, terms)
+        parameters |= EFFECTS[cause].form_limits(regression, terms)
         if origins[group[0]]:
             parameters["explanations"] = _explanations(parameters, cause, origins[group[0]])
         rivals = (
-            _rivals(regression, group)
+            rivals_of(regression, group)
             if len(findings) < RIVALLED and not current_deadline().over
             else []
         )
-        if equal := _equals(cause, rivals):
+        if equal := equal_causes(cause, rivals, spots):
             evidence = sum(regression.terms[k].bic_gain for k in group)
-            spots.append(replace(_in_doubt(equal, regression, group), evidence=evidence))
+            spots.append(replace(ambiguity_in_doubt(equal, regression, group), evidence=evidence))
+            exchanged.append((group, equal))
             continue
         weight = {
             "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
@@ -109,9 +106,24 @@ def findings_of(
                 tuple(group),
             )
         )
-    findings, alike, shared = gated_findings(regression, findings)
+    beside = [_beside_doubts(regression, finding, exchanged) for finding in findings]
+    changed = zip(findings, beside, strict=True)
+    # Together with what is in doubt they explain what they do.
+    dependent = {k for before, after in changed if after is not before for k in after.group}
+    findings, alike, shared = gated_findings(regression, beside)
+    shared |= dependent
     doubtful = [k for f in findings if not f.confirmed for k in f.group if k not in shared]
     return findings, spots + alike, doubtful
+
+
+def _beside_doubts(
+    regression: Regression, finding: Finding, exchanged: Sequence[tuple[Sequence[int], Ambiguity]]
+) -> Finding:
+    """A finding once it is known which others may be something else."""
+    for group, doubt in exchanged if finding.confirmed else ():
+        if reason := dependence(regression, group, doubt, finding.group):
+            return replace(finding, status=NOT_CONFIRMED, reason=reason)
+    return finding
 
 
 def reconsidered_findings(
@@ -141,119 +153,30 @@ def _explanations(parameters: Parameters, cause: str, origins: Sequence[Ambiguit
     return quantity([*(known if isinstance(known, list) else []), *others])
 
 
-def _alternatives(
-    regression: Regression, group: Sequence[int], causes: Sequence[str]
-) -> dict[str, tuple[Parameters, tuple[Effect, ...]]]:
-    """Every cause that may be the one, alone in place of a finding: parameters and effects."""
-    rest = regression_without(regression, group, settled=True)
-    found = {}
-    for cause in causes if not current_deadline().over else ():
-        effect = EFFECTS[cause]
-        extension = propose_candidates(effect, rest)
-        if extension is None or extension.bic_gain <= 0.0:
-            continue
-        fitted = rest.with_terms([*rest.terms, extension])
-        k = len(fitted.terms) - 1
-        parameters, effects = effect.report(fitted, [(*fitted.fitted()[k], fitted.covariance(k))])
-        found[cause] = parameters, tuple(effects)
-    return found
-
-
-def _in_doubt(doubt: Ambiguity, regression: Regression, group: Sequence[int]) -> Ambiguity:
-    """A doubt of what is seen, with what each of its causes would amount to."""
-    found = _alternatives(regression, group, doubt.causes)
-    # Not lines: one that another hides behind is no property of the joint.
-    told = (c for c in found if EFFECTS[c].acts_on_runs or is_flexible(EFFECTS[c]))
-    return replace(
-        doubt,
-        supported=True,
-        estimates={cause: found[cause][0] for cause in told},
-        hypotheses={cause: effects for cause, (_, effects) in found.items()},
-    )
-
-
-def _rivals(regression: Regression, group: Sequence[int]) -> list[tuple[str, float]]:
-    """The best other causes in place of a finding, and how much less they explain."""
-    cause = regression.terms[group[0]].cause
-    rest = regression_without(regression, group)
-    own = rest.bic - regression.bic
-    others = [name for name in EFFECTS if name != cause]
-
-    def best_of(candidates: Sequence[Candidate]) -> list[Candidate]:
-        found = [candidate for candidate in candidates if candidate[0].deviance > 0.0]
-        return sorted(found, key=lambda candidate: -candidate[2])[:RIVALS]
-
-    def least(candidates: Sequence[Candidate]) -> float:
-        best = best_of(candidates)
-        return best[-1][2] if len(best) == RIVALS else 0.0
-
-    best = best_of(candidate_extensions(rest, others, least))
-    gaps = [(candidate[0].cause, own - _settled_gain(candidate)) for candidate in best]
-    return sorted(gaps, key=lambda item: item[1])
-
-
-def _settled_gain(candidate: Candidate) -> float:
-    """Net gain of a candidate once all else is fitted beside it, as it is beside a finding.
-
-    Without either cause readings are clipped, and the noise is larger, than with one: what a
-    candidate gains there is less than the finding that is one column with it has gained.
-    """
-    extension, start, gain = candidate
-    if current_deadline().over:
-        return gain
-    settled = start.with_terms([*start.terms, extension])
-    return gain - extension.bic_gain + start.bic - settled.bic
-
-
-def _equals(cause: str, rivals: Sequence[tuple[str, float]]) -> Ambiguity | None:
-    """That other causes explain as much as one, where they do; none strongly less.
-
-    What contains it or is contained in it is the same cause in another form, and explains for it
-    where noise that follows a misfit makes the simpler form the better one; what takes up
-    anything is no cause; a line and a ramp are what is seen, whatever makes them. A step so near
-    an end of its run that the run's own zero explains as much is no step.
-    """
-    effect = EFFECTS[cause]
-    if cause in (MissingOrder.kind, ScaleError.kind):
-        return None
-    if is_flexible(effect):
-        steps = effect.draws_zeros
-        equal = [
-            other
-            for other, gap in rivals
-            if steps and gap < NEW_CAUSE and effect in EFFECTS[other].confused_with
-        ]
-        return _alike(effect, equal) if equal else None
-    forms = {other for other, _ in rivals if _is_another_form(effect, EFFECTS[other])}
-    own = min([0.0, *(gap for other, gap in rivals if other in forms)])
-    equal = [
-        other
-        for other, gap in rivals
-        if gap - own < NEW_CAUSE and other not in forms and not is_flexible(EFFECTS[other])
-    ]
-    return _alike(effect, equal) if equal else None
-
-
-def _alike(effect: type[Effect], equal: Sequence[str]) -> Ambiguity:
-    """That these explain as much as this."""
-    return Ambiguity(
-        (effect.kind, *equal),
-        "they explain what these readings show alike",
-        telling_apart(effect, EFFECTS[equal[0]]) or effect.measure,
-        supported=True,
-        factor=effect.factor,
-    )
-
-
-def _is_another_form(effect: type[Effect], other: type[Effect]) -> bool:
-    return effect in other.contains or other in effect.contains
-
-
 def scatter_finding(item: ScatterFinding, unexplained: Unexplained) -> Finding:
     """Finding of a cause of the scatter."""
     evidence = {"bic_gain": item.bic_gain}
     status, reason = confirmation_status(item.cause, None, None, (), unexplained)
-    return Finding(item.cause, item.parameters, evidence, None, [], item.effects, status, reason)
+    if item.doubt:
+        status, reason = NOT_CONFIRMED, item.doubt
+    rivals = [*item.rivals]
+    return Finding(
+        item.cause, item.parameters, evidence, None, rivals, item.effects, status, reason
+    )
+
+
+def equal_scatter(item: ScatterFinding) -> Ambiguity | None:
+    """That other causes of the scatter explain as much as one, where they do."""
+    equal = [(other, gap) for other, gap in item.rivals if gap < NEW_CAUSE]
+    if not equal:
+        return None
+    less = ", ".join(f"{other} {gap:.1f} less" for other, gap in equal)
+    return replace(
+        alike_causes(EFFECTS[item.cause], [other for other, _ in equal]),
+        because=f"they explain the scatter of these readings alike (BIC: {less} than {item.cause})",
+        evidence=item.bic_gain,
+        estimates={item.cause: item.parameters, **item.alternatives},
+    )
 
 
 def scatter_doubt(item: ScatterFinding, fault: DataFault | None = None) -> Ambiguity:

@@ -15,6 +15,7 @@ from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
 from ..effects.presliding_hysteresis import PreslidingHysteresis
 from ..effects.scale_error import ScaleError
+from ..effects.wrong_gear_ratio import WrongGearRatio
 from ..estimation.regression import Regression
 from ..support.quantiles import quantile
 from .confirmation import NOT_CONFIRMED
@@ -134,8 +135,30 @@ def _not_in_every_part(regression: Regression, finding: Finding) -> str:
     return ""
 
 
+def not_the_only_ratio(finding: Finding) -> str:
+    """A ratio that is one of several with the same lines at these positions.
+
+    The nearest to the believed one is the likeliest, but nothing of the readings says so, and
+    between the positions each has other lines.
+    """
+    aliases = finding.parameters.get("aliases")
+    if finding.cause != WrongGearRatio.kind or aliases is None:
+        return ""
+    values = np.atleast_1d(np.asarray(aliases.value, dtype=np.float64))
+    told = ", ".join(f"{value:.6g}" for value in values)
+    return (
+        f"at these positions {told} would show the same numbers, and of all it is only the nearest "
+        "to the believed one"
+    )
+
+
 #: Every gate, in the order in which reasons are given.
-GATES: tuple[Callable[[Finding], str], ...] = (_not_carried, _not_told_from_zero, _against_friction)
+GATES: tuple[Callable[[Finding], str], ...] = (
+    _not_carried,
+    _not_told_from_zero,
+    _against_friction,
+    not_the_only_ratio,
+)
 
 #: Levels of a factor, as one of them is called.
 _NOUNS = {"velocity": "speed", "temperature": "temperature", "torque": "load", "mount": "mount"}

@@ -8,7 +8,13 @@ import numpy as np
 
 from ..estimation.cache import Cache
 from ..estimation.regression import Regression
-from ..estimation.segments import less_local_level, short_segments
+from ..estimation.segments import (
+    MOST_IN_ROW,
+    flagged_segments,
+    less_local_level,
+    short_segments,
+    within_segments,
+)
 from ..estimation.whitening import Whitener
 from ..joint.signals import Signals
 from ..support.arrays import Array
@@ -17,6 +23,9 @@ from ..support.distributions import chi_squared_tail
 from .goodness import FREE_PATH, Evidence, Leftover, Unexplained, goodness_of_fit
 from .rounding import unrounded
 from .unnamed import effect_or_unnamed, is_named
+
+#: Share of a reading's noise that is left when it is forgotten.
+FORGOTTEN = 0.05
 
 
 def leftover_of(signals: Signals, residual: Array, cache: Cache) -> Leftover:
@@ -80,6 +89,34 @@ def path_evidence(regression: Regression) -> Evidence | None:
     )
 
 
+def aside_evidence(regression: Regression) -> Evidence | None:
+    """That readings are put aside in rows too long for glitches: these are an error of the mean.
+
+    Of n readings of which a share q is put aside, rows of m and more are ``n q^m`` by chance: none.
+    Noise that is correlated goes on for as long as it remembers.
+    """
+    rho, aside = regression.whiten.rho, regression.outlying
+    memory = int(np.ceil(np.log(FORGOTTEN) / np.log(rho))) if rho > 0.0 else 0
+    least = MOST_IN_ROW + 1 + memory
+    starts, stops = flagged_segments(aside, regression.bounds)
+    long = stops - starts >= least
+    count = int(np.count_nonzero(long))
+    if not count:
+        return None
+    expected = regression.n * float(np.mean(aside)) ** least
+    rows = within_segments(starts[long], stops[long], regression.n)
+    away = np.where(rows, regression.left_within_runs, 0.0)
+    rms = float(np.sqrt(np.mean(away**2)))
+    return Evidence(
+        "put aside in a row",
+        float(count),
+        float(min(expected, 1.0) ** count / np.prod(np.arange(1.0, count + 1.0))),
+        f"{int(rows.sum())} readings far off stand in {count} rows of {least} and more: something "
+        "that lasts, and no glitches",
+        rms=rms,
+    )
+
+
 def remainder_of(
     regression: Regression, without: Collection[int] = (), loose: bool = False
 ) -> Leftover:
@@ -123,4 +160,5 @@ def unexplained_remainder(regression: Regression, sigma: float | None = None) ->
         sigma,
         None if path is None else remainder_of(regression, loose=True),
         path,
+        aside_evidence(regression),
     )

@@ -29,9 +29,11 @@ def chance_between_runs(
     """Chance that the scatter of the runs' zeros makes what a finding explains between runs.
 
     0 where they do not scatter, and where readings within the runs tell the cause; else that of
-    `scatter_chance` times the laws that could have been taken in its place.
+    `scatter_chance` times the laws that could have been taken in its place. Where no run is left
+    over to tell whether they scatter, 1.
     """
-    if not any(item.test == ZEROS and item.p < CHANCE for item in unexplained.evidence):
+    scatter = any(item.test == ZEROS and item.p < CHANCE for item in unexplained.evidence)
+    if not (scatter or has_no_run_to_spare(regression)):
         return 0.0
     if not group or any(regression.terms[k].columns.size == 0 for k in group):
         return 0.0
@@ -42,9 +44,17 @@ def chance_between_runs(
     within, _ = rest.jointly_with(zeros).gain(own)
     if within > NEW_CAUSE + own.shape[1] * float(np.log(regression.n)):
         return 0.0
+    if not scatter:
+        return 1.0 if _freedom(regression, group) < 1 else 0.0
     laws = (propose_candidates(EFFECTS[cause], rest) for cause in acts_on_runs())
     tried = sum(law is not None and law.bic_gain > NEW_CAUSE for law in laws)
     return min(1.0, scatter_chance(regression, group) * max(tried, 1))
+
+
+def has_no_run_to_spare(regression: Regression) -> bool:
+    """As many coefficients as there are differences between the runs may explain these."""
+    columns = sum(term.columns.shape[1] for term in regression.terms)
+    return bool(regression.signals.runs - 1 <= columns)
 
 
 def scatter_chance(regression: Regression, group: Sequence[int]) -> float:
@@ -58,6 +68,25 @@ def scatter_chance(regression: Regression, group: Sequence[int]) -> float:
     to run, ν the runs less the coefficients. To a cause that changes from run to run alone all
     readings of a run are one: a delay takes one of four runs.
     """
+    without, told, count = _between(regression, group)
+    extra, freedom = told.rank - without.rank, count - told.rank
+    if extra < 1 or freedom < 1:
+        return 1.0
+    before, after = float(without.squares[0]), float(told.squares[0])
+    f = (before - after) / extra / max(after / freedom, 1e-300)
+    return f_tail(f, extra, freedom)
+
+
+def _freedom(regression: Regression, group: Sequence[int]) -> int:
+    """Runs beyond the coefficients of their means."""
+    _, told, count = _between(regression, group)
+    return count - told.rank
+
+
+def _between(
+    regression: Regression, group: Sequence[int]
+) -> tuple[_core.LinearModel, _core.LinearModel, int]:
+    """Means of the runs without a finding and with it, and how many they are."""
     runs = _numbered(regression)
     fitted = regression.fitted()
     explained = [fitted[k][0].columns @ fitted[k][1] for k in group]
@@ -75,13 +104,7 @@ def scatter_chance(regression: Regression, group: Sequence[int]) -> float:
         )
     )
     without = _core.LinearModel.of_rows(beside, target)
-    told = _core.LinearModel.of_rows(np.hstack([beside, own]), target)
-    extra, freedom = told.rank - without.rank, len(target) - told.rank
-    if extra < 1 or freedom < 1:
-        return 1.0
-    before, after = float(without.squares[0]), float(told.squares[0])
-    f = (before - after) / extra / max(after / freedom, 1e-300)
-    return f_tail(f, extra, freedom)
+    return without, _core.LinearModel.of_rows(np.hstack([beside, own]), target), len(target)
 
 
 def _numbered(regression: Regression) -> NDArray[np.int64]:

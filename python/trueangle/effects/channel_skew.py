@@ -23,7 +23,10 @@ from .effect import Effect
 from .filter_lag import FilterLag
 from .latency import UNTIMED, Latency
 from .missing_order import MissingOrder
-from .search import Array, Fitted, line_parameters
+from .search import Array, Fitted, golden_maximum, line_parameters
+
+#: Radians to either side of the line's own phase within which that of both parts is looked for.
+REACH = 0.5
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,7 @@ class ChannelSkew(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("time",)
     factor: ClassVar[str] = "velocity"
+    form_follows: ClassVar[bool] = True
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         Latency: "two speeds at angles dense enough for twice the sensor's order",
         MissingOrder: "both directions or two speeds",
@@ -90,13 +94,18 @@ class ChannelSkew(Effect):
         free, coefficients = regression.gain(pair)
         if regression.is_pruned(free, 2) or _is_part_of_a_line(regression):
             return None
-        # The constant part is as large as the line: which of the two signs, the data say.
         phase = float(np.arctan2(*coefficients))
+
+        def gain(turned: float) -> float:
+            return regression.gain(cls.columns(signals, around, {"phase": turned}))[0]
+
+        # The constant part is as large as the line: which of the two signs, the data say. And it
+        # leaves its mark in the phase of a line that is fitted without it.
         tried = []
-        for sign in (1.0, -1.0):
-            shape = {"phase": phase if sign > 0.0 else phase + np.pi}
-            columns = cls.columns(signals, around, shape)
-            tried.append(regression.propose(cls.kind, shape, columns, parameters=2))
+        for start in (phase, phase + np.pi):
+            settled, _ = golden_maximum(gain, start - REACH, start + REACH)
+            columns = cls.columns(signals, around, {"phase": settled})
+            tried.append(regression.propose(cls.kind, {"phase": settled}, columns, parameters=2))
         best = max(tried, key=lambda extension: extension.bic_gain)
         return best if best.bic_gain > 0.0 else None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -72,6 +72,8 @@ class Effect(TabledParameters):
         Its form leaves nothing of it, however large it is: steps of a zero, ratios of teeth.
     changes_lines : bool
         It takes or gives a part of the pattern's own lines on average.
+    form_follows : bool
+        Its form follows what else is fitted, and is asked for again when that has changed.
     is_doubted : bool
         A blind spot that names it is reason enough not to name it.
     weighs : bool
@@ -105,6 +107,7 @@ class Effect(TabledParameters):
     draws_zeros: ClassVar[bool] = False
     has_exact_form: ClassVar[bool] = False
     changes_lines: ClassVar[bool] = False
+    form_follows: ClassVar[bool] = False
     is_doubted: ClassVar[bool] = True
     weighs: ClassVar[bool] = False
     rounds: ClassVar[bool] = False
@@ -165,6 +168,14 @@ class Effect(TabledParameters):
         return None
 
     @classmethod
+    def imitate(cls, regression: Regression) -> Extension | None:
+        """What it would explain in the place of another cause, where it is not named itself.
+
+        None where `propose` has all of it.
+        """
+        return None
+
+    @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
         """Evidence of this cause in the scatter about what is known, or None."""
         return None
@@ -192,6 +203,11 @@ class Effect(TabledParameters):
         ``terms`` are this cause's terms with their coefficients and covariances.
         """
         raise NotImplementedError
+
+    @classmethod
+    def form_limits(cls, regression: Regression, terms: Sequence[Fitted]) -> Parameters:
+        """How far its error may depart from its form, by what the readings tell of that."""
+        return {}
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
@@ -296,6 +312,14 @@ class ScatterFinding:
         Inverse variances, of mean 1 (uneven noise), or 0 for outliers.
     size : float
         Of the scatter, in standard deviations of one reading.
+    blocks : tuple of str
+        What uneven noise follows, of what its cause knows.
+    rivals : tuple of (str, float)
+        Other causes of the scatter in its place, and how much less each explains (BIC).
+    alternatives : dict of str to Parameters
+        What those would be.
+    doubt : str
+        Why it is not confirmed, whatever else there is.
     """
 
     cause: str
@@ -304,6 +328,10 @@ class ScatterFinding:
     effects: list[Effect]
     weights: Array
     size: float = 1.0
+    blocks: tuple[str, ...] = ()
+    rivals: tuple[tuple[str, float], ...] = ()
+    alternatives: Mapping[str, Parameters] = field(default_factory=dict)
+    doubt: str = ""
 
 
 def telling_apart(one: type[Effect], other: type[Effect]) -> str | None:

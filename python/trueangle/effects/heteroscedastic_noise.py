@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -14,13 +14,13 @@ from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .effect import Effect, ScatterFinding
+from .noiselaw import NoiseLaw, noise_law
 from .outliers import Outliers
-from .scatter import CLIPPED_VARIANCE, SQUARE_CLIP, clipped_squares, standardised_residuals
+from .scatter import SQUARE_CLIP, standardised_residuals
 from .search import Array
 
-#: Logarithm of the largest ratio of a reading's variance to the mean one: a thousand times the
-#: standard deviation is more than noise of one kind does.
-WIDEST = 2.0 * float(np.log(1e3))
+#: The block of noise that follows the speed.
+PER_SPEED = "per_deg_s"
 
 
 @dataclass(frozen=True)
@@ -89,64 +89,24 @@ class HeteroscedasticNoise(Effect):
         """
         if regression.is_explained:
             return None
-        signals, n = regression.signals, regression.n
         whole = standardised_residuals(regression) ** 2
-        square = np.minimum(whole, SQUARE_CLIP)
-        # A reading tells half as much of the logarithm of a variance as of a mean.
-        log_n = regression.log_n - float(np.log(2.0))
-        blocks: dict[str, Array] = {}
-        penalties: dict[str, float] = {}
-        for k in (1, 2, 3):
-            x = k * signals.theta
-            blocks[f"order {k}"] = np.column_stack([np.cos(x), np.sin(x)])
-            penalties[f"order {k}"] = 2.0 * log_n + 2.0 * float(np.log(2.0 * k))
-        turns = [c for c in regression.around.joint.shafts.values() if c != 1.0]
-        for order in sorted({k * cycles for cycles in turns for k in (1, 2)}):
-            x = order * signals.theta
-            blocks[f"order {order:g}"] = np.column_stack([np.cos(x), np.sin(x)])
-            penalties[f"order {order:g}"] = 2.0 * log_n + 2.0 * float(np.log(8.0 * len(turns)))
-        for name, values in (
-            ("per_deg_s", None if signals.velocity is None else np.abs(signals.velocity)),
-            ("per_Nm", None if signals.torque is None else np.abs(signals.torque)),
-        ):
-            if values is not None and np.ptp(values) > 0.0:
-                blocks[name] = values[:, None]
-                penalties[name] = log_n + 2.0 * float(np.log(4.0))
-        chosen: list[str] = []
-        design = np.ones((n, 1))
-        total = 0.0
-        rest = square - square.mean()
-        while True:
-            power = float(rest @ rest)
-            best = (0.0, "", design)
-            for name, columns in blocks.items():
-                if name in chosen:
-                    continue
-                wider = np.hstack([design, columns])
-                q, r = np.linalg.qr(wider)
-                own = np.abs(np.diag(r)[design.shape[1] :])
-                if (own**2 <= EXCITED * np.einsum("ij,ij->j", columns, columns)).any():
-                    continue  # these readings never show it apart
-                saved = float(np.sum((q.T @ rest) ** 2))
-                gain = n * saved / power - penalties[name]
-                if gain > best[0]:
-                    best = (gain, name, wider)
-            if best[0] <= 0.0:
-                break
-            total += best[0]
-            chosen.append(best[1])
-            design = best[2]
-            rest = square - design @ np.linalg.lstsq(design, square, rcond=None)[0]
+        blocks = noise_blocks(regression)
+        total, chosen = _chosen(np.minimum(whole, SQUARE_CLIP), blocks)
+        return cls.finding_of(noise_law(whole, chosen_columns(blocks, chosen)), chosen, total)
+
+    @classmethod
+    def finding_of(
+        cls, law: NoiseLaw, chosen: Sequence[str], gain: float = 0.0
+    ) -> ScatterFinding | None:
+        """The finding of the chosen blocks, the first ones of a law; None where there are none."""
         if not chosen:
             return None
-        gamma, covariance = _log_variance(design, whole)
+        gamma, std = law.coefficients, np.sqrt(np.diag(law.covariance))
         parameters: Parameters = {}
-        cosine = sine = 0.0
-        order, start = 1.0, 1
+        start = 1
         extra: dict[str, float] = {}
         effects: list[Effect] = []
         for name in chosen:
-            std = np.sqrt(np.diag(covariance))
             if name.startswith("order"):
                 order = float(name.split()[1])
                 cosine, sine = float(gamma[start]), float(gamma[start + 1])
@@ -161,21 +121,81 @@ class HeteroscedasticNoise(Effect):
                 start += 1
         if extra:
             effects.append(HeteroscedasticNoise(**extra))
-        variance = np.exp(design @ gamma)
-        weights = 1.0 / variance
-        return ScatterFinding(cls.kind, total, parameters, effects, weights / weights.mean())
+        return ScatterFinding(
+            cls.kind, gain, parameters, effects, law.weights, blocks=tuple(chosen)
+        )
 
 
-def _log_variance(design: Array, square: Array) -> tuple[Array, Array]:
-    """Coefficients of the log variance by scoring, every square clipped by its own variance."""
-    gamma = np.zeros(design.shape[1])
-    gamma[0] = mean = np.log(np.minimum(square, SQUARE_CLIP).mean())
-    inverse = np.linalg.inv(design.T @ design)
-    for _ in range(30):
-        step = inverse @ (design.T @ (clipped_squares(square, np.exp(design @ gamma)) - 1.0))
-        if np.abs(design @ (gamma + step) - mean).max() > WIDEST:
-            break  # readings that do not scatter at all have no largest likelihood
-        gamma += step
-        if np.abs(step).max() < 1e-10:
-            break
-    return gamma, np.asarray(CLIPPED_VARIANCE * inverse, dtype=np.float64)
+@dataclass(frozen=True)
+class NoiseBlock:
+    """Columns of which the logarithm of the variance may be made, and what choosing them costs."""
+
+    columns: Array
+    penalty: float
+
+
+def noise_blocks(regression: Regression) -> dict[str, NoiseBlock]:
+    """Every block that may be chosen: low orders, those of the shafts, speed and load."""
+    signals = regression.signals
+    # A reading tells half as much of the logarithm of a variance as of a mean.
+    log_n = regression.log_n - float(np.log(2.0))
+    turns = [c for c in regression.around.joint.shafts.values() if c != 1.0]
+    fast = sorted({k * cycles for cycles in turns for k in (1, 2)})
+    orders = {f"order {k}": (float(k), 2.0 * k) for k in (1, 2, 3)}
+    orders |= {f"order {order:g}": (order, 8.0 * len(turns)) for order in fast}
+    blocks = {
+        name: NoiseBlock(
+            np.column_stack([np.cos(order * signals.theta), np.sin(order * signals.theta)]),
+            2.0 * log_n + 2.0 * float(np.log(alike)),
+        )
+        for name, (order, alike) in orders.items()
+    }
+    for name, values in (
+        (PER_SPEED, None if signals.velocity is None else np.abs(signals.velocity)),
+        ("per_Nm", None if signals.torque is None else np.abs(signals.torque)),
+    ):
+        if values is not None and np.ptp(values) > 0.0:
+            blocks[name] = NoiseBlock(values[:, None], speed_penalty(regression))
+    return blocks
+
+
+def speed_penalty(regression: Regression) -> float:
+    """What noise that follows the speed (or the load) must bring, whatever its form."""
+    # One parameter, of which a reading tells half as much as of a mean, and one of four factors.
+    return regression.log_n - float(np.log(2.0)) + 2.0 * float(np.log(4.0))
+
+
+def chosen_columns(blocks: Mapping[str, NoiseBlock], chosen: Sequence[str]) -> Array:
+    """A constant and the columns of the chosen blocks."""
+    n = len(next(iter(blocks.values())).columns)
+    return np.hstack([np.ones((n, 1)), *(blocks[name].columns for name in chosen)])
+
+
+def _chosen(square: Array, blocks: Mapping[str, NoiseBlock]) -> tuple[float, list[str]]:
+    """Blocks that clipped squares follow, one after the other, and the evidence of all."""
+    chosen: list[str] = []
+    design = chosen_columns(blocks, chosen)
+    total = 0.0
+    rest = square - square.mean()
+    while True:
+        power = float(rest @ rest)
+        best = (0.0, "", design)
+        for name, block in blocks.items():
+            if name in chosen:
+                continue
+            columns = block.columns
+            wider = np.hstack([design, columns])
+            q, r = np.linalg.qr(wider)
+            own = np.abs(np.diag(r)[design.shape[1] :])
+            if (own**2 <= EXCITED * np.einsum("ij,ij->j", columns, columns)).any():
+                continue  # these readings never show it apart
+            saved = float(np.sum((q.T @ rest) ** 2))
+            gain = square.size * saved / power - block.penalty
+            if gain > best[0]:
+                best = (gain, name, wider)
+        if best[0] <= 0.0:
+            return total, chosen
+        total += best[0]
+        chosen.append(best[1])
+        design = best[2]
+        rest = square - design @ np.linalg.lstsq(design, square, rcond=None)[0]

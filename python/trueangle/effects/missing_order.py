@@ -24,6 +24,7 @@ from .search import (
     Fitted,
     known_orders,
     line_parameters,
+    shows_line,
 )
 from .torsional_compliance import TorsionalCompliance
 
@@ -34,9 +35,6 @@ FREE_ANGLES = (
 
 #: Orders up to which an alias is told at least, whatever lines the joint is known for.
 HIGHEST = 100.0
-
-#: Periods over the travel below which there is no line.
-HALF = 0.5
 
 #: Orders closer than this share of one over the turns covered, that explain at least this
 #: much of what the best one does, are hardly told apart.
@@ -89,8 +87,7 @@ class MissingOrder(Effect):
         lines = regression.lines
         expected = int(lines.plausible.sum())
         penalties = 2.0 * np.log(np.where(lines.plausible, 2 * expected, 2 * gains.size))
-        # Less than half a period is a bend, and anything slow bends.
-        gains = np.where(lines.orders * regression.signals.run_turns().max() < HALF, 0.0, gains)
+        gains = np.where(shows_line(regression.signals, lines.orders), gains, 0.0)
         # At equal steps higher orders are the same numbers as low ones, but for the error by
         # which the angles miss the steps: what tells them apart there is the noise.
         grid = regression.signals.grid

@@ -17,8 +17,10 @@ from ..estimation.regression import Regression
 from ..estimation.segments import MOST_IN_ROW, flagged_segments, less_local_level, within_segments
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
+from ..support.distributions import f_tail
 from .effect import Effect, ScatterFinding
 from .local_defect import LocalDefect
+from .presliding_hysteresis import PreslidingHysteresis
 from .search import Array
 
 #: Degrees of freedom of heavy-tailed noise, sizes of outliers to start from.
@@ -37,6 +39,11 @@ TURNING = 0.3
 
 #: Readings on either side of a reversal that are near it.
 NEAR_REVERSAL = 3
+
+#: Readings after a start or a reversal within which outliers may gather, and the chance that as
+#: many do, below which they are not independent of it.
+AFTER = (1, 2, 4, 8)
+GATHERED = 1e-3
 
 #: Outliers smaller than this many standard deviations hide in the noise: of sizes
 #: spread evenly up to ``size`` that is a share of ``HIDDEN / size``, which the form of the
@@ -171,6 +178,7 @@ class Outliers(Effect):
             [Outliers(float(share), float(spread))],
             weights,
             size,
+            doubt=_gathered(regression, rows),
         )
 
 
@@ -282,6 +290,41 @@ def _at_reversals(regression: Regression, rows: NDArray[np.int64]) -> bool:
         near[np.clip(cuts + shift, 0, regression.n - 1)] = True
     share = float(near[rows].mean()) if rows.size else 0.0
     return share > ISOLATED and share > 2.0 * float(near.mean())
+
+
+def _gathered(regression: Regression, rows: NDArray[np.int64]) -> str:
+    """Why outliers are not independent of each other, as they gather where a motion begins.
+
+    Stretches of them are counted, each once: independent ones fall anywhere.
+    """
+    signals = regression.signals
+    begins = np.diff(signals.segment, prepend=-1) != 0
+    begins[[start for start, _ in regression.bounds]] = True
+    places = np.arange(regression.n)
+    since = places - np.maximum.accumulate(np.where(begins, places, 0))
+    starts, _ = flagged_segments(_flags(rows, regression.n), regression.bounds)
+    near = [int(np.count_nonzero(since[starts] < within)) for within in AFTER]
+    chances = [
+        len(AFTER) * _binomial_tail(count, starts.size, float(np.mean(since < within)))
+        for count, within in zip(near, AFTER, strict=True)
+    ]
+    k = int(np.argmin(chances))
+    if chances[k] > GATHERED or near[k] <= ISOLATED * starts.size:
+        return ""
+    reach = "the first reading" if AFTER[k] == 1 else f"the first {AFTER[k]} readings"
+    return (
+        f"{near[k]} of its {starts.size} places are among {reach} after a start or a reversal "
+        f"(p {chances[k]:.1g}): something that winds up or settles there leaves them, as "
+        f"{PreslidingHysteresis.kind} does"
+    )
+
+
+def _binomial_tail(count: int, of: int, chance: float) -> float:
+    """Probability of ``count`` or more."""
+    if count == 0 or chance >= 1.0:
+        return 1.0
+    above, below = 2.0 * (of - count + 1), 2.0 * count
+    return f_tail(below * (1.0 - chance) / (above * chance), above, below)
 
 
 def _normal(e: Array, scale: float) -> float:

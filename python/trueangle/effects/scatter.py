@@ -15,11 +15,11 @@ SQUARE_CLIP = 9.0
 # degrees of freedom): E[z^2], and of min(z^2, clip) mean and mean square.
 _ABOVE = chi_squared_tail(SQUARE_CLIP, 1)
 _BELOW_SQUARE = 1.0 - chi_squared_tail(SQUARE_CLIP, 3)
-_CLIPPED_MEAN = _BELOW_SQUARE + SQUARE_CLIP * _ABOVE
+CLIPPED_MEAN = _BELOW_SQUARE + SQUARE_CLIP * _ABOVE
 _CLIPPED_POWER = 3.0 * (1.0 - chi_squared_tail(SQUARE_CLIP, 5)) + SQUARE_CLIP**2 * _ABOVE
 
 #: Variance of the logarithm of a variance estimated from one clipped square; 2 without the clip.
-CLIPPED_VARIANCE = (_CLIPPED_POWER - _CLIPPED_MEAN**2) / _BELOW_SQUARE**2
+CLIPPED_VARIANCE = (_CLIPPED_POWER - CLIPPED_MEAN**2) / _BELOW_SQUARE**2
 
 #: Evidence that uneven noise must bring beyond its penalty. Half of what other causes must:
 #: nothing in the mean of the readings imitates it.
@@ -35,4 +35,4 @@ def standardised_residuals(regression: Regression) -> Array:
 
 def clipped_squares(square: Array, variance: Array) -> Array:
     """Squared residuals in their own variances, clipped, with the mean 1 for normal noise."""
-    return np.asarray(np.minimum(square / variance, SQUARE_CLIP) / _CLIPPED_MEAN)
+    return np.asarray(np.minimum(square / variance, SQUARE_CLIP) / CLIPPED_MEAN)

@@ -11,12 +11,16 @@ from numpy.typing import NDArray
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
+from ..joint.signals import Signals
 from .ambiguity import Ambiguity
 
 Array: TypeAlias = NDArray[np.float64]
 
 #: A chosen term with its coefficients and their covariance.
 Fitted: TypeAlias = tuple[Extension, Array, Array]
+
+#: Periods over the travel below which there is no line.
+HALF = 0.5
 
 #: Correlations of the noise that are one.
 SAME_CORRELATION = 0.02
@@ -81,6 +85,14 @@ def known_orders(around: JointPattern) -> list[float]:
     orders = {float(m) for m in around.pattern.orders}
     orders |= {joint.output_order(shaft, k) for shaft, k in joint.gear_orders()}
     return sorted(orders)
+
+
+def shows_line(signals: Signals, orders: Array) -> NDArray[np.bool_]:
+    """Orders of which a run travels enough for a line.
+
+    Less than half a period is a bend, and anything slow bends.
+    """
+    return np.asarray(orders * signals.run_turns().max() >= HALF)
 
 
 def is_gear_order(around: JointPattern, order: float) -> bool:

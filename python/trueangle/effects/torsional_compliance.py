@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..estimation.extension import Extension
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, line_columns, line_sum
@@ -18,7 +19,7 @@ from ..support.angles import from_arcsec
 from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .effect import Effect
 from .factor import FactorEffect
-from .search import Array, Fitted
+from .search import Array, Fitted, shows_line
 
 
 @dataclass(frozen=True)
@@ -60,10 +61,22 @@ class TorsionalCompliance(FactorEffect):
     @classmethod
     def shapes(cls, regression: Regression) -> list[dict[str, Any]]:
         torque = regression.signals.torque
-        # Where its columns are those of a line, a line is what the readings show.
-        if torque is None or not torque.any() or cls._is_line(regression):
+        if torque is None or not torque.any():
             return []
-        return [{"what": "zero"}, {"what": "line", "order": 1.0}]
+        if not cls._is_line(regression):
+            return [{"what": "zero"}, {"what": "line", "order": 1.0}]
+        # Where its columns are those of a line, a line is what the readings show: but on an arc on
+        # which none is looked for.
+        shown = bool(shows_line(regression.signals, np.ones(1))[0])
+        return [] if shown else [{"what": "zero"}]
+
+    @classmethod
+    def imitate(cls, regression: Regression) -> Extension | None:
+        if not (unloaded(regression.signals) or cls.shapes(regression)):
+            columns = torque_of(regression.signals)[:, None]
+            shape = {"what": "zero"}
+            return regression.propose(cls.kind, shape, columns, log_grid=float(np.log(2.0)))
+        return None
 
     @classmethod
     def report(
@@ -82,6 +95,30 @@ class TorsionalCompliance(FactorEffect):
             direct[0] if direct else 0.0, tuple((m, c, p) for m, c, p, *_ in lines)
         )
         return parameters, [effect]
+
+    @classmethod
+    def form_limits(cls, regression: Regression, terms: Sequence[Fitted]) -> Parameters:
+        """``departure_arcsec``: of a cube of the torque from proportion, where that is largest.
+
+        A spring that stiffens too little to be seen is a linear one to within so much.
+        """
+        torque = torque_of(regression.signals)
+        top = float(np.abs(torque).max())
+        if top == 0.0 or cls.single(terms, "zero") is None:
+            return {}
+        share = torque / top
+        low = np.hstack([line_columns(regression.signals.theta, k) for k in (1, 2, 3)])
+        cube = (share**3)[:, None]
+        if share_left(regression, cube, low, share[:, None]) < OWN_POWER:
+            return {}  # too few loads to tell
+        column, _ = regression.projected(cube)
+        power = float(column[:, 0] @ column[:, 0])
+        cubic = float(column[:, 0] @ regression.r) / power
+        # What proportion cannot take of the cube.
+        slope = float(share @ share**3) / float(share @ share)
+        most = float(np.abs(share**3 - slope * share).max())
+        std = float(np.sqrt(regression.variance / power))
+        return {"departure_arcsec": quantity(cubic * most, std * most)}
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:

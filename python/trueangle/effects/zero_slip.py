@@ -13,6 +13,7 @@ from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
+from ..support.arrays import distinct
 from .ambiguity import (
     RUNS_PER_LEVEL,
     Ambiguity,
@@ -76,6 +77,19 @@ class ZeroSlip(Effect):
         if regression.signals.runs < 2 or regression.has(cls.kind):
             return None
         return regression.propose_run_effect(cls.kind, {}, np.ones((regression.n, 1)))
+
+    @classmethod
+    def imitate(cls, regression: Regression) -> Extension | None:
+        """A zero of one run's own: of few runs the spread of all is hardly a number."""
+        if regression.signals.runs < 2 or regression.has(cls.kind):
+            return None
+        run = regression.signals.run
+        grid = float(np.log(regression.signals.runs))
+        own = (
+            regression.propose(cls.kind, {}, (run == k).astype(np.float64)[:, None], log_grid=grid)
+            for k in distinct(run)
+        )
+        return max(own, key=lambda found: found.deviance)
 
     @classmethod
     def report(

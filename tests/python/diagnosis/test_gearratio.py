@@ -65,6 +65,11 @@ def test_ratios_that_even_steps_do_not_tell_apart_are_told(ratio, believed, posi
     told = ta.diagnose(measured, belief)
     (named,) = [f for f in told.findings if f.cause == "wrong_gear_ratio"]
     assert named.parameters["aliases"].value == [*found.alike]
+    # Any of them may be the joint's: none is confirmed, written or corrected.
+    assert not named.confirmed
+    assert all(f"{other:.6g}" in named.reason for other in found.alike)
+    assert told.extended.joint.gear_ratio == believed
+    assert "Confirmed" not in told.summary().split("Measured minus")[0]
 
 
 def test_free_angles_leave_one_ratio():
@@ -75,6 +80,7 @@ def test_free_angles_leave_one_ratio():
     found = ta.diagnose(measured, belief).findings[0]
     assert found.cause == "wrong_gear_ratio"
     assert "aliases" not in found.parameters
+    assert found.confirmed
 
 
 @pytest.mark.parametrize("seed", range(2))

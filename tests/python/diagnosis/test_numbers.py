@@ -15,7 +15,7 @@ from trueangle.diagnosis.correction import _ranges
 from trueangle.diagnosis.diagnose import _noise, _overall, _structure
 from trueangle.diagnosis.discrepancy import unfolded_error
 from trueangle.diagnosis.finding import Finding
-from trueangle.diagnosis.findings import _rivals, findings_of
+from trueangle.diagnosis.findings import findings_of
 from trueangle.diagnosis.formerrors import SIZES, form_error_columns, with_form_errors
 from trueangle.diagnosis.gain import _exchanged, _level
 from trueangle.diagnosis.gearedlines import PLAIN, GearedLines
@@ -23,6 +23,7 @@ from trueangle.diagnosis.gearratio import find_ratio
 from trueangle.diagnosis.holdout import reducible_share
 from trueangle.diagnosis.overlap import finding_overlaps
 from trueangle.diagnosis.remainder import share_of_run
+from trueangle.diagnosis.rivals import rivals_of
 from trueangle.diagnosis.wrongplace import misplaced_beliefs
 from trueangle.effects import EFFECTS, LocalDefect
 from trueangle.effects.ambiguity import Ambiguity
@@ -219,7 +220,7 @@ def test_form_errors_are_the_mean_square_of_bends_given_what_is_left(signals):
 def test_a_rival_that_explains_more_has_a_gap_below_zero(signals):
     start = regression(signals, 3.0 * signals.direction)
     full = start.with_terms([candidates_above(start, "latency")])
-    found = dict(_rivals(full, [0]))
+    found = dict(rivals_of(full, [0]))
     assert found["backlash"] < -6.0
     instead = candidates_above(start, "backlash")
     assert found["backlash"] == pytest.approx(start.bic - instead.bic_gain - full.bic, abs=1e-6)

@@ -160,3 +160,46 @@ def test_a_narrow_and_a_wide_part_are_told_as_by_their_densities(start: float, w
     e[::97] *= wild
     found = _core.two_normals(e, start, EM_STEPS, NARROWEST)
     assert found == pytest.approx(two_normals(e, start, EM_STEPS), rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", [80_411, 80_413, 80_417])
+@pytest.mark.parametrize("length_deg", [0.7, 2.2])
+@pytest.mark.parametrize("size", [11.0, 34.0])
+def test_what_settles_where_runs_start_is_no_outlier(size, length_deg, seed):
+    """Friction that winds up in runs of one way leaves the first readings of each far off."""
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    runs = []
+    for k, speed in enumerate((9.0, 26.0) * int(rng.integers(3, 5))):
+        travel = np.linspace(0.0, 390.0, 331)
+        theta = rng.uniform(0.0, 360.0) + travel
+        error = 1.5 * rng.normal(size=travel.size) - 2.0 * size * np.exp(-travel / length_deg)
+        runs.append(
+            ta.CalibrationRun(
+                theta, theta + error / 3600.0, period=360.0, time=travel / speed, label=f"run {k}"
+            )
+        )
+    result = ta.diagnose(runs, Simulation(sigma_arcsec=1.5))
+    assert "outliers" not in [f.cause for f in result.findings if f.confirmed]
+    for finding in result.findings:
+        assert "after a start or a reversal" in finding.reason or result.unexplained.found
+    # It is seen.
+    assert result.findings or result.unexplained.found
+
+
+@pytest.mark.parametrize("seed", [80_421, 80_423])
+def test_outliers_of_which_some_are_at_a_start_are_outliers(seed):
+    print(f"seed {seed}")
+    rng = np.random.default_rng(seed)
+    runs = []
+    for run in ta.simulate(SIM, seed):
+        indicated = run.indicated.copy()
+        wild = np.append(rng.choice(np.arange(12, len(run)), 4, replace=False), rng.integers(0, 3))
+        indicated[wild] += rng.choice([-1.0, 1.0], wild.size) * 40.0 / 1_296_000.0 * run.period
+        runs.append(
+            ta.CalibrationRun(
+                run.reference, indicated, period=run.period, time=run.time, label=run.label
+            )
+        )
+    result = ta.diagnose(runs, SIM)
+    assert [f.cause for f in result.findings if f.confirmed] == ["outliers"]

@@ -92,6 +92,7 @@ def goodness_of_fit(
     sigma: float | None = None,
     loose: Leftover | None = None,
     path: Evidence | None = None,
+    aside: Evidence | None = None,
 ) -> Unexplained:
     """Test a residual for everything that is not noise, without asking for a cause.
 
@@ -107,6 +108,8 @@ def goodness_of_fit(
         The same with free paths in time left in, for tests of what is bound to time.
     path : Evidence, optional
         Of a free path in time that the account needs.
+    aside : Evidence, optional
+        Of readings in a row that the account puts aside.
 
     Returns
     -------
@@ -128,7 +131,7 @@ def goodness_of_fit(
     """
     noise = estimate_noise(left)
     deciding = evidence_of_tests(TestedResidual(left, left if loose is None else loose, noise, top))
-    deciding += [path] if path is not None else []
+    deciding += [item for item in (path, aside) if item is not None]
     describing = scatter_tests(left, noise, sigma)
     firing = _firing(deciding)
     # Sure is sure: of those far beyond doubt the narrower account comes first, and of a line

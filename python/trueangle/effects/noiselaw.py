@@ -1,0 +1,141 @@
+"""A law of noise that is not the same everywhere, by its likelihood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .scatter import CLIPPED_MEAN, CLIPPED_VARIANCE, SQUARE_CLIP, clipped_squares
+from .search import Array
+
+#: Logarithm of the largest ratio of a reading's variance to the mean one: a thousand times the
+#: standard deviation is more than noise of one kind does.
+WIDEST = 2.0 * float(np.log(1e3))
+
+#: Scoring steps at most, the change of a logarithm below which there are no more, and the largest
+#: change in one step.
+STEPS, SETTLED, LARGEST_STEP = 30, 1e-8, 2.0
+
+#: Ratios of the variance that grows to the other one, to start from.
+GROWTHS = (0.3, 10.0, 1e3)
+
+
+@dataclass(frozen=True)
+class NoiseLaw:
+    """Variance of the noise of every reading, as it was fitted.
+
+    ::
+
+        σ² = exp(X γ) + g s²
+
+    Attributes
+    ----------
+    coefficients : ndarray, shape (p,)
+        γ.
+    log_growth : float
+        ln g; minus infinity where no s was given.
+    covariance : ndarray
+        Of γ, and of ln g behind it where there is one.
+    log_variance : ndarray, shape (n,)
+    log_likelihood : float
+        Normal up to `SQUARE_CLIP`, beyond with the tail of which clipped squares are the slope: so
+        laws of unlike form are compared by what the same readings weigh in the fit of either.
+    """
+
+    coefficients: Array
+    log_growth: float
+    covariance: Array
+    log_variance: Array
+    log_likelihood: float
+
+    @property
+    def weights(self) -> Array:
+        """Inverse variances, of mean 1."""
+        weights = np.exp(-self.log_variance)
+        return np.asarray(weights / weights.mean())
+
+
+def noise_law(square: Array, columns: Array, growing: Array | None = None) -> NoiseLaw:
+    """The most likely law of squared residuals.
+
+    Parameters
+    ----------
+    square : ndarray, shape (n,)
+        Squared residuals, standardised by any one deviation.
+    columns : ndarray, shape (n, p)
+        X; the first one is 1.
+    growing : ndarray, shape (n,), optional
+        s: what a part of the variance is the square of, 1 at most.
+    """
+    mean = float(np.log(np.minimum(square, SQUARE_CLIP).mean()))
+    if growing is None:
+        return _of_columns(square, columns, mean)
+    found = [_with_growth(square, columns, growing**2, mean, start) for start in GROWTHS]
+    return max(found, key=lambda law: law.log_likelihood)
+
+
+def log_likelihood(square: Array, log_variance: Array) -> float:
+    """Of squared residuals with these variances (`NoiseLaw.log_likelihood`)."""
+    x = square * np.exp(-log_variance)
+    beyond = SQUARE_CLIP * (1.0 + np.log(np.maximum(x, SQUARE_CLIP) / SQUARE_CLIP))
+    taken = np.where(x > SQUARE_CLIP, beyond, x) / CLIPPED_MEAN
+    return -0.5 * float(np.sum(log_variance + taken))
+
+
+def _of_columns(square: Array, columns: Array, mean: float) -> NoiseLaw:
+    gamma = np.zeros(columns.shape[1])
+    gamma[0] = mean
+    inverse = np.linalg.inv(columns.T @ columns)
+    for _ in range(STEPS):
+        away = clipped_squares(square, np.exp(columns @ gamma)) - 1.0
+        step = inverse @ (columns.T @ away)
+        if np.abs(columns @ (gamma + step) - mean).max() > WIDEST:
+            break  # readings that do not scatter at all have no largest likelihood
+        gamma += step
+        if np.abs(step).max() < SETTLED:
+            break
+    log_variance = columns @ gamma
+    likely = log_likelihood(square, log_variance)
+    covariance = np.asarray(CLIPPED_VARIANCE * inverse, dtype=np.float64)
+    return NoiseLaw(gamma, -np.inf, covariance, log_variance, likely)
+
+
+def _with_growth(
+    square: Array, columns: Array, power: Array, mean: float, start: float
+) -> NoiseLaw:
+    """By scoring from one ratio of the two parts."""
+    found = np.zeros(columns.shape[1] + 1)
+    found[0] = mean - float(np.log1p(start * power).mean())
+    found[-1] = found[0] + float(np.log(start))
+
+    def parts(at: Array) -> tuple[Array, Array]:
+        """Logarithm of the variance, and its derivatives."""
+        own = np.exp(np.clip(columns @ at[:-1], mean - WIDEST, mean + WIDEST))
+        grown = np.exp(at[-1]) * power
+        share = own / (own + grown)
+        return np.log(own + grown), np.column_stack([share[:, None] * columns, 1.0 - share])
+
+    for _ in range(STEPS):
+        log_variance, tangents = parts(found)
+        away = clipped_squares(square, np.exp(log_variance)) - 1.0
+        step = np.linalg.pinv(tangents.T @ tangents) @ (tangents.T @ away)
+        moved = np.clip(found + np.clip(step, -LARGEST_STEP, LARGEST_STEP), *_limits(mean))
+        settled = float(np.abs(moved - found).max()) < SETTLED
+        found = moved
+        if settled:
+            break
+    log_variance, tangents = parts(found)
+    covariance = CLIPPED_VARIANCE * np.linalg.pinv(tangents.T @ tangents)
+    return NoiseLaw(
+        found[:-1],
+        float(found[-1]),
+        np.asarray(covariance, dtype=np.float64),
+        log_variance,
+        log_likelihood(square, log_variance),
+    )
+
+
+def _limits(mean: float) -> tuple[float, float]:
+    """Logarithms that neither part leaves: beyond, it is not there."""
+    return mean - WIDEST, mean + WIDEST
