@@ -107,10 +107,9 @@ def _indicated(robot: Any, entries: list[Any]) -> dict[str, Any]:
 def _asked(
     joint: Any, args: argparse.Namespace, entries: list[Any], angles: dict[str, Any]
 ) -> JointAsked:
-    """The arguments as for this joint alone: what was typed stands before what the file says,
-    and what was typed of this joint before what was typed of all.
+    """The arguments as for this joint alone: what was typed stands before what the file says.
 
-    The angles of the others are signals that it may be coupled to.
+    What was typed of this joint stands before what was typed of all. The angles of the others are signals that it may be coupled to.
     """
     from ..support.signals import COUPLED
 
