@@ -109,7 +109,8 @@ def _asked(
 ) -> JointAsked:
     """The arguments as for this joint alone: what was typed stands before what the file says.
 
-    What was typed of this joint stands before what was typed of all. The angles of the others are signals that it may be coupled to.
+    What was typed of this joint stands before what was typed of all. The angles of the others
+    are signals that it may be coupled to.
     """
     from ..support.signals import COUPLED
 
