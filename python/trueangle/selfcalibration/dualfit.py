@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..support.distributions import chi_squared_quantile
-from .dense import DenseFit, DenseRows, fit_dense, low_frequency_inflation
+from .dense import DenseFit, fit_dense, low_frequency_inflation
+from .densetriangle import DenseRows
 from .gearlines import (
     GearedChannels,
     SharedLine,

@@ -18,7 +18,8 @@ import numpy as np
 from ..errors import ArgumentError, NoModelError
 from ..support.angles import wrap
 from ..support.arrays import Array
-from .dense import DenseFit, DenseRows, dense_fixed_point, fit_dense, patterns_apart
+from .dense import DenseFit, dense_fixed_point, fit_dense, patterns_apart
+from .densetriangle import DenseRows
 from .model import reference_free_model
 from .orderchoice import significant_orders
 from .pattern import ENCODER, pattern_model

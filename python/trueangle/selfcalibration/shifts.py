@@ -21,7 +21,8 @@ from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import f_tail
 from .clampings import Clampings, clampings_of
-from .dense import DenseFit, DenseRows, dense_fixed_point, fit_dense
+from .dense import DenseFit, dense_fixed_point, fit_dense
+from .densetriangle import DenseRows
 from .model import reference_free_model
 from .orderchoice import significant_orders
 from .pattern import ENCODER, pattern_model

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trueangle.selfcalibration.dense import (
+from trueangle.selfcalibration.dense import fit_dense, low_frequency_inflation
+from trueangle.selfcalibration.densetriangle import (
     DenseRows,
     _evidence,
-    _solve,
-    _triangle,
-    fit_dense,
-    low_frequency_inflation,
+    solved_triangle,
+    triangle_of,
 )
 from trueangle.selfcalibration.orderchoice import significant_orders
 from trueangle.selfcalibration.projected import Projected, Unknown, harmonic_unknowns
@@ -179,8 +178,8 @@ def test_the_evidence_is_the_restricted_likelihood() -> None:
         freedom = runs * n - 3
         twice = freedom * np.log(left @ inverse @ left / freedom)
         expected.append(-0.5 * (twice + np.linalg.slogdet(v)[1] + np.linalg.slogdet(info)[1]))
-        triangle = _triangle(parts(patterns, nuisances, y, [20]))
-        solved = _solve(triangle, 4, 2, [1, 2, 3], variance, 45)
+        triangle = triangle_of(parts(patterns, nuisances, y, [20]))
+        solved = solved_triangle(triangle, 4, 2, [1, 2, 3], variance, 45)
         assert solved.freedom == freedom
         assert solved.noise * freedom == pytest.approx(left @ inverse @ left, rel=1e-9)
         found.append(_evidence(triangle, 4, 2, [1, 2, 3], 45)(variance))

@@ -1,0 +1,158 @@
+"""Rows of a dense fit as one triangle: solved with random nuisances of any variance, and which."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ..support.arrays import Array
+
+#: Variances of random terms that are tried, over that of their error in one run: from what the
+#: readings do not show on, two a decade.
+_SIZES: Final = np.logspace(-1.0, 12.0, 27)
+
+#: Variances of less probability than this share of the most probable one's are left out.
+_IMPROBABLE: Final = 1e-2
+
+#: No variance at all: a prior so tight that the term is nothing.
+_NO_VARIANCE: Final = 1e-24
+
+#: Singular values of patterns below this share of the largest are not seen.
+_RANK: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class DenseRows:
+    """A part of the readings: patterns (n, m), nuisances (n, p), target (n)."""
+
+    patterns: Array
+    nuisances: Array
+    target: Array
+    alone: Array | None = None
+    """Sum of squares of each pattern by itself, where the rows hold differences."""
+    series: int = 1
+    """Series of readings, of one length and one after the other, that the rows are."""
+
+    @property
+    def squares(self) -> Array:
+        """Of each pattern with nothing beside it."""
+        if self.alone is not None:
+            return self.alone
+        return np.asarray(np.einsum("ij,ij->j", self.patterns, self.patterns))
+
+
+def triangle_of(parts: Iterable[DenseRows]) -> Array:
+    """The triangle of ``[nuisances | patterns | target]``, part by part."""
+    triangle: Array | None = None
+    for part in parts:
+        block = np.concatenate([part.nuisances, part.patterns, part.target[:, None]], axis=1)
+        if triangle is not None:
+            block = np.concatenate([triangle, block])
+        triangle = np.asarray(np.linalg.qr(block, mode="r"))
+    assert triangle is not None
+    return triangle
+
+
+@dataclass(frozen=True)
+class SolvedTriangle:
+    """Nuisances eliminated: what is left for the patterns, and the noise."""
+
+    inverse: Array  # of the nuisances' triangle
+    beside: Array  # nuisances against patterns
+    corner_right: Array
+    root: Array  # of the patterns
+    right: Array
+    noise: float
+    freedom: float
+
+
+def solved_triangle(
+    triangle: Array, p: int, m: int, random: Sequence[int], variance: float, count: float
+) -> SolvedTriangle:
+    """The triangle of ``p`` nuisances and ``m`` patterns, with random ones of a variance."""
+    # In units of their own deviation random nuisances have the prior 1, of any variance, and
+    # of none the columns vanish: nothing is rounded at the size of a prior that is tight.
+    scale = np.ones(p)
+    scale[list(random)] = math.sqrt(variance)
+    scaled = triangle.copy()
+    scaled[:, :p] *= scale
+    prior = np.zeros((len(random), triangle.shape[1]))
+    prior[np.arange(len(random)), list(random)] = 1.0
+    r: Array = np.asarray(np.linalg.qr(np.concatenate([scaled, prior]), mode="r"))
+    root, right, left = r[p : p + m, p : p + m], r[p : p + m, -1:], r[p + m :, -1]
+    # Patterns that nothing shows leave the sum of squares as it is: pseudo-inverse.
+    seen, lost = _split(root, right)
+    freedom = max(count - (p - len(random) + seen.size), 1.0)
+    squares = float(left @ left) + float(np.sum(lost**2))
+    inverse: Array = np.asarray(np.linalg.pinv(r[:p, :p], 1e-12), dtype=np.float64)
+    return SolvedTriangle(
+        scale[:, None] * inverse,
+        r[:p, p : p + m],
+        r[:p, -1],
+        root,
+        right[:, 0],
+        squares / freedom,
+        freedom,
+    )
+
+
+def _split(root: Array, right: Array) -> tuple[Array, Array]:
+    """Singular values that are seen, and what stands beside the directions of the others."""
+    if root.size == 0:
+        return np.zeros(0), right
+    u, values, _ = np.linalg.svd(root)
+    seen = values > _RANK * max(float(values.max(initial=0.0)), 1e-300)
+    return values[seen], u[:, ~seen].T @ right
+
+
+def possible_variances(
+    triangle: Array, p: int, m: int, random: Sequence[int], count: float
+) -> list[tuple[float, float]]:
+    """Variances of the random nuisances with their probabilities, the improbable ones left out.
+
+    Before the readings there is none with probability one half, else any that they would show, as
+    probable in each octave.
+    """
+    shown = float((triangle[:, list(random)] ** 2).sum()) / len(random)
+    tried = np.concatenate([[0.0], _SIZES / max(shown, 1e-300)])
+    evidence = _evidence(triangle, p, m, random, count)
+    log = np.array([evidence(float(variance)) for variance in tried])
+    log[1:] -= math.log(_SIZES.size)
+    weights = np.exp(log - log.max())
+    weights[weights < _IMPROBABLE] = 0.0
+    weights /= weights.sum()
+    return [(float(v), float(w)) for v, w in zip(tried, weights, strict=True) if w > 0.0]
+
+
+def _evidence(
+    triangle: Array, p: int, m: int, random: Sequence[int], count: float
+) -> Callable[[float], float]:
+    """The restricted likelihood of a variance of the random nuisances, up to a constant.
+
+    With their columns last, what a variance changes is the small triangle R of these alone::
+
+        -2 log L = f log(S/f) + log det(R'R + I/v) + k log v
+    """
+    last = list(random)
+    first = np.delete(np.arange(p + m), last)
+    turned: Array = np.asarray(np.linalg.qr(triangle[:, [*first, *last, p + m]], mode="r"))
+    at = first.size
+    seen, lost = _split(turned[:at, :at], turned[:at, at:])
+    small = np.concatenate([lost, turned[at:, at:]])
+    freedom = max(count - seen.size, 1.0)
+
+    def evidence(variance: float) -> float:
+        variance = max(variance, _NO_VARIANCE)
+        prior = np.eye(len(last), len(last) + 1) / math.sqrt(variance)
+        r: Array = np.asarray(np.linalg.qr(np.concatenate([small, prior]), mode="r"))
+        squares = float(np.sum(r[len(last) :, -1] ** 2))
+        diagonal = np.abs(np.diagonal(r)[: len(last)])
+        twice = freedom * math.log(max(squares, 1e-300) / freedom)
+        twice += 2.0 * float(np.log(diagonal).sum()) + len(last) * math.log(variance)
+        return -0.5 * twice
+
+    return evidence
