@@ -14,6 +14,7 @@ from typing import Any, Final
 from ..errors import ArgumentError, FileError
 from ..support.angles import ARCSEC_PER_DEG
 from ..support.argumentkinds import told_kinds
+from ..support.decoding import shown_value
 from ..support.files import read_whole
 from ..support.suggestions import check_choice, did_you_mean
 from .budget import DISTRIBUTIONS, Contribution
@@ -215,7 +216,11 @@ def _contribution(position: int, entry: object) -> Contribution:
         )
     if ("half_width_arcsec" in entry) == ("standard_arcsec" in entry):
         raise ArgumentError(f"{where}: give either half_width_arcsec or standard_arcsec")
-    distribution = entry.get("distribution", "normal" if "standard_arcsec" in entry else None)
+    if "half_width_arcsec" in entry and "distribution" not in entry:
+        raise ArgumentError(
+            f"{where}: half_width_arcsec needs a distribution, one of {', '.join(DISTRIBUTIONS)}"
+        )
+    distribution = entry.get("distribution", "normal")
     check_choice(f"{where}: distribution", distribution, DISTRIBUTIONS)
     if "standard_arcsec" in entry:
         standard = _number(f"{where} standard_arcsec", entry["standard_arcsec"])
@@ -241,13 +246,13 @@ def _text(name: str, value: object) -> str:
     if isinstance(value, datetime.date):
         return value.isoformat()
     if not isinstance(value, str):
-        raise ArgumentError(f"{name} must be text in quotation marks, got {value!r}")
+        raise ArgumentError(f"{name} must be text in quotation marks, got {shown_value(value)}")
     return value.strip()
 
 
 def _number(name: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ArgumentError(f"{name} must be a number, got {value!r}")
+        raise ArgumentError(f"{name} must be a number, got {shown_value(value)}")
     try:
         number = float(value)
     except OverflowError:

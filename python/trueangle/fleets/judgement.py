@@ -38,7 +38,8 @@ def judged_fleet(
         if float((shared.scores - chosen.scores)[both].sum()) > 0.0:
             chosen = shared
     if n < FEWEST:
-        notes.append(f"{n} units do not tell which of them is an outlier: {FEWEST} are needed.")
+        those = "One unit does" if n == 1 else f"{n} units do"
+        notes.append(f"{those} not tell which of them is an outlier: {FEWEST} are needed.")
     again = [dates for dates in units.dated if len(dates) > 1]
     spread = np.array([one.variance for one in chosen.between])
     changes = {
