@@ -19,6 +19,7 @@ from .ambiguity import (
     Ambiguity,
 )
 from .backlash import Backlash, goes_both_ways
+from .current_coupling import CurrentCoupling
 from .effect import ALWAYS, Effect
 from .latency import Latency
 from .missed_counts import MissedCounts
@@ -59,6 +60,7 @@ class ZeroSlip(Effect):
         Latency: "two speeds or both directions inside one run",
         TorsionalCompliance: "several runs at each load, in random order",
         ThermalDrift: "several runs at each temperature, in random order",
+        CurrentCoupling: "several runs at each current, in random order",
         PreslidingHysteresis: "reverse inside a run: both directions between two zeros",
         MissedCounts: "longer runs: the step has to fall inside one",
     }
@@ -128,5 +130,18 @@ class ZeroSlip(Effect):
                     first=False,
                     factor=ThermalDrift.factor,
                 )
+        current = signals.current
+        if (
+            signals.runs == 2
+            and current is not None
+            and all(np.ptp(current[a:b]) == 0.0 for a, b in bounds)
+            and not any(CurrentCoupling.kind in s.causes for s in found)
+        ):
+            yield cls.blind(
+                "a current in each of two runs: the difference may be the runs' own zeros",
+                CurrentCoupling,
+                first=False,
+                factor=CurrentCoupling.factor,
+            )
         if signals.runs < 2:
             yield cls.blind("one run: a zero has no spread")

@@ -209,11 +209,12 @@ def _thinned(
     The scatter of a few stretches has fewer directions than there are coefficients: its
     standard errors may come out as small as they like.
     """
-    some = "the" if round(memory) == 1 else f"one in {memory:.0f}"
+    told = "standard errors as if the readings were independent"
+    if round(memory) > 1:
+        told = f"standard errors as if one in {memory:.0f} readings were independent"
     note = (
-        f"{said}standard errors as if {some} readings were independent (the memory "
-        f"of the residuals). {why}, and the covariance is not known: measure "
-        f"{ENOUGH_RUNS} runs and more"
+        f"{said}{told} (the memory of the residuals). {why}, and the covariance is not known: "
+        f"measure {ENOUGH_RUNS} runs and more"
     )
     # Of so many independent readings the fit takes its unknowns, and the residuals are smaller.
     left = max(independent - unknowns, 1.0)

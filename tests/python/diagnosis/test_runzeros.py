@@ -16,6 +16,7 @@ from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.simulation import (
     Backlash,
+    CurrentCoupling,
     Joint,
     MissingOrder,
     RunDesign,
@@ -91,3 +92,21 @@ def test_play_and_wind_up_of_four_runs_are_not_confirmed_as_a_delay() -> None:
     assert found.unexplained.found
     alone = ta.diagnose(simulate(believed.with_effects([TorsionalCompliance(0.8)]), 1), believed)
     assert [f.cause for f in alone.findings if f.confirmed] == ["torsional_compliance"]
+
+
+@pytest.mark.parametrize("currents", [(-3.0, 3.0), (-3.0, 3.0, 3.0, -3.0)])
+def test_a_current_in_each_of_two_runs_may_be_their_zeros(currents):
+    """Four runs tell: no zeros of their own come back with the current."""
+    designs = tuple(
+        RunDesign(samples=300, speed_deg_s=60.0, current_A=current) for current in currents
+    )
+    believed = Simulation(runs=designs)
+    true = believed.with_effects([CurrentCoupling(2.5)])
+    print("seed 28431")
+    found = ta.diagnose(simulate(true, 28_431), believed)
+    confirmed = [finding.cause for finding in found.findings if finding.confirmed]
+    told = [set(spot.causes) for spot in found.not_identifiable if spot.supported]
+    if len(currents) == 2:
+        assert (confirmed, told) == ([], [{"current_coupling", "zero_slip"}])
+    else:
+        assert (confirmed, told) == (["current_coupling"], [])

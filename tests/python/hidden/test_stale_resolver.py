@@ -47,7 +47,7 @@ def stale(rng, play=0.0):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_delay_and_the_pattern_that_it_moves_are_told_jointly(seed):
+def test_a_delay_and_the_pattern_that_it_moves_are_told_jointly(seed, patient):
     print(f"seed {seed}")
     run, delay, amplitude = stale(np.random.default_rng(seed))
     result = ta.diagnose(run, Simulation())

@@ -95,7 +95,7 @@ def saved(tmp_path, term):
     ("term", "said"),
     [
         ({"kind": "wobble", "size": 1.0}, r"terms\[0\].kind.*'wobble' is unknown.*backlash"),
-        ({"half_width": 1.0}, r"terms\[0\].kind.*None is unknown"),
+        ({"half_width": 1.0}, r"terms\[0\].kind.*null is unknown"),
         ({"kind": "backlash"}, r"terms\[0\].*needs the parameter 'half_width'"),
         ({"kind": "backlash", "half_width": 1.0, "x": 2}, r"terms\[0\].*no parameter 'x'"),
         ({"kind": "backlash", "half_width": "1"}, r"terms\[0\].*half_width must be a finite"),

@@ -175,6 +175,7 @@ def test_sizes_are_told_about_nought_and_what_is_left_by_its_deviation(fit, unit
     for numbers, sizes in zip(told, wanted, strict=True):
         assert [float(x) for x in numbers] == pytest.approx(per * np.array(sizes), rel=6e-4)
     picture = residual_picture(fit, "torque", error_unit(unit))
-    found = re.search(r"leaves of (\d+) readings against torque: (\S+) \S+ standard", picture.told)
+    found = re.search(r"leaves of (\d+) readings against torque: (\S+) \S+ rms", picture.told)
     assert int(found[1]) == fit.residuals.size
-    assert float(found[2]) == pytest.approx(per * 3600.0 * fit.residuals.std(), rel=6e-3)
+    rms = np.sqrt(np.mean(np.square(fit.residuals)))
+    assert float(found[2]) == pytest.approx(per * 3600.0 * rms, rel=6e-3)

@@ -122,9 +122,9 @@ def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
     parts = []
     # What one order has in common with itself does not depend on those chosen.
     own = sums.blocks()[:, index]
-    # At one unit's places an order may vanish: it says nothing there.
-    least = np.maximum(1e-9 * np.trace(own, axis1=2, axis2=3), 1e-200)
-    own = own + least[..., None, None] * np.eye(2)
+    # At one unit's places an order may vanish, up to rounding: it says nothing there.
+    most = np.trace(own, axis1=2, axis2=3).max(axis=1)
+    own = own + np.maximum(1e-9 * most, 1e-200)[:, None, None, None] * np.eye(2)
     for unit, blocks in enumerate(own):
         score = sums.rhs(unit, index) - sums.gram(unit, index, chosen) @ coefficients
         parts.append((blocks, np.stack([score[:n], score[n:]], axis=1)))
