@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from trueangle.cli.benchmarks import fit
 from trueangle.cli.benchmarks.fit import Case, fit_peers, measure_fits
 
 # Ours relative to the largest coefficient; the error is a difference of angles of a turn.
@@ -25,3 +27,15 @@ def test_every_way_solves_the_same_problem(case, methods):
     for row in rows:
         assert row.deviation < AGREES, row
         assert row.timing.least <= row.timing.median <= row.timing.most
+
+
+def test_a_way_that_differs_is_told_by_the_share_of_the_largest_coefficient(monkeypatch):
+    def off(theta, error, highest):
+        found = fit_peers()[0]["numpy.linalg.lstsq"](theta, error, highest)
+        moved = np.zeros_like(found)
+        moved[np.argmin(np.abs(found))] = 0.25 * np.abs(found).max()
+        return found + moved
+
+    monkeypatch.setattr(fit, "fit_peers", lambda: ({"off": off}, []))
+    (row,) = [row for row in measure_fits(Case(300, 3), rounds=1) if row.name == "off"]
+    assert row.deviation == pytest.approx(0.25, rel=1e-6)
