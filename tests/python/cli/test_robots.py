@@ -385,3 +385,12 @@ def test_columns_that_are_typed_go_before_those_of_the_robot_file(arm):
     assert columns("torque=tau") == {**of_file, "torque": "tau"}
     both = columns("torque=tau", "elbow.torque=own", "wrist.torque=not")
     assert both == {**of_file, "torque": "own"}
+
+
+def test_a_ratio_of_a_urdf_is_printed_as_it_is(tmp_path, capsys):
+    joints = "".join(TURNING.format(f"j{k}", r) for k, r in enumerate((100.5, -50, 24.375)))
+    (tmp_path / "a.urdf").write_text(URDF.format(joints=joints))
+    assert main(["robot", "--from-urdf", str(tmp_path / "a.urdf"), "-o", str(tmp_path / "r")]) == 0
+    told = capsys.readouterr().out
+    for ratio in ("ratio 100.5", "ratio 50", "ratio 24.375"):
+        assert ratio in told

@@ -153,3 +153,12 @@ def test_a_byte_of_a_name_that_is_no_text_is_shown_as_that_byte(byte):
     name = bytes([0x61, byte, 0x62]).decode("utf-8", "surrogateescape")
     assert printable_text(f"{name}.csv") == f"a\\x{byte:02x}b.csv"
     assert printable_text(chr(0x85) + chr(0x202E)) == "\\x85\\u202e"
+
+
+def test_two_blanks_of_a_name_stay_two(tmp_path, capsys):
+    """Lines of a message become one; what stands within a line is as it is called."""
+    name = str(tmp_path / "two  blanks.csv")
+    assert main(["check", name]) == 1
+    told = capsys.readouterr().err
+    assert name in told
+    assert told.count("\n") == 1
