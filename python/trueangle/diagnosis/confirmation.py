@@ -19,10 +19,9 @@ from .formerrors import FORM
 from .gain import Gain
 from .goodness import FREE_PATH, Unexplained
 from .goodness.periodogram import order_test, time_test
-from .goodness.zeros import ZEROS
 from .penalty import NEW_CAUSE, regression_without
 from .remainder import free_paths, remainder_of
-from .runzeros import CHANCE, chance_between_runs
+from .runzeros import CHANCE, chance_between_runs, zeros_scatter
 from .selection import is_flexible
 from .unnamed import is_line_in_time, is_line_of, is_named, modulator, modulators
 
@@ -110,7 +109,7 @@ def _of_scattered_zeros(
     chance = chance_between_runs(regression, group, unexplained)
     if chance <= CHANCE:
         return ""
-    if not any(item.test == ZEROS and item.p < CHANCE for item in unexplained.evidence):
+    if not zeros_scatter(unexplained):
         runs = regression.signals.runs
         return f"it shows in the zeros of {runs} runs alone, and each may have one of its own"
     return (

@@ -32,8 +32,8 @@ def chance_between_runs(
     `scatter_chance` times the laws that could have been taken in its place. Where no run is left
     over to tell whether they scatter, 1.
     """
-    scatter = any(item.test == ZEROS and item.p < CHANCE for item in unexplained.evidence)
-    if not (scatter or has_no_run_to_spare(regression)):
+    scatter = zeros_scatter(unexplained)
+    if not (scatter or _has_no_run_to_spare(regression)):
         return 0.0
     if not group or any(regression.terms[k].columns.size == 0 for k in group):
         return 0.0
@@ -51,7 +51,12 @@ def chance_between_runs(
     return min(1.0, scatter_chance(regression, group) * max(tried, 1))
 
 
-def has_no_run_to_spare(regression: Regression) -> bool:
+def zeros_scatter(unexplained: Unexplained) -> bool:
+    """The zeros of the runs differ by more than the noise, and nothing explains it."""
+    return any(item.test == ZEROS and item.p < CHANCE for item in unexplained.evidence)
+
+
+def _has_no_run_to_spare(regression: Regression) -> bool:
     """As many coefficients as there are differences between the runs may explain these."""
     columns = sum(term.columns.shape[1] for term in regression.terms)
     return bool(regression.signals.runs - 1 <= columns)

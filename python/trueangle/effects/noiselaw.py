@@ -109,9 +109,11 @@ def _with_growth(
     found[0] = mean - float(np.log1p(start * power).mean())
     found[-1] = found[0] + float(np.log(start))
 
+    least, most = mean - WIDEST, mean + WIDEST  # beyond these logarithms a part is not there
+
     def parts(at: Array) -> tuple[Array, Array]:
         """Logarithm of the variance, and its derivatives."""
-        own = np.exp(np.clip(columns @ at[:-1], mean - WIDEST, mean + WIDEST))
+        own = np.exp(np.clip(columns @ at[:-1], least, most))
         grown = np.exp(at[-1]) * power
         share = own / (own + grown)
         return np.log(own + grown), np.column_stack([share[:, None] * columns, 1.0 - share])
@@ -120,7 +122,7 @@ def _with_growth(
         log_variance, tangents = parts(found)
         away = clipped_squares(square, np.exp(log_variance)) - 1.0
         step = np.linalg.pinv(tangents.T @ tangents) @ (tangents.T @ away)
-        moved = np.clip(found + np.clip(step, -LARGEST_STEP, LARGEST_STEP), *_limits(mean))
+        moved = np.clip(found + np.clip(step, -LARGEST_STEP, LARGEST_STEP), least, most)
         settled = float(np.abs(moved - found).max()) < SETTLED
         found = moved
         if settled:
@@ -134,8 +136,3 @@ def _with_growth(
         log_variance,
         log_likelihood(square, log_variance),
     )
-
-
-def _limits(mean: float) -> tuple[float, float]:
-    """Logarithms that neither part leaves: beyond, it is not there."""
-    return mean - WIDEST, mean + WIDEST

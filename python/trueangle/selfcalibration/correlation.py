@@ -104,6 +104,17 @@ def lag_sums(one: Array, other: Array, most: int) -> Array:
     )
 
 
+def lag_pairs(lengths: Sequence[int], most: int) -> Array:
+    """Pairs of readings of one series that are 0, 1 ... most apart."""
+    apart = np.array(lengths)[:, None] - np.arange(most + 1)
+    return np.asarray(np.maximum(apart, 0).sum(axis=0), dtype=np.float64)
+
+
+def _most_terms(lengths: Sequence[int]) -> int:
+    """Terms that series of so many readings tell, at most."""
+    return min(_MOST, sum(lengths) // _PER_TERM, max(lengths, default=1) - 1)
+
+
 def correlation_of(
     series: Sequence[Array], absorbed: Callable[[Correlation, int], Array] | None = None
 ) -> Correlation:
@@ -126,12 +137,12 @@ def correlation_of(
     >>> correlation_of([noise]).terms.round(1), correlation_of([rng.normal(size=4000)]).is_white
     (array([0.8]), True)
     """
-    count = sum(one.size for one in series)
-    most = min(_MOST, count // _PER_TERM, max((one.size for one in series), default=1) - 1)
+    lengths = [one.size for one in series]
+    count, most = sum(lengths), _most_terms(lengths)
     left = np.sum([lag_sums(one, one, most) for one in series], axis=0) if count else np.zeros(1)
     if most < 1 or not left[0] > 0.0:
         return WHITE
-    pairs = np.sum([np.maximum(one.size - np.arange(most + 1), 0) for one in series], axis=0)
+    pairs = lag_pairs(lengths, most)
     found = WHITE
     for _ in range(1 if absorbed is None else _ROUNDS):
         taken = np.zeros(most + 1) if absorbed is None else absorbed(found, most)
@@ -155,11 +166,11 @@ def correlation_above(series: Sequence[Array], cut: float) -> Correlation:
     cut : float
         Cycles per reading.
     """
-    count = sum(one.size for one in series)
-    most = min(_MOST, count // _PER_TERM, max((one.size for one in series), default=1) - 1)
+    lengths = [one.size for one in series]
+    count, most = sum(lengths), _most_terms(lengths)
     if most < 1 or cut > _HIGHEST_CUT:
         return WHITE
-    left, pairs = np.zeros(most + 1), np.zeros(most + 1)
+    left = np.zeros(most + 1)
     for one in series:
         n = 1 << (2 * one.size - 1).bit_length()
         power = np.abs(np.fft.rfft(one, n)) ** 2
@@ -169,10 +180,9 @@ def correlation_above(series: Sequence[Array], cut: float) -> Correlation:
             power[frequency < cut] = power[above].mean()
         found = np.fft.irfft(power, n)[: most + 1]
         left[: found.size] += found
-        pairs += np.maximum(one.size - np.arange(most + 1), 0)
     if not left[0] > 0.0:
         return WHITE
-    lags = left / np.maximum(pairs, 1.0)
+    lags = left / np.maximum(lag_pairs(lengths, most), 1.0)
     return _autoregression(lags / lags[0], count)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..support.arrays import Array
-from .correlation import Correlation, lag_sums
+from .correlation import Correlation, lag_pairs, lag_sums
 from .densetriangle import DenseRows
 
 
@@ -37,10 +37,9 @@ class DenseSeries:
     def absorbed(self, correlation: Correlation, most: int) -> Array:
         """Sums over lags of ``H + H D + D H - H D H``, ``H = Z (Z'Z + L)^-1 Z'``, ``D = R - I``."""
         found = np.zeros(most + 1)
-        pairs = np.zeros(most + 1)
+        pairs = lag_pairs([len(rows) for rows in self.rows], most)
         middle = self._middle(correlation)
         for rows in self.rows:
-            pairs += np.maximum(len(rows) - np.arange(most + 1), 0)
             held = rows @ self.bread
             found += lag_sums(held, rows, most)
             if correlation.is_white:
