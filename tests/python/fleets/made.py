@@ -3,6 +3,7 @@
 import numpy as np
 
 import trueangle as ta
+from trueangle.fleets.calibration import Calibration
 
 ARCSEC = 1.0 / 3600.0
 PLACES = np.arange(180) * 2.0
@@ -53,3 +54,22 @@ def units(
                     )
                 )
     return found
+
+
+def alone(variance, zero_variance, when=None):
+    """A calibration of one order in one run; what a reading of variance 1 tells it to."""
+    return Calibration(
+        unit="u",
+        when=when,
+        coefficients=np.zeros(2),
+        inverse=variance * np.eye(2),
+        zero=0.0,
+        zero_inverse=zero_variance,
+        squares=1.0,
+        freedom=9.0,
+        readings=12,
+        runs=1,
+        repeat_squares=np.zeros(1),
+        repeat_freedom=0.0,
+        repeat_white=np.zeros(1),
+    )

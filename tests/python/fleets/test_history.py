@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fleets.calibration import Calibration
 from trueangle.fleets.charts import charted
 from trueangle.support.runlength import chart_limit
 
-from .made import units
+from .made import alone, units
 
 SEED = 52_030
 TWO = ("2026-01-10", "2026-07-10")
@@ -21,25 +20,6 @@ FOUR = ("2026-01-10", "2026-03-10", "2026-05-10", "2026-07-10")
 def turned(rng, size):
     angle = rng.uniform(0.0, 2.0 * np.pi)
     return size * np.array([np.cos(angle), np.sin(angle)])
-
-
-def calibration():
-    """Of one order, its coefficients known to a variance of 0.5 for readings of variance 1."""
-    return Calibration(
-        "u",
-        None,
-        np.zeros(2),
-        0.5 * np.eye(2),
-        0.0,
-        0.1,
-        1.0,
-        9.0,
-        12,
-        1,
-        np.zeros(1),
-        0.0,
-        np.zeros(1),
-    )
 
 
 def verdicts(found):
@@ -132,7 +112,7 @@ def test_the_charts_are_sums_of_independent_normal_numbers_where_nothing_moves()
 
 def test_the_sums_are_those_of_the_recursion():
     values = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, -1.0], [9.0, 0.0]])
-    dated = [(replace(calibration(), coefficients=v), 4.0) for v in values]
+    dated = [(replace(alone(0.5, 0.1), coefficients=v), 4.0) for v in values]
     upper, expected = np.zeros(4), []
     for t in range(1, 4):
         # A date's variance: noise 4 times 0.5, and half of the 2 of an ordinary change.

@@ -10,7 +10,7 @@ from trueangle.fleets.calibration import Calibration, CalibrationSums, order_col
 from trueangle.fleets.history import changes_of, drift_bound, next_calibration
 from trueangle.support.distributions import f_quantile, normal_quantile
 
-from .made import MEAN, pattern, units
+from .made import MEAN, alone, pattern, units
 
 SEED = 52_400
 ORDERS = np.arange(1.0, 5.0)
@@ -160,21 +160,7 @@ def test_a_zero_that_moved_has_its_own_limit_and_statistic():
 
 def blank(when=None):
     """A calibration of one order, known well."""
-    return Calibration(
-        "u",
-        when,
-        np.zeros(2),
-        1e-6 * np.eye(2),
-        0.0,
-        1e-6,
-        1.0,
-        9.0,
-        12,
-        1,
-        np.zeros(1),
-        0.0,
-        np.zeros(1),
-    )
+    return alone(1e-6, 1e-6, when)
 
 
 def test_a_leap_is_farther_than_two_units_are_apart_in_99_percent_of_fleets():

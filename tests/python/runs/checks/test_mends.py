@@ -142,13 +142,13 @@ def told(records):
 @pytest.mark.parametrize("fault", CASES)
 def test_what_it_says_to_do_mends_it(fault, place):
     print("seed", SEED)
-    damaged, mended = CASES[fault]
+    damaged, remedied = CASES[fault]
     records = sound()
     assert told(records) == []
     records[place] = damaged(records[place])
     (found,) = [f for f in data_faults(records) if f.fault == fault]
     assert found.runs == (f"run {place}",)
-    records[place] = mended(records[place], found)
+    records[place] = remedied(records[place], found)
     assert told(records) == []
 
 
