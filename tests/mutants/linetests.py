@@ -27,6 +27,9 @@ JOBS = 2
 #: Endings of what is kept of a room: which lines are reached, and which tests fail by themselves.
 LINES, FAILING = ".coverage", ".failing"
 
+#: Tests that are recorded apart, in the order in which they are asked.
+QUICK, SLOW = "not slow", "slow"
+
 
 def rooms_of_tests() -> list[str]:
     """Folders below ``tests/python`` that hold tests."""
@@ -40,44 +43,45 @@ class LineTests(NamedTuple):
 
     folder: Path
 
-    def record(self, copy: Copy, rooms: list[str], *, quick: bool) -> None:
-        """Record what is not there yet."""
+    def record(self, copy: Copy, rooms: list[str], which: str) -> None:
+        """Record what is not there yet of the quick tests or of the slow ones."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        wanted = [room for room in rooms if not self._of(room, FAILING).exists()]
+        wanted = [room for room in rooms if not self._of(room, which, FAILING).exists()]
         with ThreadPoolExecutor(JOBS) as pool:
-            for told in pool.map(lambda room: self._record(copy, room, quick=quick), wanted):
+            for told in pool.map(lambda room: self._record(copy, room, which), wanted):
                 print(told, flush=True)
 
-    def _record(self, copy: Copy, room: str, *, quick: bool) -> str:
+    def _record(self, copy: Copy, room: str, which: str) -> str:
         command = [
             sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=line",
             f"--cov={copy.folder / 'python' / 'trueangle'}", "--cov-context=test", "--cov-report=",
-            room, *(["-m", "not slow"] if quick else []),
+            room, "-m", which,
         ]  # fmt: skip
-        environment = copy.environment() | {"COVERAGE_FILE": str(self._of(room, LINES))}
+        environment = copy.environment() | {"COVERAGE_FILE": str(self._of(room, which, LINES))}
         done = subprocess.run(
             command, cwd=copy.folder, env=environment, check=False, text=True, capture_output=True
         )
         # A test that fails by itself, as in a copy without history, would notice every fault.
         lines = done.stdout.splitlines()
         failed = [line.split(" - ")[0].split(" ", 1)[1] for line in lines if line.startswith(ENDED)]
-        self._of(room, FAILING).write_text("\n".join(failed), "utf-8")
+        self._of(room, which, FAILING).write_text("\n".join(failed), "utf-8")
         return "\n".join([f"{room}: {lines[-1] if lines else done.stderr[-300:]}", *failed])
 
-    def _of(self, room: str, ending: str) -> Path:
-        return self.folder / (room.strip("/").replace("/", "-") + ending)
+    def _of(self, room: str, which: str, ending: str) -> Path:
+        name = "*" if room == "*" else room.strip("/").replace("/", "-")
+        return self.folder / f"{name}.{which.replace(' ', '-')}{ending}"
 
     def failing(self) -> set[str]:
         """Tests that fail without a fault."""
         kept = self.folder.glob("*" + FAILING)
         return {name for path in kept for name in path.read_text("utf-8").splitlines()}
 
-    def reached(self) -> dict[str, dict[int, list[str]]]:
-        """Tests that reach each line of each file of the package, the narrowest first."""
+    def reached(self, which: str) -> dict[str, dict[int, list[str]]]:
+        """Such tests as reach each line of each file of the package, the narrowest first."""
         unfit = self.failing()
         breadth: Counter[str] = Counter()
         lines: dict[str, dict[int, list[str]]] = {}
-        for data in sorted(self.folder.glob("*" + LINES)):
+        for data in sorted(self.folder.glob(self._of("*", which, LINES).name)):
             for path, context, bits in sqlite3.connect(data).execute(
                 "select file.path, context.context, numbits from line_bits"
                 " join file on file.id = file_id join context on context.id = context_id"
