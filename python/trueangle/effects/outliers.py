@@ -17,7 +17,7 @@ from ..estimation.regression import Regression
 from ..estimation.segments import MOST_IN_ROW, flagged_segments, less_local_level, within_segments
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from ..support.distributions import f_tail
+from ..support.distributions import binomial_tail
 from .effect import Effect, ScatterFinding
 from .local_defect import LocalDefect
 from .presliding_hysteresis import PreslidingHysteresis
@@ -305,7 +305,7 @@ def _gathered(regression: Regression, rows: NDArray[np.int64]) -> str:
     starts, _ = flagged_segments(_flags(rows, regression.n), regression.bounds)
     near = [int(np.count_nonzero(since[starts] < within)) for within in AFTER]
     chances = [
-        len(AFTER) * _binomial_tail(count, starts.size, float(np.mean(since < within)))
+        len(AFTER) * binomial_tail(count, starts.size, float(np.mean(since < within)))
         for count, within in zip(near, AFTER, strict=True)
     ]
     k = int(np.argmin(chances))
@@ -317,14 +317,6 @@ def _gathered(regression: Regression, rows: NDArray[np.int64]) -> str:
         f"(p {chances[k]:.1g}): something that winds up or settles there leaves them, as "
         f"{PreslidingHysteresis.kind} does"
     )
-
-
-def _binomial_tail(count: int, of: int, chance: float) -> float:
-    """Probability of ``count`` or more."""
-    if count == 0 or chance >= 1.0:
-        return 1.0
-    above, below = 2.0 * (of - count + 1), 2.0 * count
-    return f_tail(below * (1.0 - chance) / (above * chance), above, below)
 
 
 def _normal(e: Array, scale: float) -> float:

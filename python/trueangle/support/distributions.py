@@ -161,6 +161,23 @@ def f_quantile(p: float, numerator: float, denominator: float) -> float:
     return _root(lambda x: f_tail(x, numerator, denominator), upper)
 
 
+def binomial_tail(count: int, of: int, chance: float) -> float:
+    """Probability of ``count`` or more of ``of`` independent trials.
+
+    ::
+
+        P(K ≥ k) = I_p(k, n - k + 1)
+
+    Examples
+    --------
+    >>> round(binomial_tail(9, 10, 0.5), 9)  # (10 + 1) / 2^10
+    0.010742187
+    """
+    if count <= 0:
+        return 1.0
+    return _incomplete_beta(float(count), float(of - count + 1), chance)
+
+
 def _incomplete_beta(a: float, b: float, x: float) -> float:
     """Regularised incomplete beta function ``I_x(a, b)``, a, b > 0, 0 <= x <= 1.
 

@@ -81,3 +81,14 @@ def test_what_is_no_probability_is_refused() -> None:
 def test_a_normal_number_exceeds_this_size_on_either_side(chance: float) -> None:
     size = ours.two_sided_quantile(chance)
     assert 2.0 * stats.norm.sf(size) == pytest.approx(chance, rel=1e-6)
+
+
+@pytest.mark.parametrize("chance", [0.0, 1e-9, 0.07, 0.5, 0.93, 1.0])
+def test_a_binomial_tail_is_the_sum_of_its_terms(chance: float) -> None:
+    for of in (1, 7, 40):
+        terms = [math.comb(of, k) * chance**k * (1.0 - chance) ** (of - k) for k in range(of + 1)]
+        for count in range(of + 1):
+            tail = math.fsum(terms[count:])
+            assert ours.binomial_tail(count, of, chance) == pytest.approx(
+                tail, rel=1e-11, abs=1e-300
+            )
