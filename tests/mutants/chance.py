@@ -25,7 +25,7 @@ from queue import Queue
 from copies import LATE, Copy, Verdict
 from drawing import ROOT, Drawn, drawn, listed
 from faults import Fault
-from linetests import QUICK, SLOW, LineTests, reaching, rooms_of_tests
+from linetests import QUICK, SLOW, LineTests, of_line, rooms_of_tests
 
 PACKAGE = ROOT / "python" / "trueangle"
 
@@ -36,10 +36,13 @@ ROOMS = (
     "runs", "selfcalibration", "simulation", "simulators", "support",
 )  # fmt: skip
 
-#: Tests of one fault at most, the ones that reach least first: they are the narrowest.
+#: Tests of one fault at most: those of its module, then the ones that reach least.
 MOST_TESTS = 60
 #: The same of slow tests, which are asked last.
 MOST_SLOW = 30
+
+#: Files that are asked once more as a whole.
+MOST_FILES = 12
 
 #: The broadest, in whose approved texts stands whatever is told; asked last.
 TEXTS = "tests/python/transcripts/"
@@ -56,6 +59,12 @@ def excused(fault: Drawn) -> str:
     return ""
 
 
+def reaching(lines: dict[int, list[str]], fault: Drawn) -> list[str]:
+    """Tests that reach a fault, those in files named after its module first."""
+    stem = Path(fault.file).stem.strip("_")
+    return sorted(of_line(lines, fault.line), key=lambda test: stem not in test.split("::")[0])
+
+
 def judged(copy: Copy, fault: Drawn, asked: list[list[str]], unfit: set[str]) -> tuple[str, str]:
     """What became of a fault, ``killed`` or one of four other words, and what is said of it.
 
@@ -68,8 +77,8 @@ def judged(copy: Copy, fault: Drawn, asked: list[list[str]], unfit: set[str]) ->
         return "unreached", ""
     whole = (ROOT / fault.file).read_text("utf-8")
     verdict = Verdict("survived")
-    for tests, most in zip(asked, (MOST_TESTS, MOST_SLOW), strict=False):
-        planted = Fault("chance", fault.file, whole, fault.text, tuple(tests[:most]))
+    for tests in asked:
+        planted = Fault("chance", fault.file, whole, fault.text, tuple(tests))
         if verdict.outcome == "survived" and tests:
             verdict = copy.tried(planted, -1)
             # Tests that cannot even be collected have noticed, if they can without the fault.
@@ -85,7 +94,7 @@ def asked_again(copy: Copy, planted: Fault, tests: list[str], unfit: set[str]) -
 
     What a fixture of a module or a cache computes, the first test that asks for it reaches alone.
     """
-    files = [*dict.fromkeys(test.split("::")[0] for test in planted.tests)]
+    files = [*dict.fromkeys(test.split("::")[0] for test in planted.tests)][:MOST_FILES]
     texts = {test.split("::")[0] for test in tests if test.startswith(TEXTS)} - set(files)
     left = [f"--deselect={test}" for test in unfit]
     for asked in filter(None, (files, sorted(texts))):
@@ -142,13 +151,18 @@ def main() -> int:
         for which in kinds:
             lines.record(copies[0], args.tests or rooms_of_tests(), which)
         reached, unfit = [lines.reached(which) for which in kinds], lines.failing()
+        unseen = [lines.unseen(which) for which in kinds]
         idle = Queue[Copy]()
         for copy in copies:
             idle.put(copy)
 
         def tried(fault: Drawn) -> tuple[Drawn, str, str]:
             start = time.monotonic()
-            tests = [reaching(of.get(fault.file, {}), fault.line) for of in reached]
+            tests = [reaching(of.get(fault.file, {}), fault) for of in reached]
+            tests = [
+                [*some[:most], *more]
+                for some, most, more in zip(tests, (MOST_TESTS, MOST_SLOW), unseen, strict=False)
+            ]
             copy = idle.get()
             try:
                 outcome, said = judged(copy, fault, tests, unfit)

@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
@@ -24,8 +25,9 @@ ENDED = ("FAILED ", "ERROR ")
 #: Rooms that are recorded at a time.
 JOBS = 2
 
-#: Endings of what is kept of a room: which lines are reached, and which tests fail by themselves.
-LINES, FAILING = ".coverage", ".failing"
+#: Endings of what is kept of a room: which lines are reached, which tests fail by themselves, and
+#: which fail only where lines are recorded, as they follow calls themselves.
+LINES, FAILING, UNSEEN = ".coverage", ".failing", ".unseen"
 
 #: Tests that are recorded apart, in the order in which they are asked.
 QUICK, SLOW = "not slow", "slow"
@@ -52,20 +54,31 @@ class LineTests(NamedTuple):
                 print(told, flush=True)
 
     def _record(self, copy: Copy, room: str, which: str) -> str:
-        command = [
-            sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=line",
+        lines = str(self._of(room, which, LINES))
+        recorded = (
             f"--cov={copy.folder / 'python' / 'trueangle'}", "--cov-context=test", "--cov-report=",
             room, "-m", which,
-        ]  # fmt: skip
-        environment = copy.environment() | {"COVERAGE_FILE": str(self._of(room, which, LINES))}
-        done = subprocess.run(
-            command, cwd=copy.folder, env=environment, check=False, text=True, capture_output=True
-        )
+        )  # fmt: skip
+        told, failed = self._failed(copy, recorded, {"COVERAGE_FILE": lines})
         # A test that fails by itself, as in a copy without history, would notice every fault.
+        again = self._failed(copy, failed, {})[1] if failed else []
+        self._of(room, which, UNSEEN).write_text("\n".join(set(failed) - set(again)), "utf-8")
+        self._of(room, which, FAILING).write_text("\n".join(again), "utf-8")
+        return "\n".join([f"{room}: {told}", *failed])
+
+    def _failed(
+        self, copy: Copy, asked: Sequence[str], more: dict[str, str]
+    ) -> tuple[str, list[str]]:
+        """The last line of pytest, and the tests that fail."""
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=line"]
+        environment = copy.environment() | more
+        done = subprocess.run(
+            [*command, *asked], cwd=copy.folder, env=environment, check=False, text=True,
+            capture_output=True,
+        )  # fmt: skip
         lines = done.stdout.splitlines()
         failed = [line.split(" - ")[0].split(" ", 1)[1] for line in lines if line.startswith(ENDED)]
-        self._of(room, which, FAILING).write_text("\n".join(failed), "utf-8")
-        return "\n".join([f"{room}: {lines[-1] if lines else done.stderr[-300:]}", *failed])
+        return lines[-1] if lines else done.stderr[-300:], failed
 
     def _of(self, room: str, which: str, ending: str) -> Path:
         name = "*" if room == "*" else room.strip("/").replace("/", "-")
@@ -73,12 +86,19 @@ class LineTests(NamedTuple):
 
     def failing(self) -> set[str]:
         """Tests that fail without a fault."""
-        kept = self.folder.glob("*" + FAILING)
-        return {name for path in kept for name in path.read_text("utf-8").splitlines()}
+        return set(self._kept(self.folder.glob("*" + FAILING)))
+
+    def unseen(self, which: str) -> list[str]:
+        """Such tests as may reach any line, for theirs could not be recorded."""
+        return self._kept(self.folder.glob(self._of("*", which, UNSEEN).name))
+
+    @staticmethod
+    def _kept(files: Iterable[Path]) -> list[str]:
+        return [name for path in sorted(files) for name in path.read_text("utf-8").splitlines()]
 
     def reached(self, which: str) -> dict[str, dict[int, list[str]]]:
         """Such tests as reach each line of each file of the package, the narrowest first."""
-        unfit = self.failing()
+        unfit = self.failing() | set(self.unseen(which))
         breadth: Counter[str] = Counter()
         lines: dict[str, dict[int, list[str]]] = {}
         for data in sorted(self.folder.glob(self._of("*", which, LINES).name)):
@@ -99,7 +119,7 @@ class LineTests(NamedTuple):
         return lines
 
 
-def reaching(places: dict[int, list[str]], line: int) -> list[str]:
+def of_line(places: dict[int, list[str]], line: int) -> list[str]:
     """Tests that reach a line; of one that runs at import alone, those of the module."""
     if line in places:
         return places[line]
