@@ -21,6 +21,7 @@ from .reading import sampled_model, table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 ENTRIES = 256
+_INT8 = range(-128, 128)
 #: Scales tried above the least, for the one whose rounding is kindest to these knots.
 _SCALES = np.linspace(1.0, 1.05, 401)
 
@@ -94,7 +95,7 @@ class Moteus(Target):
                 raise table_error(path, f"{found[4]!r} is not a number", number) from None
             if found[3]:
                 scale = value
-            elif int(found[2]) >= ENTRIES or abs(value) > 128 or value != int(value):
+            elif int(found[2]) >= ENTRIES or value not in _INT8:
                 raise table_error(
                     path, f"{line.strip()!r} is not an entry of a table of int8", number
                 )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trueangle.cli.benchmarks import fit
-from trueangle.cli.benchmarks.fit import Case, fit_peers, measure_fits
+from trueangle.cli.benchmarks.fit import Case, fit_peers, measure_fits, quick_fits
 
 # Ours relative to the largest coefficient; the error is a difference of angles of a turn.
 AGREES = 1e-11
@@ -39,3 +39,9 @@ def test_a_way_that_differs_is_told_by_the_share_of_the_largest_coefficient(monk
     monkeypatch.setattr(fit, "fit_peers", lambda: ({"off": off}, []))
     (row,) = [row for row in measure_fits(Case(300, 3), rounds=1) if row.name == "off"]
     assert row.deviation == pytest.approx(0.25, rel=1e-6)
+
+
+def test_quick_fits_are_a_polygon_and_a_log():
+    """17 orders of a log: with five, all that differs is how fast the readings are read."""
+    asked = {(row.case.samples, row.case.highest) for row in quick_fits(700, rounds=1)}
+    assert asked == {(37, 5), (700, 17)}

@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from trueangle.cli import COMMANDS, build_parser, main
-from trueangle.cli.paths import Input, Output
+from trueangle.cli.paths import Input, Output, check_paths
+from trueangle.errors import FileError
+from trueangle.support.files import FileKind
 
 SIMULATION = """\
 # belief
@@ -505,3 +507,15 @@ def test_every_argument_that_names_a_file_says_whether_it_is_read_or_written(com
             continue
         assert callable(action.type), (command, action.dest)
         assert isinstance(action.type("x"), Input | Output), (command, action.dest)
+
+
+def test_an_output_is_none_of_the_files_that_a_pattern_stands_for(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a-1.csv", "a-2.csv", "b.csv"):
+        (tmp_path / name).write_text("reference_deg,indicated_deg\n")
+    written = Output.of(FileKind("calibration runs", (".csv",)))
+    for name in ("a-*.csv", "a-2.csv"):
+        read = argparse.Namespace(runs=[Input(name)], output=written("a-2.csv"))
+        with pytest.raises(FileError, match=r"^a-2\.csv: is also read"):
+            check_paths(read)
+        check_paths(argparse.Namespace(runs=[Input(name)], output=written("b.csv")))

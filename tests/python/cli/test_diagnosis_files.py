@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from trueangle.cli.diagnose import _written
-from trueangle.errors import NoModelError
+from trueangle.errors import FileError, NoModelError
 
 
 @pytest.fixture
@@ -89,3 +89,25 @@ def test_every_file_is_told_in_its_order(exported, capsys):
 def test_a_plan_without_runs_is_not_written(runs, capsys):
     with pytest.raises(ValueError, match=r"^nothing is seen that a further run tells: p\.toml not"):
         written(capsys, runs=runs or (), plan="p.toml")
+
+
+def test_every_file_that_cannot_be_written_is_told_once(capsys):
+    """The last as the error of the command, those before as lines of their own."""
+
+    def refused(path):
+        raise FileError(path, "the folder is read only")
+
+    out = SimpleNamespace(save=refused)
+    result = SimpleNamespace(
+        simulation=lambda: out, correction=lambda *_, **__: out, findings=[], torque=None,
+        next_runs=SimpleNamespace(runs=[1], save=refused),
+    )  # fmt: skip
+    files = {"extend": "e.toml", "plan": "p.toml", "corrected_model": "c.json"}
+    args = SimpleNamespace(**files, extend_into=None, into_joint=None, json=False, argument="auto")
+    with pytest.raises(FileError, match=r"^c\.json: "):
+        _written(result, args, None)
+    assert capsys.readouterr() == (
+        "",
+        "trueangle: error: e.toml: the folder is read only\n"
+        "trueangle: error: p.toml: the folder is read only\n",
+    )

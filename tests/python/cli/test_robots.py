@@ -1,6 +1,8 @@
 """Commands about every joint of a robot: one log, one command each."""
 
+import html
 import json
+import re
 
 import numpy as np
 import pytest
@@ -168,6 +170,11 @@ def test_a_report_has_a_page_in_front_and_a_section_for_every_joint(arm, capsys)
     assert text.index(">elbow</a>") < text.index(">shoulder</a>") < text.index(">wrist</a>")
     assert text.count("<iframe") == len(ranking) == 3
     assert 'title="report on wrist"' in text
+    # A title that is given is that of the whole: every section keeps its joint's name.
+    given = ["--title", "Arm of cell 7", "-o", str(page), "--json"]
+    assert asked(arm, "report", "--orders", "1", *given, capsys=capsys)[0] == 0
+    text = html.unescape(page.read_text())
+    assert re.findall("<h1>(.*?)</h1>", text) == ["Arm of cell 7", "elbow", "shoulder", "wrist"]
 
 
 def test_a_joint_whose_readings_support_nothing_does_not_stop_the_others(arm, tmp_path, capsys):

@@ -99,3 +99,22 @@ def test_the_zero_of_a_lookup_that_is_kept_is_told_in_degrees(zero, tmp_path) ->
     assert told is not None
     # An error at the reading is not one at the reference: 700 arcsec times its slope.
     assert float(told[1]) == pytest.approx(zero, abs=1e-3)
+
+
+def test_entries_of_a_scaled_table_are_int8(tmp_path) -> None:
+    """Moteus: from -128 to 127, which is one less than the other side has."""
+    path = tmp_path / "a.cfg"
+    ta.export_model(model(o1=900.0), "moteus", path, bits=14)
+    lines = path.read_text("utf-8").splitlines()
+    at = next(k for k, line in enumerate(lines) if re.search(r"compensation_table\.7 ", line))
+
+    def read(entry: str) -> object:
+        lines[at] = re.sub(r"\S+$", entry, lines[at])
+        path.write_text("\n".join(lines), "utf-8")
+        return ta.import_model(path, "moteus", bits=14)
+
+    for entry in ("-128", "127"):
+        read(entry)
+    for entry in ("-129", "128", "1.5"):
+        with pytest.raises(ta.errors.FileError, match=f"line {at + 1}.*table of int8"):
+            read(entry)

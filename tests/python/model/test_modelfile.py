@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import trueangle as ta
 from trueangle.errors import ModelFileError
-from trueangle.model.records import FitRecord, Provenance
+from trueangle.model.records import MOST_TURNS, FitRecord, Provenance
 from trueangle.support.files import InputFile
 
 numbers = st.floats(-1e-3, 1e-3, allow_nan=False).map(lambda x: x + 0.0)
@@ -158,3 +158,19 @@ def test_a_hundred_thousand_keys_are_searched_for_doubles_at_once(tmp_path):
     path.write_text("{" + keys + ', "k7": 1}')
     with pytest.raises(ModelFileError, match=r"k7.*appears twice"):
         ta.load_model(path)  # comparing every pair of keys would take minutes
+
+
+@pytest.mark.parametrize("key", ["cosine", "sine"])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_line_has_so_many_turns_at_most_either_way(key, sign, tmp_path):
+    most = sign * MOST_TURNS * 360.0
+
+    def change(content):
+        content["shafts"][0][key][0] = amplitude
+        content["argument"] = "indicated"  # else it stands for several true angles, too
+
+    amplitude = most
+    ta.load_model(written(tmp_path, change))
+    amplitude = 1.001 * most
+    with pytest.raises(ModelFileError, match=rf"shafts\[0\]\.{key}\[0\].*more than .* turns"):
+        ta.load_model(written(tmp_path, change))

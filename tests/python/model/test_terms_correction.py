@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import trueangle as ta
 from trueangle import errors
-from trueangle.model.terms import ScaleError
+from trueangle.model.terms import ScaleError, VaryingLine
 
 # The motion goes beyond the travel of the ramp, which is held there.
 pytestmark = pytest.mark.filterwarnings("ignore::trueangle.errors.OutsideSpanWarning")
@@ -271,6 +271,10 @@ def test_thermal_and_load_terms_against_their_formulas():
         * np.exp(-0.5 * ((np.mod(3.0 * theta - 100.0 + 180.0, 360.0) - 180.0) / 8.0) ** 2),
         ScaleError(2e-4, -90.0, 250.0): 2e-4 * (np.clip(theta, -90.0, 250.0) - 80.0),
     }
+    speed = signals["velocity"]
+    for follows, x_of in (("speed", np.abs(speed)), ("velocity", speed), ("torque", load)):
+        line = VaryingLine([3.5], [1e-4], [2e-4], follows)
+        cases[line] = x_of * (1e-4 * np.cos(3.5 * x) + 2e-4 * np.sin(3.5 * x))
     for term, expected in cases.items():
         model = plain.replace(terms=[term])
         added = model.error(theta, **signals) - plain.error(theta)
