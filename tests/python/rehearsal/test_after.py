@@ -1,5 +1,6 @@
 """A plan of next runs is rehearsed: as many readings as name the true cause."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -107,3 +108,21 @@ def test_trials_of_every_cause_are_counted(plan, monkeypatch, missed, to_the_end
     enough = int((1.0 - WANTED) * 20 + 1e-9) + 1
     assert found.trials == (40 if to_the_end else 20 * missed + enough)
     assert found.chance_named == 0.0
+
+
+@pytest.mark.parametrize(
+    ("trials", "noted"), [((6, 6), False), ((6, 0), True), ((0, 6), True), ((0, 0), True)]
+)
+def test_a_plan_says_where_something_that_is_seen_was_not_tried(plan, monkeypatch, trials, noted):
+    entries = tuple(replace(plan.between[0], seen=True, told=True) for _ in trials)
+    monkeypatch.setattr(
+        after._FurtherTrials,
+        "counted",
+        lambda self, plan, k, entry, to_the_end: replace(
+            entry, trials=trials[k], chance_named=1.0 if trials[k] else None
+        ),
+    )
+    asked = replace(plan, between=entries, notes=())
+    found = SimpleNamespace(runs=RUNS, noise=1.0, correlation=0.0)
+    notes = after._rehearsed(asked, found, SIM, 10_000, 3, 0).notes
+    assert notes == ((after.UNTRIED,) if noted else ())

@@ -115,3 +115,18 @@ def test_what_is_told_of_a_cause_is_counted(grows: bool) -> None:
     assert plain["named_95_interval"] == list(found.intervals[0.95])
     never = rehearsed_cause("x", "size", sizes, [(0, TrialOutcome("nothing"))], "blind", "measure")
     assert (never.blind_because, never.measure, never.ever_named) == ("blind", "measure", False)
+
+
+def test_causes_named_instead_come_by_how_often_then_by_name():
+    """Counts that run against the alphabet, and two that are equal."""
+    often = {"backlash": 1, "clock_drift": 3, "latency": 7, "scale_error": 3}
+    answers = [
+        (0, TrialOutcome("taken_for_another", instead=(cause,), beside=(cause,)))
+        for cause, count in often.items()
+        for _ in range(count)
+    ]
+    told = rehearsed_cause("x", "size", None, answers, None, None)
+    for counted in (told.confused_with, told.beside):
+        assert [*counted.items()] == [
+            ("latency", 7), ("clock_drift", 3), ("scale_error", 3), ("backlash", 1)
+        ]  # fmt: skip
