@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from trueangle.effects import EFFECTS
+from trueangle.effects.ambiguity import Ambiguity
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
+from trueangle.rehearsal import visibility
 from trueangle.rehearsal.visibility import DOWN, FIRST, NEAR, STEPS, UP, _deviance, size_range
 from trueangle.simulation import (
     Backlash,
@@ -86,3 +88,17 @@ def test_the_first_size_of_play_and_the_range_about_it(sigma: float, samples: in
     assert sizes.grows
     assert sizes.size(STEPS) == pytest.approx(2.0 * sizes.first)
     assert sizes.size(-STEPS) == pytest.approx(0.5 * sizes.first)
+
+
+def test_blind_is_a_cause_whose_naming_would_be_a_guess(monkeypatch: pytest.MonkeyPatch) -> None:
+    """None whose form all share, none that is never doubted; of two reasons the first."""
+    spots = [
+        Ambiguity(("backlash", "latency"), "one", "measure", common="backlash"),
+        Ambiguity(("latency", "missing_order", "scale_error"), "two", "measure"),
+    ]
+    monkeypatch.setattr(visibility, "blind_spots", lambda regression: spots)
+    sim = believed()
+    found = visibility.blind_causes(sim, join_runs(simulate(sim, seed=1)))
+    assert {cause: spot.because for cause, spot in found.items()} == {
+        "latency": "one", "scale_error": "two"
+    }  # fmt: skip
