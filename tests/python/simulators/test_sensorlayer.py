@@ -42,6 +42,9 @@ WRIST = ta.HarmonicModel(
 PLAIN = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.002])])
 
 
+NAMES = ("elbow", "wrist")
+
+
 def robot(include="", group=""):
     return mujoco.MjModel.from_xml_string(
         ROBOT.replace("@include@", include).replace("@class@", group)
@@ -199,6 +202,14 @@ def test_the_noise_of_a_file_is_that_of_its_joint():
     noise = SensorLayer(mj, seed=6).read([data] * 2000)
     assert np.std(noise) == pytest.approx(2e-4, rel=5.0 / np.sqrt(4000.0))
     assert not SensorLayer(mj, {"elbow": PLAIN}).read(data).any()
+    # Beside a joint that has none.
+    both = ""
+    for joint, std in (("elbow", 2e-4), ("wrist", 0.0)):
+        text = ta.export_model(PLAIN, "mujoco", joint=joint, noise_std=std).text
+        both += text.partition("<mujoco>")[2].rpartition("</mujoco>")[0]
+    layer = SensorLayer(robot(both), seed=6)
+    noise = layer.read([data] * 2000).std(axis=0)[[layer.names.index(n) for n in NAMES]]
+    assert noise == pytest.approx([2e-4, 0.0], rel=5.0 / np.sqrt(4000.0))
 
 
 def test_noise_is_new_in_every_environment_and_joint():
@@ -303,8 +314,9 @@ def test_a_coupled_joint_takes_the_reading_of_the_other():
     # Of a joint that the layer does not read, the angle itself.
     assert SensorLayer(mj, {"q0": degrees}).read(data)[0] == pytest.approx(0.37, abs=1e-14)
     circle = ta.HarmonicModel([], terms=[T.JointCoupling("q0", 0.1)])
-    with pytest.raises(ArgumentError, match="coupled in a circle"):
-        SensorLayer(mj, {"q0": degrees, "q1": circle})
+    # Those that can be read are none of the circle.
+    with pytest.raises(ArgumentError, match=r"^joints q0, q1 are coupled in a circle"):
+        SensorLayer(mj, {"q2": eccentric, "q0": degrees, "q1": circle})
     nobody = ta.HarmonicModel([], terms=[T.JointCoupling("q9", 0.1)])
     with pytest.raises(ArgumentError, match="no joint 'q9'"):
         SensorLayer(mj, {"q0": nobody})
