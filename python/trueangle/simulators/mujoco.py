@@ -285,8 +285,15 @@ class _Encoder:
         if environments is None:
             self._states = None
         elif self._states is not None:
-            chosen = np.arange(len(self._states))[np.asarray(environments)]
-            self._states.reset(np.atleast_1d(chosen).tolist())
+            count, chosen = len(self._states), np.asarray(environments)
+            try:
+                numbers = np.arange(count)[chosen if chosen.size else []]
+            except IndexError:
+                raise ArgumentError(
+                    f"environments must be a mask of the {count} that were read, or numbers below "
+                    f"{count}, got {environments!r:.60}"
+                ) from None
+            self._states.reset(np.atleast_1d(numbers).tolist())
 
 
 def _known(signals: Mapping[str, ArrayLike]) -> dict[str, Array]:

@@ -301,6 +301,54 @@ def test_many_environments_each_have_the_state_that_one_alone_has():
     np.testing.assert_array_equal(before[131], found[0, 131])
 
 
+@pytest.mark.parametrize(
+    ("asked", "forgot"),
+    [
+        (None, {0, 1, 2}),
+        ([False, True, True], {1, 2}),  # as numbers, 0 and 1
+        ([True, False, True], {0, 2}),
+        ([2, 0], {0, 2}),
+        (1, {1}),
+        ([], set()),
+    ],
+)
+def test_environments_that_are_reset_forget_their_travel_and_the_others_none(asked, forgot):
+    """Play after a way up and a little down: the side is still the upper one."""
+    models = {"q0": ta.HarmonicModel([], terms=[T.PreslidingHysteresis(30 * A, 0.1)])}
+    layers = [SensorLayer(arm(1), models) for _ in range(3)]
+    ups = np.linspace(0.0, 1.0, 20)[:, None, None] + np.zeros((1, 3, 1))
+    for up in ups:
+        for layer in layers[:2]:
+            layer.read(Batch(up, np.ones((3, 1))))
+    some, none, fresh = layers
+    some.reset(asked)
+    down = Batch(ups[-1] - 0.01, -np.ones((3, 1)))
+    found, kept, first = (layer.read(down)[:, 0] for layer in (some, none, fresh))
+    assert not np.isclose(kept, first).any()
+    wanted = [first[e] if e in forgot else kept[e] for e in range(3)]
+    np.testing.assert_array_equal(found, wanted)
+    for other in ([3], [True, False], 0.5):
+        with pytest.raises(ArgumentError, match="a mask of the 3 that were read, or numbers below"):
+            some.reset(other)
+
+
+@pytest.mark.parametrize(
+    ("signal", "value", "term"),
+    [
+        ("temperature", 25.0, T.ThermalDrift(2 * A)),
+        ("torque", 5.0, T.TorsionalCompliance(2 * A)),
+        ("velocity", 5.0, T.Latency(2 * A)),
+        ("current", 5.0, T.CurrentCoupling(2 * A)),
+    ],
+)
+def test_a_signal_that_is_given_is_taken_in_place_of_mujocos(signal, value, term):
+    layer = SensorLayer(arm(1), {"q0": ta.HarmonicModel([], terms=[term])})
+    sign = -1.0 if signal == "velocity" else 1.0  # a late reading lags behind
+    data = Batch(np.full((1, 1), 0.5), np.zeros((1, 1)))
+    found = layer.read(data, **{signal: value})[0, 0] - 0.5
+    assert found == pytest.approx(sign * 10 * A, rel=1e-9)
+
+
 def test_a_coupled_joint_takes_the_reading_of_the_other():
     series = ta.Shaft("output", 1, [1], [0.0], [1e-3])
     eccentric = ta.HarmonicModel([series])
