@@ -329,7 +329,7 @@ def test_extended_model_takes_off_what_the_harmonics_cannot(demo) -> None:
 
 def test_boxes_of_runs_mean_the_same_run_in_every_figure(made, runs) -> None:
     labels = [run.label for run in runs]
-    compared = 0
+    compared: list[int] = []
     for figure in made.figures.values():
         for chart in figure["charts"]:
             by_id = {m["id"]: m for m in models(chart)}
@@ -339,8 +339,9 @@ def test_boxes_of_runs_mean_the_same_run_in_every_figure(made, runs) -> None:
                     number = next((t[4:] for t in tags if t.startswith("run:")), None)
                     if number is not None:
                         assert f"run {labels[int(number)]}" in tool["attributes"]["tooltips"]
-                        compared += 1
-    assert compared > 3 * len(runs)
+                        compared.append(int(number))
+    assert len(compared) > 3 * len(runs)
+    assert set(compared) == set(range(len(runs)))  # the first one, too
 
 
 def test_one_cause_needs_no_chart_of_one_bar(demo) -> None:
