@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -24,8 +26,7 @@ def under(*torques: Array) -> Signals:
 def between(*corners: float) -> Array:
     """A torque that goes from corner to corner in steps of about 0.1 Nm, the corners among them."""
     parts = [
-        np.linspace(a, b, 2 + int(abs(b - a) / 0.1))[1:]
-        for a, b in zip(corners[:-1], corners[1:], strict=True)
+        np.linspace(a, b, 2 + int(abs(b - a) / 0.1))[1:] for a, b in itertools.pairwise(corners)
     ]
     return np.concatenate([[corners[0]], *parts])
 
