@@ -19,7 +19,7 @@ from trueangle.effects.outliers import (
     _interpolated,
 )
 from trueangle.estimation.regression import Regression
-from trueangle.estimation.segments import MOST_IN_ROW, REACH, less_local_level
+from trueangle.estimation.segments import MOST_IN_ROW, less_local_level
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Simulation
 
@@ -88,18 +88,6 @@ def test_a_glitch_is_short_and_its_neighbours_are_far_smaller(
         found = _glitches(values, rows, [(0, 40), (40, 80)])
         is_glitch = length <= MOST_IN_ROW and (beside < BESIDE or not 0 <= neighbour < 40)
         assert found.tolist() == (rows.tolist() if is_glitch else [])
-
-
-@pytest.mark.parametrize("size", [1, 4, 2 * REACH, 2 * REACH + 1, 40])
-def test_the_level_about_a_reading_is_that_of_the_eleven_nearest_of_its_run(size: int) -> None:
-    """Of a shorter run all; so that no burst is more than half of them, at an end neither."""
-    values = rng().normal(size=size + 30)
-    found = less_local_level(values, [(0, size), (size, size + 30)])
-    for start, stop in ((0, size), (size, size + 30)):
-        for k in range(start, stop):
-            first = min(max(k - REACH, start), max(stop - 2 * REACH - 1, start))
-            level = np.median(values[first : min(first + 2 * REACH + 1, stop)])
-            assert found[k] == pytest.approx(values[k] - level, abs=1e-12), f"reading {k}"
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
