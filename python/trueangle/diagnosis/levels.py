@@ -30,7 +30,7 @@ GAP = 0.1
 LEAST_SHARE = 0.2
 LEAST_RANGE = {"temperature": 2.0, "mount": 0.5}
 
-#: Share of a run's torque that must have one sign for its level to have that sign.
+#: Share of a run's torque that must have one sign for it to be of that sign.
 ONE_SIGN = 0.9
 
 #: Levels at most; of more, neighbours are put together.
@@ -111,7 +111,8 @@ def levels_of_runs(signals: Signals, factor: str) -> tuple[NDArray[np.int64], li
     if column is None:
         return None
     bounds = signals.run_bounds()
-    of_run = np.array([_value(factor, column[start:stop]) for start, stop in bounds])
+    parts = [column[start:stop] for start, stop in bounds]
+    of_run = _torques(parts) if factor == "torque" else np.array([_value(factor, x) for x in parts])
     span = float(np.ptp(of_run))
     if span <= LEAST_RANGE.get(factor, LEAST_SHARE * float(np.abs(of_run).max())):
         return None
@@ -135,12 +136,18 @@ def _value(factor: str, column: Array) -> float:
         moving = np.abs(column[column != 0.0])
         return float(np.median(moving)) if moving.size else 0.0
     mean = float(np.mean(column))
-    if factor == "mount":
-        return float(np.degrees(mean))
-    if factor == "torque":
-        size = float(np.mean(np.abs(column)))
-        return mean if abs(mean) > ONE_SIGN * size else size
-    return mean
+    return float(np.degrees(mean)) if factor == "mount" else mean
+
+
+def _torques(columns: Sequence[Array]) -> Array:
+    """What runs count as: their torque, or where one has either sign all by their sizes.
+
+    Whichever way the torque counts, the same runs have one level.
+    """
+    mean = np.array([np.mean(torque) for torque in columns])
+    size = np.array([np.mean(np.abs(torque)) for torque in columns])
+    has_both = (np.abs(mean) <= ONE_SIGN * size) & (size > GAP * size.max())
+    return size if has_both.any() else mean
 
 
 def gains_by_level(

@@ -199,8 +199,8 @@ class _History:
         Sign of change of the torque; 0 before the first turn.
     opens : ndarray of bool
         The branch is the first of its run.
-    last : ndarray of int
-        Last reading of every branch.
+    whole : ndarray
+        Change of the torque over every branch, until it turned.
     branch : ndarray of int, shape (n,)
     gone : ndarray, shape (n,)
         Change of the torque since the branch began.
@@ -208,7 +208,7 @@ class _History:
 
     sign: Array
     opens: NDArray[np.bool_]
-    last: NDArray[np.int64]
+    whole: Array
     branch: NDArray[np.int64]
     gone: Array
 
@@ -220,7 +220,8 @@ class _History:
         parts = [_branches(torque[start:stop], zone) for start, stop in bounds]
         sign, since = (np.concatenate(side) for side in zip(*parts, strict=True))
         begins = np.zeros(torque.size, dtype=bool)
-        begins[1:] = np.diff(since) != 0.0
+        # A torque that rests first begins to change where it rested.
+        begins[1:] = (np.diff(since) != 0.0) | (np.diff(sign) != 0.0)
         starts = np.array([start for start, _ in bounds])
         begins[starts] = True
         is_start = np.zeros(torque.size, dtype=bool)
@@ -229,19 +230,17 @@ class _History:
         return cls(
             sign[first],
             is_start[first],
-            np.append(first[1:], torque.size) - 1,
+            np.abs(np.diff(since[first], append=0.0)),
             np.cumsum(begins) - 1,
             np.abs(torque - since),
         )
 
     def state(self, span_Nm: float) -> Array:
         """State of the loop at every reading."""
-        keeps = np.exp(-np.minimum(self.gone / span_Nm, 700.0))
-        keeps[self.sign[self.branch] == 0.0] = 1.0
+        keeps, ends = (np.exp(-np.minimum(x / span_Nm, 700.0)) for x in (self.gone, self.whole))
         begun = np.zeros(self.sign.size)
         state = 0.0
-        ends = keeps[self.last].tolist()
-        rows = zip(self.sign.tolist(), self.opens.tolist(), ends, strict=True)
+        rows = zip(self.sign.tolist(), self.opens.tolist(), ends.tolist(), strict=True)
         for k, (sign, opens, keep) in enumerate(rows):
             begun[k] = state = 0.0 if opens else state
             state = sign - (sign - state) * keep

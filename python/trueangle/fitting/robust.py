@@ -125,8 +125,8 @@ def fit_robustly(problem: Problem, loss: Loss, floor: float) -> RobustFit:
         for w, b in zip(weights, problem.base, strict=True)
     )
     fitted = problem.solve(weights)
-    everything = np.concatenate(problem.residuals(fitted))
-    far = _share(everything, robust_scale(everything))
+    counted = _counted(problem, problem.residuals(fitted))
+    far = _share(counted, robust_scale(counted))
     return RobustFit(fitted, weights, wild, far, unsettled)
 
 
@@ -175,8 +175,10 @@ def _set_aside(problem: Problem, floor: float) -> RobustFit:
     start, _ = _iterate(problem, _huber, problem.base, floor)
     wild = _wild(problem, problem.solve(start), floor)
     rounds = _rounds(problem)
+    absent = sum(np.count_nonzero(b == 0.0) for b in problem.base if b is not None)
+    readings = wild.size - absent
     for _ in range(rounds):
-        share = np.count_nonzero(wild) / wild.size
+        share = np.count_nonzero(wild) / readings
         if share == 0.0 or share > WILD_SHARE:
             return plain
         edges = np.cumsum([len(run) for run in problem.runs])[:-1]
@@ -184,7 +186,6 @@ def _set_aside(problem: Problem, floor: float) -> RobustFit:
             np.where(far, 0.0, _given(b, far.size))
             for far, b in zip(np.split(wild, edges), problem.base, strict=True)
         ]
-        share = np.count_nonzero(wild) / wild.size
         found = RobustFit(problem.solve(weights), weights, int(np.count_nonzero(wild)), share)
         again = _wild(problem, found.fitted, floor)
         if (again == wild).all():
@@ -205,10 +206,12 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
     neighbour widens the limit itself, and so does noise on a slope. For choosing orders;
     `fit_robustly` looks again with the model in hand.
     """
-    if len(run) < 4 * _NEIGHBOURS:
+    given = _given(run.weights, len(run))
+    used = slice(None) if run.weights is None else given > 0.0
+    error, reference = run.centred_error[used], run.reference[used]
+    if error.size < 4 * _NEIGHBOURS:
         return run
-    error = run.centred_error
-    order = np.argsort(np.mod(run.reference, run.period), kind="stable")
+    order = np.argsort(np.mod(reference, run.period), kind="stable")
     half = _NEIGHBOURS // 2
     around = np.concatenate([error[order[-half:]], error[order], error[order[:half]]])
     windows = np.lib.stride_tricks.sliding_window_view(around, _NEIGHBOURS)
@@ -228,17 +231,24 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
         wild &= distance > WILD_COUNTS * count
     if not wild.any() or wild.mean() > WILD_SHARE:
         return run
-    return replace(run, weights=np.where(wild, 0.0, _given(run.weights, wild.size)))
+    weights = given.copy()
+    weights[used] = np.where(wild, 0.0, given[used])
+    return replace(run, weights=weights)
 
 
 def _wild(problem: Problem, fitted: SolvedProblem, floor: float) -> NDArray[np.bool_]:
     """Which of all readings, run after run, are wild; those of weight 0 never are."""
     residuals = problem.residuals(fitted)
-    everything = np.concatenate(residuals)
     given = [_given(b, r.size) for b, r in zip(problem.base, residuals, strict=True)]
-    used = np.concatenate(given) > 0.0
-    limit = max(WILD * robust_scale(everything[used]), floor)
-    return np.asarray((np.abs(everything) > limit) & used)
+    limit = max(WILD * robust_scale(_counted(problem, residuals)), floor)
+    return np.asarray((np.abs(np.concatenate(residuals)) > limit) & (np.concatenate(given) > 0.0))
+
+
+def _counted(problem: Problem, residuals: Sequence[Array]) -> Array:
+    """Those of the readings of weight above 0, run after run."""
+    return np.concatenate(
+        [r if b is None else r[b > 0.0] for r, b in zip(residuals, problem.base, strict=True)]
+    )
 
 
 def _iterate(
@@ -253,7 +263,7 @@ def _iterate(
     rounds = _rounds(problem)
     for _ in range(rounds):
         residuals = problem.residuals(problem.solve(current))
-        scale = max(robust_scale(np.concatenate(residuals)), floor)
+        scale = max(robust_scale(_counted(problem, residuals)), floor)
         weights = [
             _given(b, r.size) * weight(np.abs(r) / scale)
             for b, r in zip(problem.base, residuals, strict=True)
@@ -286,7 +296,7 @@ def robust_breakdown_sentence(problem: Problem, weighted: RobustFit) -> str:
     if share <= MANY and not robust:
         return ""
     rest = problem.residuals(weighted.fitted)
-    scale, near = robust_scale(np.concatenate(rest)), _between_neighbours(problem, rest)
+    scale, near = robust_scale(_counted(problem, rest)), _between_neighbours(problem, rest)
     bent = scale > _BENT * near
     if robust and share > (MANY if bent else _MOST):
         return (
@@ -308,8 +318,8 @@ def robust_breakdown_sentence(problem: Problem, weighted: RobustFit) -> str:
 
 def _between_neighbours(problem: Problem, residuals: list[Array]) -> float:
     """Standard deviation of a reading by how neighbours in angle differ, run by run."""
-    steps = [
-        np.diff(rest[np.argsort(np.mod(x, problem.period), kind="stable")])
-        for rest, x in zip(residuals, problem.angles, strict=True)
-    ]
+    steps = []
+    for rest, x, base in zip(residuals, problem.angles, problem.base, strict=True):
+        order = np.argsort(np.mod(x, problem.period), kind="stable")
+        steps.append(np.diff(rest[order if base is None else order[base[order] > 0.0]]))
     return robust_scale(np.concatenate(steps)) / math.sqrt(2.0)

@@ -251,7 +251,8 @@ def _bias(
 
 def _untold(problem: Problem, used: Sequence[int]) -> str:
     """Where correlation would not have been found; empty where it would."""
-    count = sum(len(problem.runs[i]) for i in used)
+    counted = ((problem.base[i], len(problem.runs[i])) for i in used)
+    count = sum(size if base is None else np.count_nonzero(base) for base, size in counted)
     if len(used) >= FEWEST_RUNS or count >= _TELLING:
         return ""
     return (

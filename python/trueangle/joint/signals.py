@@ -346,6 +346,7 @@ def _dead_zone_direction(angle: Array) -> Array:
             if abs(x - extreme) > zone:
                 sign = math.copysign(1.0, x - extreme)
                 direction[: k + 1] = sign
+                extreme, since = x, k
         elif (x - extreme) * sign >= 0.0:
             extreme, since = x, k
         elif abs(x - extreme) > zone:

@@ -170,6 +170,16 @@ def test_levels_are_of_what_each_run_is_at(sign: float) -> None:
     hanging = replace(given, torque=sign * (given.torque * 0.0 + 2.0 + levels[given.run]))
     assert levels_of_runs(hanging, "torque")[1] == pytest.approx(sorted([sign * 2.0, sign * 6.0,
                                                                       sign * 10.0]))  # fmt: skip
+    # Beside a load of either sign all count by their sizes, to whichever side they pull; beside
+    # a run that feels next to none they have theirs.
+    either = given.torque / torque  # of sizes 3 to 11 on average
+    pulled = np.where(given.run == 1, -5.0, np.where(given.run == 4, 5.0, either))
+    level, found = levels_of_runs(replace(given, torque=sign * pulled), "torque")
+    assert found == pytest.approx([5.0, 7.0, 11.0], abs=0.06)
+    np.testing.assert_array_equal(level, place)
+    small = np.where(given.run == 1, -5.0, np.where(given.run == 4, 5.0, 0.03 * either))
+    found = levels_of_runs(replace(given, torque=sign * small), "torque")[1]
+    assert found == pytest.approx([-5.0, 0.0, 5.0], abs=0.1)
     # Loads within a tenth of each other are one, to whichever side they pull.
     alike = replace(given, torque=sign * (20.0 + 0.3 * levels[given.run]))
     assert levels_of_runs(alike, "torque") is None

@@ -40,3 +40,23 @@ def test_runs_of_unlike_span_have_one_rate(centred):
     print(ratios)
     assert NEAR[0] < min(ratios)
     assert max(ratios) < NEAR[1]
+
+
+@pytest.mark.parametrize(("halves", "terms"), [(12, 24), (40, 48), (70, 96)])
+def test_a_path_has_as_many_half_periods_as_are_above_the_noise(halves, terms):
+    """They hold the path: what is left beside them is the noise."""
+    print("seed 64120")
+    rng = np.random.default_rng(64_120)
+    time = np.arange(300.0)
+    angle = np.concatenate([2.4 * time[:150], 2.4 * time[149::-1]])
+    runs = [ta.CalibrationRun(angle, angle, 360.0, time=time) for _ in range(4)]
+    waves = np.sin(np.pi * np.outer(time / time[-1], np.arange(halves) + 0.5))
+    paths = [5.0 * waves @ rng.normal(size=halves) / np.sqrt(halves) for _ in runs]
+    error = np.concatenate(paths) + rng.normal(size=4 * time.size)
+    regression = Regression.of(join_runs(runs), error, ta.Simulation().surroundings, rho=0.0)
+    found = DriftWithinRun.propose(regression)
+    assert found.shape["terms"] == terms
+    assert found.run_effect.columns.shape == (error.size, terms)
+    after = regression.with_terms([found], 0.0)
+    left = error - after.whiten.run_part(after.left, [True])
+    assert 0.8 < np.std(left) < 1.05

@@ -11,6 +11,7 @@ from trueangle.fitting.nuisancechoice import (
     _held_out,
     choose_nuisance_groups,
     error_inflation,
+    reference_lines_help,
     solve_with_groups,
 )
 from trueangle.joint.shafts import ShaftOrders
@@ -87,6 +88,40 @@ def test_shares_are_of_the_error_that_there_was_at_first():
             before = after
         assert sum(share for _, share in shares) == pytest.approx(1.0 - before / first, rel=1e-4)
     assert len(orders) == 2
+
+
+def folds_of(rng, sizes, shares):
+    """A group of such a size and coefficient in each fold, at right angles to all else there."""
+    fold = np.repeat(np.arange(FOLDS), 60)
+    columns = np.zeros((fold.size, 5))
+    for f in range(FOLDS):
+        columns[fold == f] = np.linalg.qr(rng.normal(size=(60, 5)))[0]
+    pattern, (group, idle, rest) = columns[:, :2], columns.T[2:, :, None]
+    group = group * np.array(sizes)[fold, None]
+    error = (group * np.array(shares)[fold, None] + 3.0 * rest)[:, 0]
+    groups = {"direction": group, "turned": group, "reference": idle}
+    return FoldRows(pattern, groups, error, fold)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "shares", "taken"),
+    [
+        # One fold of much is not most of them; where the others agree by half it is taken.
+        ((10.0, 1.0, 1.0), (1.0, 0.45, 0.45), False),
+        ((10.0, 1.0, 1.0), (1.0, 0.55, 0.55), True),
+        # One that gets worse is outvoted.
+        ((10.0, 10.0, 1.0), (1.0, 1.0, 0.1), True),
+        # A hundredth of the sum of squares, 27 beside it.
+        ((1.0, 1.0, 1.0), (0.299,) * 3, False),
+        ((1.0, 1.0, 1.0), (0.304,) * 3, True),
+    ],
+)
+def test_what_lowers_most_folds_and_their_sum_is_taken(sizes, shares, taken):
+    print("seed", SEED + 3)
+    rows = folds_of(np.random.default_rng(SEED + 3), sizes, shares)
+    assert reference_lines_help(rows) is taken
+    only = rows._replace(groups={"direction": rows.groups["direction"]})
+    assert choose_nuisance_groups(only, [])[0] == (["direction"] if taken else [])
 
 
 def test_groups_are_fitted_beside_the_pattern():

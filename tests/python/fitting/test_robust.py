@@ -151,6 +151,35 @@ def test_readings_that_do_not_count_are_never_called_wild():
     assert found.model.fit.wild == hit[1::2].size
 
 
+@pytest.mark.parametrize("loss", ["auto", "linear", "huber", "tukey"])
+@pytest.mark.parametrize("runs", [1, 2])
+@pytest.mark.parametrize("left_out", [0.1, 0.45])
+def test_readings_of_weight_zero_are_as_good_as_absent(left_out, runs, loss):
+    """Many far-off ones, whose scale nobody is to be judged by; a few others that are not told."""
+    rng = np.random.default_rng(21)
+    with_them, without = [], []
+    for number in range(runs):
+        run, _ = contaminated(22 + number, 0.03)
+        weights = np.ones(len(run))
+        weights[rng.choice(len(run), int(left_out * len(run)), replace=False)] = 0.0
+        indicated = run.indicated + (weights == 0.0) * rng.normal(0.0, 8.0, len(run))
+        label = str(number)
+        with_them.append(
+            ta.CalibrationRun(run.reference, indicated, 360.0, weights=weights, label=label)
+        )
+        kept = weights > 0.0
+        without.append(ta.CalibrationRun(run.reference[kept], indicated[kept], 360.0, label=label))
+    found, wanted = (ta.fit(x, orders=range(1, 6), loss=loss) for x in (with_them, without))
+    np.testing.assert_allclose(found.amplitudes, wanted.amplitudes, rtol=1e-6, atol=1e-9)
+    assert found.model.fit.note == wanted.model.fit.note
+    assert found.model.fit.wild == wanted.model.fit.wild
+    for one, other in zip(with_them, without, strict=True):
+        left, right = without_spikes(one).weights, without_spikes(other).weights
+        right = np.ones(len(other)) if right is None else right
+        np.testing.assert_array_equal(left[one.weights > 0.0], right)
+        assert not left[one.weights == 0.0].any()
+
+
 def test_the_robust_scale_is_the_standard_deviation_of_normal_readings():
     from trueangle.fitting.robust import HUBER, robust_scale
 

@@ -288,3 +288,13 @@ def test_a_dead_zone_turns_at_the_reading_farthest_out_since_it_turned_last(seed
     assert np.count_nonzero(np.diff(expected)) > 5
     for way in (1.0, -1.0):
         np.testing.assert_array_equal(_dead_zone_direction(way * angle), way * expected)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("first", [7.0, 40.0])
+def test_a_dead_zone_turns_at_the_first_reading_beyond_it_where_that_is_the_farthest(
+    first: float, sign: float
+) -> None:
+    angle = sign * np.concatenate([[0.0], first - 2.0 * np.arange(30.0)])
+    wanted = sign * np.concatenate([[1.0, 1.0], np.full(29, -1.0)])
+    np.testing.assert_array_equal(_dead_zone_direction(angle), wanted)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import itertools
 import json
 import os
@@ -51,42 +50,6 @@ class Ticks:
 
     def __call__(self):
         return float(next(self.count))
-
-
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
-
-
-def test_nothing_is_shown_in_the_first_second_nor_off_a_terminal():
-    now = [0.0]
-    for stream, style, shown in (
-        (Terminal(), "auto", "sums: 2 of 4, at least 2 s left"),
-        (io.StringIO(), "auto", ""),
-        (Terminal(), "none", ""),
-        (io.StringIO(), "text", "sums: 2 of 4, at least 2 s left"),
-    ):
-        now[0] = 0.0
-        work = Deadline(style=style, stream=stream, clock=lambda: now[0])
-        work.at("sums", 0, 4)
-        now[0] = 0.9
-        work.at("sums", 1, 4)
-        assert stream.getvalue() == ""
-        now[0] = 2.0
-        work.at("sums", 2, 4)
-        assert stream.getvalue().strip() == shown
-        work.clear()
-        assert stream.getvalue().split("\r")[-1] == ""
-
-
-def test_progress_as_json_is_an_object_a_line():
-    stream = io.StringIO()
-    work = Deadline(10.0, "json", stream, Ticks())
-    for k in range(3):
-        work.at("sums", k, 3)
-    states = [json.loads(line) for line in stream.getvalue().splitlines()]
-    assert states[-1]["stage"] == "sums"
-    assert states[-1]["seconds"] + states[-1]["seconds_left"] == 10.0
 
 
 def test_a_part_ends_before_the_whole():

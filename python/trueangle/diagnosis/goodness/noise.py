@@ -113,12 +113,10 @@ def estimate_noise(left: Leftover) -> Noise:
     root = float(np.copysign(np.sqrt(max(float(values[0] - value), 0.0)), rho))
     if rho < 0.0:
         rho, value = 0.0, float(values[0])
-    step = min(0.02, 0.5 * (1.0 - rho), max(rho, 0.004))
-    bend = (
-        sums.deviance(min(rho + step, 0.999), means)
-        - 2.0 * value
-        + sums.deviance(max(rho - step, 0.0), means)
-    ) / step**2
+    step = min(0.02, 0.5 * (1.0 - rho))
+    # Alike to both sides, of no correlation too: there the valley may lie below none.
+    sides = sums.deviance(rho + step, means) + sums.deviance(rho - step, means)
+    bend = (sides - 2.0 * value) / step**2
     std = float(np.sqrt(2.0 / bend)) if bend > 0.0 else 1.0 / np.sqrt(max(stop, 1))
     gained = float(values[0] - value)
     if gained < TOLD:

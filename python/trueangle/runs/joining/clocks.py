@@ -24,8 +24,8 @@ _TIE = 1e-3
 _ONE_SPEED = 0.02
 #: Orders of the joint that may not pass for a motion of the clock.
 _ORDERS = (1, 2, 3, 4)
-#: Rounds of refining; each is linear, and the third changes nothing measurable.
-_ROUNDS = 8
+#: Rounds of refining, each of which is linear, and the change of a time (s) that is none.
+_ROUNDS, _SETTLED = 8, 1e-9
 #: Standard errors from which a rate is taken as it is, and what two quartzes may differ by, in ppm.
 _SIGNIFICANT = 5.0
 _QUARTZ = 100.0
@@ -72,7 +72,8 @@ def estimated_clocks(
     start = float(indicated.time[0])
     notes = []
     if offset is None:
-        coarse, others = _coarse(indicated, reference)
+        own = indicated.time + 1e-6 * (rate or 0.0) * (indicated.time - start)
+        coarse, others = _coarse(replace(indicated, time=own), reference)
         if others:
             listed = ", ".join(f"{other:.6g}" for other in others[:4])
             notes.append(
@@ -233,11 +234,12 @@ def _solved(
         change = solution / scale
         for j, name in enumerate(wanted):
             std[name] = math.sqrt(float(covariance[j, j])) / float(scale[j])
-        moved = change[wanted.index("offset")] if "offset" in wanted else 0.0
-        offset += moved
-        if "rate" in wanted:
-            rate += change[wanted.index("rate")]
-        if abs(moved) < 1e-9:
+        moved, faster = (
+            float(change[wanted.index(name)]) if name in wanted else 0.0
+            for name in ("offset", "rate")
+        )
+        offset, rate = offset + moved, rate + faster
+        if np.abs(moved + 1e-6 * faster * t).max() < _SETTLED:
             break
     timed = (
         np.column_stack([np.ones_like(t) if name == "offset" else 1e-6 * t for name in wanted])

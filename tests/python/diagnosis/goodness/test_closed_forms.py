@@ -5,7 +5,13 @@ import pytest
 from scipy import stats
 
 from trueangle.diagnosis.goodness import Leftover
-from trueangle.diagnosis.goodness.noise import _independent, _PatternProducts, _refined, _Sums
+from trueangle.diagnosis.goodness.noise import (
+    _independent,
+    _PatternProducts,
+    _refined,
+    _Sums,
+    estimate_noise,
+)
 from trueangle.diagnosis.goodness.periodogram import _whitened, periodogram
 from trueangle.diagnosis.goodness.place import _smallest, unit_sums
 from trueangle.diagnosis.goodness.scatter import normal_kurtosis
@@ -148,6 +154,37 @@ def test_of_noise_alone_the_power_is_one_and_p_no_less_than_its_chance():
     # Four standard deviations of a binomial count beyond a tenth of 60.
     assert np.sum(p < 0.1) <= 6 + 4.0 * np.sqrt(60 * 0.1 * 0.9)
     assert 2 <= np.sum(p < 0.5) <= 30 + 4.0 * np.sqrt(60 * 0.5 * 0.5)
+
+
+@pytest.mark.parametrize("even", [True, False])
+@pytest.mark.parametrize("span", [0.5, 40.0])
+def test_lines_are_looked_for_from_five_resolution_cells_over_four_at_least(even, span):
+    clock = np.linspace(0.0, span, 200)
+    if not even:
+        clock[1:-1] = np.sort(rng().uniform(0.0, span, 198))
+    noise = rng().normal(size=200)
+    # A cell is one period over the record; the steps of the transform round by half of one.
+    assert periodogram(noise, clock, [(0, 200)], top=8.4 / span) is None
+    found = periodogram(noise, clock, [(0, 200)], top=9.6 / span)
+    cells = found.frequency * span
+    assert found.even is even
+    assert 5.0 <= cells[0] < 5.5
+    assert 9.0 < cells[-1] <= 9.6
+
+
+@pytest.mark.parametrize("correlation", [-0.1, -0.024, -0.016, -0.008, 0.0, 0.008, 0.1, 0.4])
+def test_the_error_of_a_correlation_is_that_of_so_many_pairs(correlation):
+    """Whatever it is found to be, none or below none too: (1 - rho^2) / n is its variance."""
+    size, wave = 3000, rng().normal(size=3000)
+    for k in range(1, size):
+        wave[k] = correlation * wave[k - 1] + np.sqrt(1.0 - correlation**2) * wave[k]
+    theta = np.sort(rng().uniform(0.0, 12.0, size))
+    left = Leftover(wave, theta, np.ones(size), np.zeros(size, dtype=np.int64), np.arange(size))
+    found = estimate_noise(left)
+    assert found.root * correlation >= 0.0 or abs(correlation) < 0.1
+    # 25 columns of a pattern and the estimate itself: a few percent.
+    rho = max(correlation, 0.0)
+    assert found.std == pytest.approx(np.sqrt((1.0 - rho**2) / size), rel=0.05)
 
 
 @pytest.mark.parametrize("correlation", [-0.6, 0.3, 0.95])

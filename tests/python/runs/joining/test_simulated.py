@@ -96,6 +96,17 @@ def test_the_noise_of_a_log_is_told_in_its_size(period: float, logs: int) -> Non
     assert found.noise_arcsec == pytest.approx(2.0, rel=0.1)
 
 
+@pytest.mark.parametrize("period", UNITS)
+def test_an_error_that_alternates_is_told_by_its_second_differences(period: float) -> None:
+    """They are four times its amplitude, and those of white noise the root of six times."""
+    x = np.arange(0.0, 300.0, 0.5)
+    error = 2.5 / ARCSEC * (-1.0) ** np.arange(x.size)
+    log = ta.CalibrationRun(x / 360.0 * period, (x + error) / 360.0 * period, period)
+    run = ta.CalibrationRun(x, x, 360.0)
+    wanted = 2.5 * 4.0 / np.sqrt(6.0)
+    assert minus_simulated(run, log).noise_arcsec == pytest.approx(wanted, rel=1e-6)
+
+
 def test_the_noise_of_several_logs_is_that_of_all() -> None:
     """Of 2 and 2.6 arcsec: the root of the mean of their squares."""
     t = np.arange(0.0, 20.0, 0.01)

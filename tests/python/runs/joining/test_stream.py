@@ -295,3 +295,29 @@ def test_offsets_that_fit_as_well_are_those_of_the_motions_period(apart, behind)
     assert len({round((other - found.offset) / period) for other in (*told, found.offset)}) == 5
     # The one taken has most readings in common.
     assert abs(found.offset - apart) <= min(abs(other - apart) for other in told) + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("declared", "rate"),
+    [
+        *(((), rate) for rate in (-300.0, 1000.0)),
+        *((("offset",), rate) for rate in (-5000.0, 300.0, 1000.0)),
+        *((("rate",), rate) for rate in (-5000.0, 300.0, 1000.0)),
+    ],
+)
+def test_clocks_are_found_whatever_of_them_is_declared(
+    declared: tuple[str, ...], rate: float
+) -> None:
+    own, other = np.arange(0.0, 300.0, 0.05), np.arange(-5.0, 310.0, 0.02)
+    known = {"offset": 1.7, "rate": rate}
+    offset, given = (known[name] if name in declared else None for name in known)
+    there = own + 1.7 + 1e-6 * rate * own
+    # An error that no motion of a clock makes.
+    said = Stream.of(own, curve(there) + 1e-3 * np.sin(1e3 * own**2))
+    found = estimated_clocks(said, Stream.of(other, curve(other)), offset, given)
+    np.testing.assert_allclose(found.to_other(own), there, rtol=0.0, atol=1e-5)
+    assert [std is None for std in (found.offset_std, found.rate_std)] == [
+        name in declared for name in known
+    ]
+    for name, std in (("offset", found.offset_std), ("rate", found.rate_std)):
+        assert abs(getattr(found, name) - known[name]) <= 5.0 * (std or 0.0), name
