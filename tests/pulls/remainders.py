@@ -27,18 +27,24 @@ CAREFUL = {
 }
 assert set(CAREFUL) == test_even.CAREFUL
 
+#: Of readings that were fitted: signs drawn for the level of chance give back what it took.
+FITTED = {
+    "place": "the fit took the lowest orders",
+    "place x direction x speed": "as place, where speed and direction change together",
+}
+
 #: Designs of the kept tests, and noises.
 DESIGNS = ("split", "few", "forward", "grid", "small")
 NOISES = ("gauss", "ar 0.5")
 
 
-def chances(left: Leftover, kind: str) -> Told:
+def chances(left: Leftover, kind: str, careful: Mapping[str, str]) -> Told:
     """Of every test that can be made; of noise that remembers the pull of its correlation."""
     found = goodness_of_fit(left, TOP, 1.0)
     memory = float(kind.split()[1]) if kind.startswith("ar ") else 0.0
     for item in found.evidence:
         if not (memory and item.test == "correlation"):
-            yield Chance(item.test, item.p, CAREFUL.get(item.test, ""))
+            yield Chance(item.test, item.p, careful.get(item.test, ""))
     if memory and found.noise.correlation:
         yield Pull("correlation", (found.noise.correlation - memory) / found.noise.std)
 
@@ -54,7 +60,7 @@ def loaded(kind: str) -> Case:
             np.concatenate(parts), left.theta, left.direction, left.run, left.clock, True,
             left.factors,
         )  # fmt: skip
-        yield from chances(made, kind)
+        yield from chances(made, kind, CAREFUL)
 
     return case
 
@@ -63,7 +69,8 @@ def design(name: str, kind: str) -> Case:
     """What a fit of five lines leaves."""
 
     def case(seed: int) -> Told:
-        yield from chances(readings.leftover(name, kind, 500_000 + seed), kind)
+        left = readings.leftover(name, kind, 500_000 + seed)
+        yield from chances(left, kind, CAREFUL | FITTED)
 
     return case
 
