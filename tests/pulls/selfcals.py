@@ -12,7 +12,6 @@ from selfcalibration import test_dual_numbers as dual
 from selfcalibration import test_shifts as shifts
 from selfcalibration.test_pulls import DESIGNS, LINES
 
-
 #: Why errors beside a coupling may be wide.
 COUPLING = "averaged over what few clampings tell of the coupling"
 
