@@ -11,10 +11,13 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 import trueangle as ta
 from asked import Case, Told, generator, pulls_of
 from effects import test_line_errors as lines
 from effects import test_stated_errors as singles
+from estimation.test_covariance import correlated
 from trueangle.effects import EFFECTS, Effect
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
@@ -38,6 +41,14 @@ FORMS: dict[str, dict[str, Any]] = {
         "orders": (2.0,), "amplitudes_arcsec": (2.0,), "phases_deg": (30.0,), "mount_sign": -1.0,
     },
 }  # fmt: skip
+
+#: Causes that are hidden in noise that remembers as well, and its memory.
+REMEMBERED = (
+    "missing_order", "backlash", "presliding_hysteresis", "latency", "filter_lag, first order",
+    "thermal_drift", "torsional_compliance", "local_defect, output", "non_integer_order",
+    "time_periodic", "sidebands", "joint_coupling",
+)  # fmt: skip
+MEMORY = 0.5
 
 #: Names under which a finding tells a field of its effect.
 FIELDS = {
@@ -88,15 +99,18 @@ def read() -> dict[str, Signals]:
     }
 
 
-def told(name: str, effect: Effect, design: str) -> Case:
-    """The cause of a name, hidden in one of the designs beside white noise."""
+def told(name: str, effect: Effect, design: str, memory: float = 0.0) -> Case:
+    """The cause of a name, hidden in one of the designs beside noise of this memory."""
 
     def case(seed: int) -> Told:
         signals = read()[design]
         rng = generator(seed, name)
         error = effect.signal(signals, singles.SIM.surroundings, rng)
-        error = error + singles.NOISE * rng.standard_normal(len(signals))
-        start = Regression.of(signals, error, singles.SIM.surroundings, rho=0.0)
+        noise = [correlated(rng, memory, b - a) for a, b in signals.run_bounds()]
+        error = error + singles.NOISE * np.concatenate(noise)
+        # White noise is known to be so; a memory is found in what is left.
+        rho = None if memory else 0.0
+        start = Regression.of(signals, error, singles.SIM.surroundings, rho=rho)
         found = EFFECTS[effect.kind].propose(start)
         if found is None:
             return
@@ -115,7 +129,11 @@ def cases() -> Mapping[str, Case]:
     hidden = {name: ("singles", given) for name, (given, _) in singles.HIDDEN.items()}
     hidden |= {name: ("lines", given) for name, (given, _) in lines.HIDDEN.items()}
     hidden |= {name: ("lines", given) for name, given in FORMS.items()}
-    return {
-        name: told(name, EFFECTS[name.partition(",")[0]](**given), design)
-        for name, (design, given) in hidden.items()
+    effects = {
+        name: EFFECTS[name.partition(",")[0]](**given) for name, (_, given) in hidden.items()
     }
+    found = {name: told(name, effect, hidden[name][0]) for name, effect in effects.items()}
+    for name in REMEMBERED:
+        longer = f"{name}, in noise that remembers"
+        found[longer] = told(longer, effects[name], hidden[name][0], MEMORY)
+    return found

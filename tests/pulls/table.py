@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import tomllib
 import warnings
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,21 +26,33 @@ COMPATIBLE = 3.5
 #: Chance of Kolmogorov and Smirnov below which p values are not even.
 UNEVEN = 1e-3
 
+#: Rows that are known to miss.
+KNOWN = Path(__file__).parent / "known.toml"
+
 #: Share of the seeds that must tell a number: what is told only where it comes out large is biased.
 TELLING = 0.95
 
 
 @dataclass(frozen=True)
 class Row:
-    """One number over the seeds."""
+    """One number over the seeds; ``known`` says why it misses where that is known."""
 
     name: str
     text: str
     misses: str
+    known: str = ""
 
     def line(self) -> str:
         """As it stands in the table."""
-        return f"{self.name:<42} {self.text}{f'  MISSES: {self.misses}' if self.misses else ''}"
+        if not self.misses:
+            return f"{self.name:<42} {self.text}"
+        told = f"  (known: {self.known})" if self.known else ""
+        return f"{self.name:<42} {self.text}  MISSES: {self.misses}{told}"
+
+
+def known_rows() -> dict[str, dict[str, dict[str, str]]]:
+    """Why rows miss, by room, case and row."""
+    return tomllib.loads(KNOWN.read_text(encoding="utf-8"))
 
 
 def rows_of(name: str, case: Case, seeds: range) -> Iterator[Row]:
@@ -98,7 +112,8 @@ def chance_row(name: str, by_seed: list[list[float]], careful: str) -> Row:
     side = "greater" if careful else "two-sided"
     chance = float(stats.kstest(values, "uniform", alternative=side).pvalue)
     below = int(np.count_nonzero(values < 0.01))
-    text = f"{len(by_seed):5d}  p of p {chance:<8.2g} {below} of {values.size} below 0.01"
+    text = f"{len(by_seed):5d}  mean  {values.mean():.2f}, {below} of {values.size} below 0.01"
+    text += f"  p of p {chance:.2g}"
     text += _one_side(careful)
     return Row(name, text, "" if chance >= UNEVEN else f"p of p {chance:.1g}")
 
