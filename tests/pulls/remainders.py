@@ -24,14 +24,17 @@ CAREFUL = {
     "place within runs": "as many frequencies as might be independent",
     "steps in time": "allows for medians of noise that remembers",
     "zeros of the runs": "the larger p of two tests",
+    "noise against repeats": "both variances are of the same readings",
 }
-assert set(CAREFUL) == test_even.CAREFUL
+assert set(CAREFUL) > test_even.CAREFUL
 
-#: Of readings that were fitted: signs drawn for the level of chance give back what it took.
-FITTED = {
-    "place": "the fit took the lowest orders",
-    "place x direction x speed": "as place, where speed and direction change together",
-}
+#: The same of what a fit of five lines leaves in few runs or on a grid: signs drawn for the level
+#: of chance give back what the fit took, and pieces of a run are not quite independent.
+FITTED = dict.fromkeys(
+    ("place", "place x direction", "place x direction x speed", "time since run",
+     "time since reversals"),
+    "beside a fit, in few runs",
+)  # fmt: skip
 
 #: Designs of the kept tests, and noises.
 DESIGNS = ("split", "few", "forward", "grid", "small")

@@ -23,11 +23,14 @@ NEAR, ENOUGH = 0.15, 200
 #: Standard errors within which a mean is compatible with 0, beyond `NEAR` too.
 COMPATIBLE = 3.5
 
-#: Chance of Kolmogorov and Smirnov below which p values are not even.
+#: Chance (of Kolmogorov and Smirnov, or of a count) below which p values are not even.
 UNEVEN = 1e-3
 
 #: Rows that are known to miss.
 KNOWN = Path(__file__).parent / "known.toml"
+
+#: Levels at which p values that are careful are counted.
+LEVELS = (0.01, 0.05, 0.1)
 
 #: Share of the seeds that must tell a number: what is told only where it comes out large is biased.
 TELLING = 0.95
@@ -104,17 +107,20 @@ def pull_row(name: str, by_seed: list[list[float]], careful: str, seeds: int) ->
 
 
 def chance_row(name: str, by_seed: list[list[float]], careful: str) -> Row:
-    """Evenness of p values, to the side of too small ones alone where they are careful.
+    """Evenness of p values; of careful ones whether small ones come oftener than they say.
 
     Whether a test can be made is a matter of the design that a seed draws, not of its noise.
     """
     values: NDArray[np.float64] = np.concatenate([np.asarray(one) for one in by_seed])
-    side = "greater" if careful else "two-sided"
-    chance = float(stats.kstest(values, "uniform", alternative=side).pvalue)
-    below = int(np.count_nonzero(values < 0.01))
-    text = f"{len(by_seed):5d}  mean  {values.mean():.2f}, {below} of {values.size} below 0.01"
-    text += f"  p of p {chance:.2g}"
-    text += _one_side(careful)
+    n, below = values.size, [int(np.count_nonzero(values <= level)) for level in LEVELS]
+    if careful:
+        tails = [stats.binom.sf(k - 1, n, level) for k, level in zip(below, LEVELS, strict=True)]
+        chance = min(len(LEVELS) * float(min(tails)), 1.0)
+    else:
+        chance = float(stats.kstest(values, "uniform").pvalue)
+    counts = ", ".join(f"{k}" for k in below)
+    text = f"{len(by_seed):5d}  mean  {values.mean():.2f}  below 1, 5, 10 %: {counts} of {n}"
+    text += f"  p of p {chance:.2g}{_one_side(careful)}"
     return Row(name, text, "" if chance >= UNEVEN else f"p of p {chance:.1g}")
 
 
