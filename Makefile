@@ -3,7 +3,7 @@
 PYTHON ?= .venv/bin/python
 
 .PHONY: check quick format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
-.PHONY: looks transcripts nightly exam walks asan kills pythons readings chance chance-core
+.PHONY: looks transcripts nightly exam walks asan kills pythons readings chance chance-core pulls
 
 # Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
 CASES ?= 20000
@@ -11,6 +11,8 @@ JOBS ?= 1
 # Faults drawn by chance: hours by the hundred. `SEED=7001` draws the same ones again.
 COUNT ?= 400
 SEED ?=
+# Of every case whose errors and p values are asked for.
+SEEDS ?= 200
 # `SAMPLE=--trust` where the tests have just passed.
 SAMPLE ?=
 
@@ -93,6 +95,9 @@ chance:             ## faults that nobody chose, in lines that tests reach; need
 chance-core:        ## the same in the core, all in one build
 	$(PYTHON) tests/mutants/chancecore.py --count $(COUNT) $(SEED:%=--seed %)
 
+pulls:              ## errors that are stated and p values by SEEDS seeds, as a table
+	$(PYTHON) tests/pulls --seeds $(SEEDS)
+
 pythons:            ## the wheel tried on every Python that is to be had here
 	rm -rf target/tried
 	$(PYTHON) -m pip wheel --quiet --no-deps --wheel-dir target/tried .
@@ -109,7 +114,7 @@ asan:               ## tests of the core under AddressSanitizer, by the compiler
 	RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=address" CARGO_TARGET_DIR=target/asan \
 	cargo test --locked --tests --target $$(rustc -vV | sed -n 's/^host: //p')
 
-NIGHTLY = aarch64 asan pythons readings kills fuzz mutants chance chance-core exam walks
+NIGHTLY = aarch64 asan pythons readings kills pulls fuzz mutants chance chance-core exam walks
 nightly: $(NIGHTLY) ## what takes hours; each has a job of its own in .github/workflows/nightly.yml
 
 bench:              ## benchmarks against a reference, in one run

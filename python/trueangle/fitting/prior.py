@@ -6,15 +6,20 @@ With ``b ~ N(μ, T)`` and readings of noise s the coefficients are normal about
 
     b̂ = (X'X/s² + T⁻¹)⁻¹ (X'y/s² + T⁻¹ μ)
 
-with the covariance ``(X'X/s² + T⁻¹)⁻¹``: few readings suffice for what the units
-differ in little.
+with the covariance ``V = (X'X/s² + T⁻¹)⁻¹``: few readings suffice for what the units
+differ in little. Where runs of one unit differ by more than such noise makes them, by variances Q
+of their coefficients, a run tells its unit no better than that, and the covariance is
+
+::
+
+    V + Σ_r V A_r Q A_r V,    A_r = X_r'X_r/s²
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -63,6 +68,9 @@ class Prior:
         Of one reading, and the degrees of freedom that it is worth.
     units : int
         From which it is known.
+    run_variance : ndarray, shape (2 K,), or None
+        Of the coefficients of single runs about their unit's, beyond what the noise of readings
+        makes of it; None where they do not differ.
     """
 
     period: float
@@ -73,6 +81,7 @@ class Prior:
     noise_variance: float
     noise_freedom: float
     units: int
+    run_variance: Array | None = None
 
     def among(self, shafts: Sequence[ShaftOrders]) -> Prior:
         """For these orders, those that it does not know left free."""
@@ -84,14 +93,22 @@ class Prior:
         }
         mean: list[float] = []
         variance: list[float] = []
+        between: list[float] = []
+        run_variance = np.zeros(self.mean.size) if self.run_variance is None else self.run_variance
         for shaft in shafts:
             for order in shaft.orders:
                 i = known.get((shaft.cycles_per_turn, order))
                 place = slice(0, 0) if i is None else slice(2 * i, 2 * i + 2)
                 mean += [0.0, 0.0] if i is None else self.mean[place].tolist()
                 variance += [math.inf] * 2 if i is None else self.variance[place].tolist()
-        values = {**vars(self), "mean": np.array(mean), "variance": np.array(variance)}
-        return Prior(**{**values, "shafts": tuple(shafts)})
+                between += [0.0, 0.0] if i is None else run_variance[place].tolist()
+        return replace(
+            self,
+            shafts=tuple(shafts),
+            mean=np.array(mean),
+            variance=np.array(variance),
+            run_variance=np.array(between) if any(between) else None,
+        )
 
 
 class Posterior(NamedTuple):
@@ -185,7 +202,8 @@ def _solved(
 ) -> tuple[SolvedProblem, Posterior]:
     products = [problem.products(weights, i, 1)[0] for i in range(len(problem.runs))]
     means = np.array([part[0] / part[0, 0] for part in products])
-    sums = total([NormalEquations.of_products(part) for part in products])
+    of_runs = [NormalEquations.of_products(part) for part in products]
+    sums = total(of_runs)
     size, runs = sums.moment.size, len(problem.runs)
     fixed = ~(prior.variance > 0.0)  # an order that no unit has of its own: its mean, exactly
     precision = np.divide(1.0, prior.variance, out=np.zeros(size), where=~fixed)
@@ -221,6 +239,12 @@ def _solved(
     covariance[1:, 1:] = inverse
     covariance[0, 1:] = covariance[1:, 0] = -inverse @ across
     covariance[0, 0] = own + across @ inverse @ across
+    if prior.run_variance is not None:
+        for run, mean in zip(of_runs, means[:, 1:-1], strict=True):
+            # What a run's own coefficients make of the zero, and of the unit's.
+            moved = inverse @ run.gram / noise
+            both = np.vstack([mean / runs - across @ moved, moved])
+            covariance += (both * prior.run_variance) @ both.T
     pairs = found.reshape(-1, 2)
     edges = np.cumsum([len(shaft.orders) for shaft in problem.shafts])[:-1]
     parts = np.split(pairs, edges)

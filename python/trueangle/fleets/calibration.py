@@ -102,6 +102,19 @@ class CalibrationSums:
         )
         return squares, 2.0 * (len(models) - 1.0), np.maximum(alike, 0.0)
 
+    def within(self) -> tuple[float, float]:
+        """Squares that patterns of single runs leave, and their freedom; 0 where one has none."""
+        if len(self.runs) < 2:
+            return 0.0, 0.0
+        squares, freedom = 0.0, 0.0
+        for run in self.runs:
+            model, size = run.solved(), run.moment.size
+            if model.rank < size or run.readings < size + 2:
+                return 0.0, 0.0
+            squares += max(run.about(model.coefficients[:, 0]).squares, 0.0)
+            freedom += run.readings - 1.0 - size
+        return squares, freedom
+
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
@@ -131,6 +144,8 @@ class Calibration:
         Of each of these sums; 0 of a single run.
     repeat_white : ndarray, shape (K,)
         These sums of independent readings of unit variance.
+    within_squares, within_freedom : float
+        The same as `squares` and `freedom` about patterns of single runs; 0 where these have none.
     louder : ndarray, shape (K,) or float
         Variance of each order's coefficients over that of independent readings.
     """
@@ -148,6 +163,8 @@ class Calibration:
     repeat_squares: Array
     repeat_freedom: float
     repeat_white: Array
+    within_squares: float = 0.0
+    within_freedom: float = 0.0
     louder: Array | float = 1.0
 
     @classmethod
@@ -177,6 +194,7 @@ class Calibration:
             round(every.readings),
             len(sums.runs),
             *sums.repeats(found, inverse),
+            *sums.within(),
         )
 
     def blocks(self) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,7 +16,7 @@ from ..fitting.prior import Prior
 from ..joint.shafts import ShaftOrders
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.argumentkinds import told_kinds
-from ..support.decoding import Decoder, json_value, read_text
+from ..support.decoding import Decoder, Entries, json_value, read_text
 from ..support.files import RUNS_BYTES
 from .history import HistoryOrder, HistoryRow
 from .result import BetweenOrder, CommonOrder, Fleet
@@ -29,7 +29,7 @@ __all__ = ["FORMAT", "load_fleet"]
 T = TypeVar("T")
 
 _KEYS = ("prior", "units", "common", "between", "tolerance", "history", "notes")
-_PRIOR = tuple(field.name for field in fields(Prior))
+_PRIOR = {field.name: field.default is MISSING for field in fields(Prior)}
 _UNIT = ("unit", "verdict", "because", "orders", "peak_to_peak_arcsec", "left_arcsec", "p", "limit")
 _ROW = ("order", "amplitude_arcsec", "phase_deg", "std_arcsec", "z")
 _COMMON = ("order", "shaft", "amplitude_arcsec", "phase_deg", "std_arcsec")
@@ -122,13 +122,16 @@ class _FleetReader(Decoder):
         return lambda value, key: tuple(self.each(value, key, read))
 
     def prior(self, value: Any) -> Prior:
-        of = self.entries(value, _PRIOR, "prior")
+        of = Entries(self.table(value, _PRIOR, "prior"), "prior")
         period = of(self.above_zero, "period")
         shafts = of(self.listed(self.shaft), "shafts")
         size = 2 * sum(len(shaft.orders) for shaft in shafts)
         mean, variance = (np.array(of(self.coefficients, name)) for name in ("mean", "variance"))
         if mean.size != size or variance.size != size or (variance < 0.0).any():
             raise self.error(f"{size} numbers, none negative, are needed", "prior.variance")
+        runs = np.array(of(self.coefficients, "run_variance")) if "run_variance" in value else None
+        if runs is not None and (runs.size != size or (runs < 0.0).any()):
+            raise self.error(f"{size} numbers, none negative, are needed", "prior.run_variance")
         worth = of(self.maybe, "noise_freedom")
         noise = of(self.above_zero, "noise_variance")
         return Prior(
@@ -140,6 +143,7 @@ class _FleetReader(Decoder):
             noise,
             math.inf if worth is None else worth,
             of(lambda v, k: self.whole(v, k, 1), "units"),
+            runs,
         )
 
     def coefficients(self, value: Any, key: str) -> tuple[float, ...]:

@@ -120,6 +120,7 @@ def _prior(units: Units, chosen: SharedPattern) -> Prior:
         max(units.noise.variance, 1e-30 * units.period**2),
         units.noise.freedom,
         kept,
+        units.run_variance,
     )
 
 

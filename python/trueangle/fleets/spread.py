@@ -35,7 +35,10 @@ PASSES, EXCHANGED = 4, 400
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """What is known of a unit, and the columns of its coefficients over a grid; arcsec."""
+    """What is known of a unit, and the columns of its coefficients over a grid; arcsec.
+
+    ``between`` is by how much runs of one unit differ in a coefficient at most, beyond their noise.
+    """
 
     orders: tuple[float, ...]
     variance: Array
@@ -43,6 +46,7 @@ class Spread:
     units: int
     grid: Array
     rows: Array
+    between: float
 
     @classmethod
     def of(
@@ -70,7 +74,9 @@ class Spread:
         x = 2.0 * math.pi * np.outer(grid, wanted)
         lines = np.stack([np.cos(x), np.sin(x)], axis=2).reshape(count, -1)
         rows = np.hstack([np.ones((count, 1)), lines])
-        return cls(wanted, variance, float(scale), prior.units, grid, rows)
+        most = 0.0 if prior.run_variance is None else float(prior.run_variance.max())
+        between = math.sqrt(most) * arcsec
+        return cls(wanted, variance, float(scale), prior.units, grid, rows, between)
 
     def found(self, readings: int | None, uncertainty: float | None) -> Places:
         """Places of the grid, each reading where the curve is known least, then exchanged."""

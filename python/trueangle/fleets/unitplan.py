@@ -182,6 +182,11 @@ def plan_unit(
     notes = []
     if without is not None and without <= places.size:
         notes.append("the fleet spares no readings here: its units differ by more than is wanted")
+    if known.between > 0.0:
+        notes.append(
+            f"runs of one unit of this fleet differ by {known.between:.3g} arcsec in a coefficient "
+            "beyond their noise, and no readings of one run tell the unit better"
+        )
     turns, counts = np.unique(np.round(known.grid[places] * 360.0, 6), return_counts=True)
     left = np.diag(known.covariance(places))[1:].reshape(-1, 2)
     taken = np.divide(left, known.variance, out=np.ones_like(left), where=known.variance > 0.0)

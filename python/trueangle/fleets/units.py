@@ -40,6 +40,14 @@ class Units:
             np.array([one.squares for one in every]), np.array([one.freedom for one in every])
         )
         louder = louder_orders(every, self.noise.units)
+        if (louder > 1.0).any() and all(one.within_freedom for one in every):
+            # What runs differ by is in these squares, and no noise of a unit: a few runs draw it.
+            self.noise = noise_of(
+                np.array([one.within_squares for one in every]),
+                np.array([one.within_freedom for one in every]),
+            )
+            louder = louder_orders(every, self.noise.units)
+        self.run_variance = run_variance(every, self.noise.units, louder)
         known = {
             id(one): (replace(one, louder=louder), noise)
             for one, noise in zip(every, self.noise.units.tolist(), strict=True)
@@ -109,6 +117,22 @@ def louder_orders(calibrations: Sequence[Calibration], noise: Array) -> Array:
     limit = chi_squared_quantile(1.0 - _LEVEL / found.size, freedom) / freedom
     ratio = np.divide(squares, white, out=np.ones(squares.size), where=white > 0.0)
     return np.where(ratio > limit, ratio, found)
+
+
+def run_variance(calibrations: Sequence[Calibration], noise: Array, louder: Array) -> Array | None:
+    """Variance of single runs' coefficients about their unit's that no noise of readings makes.
+
+    Of cosine and sine of each order; None where no order is louder.
+    """
+    freedom = sum(one.repeat_freedom for one in calibrations)
+    if not (louder > 1.0).any():
+        return None
+    more = [
+        one.repeat_squares - share * one.repeat_white
+        for one, share in zip(calibrations, noise.tolist(), strict=True)
+    ]
+    excess = np.where(louder > 1.0, np.sum(more, axis=0) / freedom, 0.0)
+    return np.repeat(np.maximum(excess, 0.0), 2)
 
 
 class UnitNoise(NamedTuple):

@@ -16,6 +16,7 @@ VERSION: Final = 1
 
 def save_fleet(prior: Prior, told: dict[str, Any], path: str | PathLike[str]) -> None:
     """Write a fleet: its prior, and what it tells as plain values; see `Fleet.save`."""
+    runs = prior.run_variance
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -28,6 +29,7 @@ def save_fleet(prior: Prior, told: dict[str, Any], path: str | PathLike[str]) ->
             "noise_variance": prior.noise_variance,
             "noise_freedom": None if math.isinf(prior.noise_freedom) else prior.noise_freedom,
             "units": prior.units,
+            **({} if runs is None else {"run_variance": runs.tolist()}),
         },
         **told,
     }

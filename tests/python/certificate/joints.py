@@ -46,6 +46,12 @@ RIGS = (
 
 def covered(rig: Rig, seed: int) -> np.ndarray:
     """Whether the true error of one simulated joint lies within U, position by position."""
+    away, rows = judged(rig, seed)
+    return np.abs(away) <= [row["expanded_arcsec"] for row in rows]
+
+
+def judged(rig: Rig, seed: int) -> tuple[np.ndarray, list[dict[str, float]]]:
+    """How far the value of each position is off, arcsec, and what the certificate says of it."""
     rng = np.random.default_rng([20261121, seed])
     amplitude = rng.uniform(5.0, 60.0, len(rig.orders))
     phase = rng.uniform(0.0, 2.0 * np.pi, len(rig.orders))
@@ -77,7 +83,7 @@ def covered(rig: Rig, seed: int) -> np.ndarray:
     # What no reading shows is drawn anew for every joint and position.
     unseen = sum((_draw(item, rng, angle.size) for item in rig.contributions), np.zeros(angle.size))
     value = np.array([row["error_arcsec"] for row in rows]) + unseen
-    return np.abs(value - truth) <= [row["expanded_arcsec"] for row in rows]
+    return value - truth, rows
 
 
 def _draw(item: Contribution, rng: np.random.Generator, count: int) -> np.ndarray:

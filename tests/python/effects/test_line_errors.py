@@ -9,7 +9,7 @@ import trueangle as ta
 from trueangle.effects import EFFECTS
 from trueangle.effects.randomphase import RandomPhaseLine
 from trueangle.estimation.regression import Regression
-from trueangle.joint.signals import join_runs
+from trueangle.joint.signals import Signals, join_runs
 
 from .test_stated_errors import SIM
 
@@ -58,8 +58,7 @@ HIDDEN = {
 }
 
 
-@pytest.fixture(scope="module")
-def signals():
+def readings() -> Signals:
     rng = np.random.default_rng(5)
     runs = [
         replace(
@@ -72,6 +71,11 @@ def signals():
         for k, run in enumerate(SIM.runs)
     ]
     return join_runs(ta.simulate(replace(SIM, runs=tuple(runs)), 3))
+
+
+@pytest.fixture(scope="module")
+def signals():
+    return readings()
 
 
 def one(value):

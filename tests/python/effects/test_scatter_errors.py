@@ -8,7 +8,7 @@ import pytest
 import trueangle as ta
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
-from trueangle.joint.signals import join_runs
+from trueangle.joint.signals import Signals, join_runs
 
 from .test_stated_errors import SIM
 
@@ -30,8 +30,7 @@ HIDDEN = {
 }
 
 
-@pytest.fixture(scope="module")
-def signals():
+def readings() -> Signals:
     """Three speeds: two do not tell noise that follows the speed from its square."""
     speeds = (2.0, 15.0, 40.0)
     # Loads of both signs that do not follow the angle: a weight's size goes twice a turn.
@@ -41,6 +40,11 @@ def signals():
         for k, run in enumerate(SIM.runs)
     ]
     return join_runs(ta.simulate(replace(SIM, runs=tuple(runs)), 3))
+
+
+@pytest.fixture(scope="module")
+def signals():
+    return readings()
 
 
 @pytest.mark.parametrize("case", HIDDEN)

@@ -8,7 +8,7 @@ import pytest
 import trueangle as ta
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
-from trueangle.joint.signals import join_runs
+from trueangle.joint.signals import Signals, join_runs
 
 from .test_stated_errors import SIM
 
@@ -19,14 +19,18 @@ RUNS = 12
 NOISE = 2.0
 
 
-@pytest.fixture(scope="module")
-def signals():
+def readings(count: int = RUNS) -> Signals:
     """Runs of one length in time: a drift of so much a second ends alike in all of them."""
     runs = [
         replace(SIM.runs[k % 8], label=f"run {k}", samples=60, speed_deg_s=15.0)
-        for k in range(RUNS)
+        for k in range(count)
     ]
     return join_runs(ta.simulate(replace(SIM, runs=tuple(runs)), 3))
+
+
+@pytest.fixture(scope="module")
+def signals():
+    return readings()
 
 
 #: The effect, the figure that is its size, and what a run adds to the count of free ones.

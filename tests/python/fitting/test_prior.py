@@ -1,5 +1,7 @@
 """A fit under a prior against dense matrices of all readings, every run's zero free beside them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -121,3 +123,31 @@ def test_an_order_that_no_unit_has_of_its_own_is_that_of_all(unit):
     np.testing.assert_allclose(known.covariance[others] / scale,
                                nearly.covariance[others] / scale, atol=1e-7)  # fmt: skip
     assert known.posterior.own[1] == 0.0
+
+
+def test_what_runs_differ_by_widens_errors_as_it_moves_the_estimate():
+    """Each run's own coefficients, one by one: the fit is linear in the readings."""
+    runs = runs_of(360.0, False)
+    prior = prior_of(360.0)
+    between = (np.array([3e-6, 3e-6, 0.0, 0.0, 4e-5, 4e-5]) * 360.0) ** 2
+
+    def told(readings, known):
+        fit = ta.fit(readings, prior=known, loss="linear")
+        pairs = [(a, b) for s in fit.model.shafts for a, b in zip(s.cosine, s.sine, strict=True)]
+        return fit, np.array([fit.model.constant, *np.ravel(pairs)])
+
+    plain, found = told(runs, prior)
+    wider, same = told(runs, replace(prior, run_variance=between))
+    np.testing.assert_array_equal(same, found)
+    wanted = plain.covariance.copy()
+    for i, run in enumerate(runs):
+        x = 2.0 * np.pi / run.period * run.reference
+        waves = [f(k * x) for k in (1.0, 3.0, 7.0) for f in (np.cos, np.sin)]
+        for wave, variance in zip(waves, between, strict=True):
+            moved = [*runs]
+            moved[i] = replace(run, indicated=run.indicated + 1e-3 * wave)
+            slope = (told(moved, prior)[1] - found) / 1e-3
+            wanted += variance * np.outer(slope, slope)
+    assert (np.diag(wider.covariance) > 1.05 * np.diag(plain.covariance))[5:].all()
+    # The constant is a circular mean, and no line.
+    np.testing.assert_allclose(wider.covariance, wanted, rtol=1e-5, atol=1e-9 * wanted.max())

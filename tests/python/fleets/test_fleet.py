@@ -111,6 +111,22 @@ def test_it_is_saved_and_read_back(runs, tmp_path):
     assert first["prior"] == second["prior"]
 
 
+def test_what_runs_differ_by_is_saved_and_read_back(runs, tmp_path):
+    found = ta.fleet(runs, orders=[1, 2])
+    assert found.prior.run_variance is None
+    known = replace(found.prior, run_variance=np.array([1e-6, 1e-6, 0.0, 0.0]))
+    replace(found, prior=known).save(tmp_path / "fleet.json")
+    again = ta.load_fleet(tmp_path / "fleet.json").prior
+    assert (again.run_variance == known.run_variance).all()
+    turned = again.among(again.shafts[::-1])
+    assert (turned.run_variance == known.run_variance).all()
+    content = json.loads((tmp_path / "fleet.json").read_text())
+    content["prior"]["run_variance"] = [1e-6]
+    (tmp_path / "fleet.json").write_text(json.dumps(content))
+    with pytest.raises(FileError, match=r"prior\.run_variance"):
+        ta.load_fleet(tmp_path / "fleet.json")
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [

@@ -59,6 +59,10 @@ def test_a_calibration_is_the_least_squares_of_all_its_runs(sizes):
     assert made.squares == pytest.approx(squares, rel=1e-6)
     assert made.freedom == sum(sizes) - 8 - len(sizes)
     assert made.repeat_freedom == 2.0 * (len(sizes) - 1)
+    # About patterns of single runs, where there are several.
+    within = sum(solved([run])[2] for run in runs) if len(sizes) > 1 else 0.0
+    assert made.within_squares == pytest.approx(within, rel=1e-6)
+    assert made.within_freedom == (sum(n - 9 for n in sizes) if len(sizes) > 1 else 0)
 
 
 def test_a_units_amplitudes_phases_and_errors_are_those_of_its_readings(fleet_of):

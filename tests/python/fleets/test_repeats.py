@@ -11,7 +11,8 @@ from scipy import signal, stats
 
 import trueangle as ta
 from trueangle.fleets.calibration import Calibration
-from trueangle.fleets.units import louder_orders
+from trueangle.fleets.units import Units, louder_orders
+from trueangle.joint.shafts import ShaftOrders
 
 from .made import ARCSEC, units
 
@@ -90,3 +91,39 @@ def test_runs_differ_by_more_than_readings_from_one_percent_on() -> None:
         assert found == pytest.approx(np.full(2, kept))
         louder = replace(one, louder=found).blocks()
         assert louder == pytest.approx(kept * one.blocks())
+
+
+def calibration(number: int, squares: float, apart: float) -> Calibration:
+    """Of one order in three runs of 40 readings, of variance 2 within runs."""
+    return Calibration(
+        unit=f"u{number}",
+        when=None,
+        coefficients=np.array([1.0, 2.0]) * number,
+        inverse=np.eye(2) / 60.0,
+        zero=0.0,
+        zero_inverse=1.0 / 120.0,
+        squares=squares,
+        freedom=115.0,
+        readings=120,
+        runs=3,
+        repeat_squares=np.array([apart]),
+        repeat_freedom=4.0,
+        repeat_white=np.array([4.0 / 20.0]),
+        within_squares=2.0 * 111.0,
+        within_freedom=111.0,
+    )
+
+
+def test_what_runs_differ_by_is_no_noise_of_their_unit() -> None:
+    """Squares about the common pattern hold what a few runs drew: units seem to differ by it."""
+    shafts = [ShaftOrders("output", 1.0, (1,))]
+    alike = [[calibration(k, 2.0 * 115.0, 0.4)] for k in range(8)]
+    units = Units(alike, shafts, 360.0)
+    assert units.noise.units == pytest.approx(np.full(8, 2.0))
+    assert units.run_variance is None
+    apart = [[calibration(k, 2.0 * 111.0 + 20.0 * s, s)] for k, s in enumerate(range(4, 12))]
+    units = Units(apart, shafts, 360.0)
+    assert units.noise.units == pytest.approx(np.full(8, 2.0))
+    # Mean of the sums by their freedom, less 2/20 that noise makes of a coefficient of one run.
+    assert units.run_variance == pytest.approx(np.full(2, 7.5 / 4.0 - 0.1))
+    assert units.own[0] == pytest.approx(np.tile(7.5 / 4.0 / 3.0 * np.eye(2), (8, 1, 1)))

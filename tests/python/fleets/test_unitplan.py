@@ -179,3 +179,15 @@ def test_the_command_prints_the_plan(fleet_file, capsys):
     assert "--uncertainty 2arcsec" in capsys.readouterr().err
     assert main([*asked, "--apart", "2"]) == 1
     assert "--apart does not go with --prior" in capsys.readouterr().err
+
+
+def test_what_runs_of_one_unit_differ_by_is_told():
+    """The largest of any coefficient; of a fleet whose runs do not differ nothing is."""
+    apart = np.array([0.4, 0.4, 1.5, 1.5, 0.0, 0.0, 0.2, 0.2]) / 3600.0
+    plan, plain = (
+        plan_unit(replace(PRIOR, run_variance=known), 0.0, 360.0, readings=12)
+        for known in (apart**2, None)
+    )
+    (note,) = set(plan.notes) - set(plain.notes)
+    assert "differ by 1.5 arcsec" in note
+    assert plan.places_deg == plain.places_deg
