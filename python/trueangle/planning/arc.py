@@ -16,7 +16,7 @@ from .arcplan import ArcPlan
 from .counts import exchanged, rounded
 from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
 from .noisefactors import noise_factors
-from .plan import readings_needed
+from .plan import check_sizes, readings_needed
 
 #: Readings where neither their number nor what they are for is given.
 READINGS = 60
@@ -110,6 +110,7 @@ def plan_arc(
     (1.0, 0.7)
     """
     check_arc(start, stop)
+    check_sizes(noise=noise, standard_error=standard_error, uncertainty=uncertainty)
     wanted = tuple(float(k) for k in limited_orders(USUAL if orders is None else orders))
     if not wanted or len(set(wanted)) < len(wanted) or min(wanted) <= 0.0:
         raise ArgumentError(f"orders must be positive and each named once, got {wanted!r}")
@@ -217,8 +218,6 @@ def _readings(
         worst = float(noise_factors(dense, columns.orders.tolist()).max())
         needed.append(readings_needed(noise, standard_error, worst))
     if uncertainty is not None:
-        if not (math.isfinite(uncertainty) and uncertainty > 0.0):
-            raise ArgumentError(f"uncertainty must be positive and finite, got {uncertainty!r}")
         needed.append(math.ceil(columns.count * (COVERAGE * noise / uncertainty) ** 2))
     return max(needed)
 
@@ -280,8 +279,6 @@ def _uncertainty(
     """Expanded, of the curve at the worst place."""
     if noise is None:
         return None
-    if not (math.isfinite(noise) and noise > 0.0):
-        raise ArgumentError(f"noise must be positive and finite, got {noise!r}")
     shares = np.full(turns.size, 1.0 / turns.size)
     rows = columns.at(columns.grid)
     inverse = np.linalg.inv(columns.information(turns, shares))

@@ -31,6 +31,13 @@ __all__ = [
 ]
 
 
+def check_sizes(**sizes: float | None) -> None:
+    """Refuse a size, by its name, that is given and not positive and finite."""
+    for name, value in sizes.items():
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise ArgumentError(f"{name} must be positive and finite, got {value!r}")
+
+
 @told_kinds
 def readings_needed(noise: float, standard_error: float, factor: float = 1.0) -> int:
     """Readings that bring an order's standard error down to ``standard_error``.
@@ -44,9 +51,7 @@ def readings_needed(noise: float, standard_error: float, factor: float = 1.0) ->
     >>> readings_needed(5.0, 0.5, factor=1.02)
     209
     """
-    for name, value in (("noise", noise), ("standard_error", standard_error), ("factor", factor)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise ArgumentError(f"{name} must be positive and finite, got {value!r}")
+    check_sizes(noise=noise, standard_error=standard_error, factor=factor)
     return math.ceil(2.0 * (factor * noise / standard_error) ** 2)
 
 
