@@ -40,3 +40,18 @@ def test_a_size_of_an_arc_is_positive_and_finite(name: str, value: float) -> Non
         given = {"noise": 2.0, **wanted, name: value}
         with pytest.raises(ta.errors.ArgumentError, match=f"^{name} must be positive and finite"):
             plan_arc(0.0, 90.0, [1, 2], **given)
+
+
+@pytest.mark.parametrize("given", [{"uncertainty": 1e-3}, {"standard_error": 1e-3},
+                                   {"uncertainty": 5e-324}, {"readings": 10**7}])  # fmt: skip
+def test_an_arc_is_not_read_a_million_times(given: dict[str, float]) -> None:
+    """Of so many readings the places once took more memory than there is."""
+    with pytest.raises(ta.errors.ArgumentError, match="1000000"):
+        plan_arc(0.0, 90.0, [1, 2], noise=5.0, **given)
+
+
+@pytest.mark.parametrize(("noise", "wanted"), [(1e308, 1.0), (5.0, 5e-324), (1.0, 1e-6)])
+def test_more_readings_than_anybody_takes_are_refused(noise: float, wanted: float) -> None:
+    with pytest.raises(ta.errors.ArgumentError, match=r"takes more than 1e\+12 readings"):
+        readings_needed(noise, wanted)
+    assert readings_needed(1.0, 1.5e-6) == pytest.approx(2.0 / 1.5e-6**2)
