@@ -110,5 +110,5 @@ def test_numbers_of_a_contribution(name: str, allowed: list[float], refused: lis
         assert math.isfinite(budget.expanded)
         assert sum(budget.shares()) == pytest.approx(100.0)
     for value in refused:
-        with pytest.raises(ArgumentError, match="^contribution 'a': "):
+        with pytest.raises(ArgumentError, match=r"^contribution 'a': "):
             Contribution("a", **{"standard": 2.0, name: value})
