@@ -17,7 +17,20 @@ def model(period, argument):
     shafts = [ta.Shaft("output", 1, [1, 3], [2.0 * size, 0.5 * size], [size, -0.25 * size])]
     return ta.HarmonicModel(
         shafts, constant=16.0 * size, period=period, argument=argument,
-        terms=[ta.terms.Backlash(0.5 * size)],
+        terms=[
+            ta.terms.Backlash(0.5 * size),
+            # Lengths and places are angles too; times, torques and temperatures are none.
+            ta.terms.PreslidingHysteresis(0.25 * size, 8.0 * size, 0.5),
+            ta.terms.StiffeningCompliance(size, 0.5 * size, 2.0 * size, 4.0, gravity=32.0 * size),
+            ta.terms.TorsionalCompliance(size),
+            ta.terms.LocalDefect(64.0 * size, 16.0 * size, 2.0 * size),
+            ta.terms.ScaleError(0.125, -256.0 * size, 256.0 * size),
+            ta.terms.ThermalDrift(0.5 * size, 0.25),
+            ta.terms.CurrentCoupling(0.5 * size),
+            ta.terms.LoadDependentGearError((2.5,), (size,), (0.5 * size,)),
+            ta.terms.Latency(0.25),
+            ta.terms.FilterLag(8.0, 0.5),
+        ],
     )  # fmt: skip
 
 
