@@ -65,6 +65,10 @@ class Contribution:
                 f"contribution {self.name!r}: degrees_of_freedom must be positive, got "
                 f"{self.degrees_of_freedom!r}"
             )
+        if not math.isfinite(self.sensitivity):
+            raise ArgumentError(
+                f"contribution {self.name!r}: sensitivity must be finite, got {self.sensitivity!r}"
+            )
 
     @property
     def effect(self) -> float:

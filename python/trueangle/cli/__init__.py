@@ -120,7 +120,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     with plain_streams(wording), ending_by_signals() as ending:
         words = list(sys.argv[1:] if argv is None else argv)
         # The others are looked at only where their names are to be told.
-        called = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
+        called = words[:1] if words and words[0] in COMMANDS else COMMANDS
         parser = build_parser(words, called)
         wording.parser = parser.commands.get(words[0] if words else "")
         args = parser.parse_args(words)

@@ -70,6 +70,7 @@ class Admt4000(Target):
                 f'its step of {_MAGNITUDE / _CORDIC:.3g} deg; use `target="c"`'
             )
         mean = float(np.mean(values))
+        zero = pattern.zero + mean
         left = values - mean - _series(codes, x)
         missing = [k for k in pattern.lines if k not in REGISTERS]
         notes = [
@@ -104,10 +105,10 @@ class Admt4000(Target):
             part=TablePart.at_readings(
                 pattern,
                 lambda angles: _series(codes, angles / 2.0**32),
-                zero=pattern.zero + mean,
+                zero=zero,
             ),
             floor_arcsec=math.sqrt(len(codes) / 24.0) * step * ARCSEC_PER_TURN,
-            zero_deg=(pattern.zero + mean) * 360.0,
+            zero_deg=zero * 360.0,
             notes=tuple(notes),
         )
 

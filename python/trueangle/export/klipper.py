@@ -70,8 +70,7 @@ class Klipper(Target):
             KNOTS, self.name, 'Klipper has 64 knots and no setting; use `target="c"`'
         )
         steps = len(present)
-        backwards = present[-2] > present[-1]
-        direction = -1 if backwards else 1
+        direction = -1 if is_backwards(present) else 1
         places = direction * np.arange(steps) / steps
         # Where step 0 stands: the mean of what the present list says, by this model.
         there = present / TURN - pattern.correction(present / TURN) - pattern.zero - places
@@ -208,6 +207,11 @@ def _list_of(text: str, path: str, section: str | None) -> tuple[str, Array]:
     return name, readings
 
 
+def is_backwards(readings: Array) -> bool:
+    """Whether the sensor counts against the steps: Klipper goes by the last two readings."""
+    return bool(readings[-2] > readings[-1])
+
+
 def solved_knots(values: Array) -> tuple[Whole, int]:
     """The 65 knots that Klipper solves from a list, and which of its entries is position 0.
 
@@ -216,8 +220,7 @@ def solved_knots(values: Array) -> tuple[Whole, int]:
     """
     angles = np.asarray(values, dtype=np.float64)
     steps = len(angles)
-    backwards = angles[-2] > angles[-1]
-    order = np.arange(steps)[::-1] if backwards else np.arange(steps)
+    order = np.arange(steps)[::-1] if is_backwards(angles) else np.arange(steps)
     first = int(np.argmin(angles[order]))
     order = np.roll(order, -first)
     angles = angles[order]

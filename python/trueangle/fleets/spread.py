@@ -14,6 +14,7 @@ from ..errors import ArgumentError
 from ..fitting.prior import Prior, fleet_prior
 from ..joint.shafts import limited_orders
 from ..planning.arc import COVERAGE
+from ..planning.plan import check_sizes
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array, first_largest
 
@@ -57,8 +58,7 @@ class Spread:
         prior: Prior = fleet_prior(given, period)
         arcsec = ARCSEC_PER_TURN / prior.period
         scale = math.sqrt(prior.noise_variance) * arcsec if noise is None else noise
-        if not (math.isfinite(scale) and scale > 0.0):
-            raise ArgumentError(f"noise must be positive and finite, got {scale!r}")
+        check_sizes(noise=scale)
         of_order = {
             shaft.cycles_per_turn * order: prior.variance[2 * i : 2 * i + 2] * arcsec**2
             for i, (shaft, order) in enumerate((s, k) for s in prior.shafts for k in s.orders)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..planning.arc import check_arc, plan_arc
+from ..planning.plan import check_sizes
 from ..planning.tables import place_table, plain_arc_plan
 from ..support.argumentkinds import told_kinds
 from ..support.layout import counted, laid_out
@@ -172,8 +172,7 @@ def plan_unit(
             "for), one of them"
         )
     known = Spread.of(prior, orders, noise, start / 360.0, stop / 360.0)
-    if uncertainty is not None and not (math.isfinite(uncertainty) and uncertainty > 0.0):
-        raise ArgumentError(f"uncertainty must be positive and finite, got {uncertainty!r}")
+    check_sizes(uncertainty=uncertainty)
     if readings is not None and (readings != int(readings) or not 1 <= readings <= MOST):
         raise ArgumentError(f"readings must be a whole number from 1 to {MOST}, got {readings!r}")
     places = known.found(readings, uncertainty)

@@ -16,12 +16,11 @@ from ..errors import FileError
 from .budget import FileExtent
 from .damage import damage_told
 from .format import Batch, Contents, CopyTask, Selection, check_lengths, note, row_labels
-from .matlabelements import check_elements
+from .matlab4 import NOTE, count_of_added, note_name
+from .matlabelements import array_places, check_elements
 
 #: Bytes of the header of a file, whose last two tell the order of bytes.
 _HEADER = 128
-#: Variable of a copy that tells how its corrected ones were made.
-_NOTE = "trueangle_note"
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -77,7 +76,8 @@ def copy(task: CopyTask) -> Contents:
         rows = max(rows, len(column))
         task.watch(len(column), 1.0)
     extra = io.BytesIO()
-    savemat(extra, {**made, _NOTE: note(additions)}, do_compression=False, long_field_names=True)
+    made_note = {note_name(there): note(additions)}
+    savemat(extra, {**made, **made_note}, do_compression=False, long_field_names=True)
     with task.target.open("wb") as file:
         file.write(data)
         file.write(extra.getvalue()[_HEADER:])
@@ -88,16 +88,22 @@ def copy(task: CopyTask) -> Contents:
 def contents(path: Path, topic: str | None = None) -> Contents:
     """Checksums of the corrected variables and of all bytes before them."""
     data = path.read_bytes()
-    found = {name: values for name, values in _vectors(path).items() if "corrected" in name}
-    extra = io.BytesIO()
+    places = array_places(data)
+    notes = [i for i, (name, _) in enumerate(places) if name.startswith(NOTE)]
+    last = notes[-1] if notes else len(places)
+    told = _loaded(path, [places[last][0]]) if notes else {}
+    first = last - count_of_added(next((str(text[0]) for text in told.values()), ""))
+    kept = _loaded(path, [name for name, _ in places[first:last]])
+    end = places[first][1] if first < len(places) else len(data)
+    sums = {"source": f"{zlib.crc32(data[:end]):08x}:{end}"}
+    rows = max((len(values) for values in kept.values()), default=0)
+    return Contents(rows, sums | {name: _sum(values) for name, values in kept.items()})
+
+
+def _loaded(path: Path, names: list[str]) -> dict[str, NDArray[Any]]:
     with damage_told(path, "a MATLAB file"):
-        variables = loadmat(path, variable_names=[*found, _NOTE])
-    kept = {name: variables[name] for name in found}
-    savemat(extra, {**kept, _NOTE: str(variables[_NOTE][0])}, long_field_names=True)
-    size = len(data) - (len(extra.getvalue()) - _HEADER)
-    sums = {"source": f"{zlib.crc32(data[:size]):08x}:{size}"}
-    rows = max((len(values) for values in found.values()), default=0)
-    return Contents(rows, sums | {name: _sum(kept[name]) for name in kept})
+        found = loadmat(path, variable_names=names) if names else {}
+    return {name: found[name] for name in names if name in found}
 
 
 def _sum(values: NDArray[Any]) -> str:
@@ -110,7 +116,7 @@ def _vectors(path: Path) -> dict[str, NDArray[Any]]:
         variables = loadmat(path, struct_as_record=True, squeeze_me=False, chars_as_strings=True)
     found: dict[str, NDArray[Any]] = {}
     for name, value in variables.items():
-        if not name.startswith("__") and name != _NOTE:
+        if not name.startswith("__") and not name.startswith(NOTE):
             _add(found, name, value)
     return found
 

@@ -5,9 +5,10 @@ Format: https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf (Level 
 
 from __future__ import annotations
 
+import json
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,7 +23,7 @@ from .format import Batch, Contents, CopyTask, Selection, check_lengths, note
 _KINDS = ("f8", "f4", "i4", "i2", "u2", "u1")
 _HEAD = struct.Struct("<5i")
 #: Matrix of a copy that tells how its corrected ones were made.
-_NOTE = "trueangle_note"
+NOTE = "trueangle_note"
 
 
 class _Matrix(NamedTuple):
@@ -82,24 +83,41 @@ def copy(task: CopyTask) -> Contents:
             rows = max(rows, column.size)
             task.watch(column.size, 1.0)
         text = np.frombuffer(note(additions).encode(), np.uint8)
-        file.write(_head(51, 1, _NOTE, text.size) + text.tobytes())
+        told = note_name([matrix.name for matrix in _matrices(task.source)])
+        file.write(_head(51, 1, told, text.size) + text.tobytes())
     return Contents(rows, sums)
 
 
 def contents(path: Path, topic: str | None = None) -> Contents:
     """Checksums of the corrected vectors and of all bytes before them."""
     matrices = list(_matrices(path))
-    notes = [i for i, matrix in enumerate(matrices) if matrix.name == _NOTE]
-    # What a copy adds stands between its note and the note, if any, of the copy before it.
-    first = next((i for i, m in enumerate(matrices) if "corrected" in m.name), len(matrices))
-    first = max([first, *(i + 1 for i in notes[:-1])])
-    made = [matrix for matrix in matrices[first:] if matrix.name != _NOTE]
+    notes = [i for i, matrix in enumerate(matrices) if matrix.name.startswith(NOTE)]
+    last = notes[-1] if notes else len(matrices)
+    told = _values(path, matrices[last]).astype("u1").tobytes() if notes else b""
+    first = last - count_of_added(told)
+    made = matrices[first:last]
     data = path.read_bytes()
     end = matrices[first].start if first < len(matrices) else len(data)
     sums = {"source": f"{zlib.crc32(data[:end]):08x}:{end}"}
     for matrix in made:
         sums[matrix.name] = f"{zlib.crc32(_values(path, matrix).astype('<f8').tobytes()):08x}"
     return Contents(max((matrix.size for matrix in made), default=0), sums)
+
+
+def note_name(names: Collection[str]) -> str:
+    """The name of a further note: readers of such files keep one variable of a name."""
+    count = sum(name.startswith(NOTE) for name in names)
+    return f"{NOTE}_{count + 1}" if count else NOTE
+
+
+def count_of_added(note: str | bytes) -> int:
+    """Variables that a copy put before its note; none where that is damaged."""
+    try:
+        told = json.loads(note)
+    except (ValueError, RecursionError):
+        return 0
+    entries = told.get("corrected") if isinstance(told, dict) else None
+    return len(entries) if isinstance(entries, list) else 0
 
 
 def _head(kind: int, rows: int, name: str, width: int = 1) -> bytes:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
+from itertools import islice
 from math import prod
 from typing import Final, NamedTuple
 
@@ -57,6 +58,21 @@ def check_elements(data: bytes) -> None:
             _check_variable(whole, order)
         else:
             _check_matrix(data, element, order, 0)
+
+
+def array_places(data: bytes) -> list[tuple[str, int]]:
+    """Name and first byte of every array of a whole file; packed ones go without their name."""
+    order = "<" if data[_HEADER - 2 : _HEADER] == b"IM" else ">"
+    found, start = [], _HEADER
+    for element in _elements(data, _HEADER, len(data), order):
+        name = ""
+        if element.kind == _MATRIX:
+            parts = [*islice(_elements(data, element.start, element.stop, order), 3)]
+            if len(parts) == 3:  # flags, extent, name
+                name = data[parts[2].start : parts[2].stop].decode("latin-1")
+        found.append((name, start))
+        start = element.after
+    return found
 
 
 def _inflated(data: bytes, most: int) -> bytes:

@@ -16,10 +16,13 @@ from .arcplan import ArcPlan
 from .counts import exchanged, rounded
 from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
 from .noisefactors import noise_factors
-from .plan import readings_needed
+from .plan import check_sizes, readings_needed
 
 #: Readings where neither their number nor what they are for is given.
 READINGS = 60
+
+#: Readings of a plan at most: more take minutes to place, and nobody that long to read.
+MOST = 1_000_000
 
 #: Orders asked for where none are named, as far as the arc tells them.
 USUAL = (1.0, 2.0, 3.0, 4.0)
@@ -94,7 +97,7 @@ def plan_arc(
     ------
     ArgumentError
         An arc of no length or beyond a turn; orders that look alike over it; too few readings for
-        the coefficients; a wanted error without ``noise``.
+        the coefficients or more than a million; a wanted error without ``noise``.
 
     Notes
     -----
@@ -110,6 +113,7 @@ def plan_arc(
     (1.0, 0.7)
     """
     check_arc(start, stop)
+    check_sizes(noise=noise, standard_error=standard_error, uncertainty=uncertainty)
     wanted = tuple(float(k) for k in limited_orders(USUAL if orders is None else orders))
     if not wanted or len(set(wanted)) < len(wanted) or min(wanted) <= 0.0:
         raise ArgumentError(f"orders must be positive and each named once, got {wanted!r}")
@@ -202,8 +206,10 @@ def _readings(
 ) -> int:
     """As many as are given, or as the wanted error needs."""
     if readings is not None:
-        if readings != int(readings) or readings < 1:
-            raise ArgumentError(f"readings must be a whole number, got {readings!r}")
+        if readings != int(readings) or not 1 <= readings <= MOST:
+            raise ArgumentError(
+                f"readings must be a whole number from 1 to {MOST}, got {readings!r}"
+            )
         return int(readings)
     if standard_error is None and uncertainty is None:
         return READINGS
@@ -211,16 +217,19 @@ def _readings(
         raise ArgumentError(
             "how many readings reach a wanted error follows from the scatter of one: give `noise=`"
         )
-    needed = [columns.count]
+    needed: list[float] = [columns.count]
     if standard_error is not None:
         dense = np.repeat(best.places, np.maximum(rounded(best.weights, 4096), 1))
         worst = float(noise_factors(dense, columns.orders.tolist()).max())
         needed.append(readings_needed(noise, standard_error, worst))
     if uncertainty is not None:
-        if not (math.isfinite(uncertainty) and uncertainty > 0.0):
-            raise ArgumentError(f"uncertainty must be positive and finite, got {uncertainty!r}")
-        needed.append(math.ceil(columns.count * (COVERAGE * noise / uncertainty) ** 2))
-    return max(needed)
+        ratio = COVERAGE * noise / uncertainty
+        needed.append(columns.count * ratio * ratio)
+    if max(needed) > MOST:
+        raise ArgumentError(
+            f"with `noise={noise:g}` the wanted error takes more than {MOST} readings"
+        )
+    return math.ceil(max(needed))
 
 
 def _places(columns: OrthonormalColumns, best: ArcDesign, readings: int) -> Array:
@@ -280,8 +289,6 @@ def _uncertainty(
     """Expanded, of the curve at the worst place."""
     if noise is None:
         return None
-    if not (math.isfinite(noise) and noise > 0.0):
-        raise ArgumentError(f"noise must be positive and finite, got {noise!r}")
     shares = np.full(turns.size, 1.0 / turns.size)
     rows = columns.at(columns.grid)
     inverse = np.linalg.inv(columns.information(turns, shares))

@@ -31,6 +31,17 @@ __all__ = [
 ]
 
 
+#: Readings that nobody takes.
+_MOST = 1e12
+
+
+def check_sizes(**sizes: float | None) -> None:
+    """Refuse a size, by its name, that is given and not positive and finite."""
+    for name, value in sizes.items():
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise ArgumentError(f"{name} must be positive and finite, got {value!r}")
+
+
 @told_kinds
 def readings_needed(noise: float, standard_error: float, factor: float = 1.0) -> int:
     """Readings that bring an order's standard error down to ``standard_error``.
@@ -39,15 +50,25 @@ def readings_needed(noise: float, standard_error: float, factor: float = 1.0) ->
 
         N = 2 (f σ/u)²
 
+    Raises
+    ------
+    ArgumentError
+        A size that is not positive and finite, or more than a million million readings.
+
     Examples
     --------
     >>> readings_needed(5.0, 0.5, factor=1.02)
     209
     """
-    for name, value in (("noise", noise), ("standard_error", standard_error), ("factor", factor)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise ArgumentError(f"{name} must be positive and finite, got {value!r}")
-    return math.ceil(2.0 * (factor * noise / standard_error) ** 2)
+    check_sizes(noise=noise, standard_error=standard_error, factor=factor)
+    ratio = factor * noise / standard_error
+    count = 2.0 * ratio * ratio
+    if count > _MOST:
+        raise ArgumentError(
+            f"`standard_error={standard_error:g}` takes more than {_MOST:g} readings with "
+            f"`noise={noise:g}`"
+        )
+    return math.ceil(count)
 
 
 @told_kinds

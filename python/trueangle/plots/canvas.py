@@ -112,7 +112,7 @@ def _subplots(rows: int, columns: int, width: float, height: float, **how: Any) 
     return figure, figure.subplots(rows, columns, squeeze=False, **how)
 
 
-def turn_axis(ax: Axes, low: float = 0.0, high: float = 360.0) -> None:
+def turn_axis(ax: Axes, low: float, high: float) -> None:
     """Angle axis in degrees, with whole parts of a turn as ticks."""
     from matplotlib.ticker import MultipleLocator
 

@@ -192,7 +192,7 @@ def fleet_patterns(fleet: Fleet, errors_in: ErrorsIn = "auto", most: int = _PATT
         fine = unit.verdict == "fine"
         ax.plot(angle, size * common, color=palette.MUTED, linewidth=0.9)
         ax.plot(angle, size * own, color=palette.AFTER if fine else palette.WARNING)
-        turn_axis(ax)
+        turn_axis(ax, 0.0, 360.0)
         ax.set_xticks([0.0, 180.0, 360.0], ["", "", ""])
         if i + columns >= len(units):
             ax.set_xticks([0.0, 180.0, 360.0], ["0", "180", "360"])

@@ -47,7 +47,7 @@ def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
         )
     low = min(plan.mount_offsets_deg) - 0.15 * pitch
     ax.set_xlim(low, low + 3.1 * pitch)
-    ax.set_ylim(0.6 - len(plan.mount_offsets_deg), 0.6)
+    ax.set_ylim(0.4 - len(plan.mount_offsets_deg), 0.6)
     ax.set_yticks(
         [-float(i) for i in range(len(plan.mount_offsets_deg))],
         [f"{what} {i + 1}: {offset:+.4g}°" for i, offset in enumerate(plan.mount_offsets_deg)],

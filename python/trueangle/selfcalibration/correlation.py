@@ -75,7 +75,7 @@ class Correlation:
 
     def times(self, rows: Array) -> Array:
         """``R X``: rows of one series, along which the noise correlates."""
-        if self.is_white or not len(rows):
+        if self.is_white:
             return rows
         n = 1 << (len(rows) + min(len(rows), _BEYOND) - 1).bit_length()
         power = self.spectrum(np.fft.rfftfreq(n))[:, None]

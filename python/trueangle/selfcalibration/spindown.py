@@ -114,7 +114,7 @@ def spin_down(
     given, sums, blind = _sorted_out(
         table, readings, loop, bandwidth, separable, ripple, with_current
     )
-    if loop == "closed" and bandwidth is not None and given and not with_current:
+    if given and bandwidth is not None and not with_current:
         first = given[0].order
         share = followed_share(first * float(np.quantile(readings.speed, 0.02)), loop, bandwidth)
         notes.append(

@@ -22,8 +22,10 @@ from trueangle.certificate import (
     conformity,
     language,
     load_identity,
+    typesetting,
 )
 from trueangle.errors import ArgumentError, FileError
+from trueangle.plots.canvas import new_figure
 from trueangle.support.distributions import normal_quantile
 
 #: JCGM 106:2012, examples of clause 7: value, u, lower and upper limit, probability as printed.
@@ -239,6 +241,24 @@ def test_values_as_left_are_those_of_the_corrected_readings():
     assert left["conformity"]["conformance_probability"] > 0.99
     assert not left["same_readings"]
     assert sum(line["share_percent"] for line in left["budget"]["lines"]) == pytest.approx(100.0)
+
+
+def test_errors_found_and_left_stand_above_one_axis_of_angles(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    drawn = []
+
+    def kept(*args, **how):
+        figure, axes = new_figure(*args, **how)
+        drawn.extend(axes)
+        return figure, axes
+
+    monkeypatch.setattr(typesetting, "new_figure", kept)
+    model = ta.fit(runs(seed=1), orders=[1]).model
+    typesetting.lay_out(certify(runs(seed=2), WHO, orders=[1], model=model).content, tmp_path)
+    found, left = drawn
+    assert "left" in left.get_ylabel()
+    assert "left" not in found.get_ylabel()
+    assert (found.get_xlabel(), left.get_xlabel()) == ("", "position / °")
 
 
 def test_a_model_of_these_very_readings_is_told(tmp_path):

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from trueangle.certificate import Budget, Contribution, Estimates
 from trueangle.certificate.budget import coverage_factor
+from trueangle.errors import ArgumentError
 
 VOLT = [5.007, 4.994, 5.005, 4.990, 4.999]
 MILLIAMPERE = [19.663, 19.639, 19.640, 19.685, 19.678]
@@ -89,3 +91,24 @@ def test_h3_thermometer() -> None:
 def test_no_contribution_is_no_uncertainty() -> None:
     empty = Budget(())
     assert (empty.standard, empty.expanded, empty.degrees_of_freedom) == (0.0, 0.0, math.inf)
+
+
+@pytest.mark.parametrize(
+    ("name", "allowed", "refused"),
+    [
+        ("standard", [0.0, 1e-9, 3.0], [-1e-9, math.nan, math.inf]),
+        ("degrees_of_freedom", [0.5, 9.0, math.inf], [0.0, -1.0, math.nan]),
+        ("sensitivity", [-2.0, 0.0, 1.0], [math.nan, math.inf, -math.inf]),
+    ],
+)
+def test_numbers_of_a_contribution(name: str, allowed: list[float], refused: list[float]) -> None:
+    """A budget of any that is allowed is one of numbers; a sensitivity of nan was let through."""
+    for value in allowed:
+        line = Contribution("a", **{"standard": 2.0, name: value})
+        budget = Budget((line, Contribution("b", 1.0)))
+        assert budget.standard == pytest.approx(math.hypot(line.sensitivity * line.standard, 1.0))
+        assert math.isfinite(budget.expanded)
+        assert sum(budget.shares()) == pytest.approx(100.0)
+    for value in refused:
+        with pytest.raises(ArgumentError, match=r"^contribution 'a': "):
+            Contribution("a", **{"standard": 2.0, name: value})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -84,6 +85,19 @@ def test_a_list_that_is_there_is_told_by_its_distance(tmp_path) -> None:
     said = float(re.findall(r"is (\S+) arcsec", note)[0])
     # Whole tenths of a count are 2 arcsec.
     assert said == pytest.approx(300.0 / np.sqrt(2.0), rel=0.02)
+
+
+def test_a_list_that_ends_in_two_equal_readings_counts_as_rising(tmp_path) -> None:
+    """As Klipper has it; taken for a falling one it is of no motor with this model."""
+    path = Path(existing(tmp_path, model(o2=500.0)))
+    *rows, before, _ = path.read_text().split(", ")
+    path.write_text(", ".join([*rows, before, before]) + "\n")
+    made = ta.export_model(model(o2=500.0), "klipper", existing=str(path))
+    (note,) = [n for n in made.notes if n.startswith("the present list is")]
+    # One of 200 is a full step off, of 6480 arcsec.
+    assert float(re.findall(r"is (\S+) arcsec", note)[0]) == pytest.approx(
+        6480.0 / 200.0**0.5, rel=0.05
+    )
 
 
 @pytest.mark.parametrize("zero", [-47.0, 0.5, 123.0])

@@ -186,3 +186,14 @@ def test_a_list_for_one_direction_is_that_of_both(bilateral, tmp_path):
     if bilateral != "1":
         np.testing.assert_array_equal(other.amplitudes, same.amplitudes)
         assert other.constant == same.constant
+
+
+@pytest.mark.parametrize("counts", [1 << 20, 36_000, 1_000_000, 4320, 1 << 12])
+def test_tables_of_a_controller_are_round_parts_of_a_turn(counts):
+    """Between two entries stand whole counts, and sizes have no other factors than 2, 3 and 5."""
+    sizes = TARGETS["pmac"].sizes({"counts_per_turn": counts, "entries": None})
+    assert {1 << k for k in range(5, 12) if counts % (1 << k) == 0} <= set(sizes)
+    assert sizes == sorted(sizes)
+    for size in sizes:
+        assert counts % size == 0
+        assert 30**11 % size == 0

@@ -43,7 +43,9 @@ def test_registers_take_off_the_correction_and_the_zero_that_is_told(bump, const
         made = ta.export_model(model, "admt4000", bits=12)
         left = x - series(made.text, x) - np.asarray(model.correct(x)) - made.zero_deg
         left -= 360.0 * np.rint(left / 360.0)
-        assert np.max(np.abs(left)) * 3600.0 <= made.max_difference_arcsec * 1.0001
+        # The bound, over 4096 readings, is reached.
+        worst = np.max(np.abs(left)) * 3600.0
+        assert 0.99 * made.max_difference_arcsec < worst <= made.max_difference_arcsec * 1.0001
         # What is left is that of four roundings and has no mean of its own.
         assert abs(float(np.mean(left))) < 1e-4
 

@@ -261,6 +261,34 @@ def test_a_copy_has_one_column_more_and_says_how_it_was_made(made):
     assert note_of(made.format.module_name, target) in (None, ENTRY)
 
 
+def test_a_copy_is_known_by_all_that_it_added(made):
+    """Two columns, and a third by a copy of that copy: read back they are what was written."""
+
+    def added(column, name):
+        other = {"enc": "ref", "ref": "enc"}[column]
+        return SimpleNamespace(
+            column=column, added=name, signals={"place": other},
+            entry={**ENTRY, "column": name, "from": column},
+            correct=lambda values, signals: twice(values, signals) + len(name),
+        )  # fmt: skip
+
+    source = made.path
+    for parts in (
+        [("enc", "corrected_x"), ("ref", "x_corrected_y")],
+        [("ref", "corrected_abc")],
+    ):
+        target = source.with_name(f"out_{source.name}")
+        task = CopyTask(source, target, lambda _, p=parts: [added(*k) for k in p], lambda *_: None)
+        kept = made.module.copy(task)
+        assert kept == made.module.contents(target, None), parts
+        both = made.columns["enc"] + made.columns["ref"]
+        for column, name in parts:
+            found = whole(made.module.read(target, Selection([name])), [name])[name]
+            wanted = both + made.columns[column] + len(name)
+            np.testing.assert_allclose(found, wanted, rtol=1e-12, err_msg=name)
+        source = target
+
+
 def note_of(kind, target):
     """The entry where a library reads it."""
     if kind == "hdf5":

@@ -7,6 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import FileError
+from trueangle.formats.formats import find_format
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
@@ -84,6 +85,18 @@ def test_lists_that_differ_in_length(tmp_path):
         ta.read_runs(tmp_path / "a.parquet", signals={"indicated": ("state[1]", "deg")})
     with pytest.raises(FileError, match=r"column 'state\[2\]': several columns may be"):
         ta.read_runs(tmp_path / "a.parquet", signals={"indicated": ("state[2]", "deg")})
+
+
+def test_lists_of_any_length_are_no_columns_of_arrow_files(tmp_path):
+    """No length is told before the rows are read; of fixed ones it is that of the type."""
+    for kind, count in (("fixed", JOINTS), ("any", 0)):
+        names = find_format(written(tmp_path / "a.arrow", LISTS[kind])).module.columns(
+            tmp_path / "a.arrow"
+        )
+        for name in ("observation.state", "action"):
+            assert [n for n in names if n.startswith(name)] == [
+                f"{name}[{i}]" for i in range(count)
+            ]
 
 
 def test_times_and_truth_values_beside_the_angles(tmp_path):

@@ -84,3 +84,20 @@ def test_what_is_damaged_or_not_read_is_told(tmp_path):
     io.savemat(path, {"reference_deg": TRUE, "indicated_deg": READ[:-1]}, format="4")
     with pytest.raises(FileError, match="differ in length: reference_deg 120, indicated_deg 119"):
         ta.read_runs(path)
+
+
+@pytest.mark.parametrize("version", ["4", "5"])
+def test_joints_are_corrected_one_after_the_other(version, tmp_path):
+    """In version 5 the second was said not to read back as written; readers keep both notes."""
+    io = pytest.importorskip("scipy.io")
+    kept = {"elbow_indicated_deg": READ, "wrist_indicated_deg": READ + 1.0, "corrected_by": TRUE}
+    io.savemat(tmp_path / "0.mat", kept, format=version, oned_as="column")
+    for k, joint in enumerate(("elbow", "wrist")):
+        source, target = tmp_path / f"{k}.mat", tmp_path / f"{k + 1}.mat"
+        report = ta.correct_logs(source, {joint: MODEL}, target)
+        assert report.is_done, report.logs[0].error
+    found = io.loadmat(tmp_path / "2.mat")
+    for joint, note in (("elbow", "trueangle_note"), ("wrist", "trueangle_note_2")):
+        corrected = MODEL.correct(kept[f"{joint}_indicated_deg"])
+        np.testing.assert_array_equal(found[f"{joint}_corrected_deg"].ravel(), corrected)
+        assert f'"column": "{joint}_corrected_deg"' in found[note][0]

@@ -103,3 +103,28 @@ def test_no_single_word_ends_the_process():
             except ValueError:
                 refused += 1
     assert refused > 100
+
+
+@pytest.mark.parametrize("kind", ["i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"])
+def test_numbers_are_as_many_as_their_array_says(kind):
+    check_extents(saved({"x": np.ones(50, kind)}), passes=[50], refused=[25, 49, 51, 100])
+
+
+@pytest.mark.parametrize(("element", "size"), [(16, 1), (17, 2), (18, 4)])
+def test_a_letter_is_at_most_four_values(element, size):
+    data = bytearray(saved({"x": "a" * (50 * size)}))
+    assert struct.unpack_from("<I", data, 176) == (16,)
+    struct.pack_into("<I", data, 176, element)
+    check_extents(bytes(data), passes=[13, 50], refused=[0, 12])
+
+
+def check_extents(data, passes, refused):
+    """Of the second extent of the only array in a file."""
+    for count in (*passes, *refused):
+        changed = bytearray(data)
+        struct.pack_into("<I", changed, 164, count)
+        if count in passes:
+            check_elements(bytes(changed))
+        else:
+            with pytest.raises(ValueError, match=f"values for an array of {count}$"):
+                check_elements(bytes(changed))

@@ -111,3 +111,12 @@ def test_a_condition_number_is_one_or_more_but_for_its_rounding(condition):
     assert model(360.0).replace(condition_number=1.0 - 1e-9).condition_number < 1.0
     with pytest.raises(ta.errors.ArgumentError, match="condition_number must be a finite number"):
         model(360.0).replace(condition_number=condition)
+
+
+@pytest.mark.parametrize("count", [1, 4, 5, 9])
+def test_the_first_line_names_four_shafts_and_counts_the_others(count):
+    shafts = [ta.Shaft(f"s{k}", k, [1], [1e-4], [0.0]) for k in range(1, count + 1)]
+    told = repr(ta.HarmonicModel(shafts, 0.0, 360.0))
+    named = ", ".join(f"s{k}" for k in range(1, min(count, 4) + 1))
+    more = f" and {count - 4} more" if count > 4 else ""
+    assert f" of {named}{more}, period 360" in told

@@ -139,7 +139,16 @@ def test_the_object_printed_keeps_the_contract(plan, tmp_path):
     told = json.loads(plan.to_json())
     assert {"runs", "between"} <= set(told)
     assert {"label", "speed_deg_s"} <= set(told["runs"][0])
-    RunDesign(**{**told["runs"][0], "reversals": tuple(told["runs"][0].get("reversals", ()))})
+    designs = [
+        RunDesign(**{key: tuple(v) if isinstance(v, list) else v for key, v in run.items()})
+        for run in told["runs"]
+    ]
+    assert tuple(designs) == plan.runs
+    usual = RunDesign()
+    for run in told["runs"]:
+        # Beside the three that are always told only what is not as usual.
+        others = run.keys() - {"label", "speed_deg_s", "samples"}
+        assert not [key for key in others if run[key] == getattr(usual, key)]
     assert {"causes", "expected_bic", "chance_named"} <= set(told["between"][0])
     plan.save(tmp_path / "designs.toml")
     again = ta.load_simulation(tmp_path / "designs.toml")

@@ -15,8 +15,8 @@ from trueangle.certificate.typesetting import certified_errors
 from trueangle.fitting.phases import run_phases
 from trueangle.plots import curves
 from trueangle.plots.curves import Points
-from trueangle.plots.detection import detection
-from trueangle.plots.diagnosispictures import gains
+from trueangle.plots.detection import _size_ticks, detection
+from trueangle.plots.diagnosispictures import error_left, gains
 from trueangle.plots.readingpictures import before_after_picture, residual_picture
 from trueangle.rehearsal.cause import RehearsedCause
 from trueangle.support.display_units import error_unit
@@ -132,6 +132,43 @@ def test_gains_end_at_both_ends_of_their_intervals():
     assert [segment[:, 0].tolist() for segment in bars] == [
         pytest.approx([100.0 * low, 100.0 * high]) for _, _, low, high in rows
     ]
+
+
+@pytest.mark.parametrize(("errors_in", "per"), [("arcsec", 1.0), ("mrad", np.pi / 648.0)])
+def test_what_is_left_with_all_causes_and_without_each(errors_in, per):
+    def finding(cause, before, share):
+        # Rms, peak-to-peak and largest error of the readings held out.
+        gain = SimpleNamespace(before=(before, 5.0 * before, 3.0 * before), after=(4.0, 19.0, 11.0),
+                               reducible_share=share)  # fmt: skip
+        return SimpleNamespace(cause=cause, gain=gain, parameters={})
+
+    found = [finding("backlash", 30.0, 0.6), finding("tilt", 12.0, None), finding("lag", 7.0, 0.2)]
+    ax = error_left(SimpleNamespace(findings=found, noise=3.0), errors_in=errors_in)
+    names = [mark.get_text() for mark in ax.get_yticklabels()]
+    assert names == ["with all causes", "without backlash", "without lag"]
+    drawn = [bar.get_width() for bar in ax.patches]
+    assert drawn == pytest.approx([4.0 * per, 30.0 * per, 7.0 * per])
+    (noise,) = ax.lines
+    assert noise.get_xdata()[0] == pytest.approx(3.0 * per)
+
+
+@pytest.mark.parametrize("low", [0.1, 0.27, 0.6, 4.0, 55.0])
+@pytest.mark.parametrize("span", [2.0, 3.1, 9.0, 17.0, 40.0, 300.0, 2e4, 3e6])
+def test_sizes_are_marked_evenly_on_their_logarithmic_axis(low, span):
+    """Of 1, 2 and 5 a decade, of 1 and 3, of 1: at most four, and none far from the next."""
+    _, ax = matplotlib.pyplot.subplots()
+    ax.set_xscale("log")
+    ax.set_xlim(low, span * low)
+    _size_ticks(ax)
+    marks = ax.get_xticks()
+    assert 1 <= marks.size <= 4
+    assert low * (1.0 - 1e-9) <= marks.min() <= marks.max() <= span * low * (1.0 + 1e-9)
+    assert [float(t.get_text()) for t in ax.get_xticklabels()] == pytest.approx(marks, rel=5e-3)
+    gaps = np.diff(np.log10(marks))
+    # From 2 to 5 and from 1 to 2.
+    assert gaps.size == 0 or gaps.max() / gaps.min() < 1.001 * np.log10(2.5) / np.log10(2.0)
+    if span >= 9.0:
+        assert marks.size >= 2
 
 
 @pytest.mark.parametrize(("errors_in", "per"), [("arcsec", 1.0), ("mrad", np.pi / 648.0)])

@@ -70,6 +70,8 @@ def seen(ax) -> tuple[list[str], list[np.ndarray]]:
     figure, told = ax.figure, []
     for one in figure.axes:
         legend = one.get_legend()
+        # As everywhere in the pictures: a frame would look like one more thing drawn.
+        assert legend is None or not legend.get_frame_on()
         names = [t.get_text() for t in legend.get_texts()] if legend else []
         told += [one.get_title(), one.get_xlabel(), one.get_ylabel(), one.get_label(), *names]
     marks = [points for one in figure.axes for *_, points in figure_marks(one)]

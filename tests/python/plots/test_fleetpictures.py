@@ -93,6 +93,7 @@ def test_patterns_are_the_units_and_the_common_one(fleet, errors_in, per):
         wave = sum(r.amplitude * np.sin(r.order * x + np.radians(r.phase_deg)) for r in unit.orders)
         np.testing.assert_allclose(own, per * wave, atol=1e-9)
         assert np.ptp(own) == pytest.approx(per * unit.peak_to_peak, rel=1e-2)
+        assert ax.get_xlim() == (0.0, 360.0)
 
 
 def test_the_charts_of_a_unit_have_each_their_statistic_and_its_limit(fleet):

@@ -91,6 +91,10 @@ def test_positions_of_a_plan() -> None:
     assert [mark.get_text() for mark in ax.get_yticklabels()] == counted
     steps = [np.diff(part.lines[0].get_xdata()) for part in ax.containers]
     np.testing.assert_allclose(steps, 360.0 / int(positions))
+    rows = np.array([part.lines[0].get_ydata()[0] for part in ax.containers])
+    low, high = ax.get_ylim()
+    # Half a row and some of the next to both sides.
+    assert (rows.min() - low, high - rows.max()) == pytest.approx((0.6, 0.6))
 
 
 @pytest.mark.parametrize("grows", [True, False])

@@ -3,7 +3,7 @@
 import pytest
 
 from trueangle.plots.orderlines import OrderLine
-from trueangle.reports.spectrum import _sides
+from trueangle.reports.spectrum import _apart, _sides
 
 LOW, HIGH = 0.0, 100.0
 
@@ -37,3 +37,18 @@ def test_dots_further_away_than_the_name_is_long_are_in_nobodys_way(order, besid
     step = 0.3 if beside > order else -0.3
     away = OrderLine(beside + step, 2.0)
     assert _sides([line], [line, away], LOW, HIGH, name) == {line: False}
+
+
+@pytest.mark.parametrize(("ratio", "both"), [(1.0, False), (1.9, False), (2.1, True), (30.0, True)])
+def test_of_names_that_run_into_each_other_both_stand_if_one_dot_is_far_higher(ratio, both):
+    tall, small = OrderLine(10.0, 2.0), OrderLine(11.0, 2.0 / ratio)
+    assert _apart([tall, small], LOW, HIGH, name) == [tall, small][: 1 + both]
+    # The first stands whatever its size, and one that is left out is in nobody's way.
+    assert _apart([small, tall], LOW, HIGH, name) == [small, tall][: 1 + both]
+    third = OrderLine(13.0, 2.0 / ratio)
+    beside = OrderLine(16.0, 2.0 / ratio)
+    assert _apart([tall, third, beside], LOW, HIGH, name) == (
+        [tall, third] if both else [tall, beside]
+    )
+    away = OrderLine(60.0, 2.0)
+    assert _apart([tall, away], LOW, HIGH, name) == [tall, away]

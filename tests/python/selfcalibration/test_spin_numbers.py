@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -257,3 +258,25 @@ def test_an_order_is_kept_where_chance_makes_none_of_all_so_large() -> None:
             assert (6.0 in kept) == (size > limit), (seed, size, limit)
             told.add(1.1 * limit < size < 1.9 * limit)
     assert True in told
+
+
+@pytest.mark.parametrize("bandwidth", [0.5, 2.0, 3.0, 20.0])
+def test_what_a_slow_loop_still_follows_widens_errors_and_is_told(log, found, bandwidth) -> None:
+    """Of order k at s turns a second at most b/(ks), in any phase: half of it along each axis."""
+    closed = ta.selfcal(log, **{**OPTIONS, "loop": "closed"}, loop_bandwidth=bandwidth)
+    slowest = float(np.quantile(np.geomspace(3.0, 10.0, 1000), 0.02))
+    given = [o for o in found.orders if o.order * slowest >= 2.0 * bandwidth]
+    assert [o.order for o in closed.orders] == [o.order for o in given]
+    for o, alone in zip(closed.orders, given, strict=True):
+        followed = bandwidth / (o.order * slowest)
+        std = math.hypot(alone.std, 0.5 * followed * alone.amplitude)
+        assert o.std == pytest.approx(std, rel=0.03)
+    told = [note for note in closed.notes if "rolls off slowly" in note]
+    assert len(told) == bool(given)
+    for note in told:
+        share, order = re.findall(r"follows (\d+)% of order (\S+) ", note)[0]
+        assert float(order) == given[0].order
+        assert float(share) == pytest.approx(
+            100.0 * bandwidth / (given[0].order * slowest), abs=1.0
+        )
+    assert not any("rolls off" in note for note in found.notes)
