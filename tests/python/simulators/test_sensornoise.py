@@ -102,5 +102,5 @@ def test_texts_and_numbers_without_a_name_are_of_nobody() -> None:
     )
     spec.add_text(data="x")
     spec.add_numeric(data=[1.0])
-    with pytest.raises(ArgumentError, match="or the file hold what `ta.export_model"):
+    with pytest.raises(ArgumentError, match=r"or the file hold what `ta\.export_model"):
         SensorLayer(spec.compile())
