@@ -312,7 +312,7 @@ def _embedded_noise(mjmodel: MjModel) -> dict[str, float]:
     found = {}
     for i in range(mjmodel.nnumeric):
         numeric = mjmodel.numeric(i)
-        if numeric.name.startswith(NOISE_NAME) and numeric.data.size:
+        if numeric.name.startswith(NOISE_NAME):
             found[numeric.name[len(NOISE_NAME) :]] = float(numeric.data[0])
     return found
 
