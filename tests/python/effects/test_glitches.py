@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from fractions import Fraction
-
 import numpy as np
 import pytest
 
@@ -14,7 +11,6 @@ from trueangle.effects.outliers import (
     BESIDE,
     _apart,
     _beside_neighbours,
-    _binomial_tail,
     _glitches,
     _interpolated,
 )
@@ -102,15 +98,3 @@ def test_few_readings_stand_apart_from_all_others(way: float) -> None:
         rows = np.arange(9, 9 + many)
         e[rows] = way * 30.0
         assert _apart(e).tolist() == (rows.tolist() if told else [])
-
-
-@pytest.mark.parametrize("chance", [Fraction(1, 50), Fraction(1, 3), Fraction(9, 10)])
-def test_the_chance_of_so_many_or_more_is_the_sum_of_all_counts(chance: Fraction) -> None:
-    for of in (1, 7, 30):
-        for count in range(of + 1):
-            exact = sum(
-                math.comb(of, k) * chance**k * (1 - chance) ** (of - k)
-                for k in range(count, of + 1)
-            )
-            assert _binomial_tail(count, of, float(chance)) == pytest.approx(float(exact), rel=1e-9)
-    assert _binomial_tail(3, 3, 1.0) == 1.0
