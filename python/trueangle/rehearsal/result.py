@@ -77,7 +77,8 @@ class Rehearsal(PlainResult):
     def _brief(self) -> str:
         named = sum(cause.named_50 is not None for cause in self.causes)
         ended = "" if self.complete else ", incomplete"
-        return f"{named} of {counted(self.causes, 'cause')} named, {counted(self.trials, 'trial')}{ended}"
+        causes, trials = counted(self.causes, "cause"), counted(self.trials, "trial")
+        return f"{named} of {causes} named, {trials}{ended}"
 
     def summary(self) -> str:
         """The table of sizes, what is not seen and why, and the runs that would help most."""

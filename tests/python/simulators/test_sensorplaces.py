@@ -254,6 +254,12 @@ def test_the_signal_that_is_missing_first_is_told_with_its_joint() -> None:
         layer.read(data)
     with pytest.raises(MissingSignalError, match=f"needs {second}, "):
         layer.read(data, **{first: 1.0})
+    # The direction of travel is that of the velocity, or of the angle.
+    way = ta.HarmonicModel([], terms=[T.DirectionalPattern((1.0,), (3.0 * A,), (0.0,))])
+    assert way.signals == ("direction",)
+    data.qvel[:] = -1.0
+    found = SensorLayer(mj, {"q1": way}).read(data)[0] + 0.7
+    assert found == pytest.approx(-3.0 * A * np.cos(-0.7), rel=1e-9)
     # Of batches that have no torque.
     soft = SensorLayer(mj, {"q1": ta.HarmonicModel([], terms=[T.TorsionalCompliance(A)])})
     bare = SimpleNamespace(qpos=data.qpos, qvel=data.qvel)
