@@ -86,14 +86,14 @@ class Chance:
         self._weight = weight / weight.sum()
 
     def quantile(self, share: float, at: float) -> float:
-        """Quantile ``at`` of the step at which ``share`` is named; infinite where it never is."""
+        """Quantile ``at``, below one, of the step where ``share`` is named; infinite where never."""
         reach = 1.0 - self._lapse
         possible = reach > share
         odds = share / np.where(possible, reach - share, 1.0)
         step = np.where(possible, self._mu + self._w * np.log(odds), np.inf)
         order = np.argsort(step)
         heap = np.cumsum(self._weight[order])
-        return float(step[order][min(int(np.searchsorted(heap, at)), heap.size - 1)])
+        return float(step[order][np.searchsorted(heap, at)])
 
     def threshold(self, share: float) -> Threshold:
         """The step at which ``share`` is named, as far as the sizes tried bracket it."""

@@ -16,6 +16,7 @@ from ..planning.planner import next_runs
 from ..simulation.simulation import SIMULATION, Simulation
 from ..support.argumentkinds import of_type, told_kinds
 from ..support.deadline import Deadline, with_deadline
+from ..support.layout import counted
 from ..support.suggestions import check_choice
 from .cause import RehearsedCause
 from .result import Rehearsal
@@ -220,12 +221,13 @@ def _notes(searches: Collection[SizeSearch], at: Deadline) -> list[str]:
     if left:
         why = "it was interrupted" if at.stopped else f"the {at.within:g} s given were up"
         none = [search.cause for search in searches if not search.done and not search.answers]
-        text = f"INCOMPLETE: {why} before all trials of {len(left)} causes were made"
+        text = f"INCOMPLETE: {why} before all trials of {counted(left, 'cause')} were made"
         notes.append(text + (f"; not tried at all: {', '.join(none)}" if none else ""))
     failed = [o for search in searches for _, o in search.answers if o.verdict == FAILED]
     if failed:
         notes.append(
-            f"{len(failed)} diagnoses failed ({failed[0].failure}) and count as not named: this is "
-            "a defect of trueangle"
+            f"{counted(failed, 'diagnosis', 'diagnoses')} failed ({failed[0].failure}) and "
+            f"{'counts' if len(failed) == 1 else 'count'} as not named: this is a defect of "
+            "trueangle"
         )
     return notes

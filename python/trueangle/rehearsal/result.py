@@ -77,7 +77,8 @@ class Rehearsal(PlainResult):
     def _brief(self) -> str:
         named = sum(cause.named_50 is not None for cause in self.causes)
         ended = "" if self.complete else ", incomplete"
-        return f"{named} of {counted(self.causes, 'cause')} named, {self.trials} trials{ended}"
+        causes, trials = counted(self.causes, "cause"), counted(self.trials, "trial")
+        return f"{named} of {causes} named, {trials}{ended}"
 
     def summary(self) -> str:
         """The table of sizes, what is not seen and why, and the runs that would help most."""
@@ -86,9 +87,9 @@ class Rehearsal(PlainResult):
             if note.startswith("INCOMPLETE"):
                 lines += [*wrapped_lines(f"{note}.", 2), ""]
         lines += wrapped_lines(
-            f"{self.runs} runs, {self.readings} readings, noise {self.noise:g} arcsec; "
-            f"{self.trials} diagnoses, at most {self.seeds} of a cause, seed "
-            f"{self.seed}.",
+            f"{counted(self.runs, 'run')}, {counted(self.readings, 'reading')}, noise "
+            f"{self.noise:g} arcsec; {counted(self.trials, 'diagnosis', 'diagnoses')}, at most "
+            f"{self.seeds} of a cause, seed {self.seed}.",
             2,
         )
         tried = [cause for cause in self.causes if cause.ever_named]

@@ -120,11 +120,12 @@ def trial_outcome(result: Diagnosis, cause: str) -> TrialOutcome:
     for spot in seen:
         if cause in spot.causes:
             return TrialOutcome(UNTOLD, tuple(c for c in spot.causes if c != cause))
-    others += tuple(c for spot in seen for c in spot.causes if c not in others)
+    untold = [c for spot in seen for c in spot.causes]
     # A refuted line or effect of the simulation is another name for what is hidden.
-    others += tuple(w for w in refuted if w in EFFECTS)
-    if others or refuted:
-        return TrialOutcome(OTHER, others)
+    believed = [what for what in refuted if what in EFFECTS]
+    instead = tuple(dict.fromkeys((*others, *untold, *believed)))
+    if instead or refuted:
+        return TrialOutcome(OTHER, instead)
     if result.unexplained is not None and result.unexplained.found:
         return TrialOutcome(UNEXPLAINED)
     return TrialOutcome(NOTHING)

@@ -101,7 +101,7 @@ def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Size
     return SizeRange(
         float(size),
         int(np.floor(np.log2(DOWN) * STEPS)),
-        max(int(np.floor(highest * STEPS)), 0),
+        int(np.floor(highest * STEPS)),
         effect.size_grows,
     )
 

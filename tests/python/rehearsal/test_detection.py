@@ -130,3 +130,30 @@ def test_causes_named_instead_come_by_how_often_then_by_name():
         assert [*counted.items()] == [
             ("latency", 7), ("clock_drift", 3), ("scale_error", 3), ("backlash", 1)
         ]  # fmt: skip
+
+
+def test_the_weights_are_those_that_the_words_tell() -> None:
+    """From 5 to 95 % in a third of an octave to six; shares never named weigh one in all."""
+    octaves = 2.0 * math.log(19.0) * WIDTHS / STEPS
+    assert octaves[[0, -1]] == pytest.approx([1.0 / 3.0, 6.0], rel=0.12)
+    assert np.diff(np.log(WIDTHS)) == pytest.approx(np.full(12, math.log(16.0) / 12.0))
+    assert sum(LAPSES.values()) == pytest.approx(1.0)
+    assert SHARES == (0.5, 0.95)
+
+
+def test_a_threshold_at_the_least_or_greatest_size_is_given() -> None:
+    """The sizes tried bracket it, themselves included; beyond either side it is open."""
+    chance = Chance(TRIED)
+    assert [chance._inside(step) for step in (-4.0, 10.0, -4.5, 10.5)] == [-4.0, 10.0, None, None]
+
+
+def test_a_curve_is_drawn_in_sixty_places() -> None:
+    drawn = Chance(TRIED).curve(lambda step: step)
+    assert [step for step, _ in drawn] == pytest.approx([-6.0 + 18.0 * k / 59.0 for k in range(60)])
+
+
+def test_binomial_intervals_are_shares() -> None:
+    for count in range(1, 40):
+        for named in (0, count):
+            low, high = binomial_interval(named, count)
+            assert 0.0 <= low <= high <= 1.0

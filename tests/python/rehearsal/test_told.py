@@ -18,6 +18,7 @@ from trueangle.rehearsal.rehearse import _notes, _still
 from trueangle.rehearsal.result import Rehearsal, _never, _size
 from trueangle.rehearsal.search import SizeSearch
 from trueangle.rehearsal.trial import FAILED, NAMED, TrialOutcome, trial_outcome
+from trueangle.support.layout import counted as in_words
 
 
 def cause(**changes) -> RehearsedCause:
@@ -196,7 +197,9 @@ def test_what_is_incomplete_is_what_has_trials_left(stopped) -> None:
             assert len(notes) == bool(left)
             if left:
                 why = "it was interrupted" if stopped else "the 7.5 s given were up"
-                wanted = f"INCOMPLETE: {why} before all trials of {len(left)} causes were made"
+                wanted = (
+                    f"INCOMPLETE: {why} before all trials of {in_words(left, 'cause')} were made"
+                )
                 more = "; not tried at all: none" if "none" in chosen else ""
                 assert notes == [wanted + more]
     failed = [(0, TrialOutcome(FAILED, failure="KeyError: x")), (0, TrialOutcome(NAMED))]

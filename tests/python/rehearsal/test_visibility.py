@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,16 @@ from trueangle.effects.ambiguity import Ambiguity
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 from trueangle.rehearsal import visibility
-from trueangle.rehearsal.visibility import DOWN, FIRST, NEAR, STEPS, UP, _deviance, size_range
+from trueangle.rehearsal.visibility import (
+    DOWN,
+    FIRST,
+    NEAR,
+    STEPS,
+    UP,
+    SizeRange,
+    _deviance,
+    size_range,
+)
 from trueangle.simulation import (
     Backlash,
     HeteroscedasticNoise,
@@ -102,3 +113,137 @@ def test_blind_is_a_cause_whose_naming_would_be_a_guess(monkeypatch: pytest.Monk
     assert {cause: spot.because for cause, spot in found.items()} == {
         "latency": "one", "scale_error": "two"
     }  # fmt: skip
+
+
+# -- the search for the first size, with a law that is given ----------------------------
+
+
+def sized(
+    monkeypatch: pytest.MonkeyPatch,
+    law: Callable[[float, int], float | None],
+    grows: bool = True,
+    most: float = np.inf,
+    seed: int = 3,
+) -> tuple[SizeRange | None, list[tuple[int, str, int]]]:
+    """The sizes of an effect whose deviance is a law of size and draw; whose numbers were asked."""
+    asked: list[tuple[int, str, int]] = []
+    kind = SimpleNamespace(size_grows=grows, size_most=most)
+    monkeypatch.setattr(visibility, "EFFECTS", {"x": kind})
+    monkeypatch.setattr(visibility, "trial_rng", lambda *key: asked.append(key) or key[2])
+
+    def drawn(cause: str, size: float, signals: Any, around: Any, rng: int) -> Any:
+        found = law(size, rng)
+        return None if found is None else (found,)
+
+    monkeypatch.setattr(visibility, "drawn_effect", drawn)
+    monkeypatch.setattr(visibility, "_deviance", lambda effect, *more: effect[0])
+    sim = believed()
+    return size_range(sim, join_runs(simulate(sim, seed=1)), "x", seed), asked
+
+
+TOP = int(np.floor(np.log2(UP * np.sqrt(N / FIRST)) * STEPS))
+
+
+def test_the_mean_of_four_draws_is_met_within_a_fifth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the trials' own numbers; one that these runs cannot have shows nothing."""
+    draws = {0: 1.0, 1: None, 2: 5.0, 3: 10.0}
+    sizes, asked = sized(
+        monkeypatch, lambda size, k: None if draws[k] is None else draws[k] * size**2, seed=8
+    )
+    assert sizes is not None
+    assert FIRST / 1.2 < 4.0 * sizes.first**2 < FIRST * 1.2
+    assert set(asked) == {(8, "x", number) for number in range(4)}
+    assert (sizes.lowest, sizes.highest, sizes.grows) == (-16, TOP, True)
+
+
+@pytest.mark.parametrize("grows", [True, False])
+@pytest.mark.parametrize("scale", [1e-40, 1e-3, 1.0, 1e3, 1e40])
+def test_a_first_size_is_found_from_far_off(
+    monkeypatch: pytest.MonkeyPatch, scale: float, grows: bool
+) -> None:
+    """Up or down by many powers of ten, the other way where smaller ones show more."""
+    sizes, _ = sized(
+        monkeypatch, lambda size, k: scale * (size if grows else 1.0 / size) ** 2, grows
+    )
+    assert sizes is not None
+    met = scale * (sizes.first if grows else 1.0 / sizes.first) ** 2
+    assert FIRST / NEAR < met < FIRST * NEAR
+    assert (sizes.lowest, sizes.highest, sizes.grows) == (-16, TOP, grows)
+
+
+@pytest.mark.parametrize("most", [0.125, 2.0, 16.0])
+def test_no_size_is_beyond_what_an_effect_may_have(
+    monkeypatch: pytest.MonkeyPatch, most: float
+) -> None:
+    """The first is not, nor is the highest; and none is asked for."""
+    tried: list[float] = []
+
+    def law(size: float, number: int) -> float:
+        tried.append(size)
+        return 2.0 * size**2
+
+    sizes, _ = sized(monkeypatch, law, most=most)
+    assert sizes is not None
+    assert max(tried) <= most
+    assert sizes.first == pytest.approx(min(most, np.sqrt(20.0)), rel=0.1)
+    assert sizes.size(sizes.highest) <= most < sizes.size(sizes.highest + 1)
+    assert tried[0] == min(1.0, most)
+
+
+def test_a_law_of_leaps_ends_at_the_largest_size_of_the_range(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nothing below a size, and far too much above: steps of eight octaves at most."""
+    tried: list[float] = []
+
+    def law(size: float, number: int) -> float:
+        tried.append(size)
+        return 1e-200 * size if size < 2.0**30 else 1e200
+
+    sizes, _ = sized(monkeypatch, law)
+    assert sizes is not None
+    # Two looks at the start, a smaller size, and every one that follows.
+    moves = np.diff(np.log2(tried[12::4]))
+    assert set(moves.round(9)) == {8.0, -8.0}
+    assert len(tried) == 4 * (3 + 40)
+
+
+@pytest.mark.parametrize("grows", [True, False])
+def test_an_effect_of_one_size_has_no_range_and_one_that_never_shows_none_at_all(
+    monkeypatch: pytest.MonkeyPatch, grows: bool
+) -> None:
+    for value, wanted in ((7.0, SizeRange(1.0, 0, 0, grows)), (0.0, None)):
+        sizes, _ = sized(monkeypatch, lambda size, k, value=value: value, grows)
+        assert sizes == wanted
+    assert sized(monkeypatch, lambda size, k: None, grows)[0] is None
+
+
+def test_few_readings_have_no_size_above_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the range ends at the first size, that is the highest."""
+    sizes, _ = sized(monkeypatch, lambda size, k: 1e-3 * size**2, most=1.0)
+    assert sizes is not None
+    assert (sizes.first, sizes.highest) == (1.0, 0)
+
+
+def test_the_numbers_of_the_search_are_those_that_its_words_tell() -> None:
+    """Steps of a quarter of an octave, a deviance of 40, up to thirty times the noise."""
+    assert (STEPS, FIRST, DOWN, UP, NEAR) == (4, 40.0, 1.0 / 16.0, 30.0, 1.2)
+    assert visibility.DRAWS == 4
+
+
+def test_what_the_zero_and_the_lines_take_shows_nothing() -> None:
+    """An error that is the same at all readings, beside one that is not."""
+    sim = believed()
+    regression = regression_of(sim)
+    for column, shows in (
+        (np.ones(N), False),
+        (np.where(np.asarray(regression.signals.direction) > 0, 1.0, -1.0), True),
+    ):
+        made = SimpleNamespace(
+            signal=lambda signals, around, rng, column=column: 5.0 * column,
+            written=lambda degrees: degrees,
+            noise_factor=lambda signals, around: None,
+        )
+        found = _deviance(made, regression, np.random.default_rng(1), sim)
+        assert (found > 100.0) is shows
+        assert shows or found == 0.0

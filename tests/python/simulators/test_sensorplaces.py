@@ -161,12 +161,12 @@ def test_a_reading_at_its_indicated_angle_solves_its_equation() -> None:
         for (name, slope), unit in zip(slopes.items(), (1.0, 180.0 / np.pi, 1.0, 2e3), strict=True)
     }
     layer = SensorLayer(mj, models)
-    for part in (angles, *angles[:, None]):
+    for part in (angles, *angles[:, None], angles[:0]):
         qpos = np.zeros((len(part), mj.nq))
         qpos[:, 7:11] = part
         found = layer.read(SimpleNamespace(qpos=qpos, qvel=np.zeros((len(part), mj.nv))))
         left = found - np.array([*slopes.values()]) * np.sin(found) - part
-        assert np.max(np.abs(left)) < 5e-13
+        assert np.max(np.abs(left), initial=0.0) < 5e-13
         layer.reset()
 
 
@@ -254,6 +254,12 @@ def test_the_signal_that_is_missing_first_is_told_with_its_joint() -> None:
         layer.read(data)
     with pytest.raises(MissingSignalError, match=f"needs {second}, "):
         layer.read(data, **{first: 1.0})
+    # The direction of travel is that of the velocity, or of the angle.
+    way = ta.HarmonicModel([], terms=[T.DirectionalPattern((1.0,), (3.0 * A,), (0.0,))])
+    assert way.signals == ("direction",)
+    data.qvel[:] = -1.0
+    found = SensorLayer(mj, {"q1": way}).read(data)[0] + 0.7
+    assert found == pytest.approx(-3.0 * A * np.cos(-0.7), rel=1e-9)
     # Of batches that have no torque.
     soft = SensorLayer(mj, {"q1": ta.HarmonicModel([], terms=[T.TorsionalCompliance(A)])})
     bare = SimpleNamespace(qpos=data.qpos, qvel=data.qvel)

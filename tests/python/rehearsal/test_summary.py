@@ -1,0 +1,195 @@
+"""The words of a rehearsal: its table, what is never named, and the notes, each in its place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from trueangle.rehearsal.cause import RehearsedCause, rehearsed_cause
+from trueangle.rehearsal.detection import binomial_interval
+from trueangle.rehearsal.rehearse import _notes
+from trueangle.rehearsal.result import Rehearsal, _else, _never, _size, _table
+from trueangle.rehearsal.search import SizeSearch
+from trueangle.rehearsal.trial import FAILED, TrialOutcome
+from trueangle.rehearsal.visibility import SizeRange
+
+PLAY = RehearsedCause(
+    cause="backlash",
+    size_name="half_width_arcsec",
+    tried={1.0: (0, 4), 2.0: (3, 4), 4.0: (2, 2)},
+    named_50=1.5,
+    named_95=3.5,
+    intervals={0.5: (1.25, 1.75), 0.95: (2.5, None)},
+    told={"named": 5, "not_told_apart": 4, "nothing": 1},
+    confused_with={"zero_slip": 4, "latency": 3, "clock_drift": 2, "outliers": 1},
+    beside={"scale_error": 1},
+)
+LATE = replace(
+    PLAY, cause="latency", size_name="delay_s", confused_with={}, named_95=None, intervals={}
+)
+#: Seen only at times, of sizes that show the more the smaller they are, of one size, and never.
+NEVER = replace(
+    PLAY, cause="outliers", size_name="share", tried={9.0: (0, 4), 3.0: (0, 1)}, named_50=None,
+    named_95=None, intervals={}, told={"not_confirmed": 4, "nothing": 1},
+)  # fmt: skip
+UNTRIED = replace(NEVER, cause="clock_drift", tried={}, told={}, confused_with={})
+NOTES = ["INCOMPLETE: why", "a note", "another"]
+
+
+def rehearsal(*causes: RehearsedCause, **changes: Any) -> Rehearsal:
+    trials = sum(cause.trials for cause in causes)
+    return replace(
+        Rehearsal([*causes], None, 701, 8, 1.25, 41, 20, trials, True, list(NOTES)), **changes
+    )
+
+
+def test_the_summary_has_what_ended_it_first_and_every_cause_where_it_belongs() -> None:
+    lines = rehearsal(PLAY, NEVER, LATE, UNTRIED).summary().splitlines()
+    assert lines[0] == "INCOMPLETE: why."
+    assert lines[2].startswith("8 runs, 701 readings, noise 1.25 arcsec; 25 diagnoses, at most 20")
+    # The lines of the table, before what is too long is folded.
+    head, first, second = _table([PLAY, LATE])
+    assert (first[:27], second[:16]) == ("backlash, half_width_arcsec", "latency, delay_s")
+    assert head.startswith("cause, size  ")
+    # Columns stand below each other.
+    places = [head.index(text) for text in ("named in 50", "named in 95", "trials", "else")]
+    assert places == sorted(places)
+    for line, cells in (
+        (first, ("1.5 (1.25 to 1.75)", "3.5 (2.5 to ?)", "10", "zero_slip, latency, clock_drift")),
+        (second, ("1.5 (? to ?)", "? (2 of 2 at 4)", "10", "not told apart, nothing")),
+    ):
+        for k, (place, cell) in enumerate(zip(places, cells, strict=True)):
+            rest = line[place:]
+            assert rest.startswith(cell)
+            if k < 3:
+                assert rest[len(cell) : len(cell) + 2] == "  "
+            else:
+                assert rest == cell
+    assert "Sizes with their 95 % intervals; ? where the sizes tried do not bracket them." in lines
+    at = lines.index("Not named in these runs:")
+    assert [line for line in lines[:at] if line.startswith(second[:40])]
+    told = " ".join(" ".join(lines[at:]).split())
+    assert told == (
+        "Not named in these runs: - outliers (hidden 5 times, up to share 3; taken for zero_slip, "
+        "latency, clock_drift). - clock_drift: not tried. No further run was found that tells "
+        "another cause. Note: a note. Note: another."
+    )
+
+
+def test_the_summary_leaves_out_what_there_is_none_of() -> None:
+    text = rehearsal(PLAY).summary()
+    assert "Not named" not in text
+    assert "No further run" not in text
+    text = rehearsal(NEVER).summary()
+    assert "Sizes with" not in text
+    plan: Any = SimpleNamespace(summary=lambda: "Next: this\n  then that")
+    text = rehearsal(PLAY, NEVER, next_runs=plan).summary()
+    assert "No further run" not in text
+    assert "\nNext: this\n  then that\n\nNote: a note." in text
+
+
+def test_one_of_each_is_told_in_the_singular() -> None:
+    """Of runs, readings, trials, causes and diagnoses."""
+    once = replace(NEVER, tried={9.0: (0, 1)})
+    found = rehearsal(once, runs=1, readings=1)
+    text = " ".join(found.summary().split())
+    assert "1 run, 1 reading, noise 1.25 arcsec; 1 diagnosis, at most 20 of a cause" in text
+    assert "hidden 1 time, up to" in text
+    assert found._brief() == "0 of 1 cause named, 1 trial"
+    failed = [(0, TrialOutcome(FAILED, failure="KeyError: x"))]
+    at: Any = SimpleNamespace(stopped=False, within=2.0)
+    search = SizeSearch("a", None, None, 2, answers=failed)
+    assert _notes([search], at) == [
+        "INCOMPLETE: the 2 s given were up before all trials of 1 cause were made",
+        "1 diagnosis failed (KeyError: x) and counts as not named: this is a defect of trueangle",
+    ]
+
+
+def test_the_brief_counts_what_has_a_size() -> None:
+    found = rehearsal(PLAY, replace(LATE, named_50=None), NEVER, LATE, complete=False)
+    assert found._brief() == "2 of 4 causes named, 35 trials, incomplete"
+
+
+def test_a_cause_is_found_by_its_whole_name() -> None:
+    found = rehearsal(replace(PLAY, cause="zero_slip_2"), replace(PLAY, cause="zero_slip"), LATE)
+    assert found["zero_slip"] is found.causes[1]
+    with pytest.raises(KeyError, match="zero"):
+        found["zero"]
+
+
+def test_what_is_printed_holds_the_further_runs_and_every_field_of_a_cause() -> None:
+    plan: Any = SimpleNamespace(to_dict=lambda: {"runs": 3})
+    told = rehearsal(
+        replace(PLAY, blind_because="one way", measure="turn back"), UNTRIED, next_runs=plan
+    ).to_dict()
+    assert told["next_run"] == {"runs": 3}
+    of, untried = told["causes"]
+    assert (of["cause"], of["size_name"]) == ("backlash", "half_width_arcsec")
+    assert of["confused_with"] == ["zero_slip", "latency", "clock_drift", "outliers"]
+    assert (of["blind_because"], of["measure"]) == ("one way", "turn back")
+    assert [entry["interval"] for entry in of["tried"]] == [
+        [*binomial_interval(*counts)] for counts in ((0, 4), (3, 4), (2, 2))
+    ]
+    assert untried["named_50_interval"] == untried["named_95_interval"] == [None, None]
+
+
+@pytest.mark.parametrize(
+    ("changes", "share", "said"),
+    [
+        # All but one of twenty are not more than 95 %, of a hundred they are.
+        ({"tried": {2.0: (19, 20), 4.0: (20, 20)}}, 0.95, "? (20 of 20 at 4)"),
+        ({"tried": {2.0: (99, 100), 4.0: (20, 20)}}, 0.95, "below 2"),
+        ({"tried": {2.0: (18, 20), 4.0: (20, 20)}}, 0.95, "? (20 of 20 at 4)"),
+        ({"tried": {9.0: (20, 20), 4.0: (1, 20)}, "grows": False}, 0.95, "above 9"),
+        ({"tried": {9.0: (0, 20)}, "named_95": 3.0}, 0.95, "0 of 20"),
+    ],
+)
+def test_a_size_that_is_not_bracketed_is_told_by_its_share(
+    changes: dict[str, Any], share: float, said: str
+) -> None:
+    assert _size(replace(PLAY, **{"named_95": None, **changes}), share) == said
+
+
+def test_what_is_never_named_says_why_and_what_would() -> None:
+    told = {"blind_because": "one way", "measure": "turn back"}
+    assert _never(replace(UNTRIED, **told)) == "clock_drift: one way. To find out: turn back."
+    assert _else(PLAY) == "not told apart, nothing"
+    # The last size is the most visible one, though it is the least.
+    assert "up to share 3;" in _never(NEVER)
+
+
+# -- of one cause ------------------------------------------------------------------------
+
+
+def test_trials_of_a_cause_are_put_together_in_any_order() -> None:
+    sizes = SizeRange(3.0, -16, 20, False)
+    nothing, named = TrialOutcome("nothing"), TrialOutcome("named")
+    answers = [(4, named), (0, nothing), (4, nothing), (-4, nothing), (0, nothing), (0, named)]
+    found = rehearsed_cause("x", "size", sizes, answers, "blind", "measure")
+    # From the least visible on, which is the largest here; what was said most often first.
+    assert [*found.tried.items()] == [(6.0, (0, 1)), (3.0, (1, 3)), (1.5, (1, 2))]
+    assert [*found.told.items()] == [("nothing", 4), ("named", 2)]
+    assert found.ever_named
+    assert not found.grows
+    assert (found.blind_because, found.measure) == (None, None)
+    # Two steps beyond either side.
+    ends = [found.curve[0][0], found.curve[-1][0]]
+    assert ends == pytest.approx([6.0 * 2.0**0.5, 1.5 / 2.0**0.5])
+    assert len(found.curve) == 60
+
+
+@pytest.mark.parametrize("highest", [0, 1])
+def test_a_cause_of_one_size_has_shares_and_no_thresholds(highest: int) -> None:
+    """As one of which nothing was tried, or that has no sizes at all."""
+    sizes = SizeRange(1.0, 0, highest, True)
+    answers = [(0, TrialOutcome("named")), (0, TrialOutcome("nothing"))]
+    found = rehearsed_cause("x", "size", sizes, answers, None, None)
+    assert found.tried == {1.0: (1, 2)}
+    assert bool(found.intervals) == bool(found.curve) == bool(highest)
+    none = rehearsed_cause("x", "size", sizes, [], "blind", "measure")
+    assert (none.tried, none.intervals, none.curve) == ({}, {}, ())
+    assert (none.blind_because, none.measure, none.grows) == ("blind", "measure", True)
+    assert rehearsed_cause("x", "size", None, [], None, None).grows
