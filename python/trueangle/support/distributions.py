@@ -170,8 +170,8 @@ def binomial_tail(count: int, of: int, chance: float) -> float:
 
     Examples
     --------
-    >>> round(binomial_tail(9, 10, 0.5), 9)  # (10 + 1) / 2^10
-    0.010742187
+    >>> round(binomial_tail(9, 10, 0.5), 10)  # (10 + 1) / 2^10
+    0.0107421875
     """
     if count <= 0:
         return 1.0
