@@ -86,7 +86,7 @@ class Chance:
         self._weight = weight / weight.sum()
 
     def quantile(self, share: float, at: float) -> float:
-        """Quantile ``at``, below one, of the step where ``share`` is named; infinite where never."""
+        """Quantile ``at``, below one, of the step where ``share`` is named; infinite if never."""
         reach = 1.0 - self._lapse
         possible = reach > share
         odds = share / np.where(possible, reach - share, 1.0)
