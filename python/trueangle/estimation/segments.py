@@ -71,9 +71,9 @@ def less_local_level(values: Array, bounds: list[tuple[int, int]]) -> Array:
     out = np.empty_like(values)
     for start, stop in bounds:
         part = values[start:stop]
-        width = min(2 * REACH + 1, part.size)
-        levels = np.median(sliding_window_view(part, width), axis=1)
-        # At either end of a run the level is that of its first or last readings.
-        about = np.clip(np.arange(part.size) - REACH, 0, levels.size - 1)
-        out[start:stop] = part - levels[about]
+        if part.size <= REACH:
+            out[start:stop] = part - np.median(part)
+            continue
+        windows = sliding_window_view(np.pad(part, REACH, mode="reflect"), 2 * REACH + 1)
+        out[start:stop] = part - np.median(windows, axis=1)
     return out

@@ -58,13 +58,7 @@ def test_each_wild_reading_is_held_against_neighbours_without_the_others(rho: fl
 
 @pytest.mark.parametrize(
     ("first", "length"),
-    [
-        *((0, n) for n in range(1, MOST_IN_ROW + 1)),
-        *((first, MOST_IN_ROW) for first in (1, 2, 20, 34, 35, 40 - MOST_IN_ROW)),
-        (20, MOST_IN_ROW + 1),
-        (1, 1),
-        (39, 1),
-    ],
+    [(0, 1), (0, 2), (1, 1), (20, 1), (20, MOST_IN_ROW), (20, MOST_IN_ROW + 1), (38, 2), (39, 1)],
 )
 @pytest.mark.parametrize("beside", [0.9 * BESIDE, 1.1 * BESIDE])
 def test_a_glitch_is_short_and_its_neighbours_are_far_smaller(
