@@ -238,6 +238,27 @@ fn the_exact_path_corrects_without_a_table() {
     }
 }
 
+/// The slow way of both arguments against the way that is taken by itself.
+#[test]
+fn the_direct_path_corrects_as_the_others_do() {
+    let series = scaled(&series(360.0, 0.3, &[(1.0, &[1, 2]), (50.0, &[1])]), 0.4);
+    let x = hard_angles(360.0, 64);
+    let x: Vec<f64> = x.into_iter().filter(|x| x.abs() < 1e4).collect();
+    for argument in [Argument::Indicated, Argument::Reference] {
+        let evaluator = Evaluator::new(series.clone(), argument);
+        let slow = evaluate(&evaluator, Quantity::Correction, Some("direct"), &x);
+        let quick = evaluate(&evaluator, Quantity::Correction, None, &x);
+        for ((slow, quick), x) in slow.iter().zip(&quick).zip(&x) {
+            let off = (slow - quick).abs();
+            // Amplitudes of 0.4 in all, and angles that are themselves rounded.
+            assert!(
+                off <= TOLERANCE + 4.0 * f64::EPSILON * x.abs(),
+                "{off:e} at {x}"
+            );
+        }
+    }
+}
+
 #[test]
 fn counts_are_looked_up_and_agree_with_the_table() {
     for period in [4096.0, 1000.0, 1_048_576.0] {

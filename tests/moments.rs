@@ -103,6 +103,24 @@ fn threads_do_not_change_a_bit() {
 }
 
 #[test]
+fn no_readings_change_nothing() {
+    let data = readings(4, 300, 360.0);
+    let mut found = sums(360.0, 5, &data, 1);
+    let before = found.store();
+    for threads in [1, 2] {
+        let none = Readings {
+            angle: &[],
+            error: &[],
+            reference: None,
+            weights: None,
+        };
+        found.update(none, threads);
+        assert_eq!(found.count(), 300);
+        assert_eq!(found.store(), before);
+    }
+}
+
+#[test]
 fn equal_readings_lose_no_digits() {
     // Plain summation of two million equal terms would be off by some 1e-11.
     let len = 2_000_000;

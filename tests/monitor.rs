@@ -278,3 +278,53 @@ fn charts_are_those_of_all_windows() {
         );
     }
 }
+
+/// Bytes, as an allocator counts them; the extension has an allocator of its own.
+#[cfg(not(feature = "python"))]
+mod bytes {
+    use std::alloc::{GlobalAlloc, Layout, System};
+    use std::cell::Cell;
+
+    use super::*;
+
+    /// The system's allocator, which counts what a thread holds.
+    struct Counting;
+
+    #[global_allocator]
+    static COUNTING: Counting = Counting;
+
+    thread_local! {
+        static HELD: Cell<usize> = const { Cell::new(0) };
+    }
+
+    // SAFETY: every piece comes from the system's allocator and goes back to it with its layout.
+    unsafe impl GlobalAlloc for Counting {
+        unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+            HELD.set(HELD.get().wrapping_add(layout.size()));
+            // SAFETY: as promised by the caller, here and below.
+            unsafe { System.alloc(layout) }
+        }
+
+        unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+            HELD.set(HELD.get().wrapping_sub(layout.size()));
+            // SAFETY: as above.
+            unsafe { System.dealloc(place, layout) };
+        }
+    }
+
+    /// Of more coefficients a monitor says so many bytes more as the allocator gives it.
+    #[test]
+    fn a_monitor_says_how_many_bytes_its_coefficients_take() {
+        let made = |size: usize| {
+            let before = HELD.get();
+            let window = Window::new(&ORDERS, &COSINE, &SINE);
+            let monitor = Monitor::new(360.0, window, vec![0.0; size], 1.0, LIMITS);
+            (monitor.bytes(), HELD.get().wrapping_sub(before))
+        };
+        let (said, held) = made(0);
+        for size in [2, 6, 200] {
+            let (more_said, more_held) = made(size);
+            assert_eq!(more_said - said, more_held - held, "{size} coefficients");
+        }
+    }
+}

@@ -326,6 +326,81 @@ fn columns_of_another_length_are_refused() {
     );
 }
 
+/// Millions of turns away the angle is found as closely as a double tells it.
+#[test]
+fn a_distant_angle_is_found() {
+    let bump = term(Form::Bump {
+        place: 100.0,
+        width: 5.0,
+        height: 0.01,
+        cycles: 2.0,
+    });
+    let terms = [bump];
+    let (mut forward, mut back) = (corrector(&terms), corrector(&terms));
+    let none = Signals::default();
+    for turns in [0.0, 300.0, 1e3, -1e3, 1e6, -1e6, 1e9] {
+        for k in 0..100 {
+            let theta = (turns + 0.0137 * f64::from(k)) * PERIOD;
+            let goal = theta + forward.error(theta, &none).unwrap();
+            let found = back.correct(goal, &none).unwrap();
+            let near = SOLVED + 4.0 * f64::EPSILON * theta.abs();
+            assert!((found - theta).abs() <= near, "{found} is not {theta}");
+        }
+    }
+}
+
+/// An encoder within a turn tells what one that counts its turns tells: travel goes on.
+#[test]
+fn angles_within_a_turn_are_corrected_as_those_that_go_on() {
+    /// Of angles of some turns.
+    const ROUNDING: f64 = 1e-11;
+    let travel = [
+        term(Form::Play {
+            half_width: 0.02,
+            lines: vec![],
+        }),
+        term(Form::Friction {
+            amplitude: 0.01,
+            length: 2.0,
+            start: 0.5,
+        }),
+    ];
+    // Some turns on and back, twice, in steps of 7 degrees and less.
+    let angles: Vec<f64> = (0..900)
+        .map(|i| 1500.0 * (f64::from(i) * 0.0044).sin() + 40.0)
+        .collect();
+    let within: Vec<f64> = angles.iter().map(|x| x.rem_euclid(PERIOD)).collect();
+    let direction: Vec<f64> = (0..900)
+        .map(|i| (f64::from(i) * 0.0044).cos().signum())
+        .collect();
+    let corrected = |terms: &[Term], angles: &[f64], directed: bool| {
+        let mut columns = Columns::default();
+        if directed {
+            columns = columns.with(Signal::Direction, &direction[..]);
+        }
+        let mut out = vec![0.0; angles.len()];
+        let pairs = Batch::apart(angles, &mut out).unwrap();
+        corrector(terms)
+            .run(Quantity::Correction, pairs, &columns, None, None)
+            .unwrap();
+        out
+    };
+    for terms in [&travel[..1], &travel[1..], &travel[..]] {
+        for directed in [true, false] {
+            if !directed && terms.len() == 1 && matches!(terms[0].form, Form::Friction { .. }) {
+                continue;
+            }
+            let whole = corrected(terms, &angles, directed);
+            let parts = corrected(terms, &within, directed);
+            for i in 0..angles.len() {
+                let turns = angles[i] - within[i];
+                let off = (whole[i] - parts[i] - turns).abs();
+                assert!(off < ROUNDING, "{directed} at {}: {off}", angles[i]);
+            }
+        }
+    }
+}
+
 #[test]
 fn resetting_forgets_the_past() {
     let mut corrector = corrector(&[term(Form::Play {

@@ -161,3 +161,53 @@ impl<const SUBTRACT: bool> Sweep<'_, '_, SUBTRACT> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::table;
+    use super::*;
+    use crate::angle::Period;
+
+    /// A function that is this cubic in every segment, and no table's error.
+    fn cubics(c: [f64; DEGREE + 1]) -> Option<Cubics> {
+        let mut expansion = [0.0; table::DEGREE + 1];
+        expansion[0] = c[0] + 0.5 * c[2];
+        expansion[1] = c[1] + 0.75 * c[3];
+        expansion[2] = 0.5 * c[2];
+        expansion[3] = 0.25 * c[3];
+        let period = Period::new(8.0).unwrap();
+        let table = Table::new((0..8).map(|_| expansion), 0.0, period, 0.0);
+        Cubics::new(&table, 0.0, |_| 0.0)
+    }
+
+    /// A coefficient of a power k is rounded itself and in the result, and within the rule of
+    /// Horner k times in each of three ways; whatever the signs are, they may all add up.
+    #[test]
+    fn the_bound_counts_the_roundings_of_every_coefficient() {
+        let counted = |c: [f64; DEGREE + 1]| {
+            let parts = c.iter().zip([2.0, 5.0, 8.0, 11.0]);
+            parts.map(|(c, times)| c.abs() * times).sum::<f64>() * ROUNDING
+        };
+        for number in 0..81 {
+            let c = [1, 3, 9, 27].map(|power| f64::from(number / power % 3 - 1));
+            let (bound, least) = (cubics(c).unwrap().bound(), counted(c));
+            // Below the least normal number rounding is by that number's ulp.
+            assert!(
+                bound >= least && bound < 1.03 * least + 1e-40,
+                "{c:?} {bound}"
+            );
+        }
+    }
+
+    /// The greatest value that may come out decides, whichever coefficients it is of.
+    #[test]
+    fn values_beyond_single_precision_have_no_cubics() {
+        for k in 0..=DEGREE {
+            let mut c = [0.0; DEGREE + 1];
+            for (size, is_there) in [(0.99 * MOST, true), (1.01 * MOST, false)] {
+                c[k] = size;
+                assert_eq!(cubics(c).is_some(), is_there, "{c:?}");
+            }
+        }
+    }
+}

@@ -212,6 +212,28 @@ mod tests {
         }
     }
 
+    /// A unit ends within a vector: what lies beyond is no part of it, whatever it is.
+    #[test]
+    fn a_unit_knows_nothing_of_the_next() {
+        let orders = Ladder {
+            first: 0.5,
+            step: 1.0,
+            count: 3,
+        };
+        for len in 1..2 * MOST_LANES {
+            let mut theta = angles()[..len].to_vec();
+            let values = vec![1.0; len + MOST_LANES];
+            let mut alone = vec![0.0; 2 * orders.count];
+            unit_sums(&theta, &values[..len], &[0], orders, &mut alone).unwrap();
+            theta.extend([f64::NAN; MOST_LANES]);
+            let mut both = vec![0.0; 4 * orders.count];
+            unit_sums(&theta, &values, &[0, len], orders, &mut both).unwrap();
+            for (own, pair) in alone.chunks_exact(2).zip(both.chunks_exact(4)) {
+                assert_eq!(own, &pair[..2], "{len} readings");
+            }
+        }
+    }
+
     #[test]
     fn lengths_that_do_not_match_are_told() {
         let orders = Ladder {

@@ -196,7 +196,8 @@ mod tests {
     use super::*;
     use nalgebra::DMatrix;
 
-    const BOUNDS: [(usize, usize); 3] = [(0, 130), (130, 131), (131, 300)];
+    /// Runs of many readings, of one, and of none.
+    const BOUNDS: [(usize, usize); 5] = [(0, 0), (0, 130), (130, 131), (131, 131), (131, 300)];
 
     /// Rounding of sums of 300 products of at most 2: in single precision of 64 at a time.
     const DOUBLE: f64 = 1e-12;

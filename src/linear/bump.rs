@@ -185,6 +185,53 @@ mod tests {
         assert!((width - 16.0).abs() < 1.0, "{width}");
     }
 
+    /// Derivatives of `e^(-a²/2)`, `a = (φ - c)/w`: `a/w` and `a²/w` times the bump.
+    #[test]
+    fn tangents_are_the_derivatives_by_place_and_width() {
+        /// Third derivatives of at most 5 in widths, times a sixth of the step squared.
+        const DIFFERENCE: f64 = 5.0 * SLOPE * SLOPE / 6.0;
+        for width in [0.5, 6.0, 40.0] {
+            let phase: Vec<f64> = (-40..=40)
+                .map(|i| 100.0 + 0.1 * width * f64::from(i))
+                .collect();
+            let beside = fitted(&phase, &vec![0.0; phase.len()], 0.0);
+            let rows = Bumps::new(&beside, &phase, 90.0).tangents(100.0, width);
+            for (row, x) in rows.chunks_exact(3).zip(&phase) {
+                let a = (x - 100.0) / width;
+                let bump = (-0.5 * a * a).exp();
+                assert!((row[0] - bump).abs() < 1e-12, "{width} {a}");
+                for (slope, expected) in [(row[1], a * bump), (row[2], a * a * bump)] {
+                    let off = (width * slope - expected).abs();
+                    assert!(off < DIFFERENCE, "{width} {a}: {off}");
+                }
+            }
+        }
+    }
+
+    /// Of the readings where the bump is nothing is left: a step would be nothing by nothing.
+    #[test]
+    fn where_nothing_is_left_a_bump_keeps_a_place() {
+        let phase: Vec<f64> = (0..720).map(|i| 0.5 * f64::from(i)).collect();
+        let n = phase.len();
+        let sign = |i: usize| 1.0 - 2.0 * (i % 2) as f64;
+        let left: Vec<f64> = (0..n)
+            .map(|i| if i < 480 { 0.0 } else { sign(i) })
+            .collect();
+        let bounds = [(0, n)];
+        let noise = Correlated {
+            bounds: &bounds,
+            rho: 0.0,
+            roots: None,
+        };
+        let constant = vec![(n as f64).sqrt().recip(); n];
+        let beside = Beside::new(noise, &constant, &left, (&[], &[]), 240.0, 1e-4);
+        let (place, width) = Bumps::new(&beside, &phase, 4.0).refined(100.0, 2.0);
+        assert!(
+            (place - 100.0).abs() < 10.0 && width > 0.0 && width <= 4.0,
+            "{place} {width}"
+        );
+    }
+
     #[test]
     fn the_place_of_nothing_is_where_it_was_looked_for() {
         let phase = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0];

@@ -97,6 +97,16 @@ mod tests {
         assert!(clipped(&left, &left, &[1.0; 7], 4.0, 0.0).outlying[5]);
     }
 
+    /// Readings that agree to the last bit: what is left of one counts from 4e-12 on.
+    #[test]
+    fn a_deviation_below_the_least_is_the_least() {
+        let left = [0.0, 0.0, 0.0, 0.0, 0.0, 3.9e-12, 4.1e-12];
+        let found = clipped(&left, &left, &[1.0; 7], 4.0, 0.0);
+        assert_eq!(found.outlying.iter().position(|&beyond| beyond), Some(6));
+        assert_eq!(found.kept[5], left[5]);
+        assert!((found.kept[6] - 4.0 * LEAST).abs() < 1e-24);
+    }
+
     #[test]
     fn a_majority_away_from_zero_is_no_outlier() {
         let left = [5.0, 5.0, 5.0, 5.0, 0.0, 0.1, -0.1];

@@ -93,17 +93,15 @@ impl PyCorrector {
                 signals = signals.with(signal, single(given, signal.name())?);
             }
         }
-        if others.is_some() || !self.others.is_empty() {
-            for (name, given) in others.into_iter().flatten() {
-                let name: String = name.extract()?;
-                if !given.is_none()
-                    && let Some(signal) = self.signal(&name)?
-                {
-                    signals = signals.with(signal, single(&given, &name)?);
-                }
+        for (name, given) in others.into_iter().flatten() {
+            let name: String = name.extract()?;
+            if !given.is_none()
+                && let Some(signal) = self.signal(&name)?
+            {
+                signals = signals.with(signal, single(&given, &name)?);
             }
-            self.check_others(py, |signal| signals.get(signal).is_some())?;
         }
+        self.check_others(py, |signal| signals.get(signal).is_some())?;
         Ok(attached(py, || self.inner.correct(angle, &signals))??)
     }
 

@@ -14,7 +14,7 @@ use super::noise::{Bounds, consecutive};
 use super::release::detached;
 use super::whitening::{PyLagCorrelation, PyWhitener};
 use crate::check::same_length;
-use crate::linear::{self, Correlated, Factor, Fitted, Noise, Observed, Settled};
+use crate::linear::{self, Factor, Fitted, Noise, Observed, Settled};
 
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 type Matrix<'py> = Bound<'py, PyArray2<f64>>;
@@ -242,12 +242,7 @@ pub fn short_stretches<'py>(
     flags: PyReadonlyArray1<'py, bool>,
     bounds: Bounds,
 ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-    let noise = Correlated {
-        bounds: &bounds,
-        rho: 0.0,
-        roots: None,
-    };
-    consecutive(py, flags.len(), &noise)?;
+    consecutive(py, flags.len(), &bounds)?;
     vector(py, &linear::short_stretches(flags.as_slice()?, &bounds))
 }
 

@@ -43,8 +43,9 @@ impl PyMoments {
     #[new]
     fn new(period: f64, cycles: Vec<f64>, orders: &Bound<'_, PyAny>) -> PyResult<Self> {
         let design = design(period, cycles, orders)?;
-        let (cycles, orders) = design.common_turn().ok_or(Error::Method)?;
-        let highest = orders.into_iter().max().unwrap_or(0);
+        let turn = design.common_turn();
+        let turn = turn.and_then(|(cycles, orders)| Some((cycles, orders.into_iter().max()?)));
+        let (cycles, highest) = turn.ok_or(Error::Method)?;
         Accumulator::room(highest)?;
         Ok(Self {
             period,

@@ -60,7 +60,7 @@ fn products<'py, T: Element + RealField + Copy + Into<f64>>(
     let &[n, columns] = x.shape() else {
         unreachable!("two dimensions")
     };
-    consecutive(py, n, &noise)?;
+    weighted(py, n, noise.bounds, noise.roots)?;
     if width == 0 || columns % width != 0 {
         let problem = format!("width must divide the {columns} columns, got {width}");
         return Err(argument_error(py, problem));
@@ -97,13 +97,23 @@ pub fn two_normals(
     Ok((found.value, found.share, found.size, found.scale))
 }
 
-/// Runs follow each other from the first reading to the last.
-pub(super) fn consecutive(py: Python<'_>, n: usize, noise: &Correlated<'_>) -> PyResult<()> {
-    if let Some(roots) = noise.roots {
+/// As [`consecutive`]; the readings have a root of a weight each, if any.
+pub(super) fn weighted(
+    py: Python<'_>,
+    n: usize,
+    bounds: &[(usize, usize)],
+    roots: Option<&[f64]>,
+) -> PyResult<()> {
+    if let Some(roots) = roots {
         same_length("roots", roots.len(), "rows", n)?;
     }
+    consecutive(py, n, bounds)
+}
+
+/// Runs follow each other from the first reading to the last.
+pub(super) fn consecutive(py: Python<'_>, n: usize, bounds: &[(usize, usize)]) -> PyResult<()> {
     let mut at = 0;
-    for &(start, stop) in noise.bounds {
+    for &(start, stop) in bounds {
         if start != at || stop < start {
             break;
         }

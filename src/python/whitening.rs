@@ -13,10 +13,10 @@ use super::array::{columns, values, vector};
 use super::beside::{PyBeside, by_columns};
 use super::failure::argument_error;
 use super::linear::{NOT_FINITE, told};
-use super::noise::{Bounds, consecutive};
+use super::noise::{Bounds, consecutive, weighted};
 use super::release::detached;
 use crate::check::same_length;
-use crate::linear::{Correlated, Neighbours, Noise, RunEffect};
+use crate::linear::{Neighbours, Noise, RunEffect};
 
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 type Matrix<'py> = Bound<'py, PyArray2<f64>>;
@@ -72,12 +72,7 @@ impl PyWhitener {
             weights.as_array().iter().map(|w| w.sqrt()).collect()
         });
         let roots: Option<Vec<f64>> = roots;
-        let noise = Correlated {
-            bounds: &runs,
-            rho,
-            roots: roots.as_deref(),
-        };
-        consecutive(py, n, &noise)?;
+        weighted(py, n, &runs, roots.as_deref())?;
         let mut columns = Vec::with_capacity(effects.len());
         for effect in &effects {
             let own = effect.get().columns.bind(py).readonly();
@@ -237,13 +232,8 @@ impl PyLagCorrelation {
     /// Of runs whose clock increases.
     #[new]
     fn new(py: Python<'_>, clock: PyReadonlyArray1<'_, f64>, bounds: Bounds) -> PyResult<Self> {
-        let noise = Correlated {
-            bounds: &bounds,
-            rho: 0.0,
-            roots: None,
-        };
         let readings = clock.len();
-        consecutive(py, readings, &noise)?;
+        consecutive(py, readings, &bounds)?;
         let clock = values(&clock);
         let core = detached(py, || Neighbours::new(&clock, &bounds))?;
         Ok(Self { core, readings })

@@ -343,3 +343,37 @@ impl<const N: usize> Search<'_, N> {
         is_open
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::block::BLOCK;
+    use super::*;
+
+    /// Notes how many lanes it is run with and whether these round a product and sum once.
+    struct Noting<'a>(&'a mut (usize, bool));
+
+    impl Kernel for Noting<'_> {
+        #[inline(always)]
+        fn run<L: Lanes>(self) {
+            *self.0 = (L::N, L::FUSED);
+        }
+    }
+
+    /// A step is the same on every processor; a block is worked on as fast as this one can.
+    #[test]
+    fn one_reading_is_computed_alike_on_every_processor() {
+        for set in [
+            InstructionSet::Portable,
+            InstructionSet::Avx2,
+            InstructionSet::Avx512,
+        ] {
+            let (mut one, mut block, mut own) = ((0, true), (0, true), (0, true));
+            pass::<1>(set, Noting(&mut one));
+            pass::<BLOCK>(set, Noting(&mut block));
+            dispatch(set, Noting(&mut own));
+            assert_eq!(one, (1, false), "{set:?}");
+            assert_eq!(block, own, "{set:?}");
+            assert!(own.0 > 1, "{set:?}");
+        }
+    }
+}

@@ -216,3 +216,35 @@ impl Travel {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of all angles whole turns off, the one within half a turn; the reversal goes along.
+    #[test]
+    fn turns_are_counted_as_the_angle_counts_them() {
+        let period = 8.0;
+        for step in -400..=400 {
+            // Everything is exact in binary; half a turn either side is not told apart.
+            let (angle, farthest) = (3.25 + 0.125 * f64::from(step), 2.5);
+            let mut travel = Travel::new(0);
+            (travel.farthest, travel.reversal) = (farthest, 1.0);
+            let moved = travel.align(angle, period);
+            let turns = (travel.farthest - farthest) / period;
+            assert_eq!(turns, turns.round(), "{angle}");
+            assert!((angle - travel.farthest).abs() <= 0.5 * period, "{angle}");
+            assert_eq!(travel.reversal - 1.0, turns * period, "{angle}");
+            assert_eq!(moved, turns != 0.0, "{angle}");
+        }
+    }
+
+    #[test]
+    fn an_angle_that_is_not_known_moves_nothing() {
+        let mut unknown = Travel::new(0);
+        assert!(!unknown.align(1e9, 360.0) && !unknown.is_known());
+        unknown.farthest = 1.0;
+        assert!(!unknown.align(f64::NAN, 360.0));
+        assert_eq!(unknown.farthest, 1.0);
+    }
+}

@@ -57,6 +57,19 @@ def test_lines_are_those_of_numpy():
     np.testing.assert_allclose(both, [value, slope], rtol=0, atol=10 * ROUNDING)
 
 
+def test_columns_that_are_rounding_are_zeros_where_that_is_asked_for():
+    theta, orders = 2.0 * np.pi / 36.0 * np.arange(36), np.array([18.0, 3.0])
+    plain = _core.line_columns(theta, orders)
+    most = np.abs(plain[:, 1]).max()
+    assert 0.0 < most < ROUNDING
+    np.testing.assert_array_equal(
+        _core.line_columns(theta, orders, vanishing=0.999 * most / 18.0), plain
+    )
+    found = _core.line_columns(theta, orders, vanishing=1.001 * most / 18.0)
+    np.testing.assert_array_equal(found[:, 1], 0.0)
+    np.testing.assert_array_equal(found[:, [0, 2, 3]], plain[:, [0, 2, 3]])
+
+
 def test_sums_over_units_are_those_of_numpy():
     values, starts = RNG.normal(size=(2, N)), [0, 3, 20]
     found = _core.unit_sums(THETA, values, starts, 0.5, 0.25, 6)
@@ -199,6 +212,13 @@ def test_sums_count_what_has_a_weight():
     sums.update(THETA, THETA, ROOTS)
     assert sums.update_known(THETA, np.append(np.nan, THETA[1:]), False) == N - 1
     assert (sums.count, sums.copy().count) == (2 * N - 1, 2 * N - 1)
+
+
+def test_sums_of_no_readings_are_counted_from_zero():
+    weight, error, *rest = _core.Moments(360.0, [1.0], [[1, 3]]).spectrum()
+    assert not weight.any()
+    assert not error.any()
+    assert rest == [0.0, 0, 0.0]
 
 
 def test_joints_alike_are_copied_whole():

@@ -1,6 +1,7 @@
 """Models of the core as callers hand them over: counts, bounds, states, what is refused."""
 
 import json
+import multiprocessing.process
 import subprocess
 import sys
 from fractions import Fraction
@@ -160,6 +161,13 @@ def test_a_step_takes_an_angle_and_signals():
             held(*given)
 
 
+@pytest.mark.parametrize(("parent", "threads"), [(None, 3), (object(), 1)])
+def test_a_process_with_a_parent_in_python_takes_one_thread(parent, threads, monkeypatch):
+    monkeypatch.setenv("TRUEANGLE_NUM_THREADS", "3")
+    monkeypatch.setattr(multiprocessing.process, "parent_process", lambda: parent)
+    assert _core.thread_count() == threads
+
+
 THREADS = """\
 import json, os, sys
 import trueangle._core as core
@@ -263,4 +271,6 @@ def test_a_model_is_coupled_to_so_many_joints_and_no_more():
         assert taken.error(33.0, **angles) == pytest.approx(series().error(33.0) + added)
         with pytest.raises(MissingSignalError, match=joints[count - 1]):
             corrector(*terms[:count]).error(33.0, **dict(list(angles.items())[:-1]))
+        with pytest.raises(MissingSignalError, match=f"{joints[0]}, the angle of another joint"):
+            corrector(*terms[:count]).step(33.0)
     assert 2 <= most < len(joints)

@@ -46,6 +46,27 @@ def test_the_nth_allocation_fails(what, driver, desk):
     assert gentle >= 20
 
 
+#: Before long work, a shorter one that makes what is made once; the result has a place already.
+LONG = f"m = {MODEL})\nm.error(x[:9], path='direct')\ny = np.tile(x, 400)\n"
+
+
+def test_long_work_ends_where_it_lives_on_the_reserve(driver, desk):
+    before = driver.run(desk, code=START + LONG)
+    assert before.status == 0, before.told
+    code = START + LONG + (
+        "try:\n    m.error(y, out=y, path='direct', threads=1)\n"
+        "except MemoryError as error:\n    print(error)\n    raise\n"
+    )  # fmt: skip
+    # The first may fail before the work has filled the reserve again; one of the next is its own.
+    first = before.counts["allocate"]
+    for n in range(first, first + 4):
+        found = driver.run(desk, code=code, kind="allocate", n=n, error=NO_MEMORY)
+        assert found.status in (0, 12), found
+        if "memory ran short while" in found.told:
+            return
+    pytest.fail(f"the work went on without a reserve: {found}")
+
+
 #: Leaves so many addresses beyond those in use, before the work; status 12 for a MemoryError.
 #: Done once before, so that Python has imported what it needs: its own imports end otherwise.
 TIGHT = """
