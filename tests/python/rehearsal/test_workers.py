@@ -151,7 +151,8 @@ def test_every_trial_is_answered_once_and_every_process_ended(echoing):
     assert list(side.answers()) == [(7, ("answer", 7))]
     side.close()
     assert all(process.killed and process.waited for process in echoing)
-    assert [process.got[0] for process in echoing] == [(sim, 41)] * 3
+    # One that is slow to begin may find that the others have done it all.
+    assert all(process.got[:1] in ([], [(sim, 41)]) for process in echoing)
     assert sorted(k for process in echoing for k in process.got[1:]) == list(range(8))
 
 
