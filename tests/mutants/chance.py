@@ -16,7 +16,6 @@ import dataclasses
 import sys
 import tempfile
 import time
-import tomllib
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -24,7 +23,7 @@ from queue import Queue
 
 from copies import LATE, Copy, Verdict
 from drawing import ROOT, Drawn, drawn, listed
-from faults import Fault
+from faults import Fault, excused
 from linetests import QUICK, SLOW, LineTests, of_line, rooms_of_tests
 
 PACKAGE = ROOT / "python" / "trueangle"
@@ -48,17 +47,6 @@ MOST_FILES = 12
 TEXTS = "tests/python/transcripts/"
 
 
-def excused(fault: Drawn) -> str:
-    """Why nobody can notice it, where `equivalent.toml` says so."""
-    path = Path(__file__).with_name("equivalent.toml")
-    for entry in tomllib.loads(path.read_text("utf-8"))["equivalent"]:
-        if (entry["file"], entry["before"], entry["after"]) == (
-            fault.file, fault.before, fault.after,
-        ):  # fmt: skip
-            return str(entry["because"])
-    return ""
-
-
 def reaching(lines: dict[int, list[str]], fault: Drawn) -> list[str]:
     """Tests that reach a fault, those in files named after its module first."""
     stem = Path(fault.file).stem.strip("_")
@@ -70,7 +58,7 @@ def judged(copy: Copy, fault: Drawn, asked: list[list[str]], unfit: set[str]) ->
 
     ``asked`` are the quick tests that reach it, and the slow ones where they are asked.
     """
-    why = excused(fault)
+    why = excused(fault.file, fault.before, fault.after)
     if why:
         return "excused", why
     if not any(asked):

@@ -19,13 +19,13 @@ import subprocess
 import sys
 import tempfile
 import time
-import tomllib
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from copies import CHOSEN, Copy
+from faults import changed_line, excused
 from rustchanges import Change, changes, switched
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -99,21 +99,8 @@ def drawn(count: int, seed: int, files: Sequence[Path], root: Path = ROOT) -> li
 def _of(path: Path, change: Change, root: Path) -> Drawn:
     source = path.read_bytes()
     changed = source[: change.start] + change.new.encode() + source[change.end :]
-    old, new = (text.decode().splitlines() for text in (source, changed))
-    line = next(k for k, (a, b) in enumerate(zip(old, new, strict=False)) if a != b)
-    file = path.relative_to(root).as_posix()
-    return Drawn(file, change, old[line].strip(), new[line].strip())
-
-
-def excused(fault: Drawn) -> str:
-    """Why nobody can notice it, where `equivalent.toml` says so."""
-    text = Path(__file__).with_name("equivalent.toml").read_text("utf-8")
-    for entry in tomllib.loads(text)["equivalent"]:
-        if (entry["file"], entry["before"], entry["after"]) == (
-            fault.file, fault.before, fault.after,
-        ):  # fmt: skip
-            return str(entry["because"])
-    return ""
+    _, before, after = changed_line(source.decode(), changed.decode())
+    return Drawn(path.relative_to(root).as_posix(), change, before.strip(), after.strip())
 
 
 def built(copy: Copy, faults: dict[int, Drawn], cargo: Sequence[str]) -> list[str]:
@@ -266,7 +253,7 @@ def main() -> int:
         copy.switchable()
         made = built(copy, left, ["test", "--no-run", "--lib", "--tests"])
         tests = of_rust(copy, made)
-        asked = {k: f for k, f in left.items() if not excused(f)}
+        asked = {k: f for k, f in left.items() if not excused(f.file, f.before, f.after)}
         outcomes = dict.fromkeys(left, "excused") | judge(asked, tests, noticed_in_rust, copy)
         made = built(copy, left, ["build", "--lib", "--features", "python"])
         asked = {k: f for k, f in asked.items() if k in left and outcomes[k] != "killed"}

@@ -11,6 +11,8 @@ from typing import NamedTuple
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator
 
+from faults import changed_line
+
 ROOT = Path(__file__).resolve().parents[2]
 
 OPERATORS = (
@@ -85,12 +87,11 @@ def drawn(count: int, seed: int, files: list[Path]) -> list[Drawn]:
 
 def mutation(path: Path, operator: str, occurrence: int, code: str, changed: str) -> Drawn | None:
     """The fault at one occurrence; None where it is none, or none that runs."""
-    old, new = code.splitlines(), changed.splitlines()
-    line = next((k for k, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), None)
+    line, before, after = changed_line(code, changed)
     # Lengths that never differ: without the guard nothing changes.
-    if line is not None and new[line] == old[line].replace(GUARD, GUARD.replace("True", "False")):
+    if after == before.replace(GUARD, GUARD.replace("True", "False")):
         return None
-    if line is None or old[line].lstrip().startswith(("from ", "import ", "@", "__all__", "*,")):
+    if before.lstrip().startswith(("from ", "import ", "@", "__all__", "*,")):
         return None
     try:
         if ast.dump(ast.parse(code)) == ast.dump(ast.parse(changed)):
@@ -98,9 +99,7 @@ def mutation(path: Path, operator: str, occurrence: int, code: str, changed: str
     except SyntaxError:
         return None
     file = path.relative_to(ROOT).as_posix()
-    return Drawn(
-        file, operator, occurrence, line + 1, old[line].strip(), new[line].strip(), changed
-    )
+    return Drawn(file, operator, occurrence, line, before.strip(), after.strip(), changed)
 
 
 def listed(path: Path) -> list[Drawn]:
@@ -112,8 +111,6 @@ def listed(path: Path) -> list[Drawn]:
         if code.count(old) != 1:
             raise SystemExit(f"{entry['name']}: {file} holds its text {code.count(old)} times")
         changed = code.replace(old, new)
-        pairs = zip(code.splitlines(), changed.splitlines(), strict=False)
-        line = next(k for k, (a, b) in enumerate(pairs) if a != b)
-        before, after = code.splitlines()[line].strip(), changed.splitlines()[line].strip()
-        found.append(Drawn(file, entry["name"], 0, line + 1, before, after, changed))
+        line, before, after = changed_line(code, changed)
+        found.append(Drawn(file, entry["name"], 0, line, before.strip(), after.strip(), changed))
     return found

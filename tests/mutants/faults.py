@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -57,6 +58,24 @@ class Fault:
         before = path.read_text(encoding="utf-8")
         path.write_text(before.replace(self.old, self.new), encoding="utf-8")
         return before
+
+
+def changed_line(code: str, changed: str) -> tuple[int, str, str]:
+    """Number of the first line that differs, from 1, and that line before and after.
+
+    A text that only ends earlier or later differs in a last line of its own.
+    """
+    pairs = itertools.zip_longest(code.splitlines(), changed.splitlines(), fillvalue="")
+    return next((k, a, b) for k, (a, b) in enumerate(pairs, 1) if a != b)
+
+
+def excused(file: str, before: str, after: str) -> str:
+    """Why nobody can notice that a line became another one, where `equivalent.toml` says so."""
+    text = FOLDER.with_name("equivalent.toml").read_text("utf-8")
+    for entry in tomllib.loads(text)["equivalent"]:
+        if (entry["file"], entry["before"], entry["after"]) == (file, before, after):
+            return str(entry["because"])
+    return ""
 
 
 def _may_be_expression(text: str) -> bool:
