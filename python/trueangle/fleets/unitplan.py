@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..planning.arc import check_arc, plan_arc
-from ..planning.plan import check_sizes
+from ..planning.plan import check_readings, check_sizes
 from ..planning.tables import place_table, plain_arc_plan
 from ..support.argumentkinds import told_kinds
 from ..support.layout import counted, laid_out
@@ -173,8 +173,7 @@ def plan_unit(
         )
     known = Spread.of(prior, orders, noise, start / 360.0, stop / 360.0)
     check_sizes(uncertainty=uncertainty)
-    if readings is not None and (readings != int(readings) or not 1 <= readings <= MOST):
-        raise ArgumentError(f"readings must be a whole number from 1 to {MOST}, got {readings!r}")
+    check_readings(readings, MOST)
     places = known.found(readings, uncertainty)
     reached = known.uncertainty(places)
     without = _without(start, stop, known, reached)

@@ -16,7 +16,7 @@ from .arcplan import ArcPlan
 from .counts import exchanged, rounded
 from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
 from .noisefactors import noise_factors
-from .plan import check_sizes, readings_needed
+from .plan import check_readings, check_sizes, readings_needed
 
 #: Readings where neither their number nor what they are for is given.
 READINGS = 60
@@ -206,10 +206,7 @@ def _readings(
 ) -> int:
     """As many as are given, or as the wanted error needs."""
     if readings is not None:
-        if readings != int(readings) or not 1 <= readings <= MOST:
-            raise ArgumentError(
-                f"readings must be a whole number from 1 to {MOST}, got {readings!r}"
-            )
+        check_readings(readings, MOST)
         return int(readings)
     if standard_error is None and uncertainty is None:
         return READINGS

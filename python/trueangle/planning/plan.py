@@ -42,6 +42,12 @@ def check_sizes(**sizes: float | None) -> None:
             raise ArgumentError(f"{name} must be positive and finite, got {value!r}")
 
 
+def check_readings(readings: float | None, most: int) -> None:
+    """Refuse a number of readings that is given and not whole, or not from 1 to ``most``."""
+    if readings is not None and (readings != int(readings) or not 1 <= readings <= most):
+        raise ArgumentError(f"readings must be a whole number from 1 to {most}, got {readings!r}")
+
+
 @told_kinds
 def readings_needed(noise: float, standard_error: float, factor: float = 1.0) -> int:
     """Readings that bring an order's standard error down to ``standard_error``.
