@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 
 import trueangle as ta
+from trueangle.errors import ArgumentError
 from trueangle.planning import plan_arc, plan_mounts
-from trueangle.planning.plan import readings_needed
+from trueangle.planning.plan import check_readings, readings_needed
 
 NO_SIZE = [0.0, -1.0, math.nan, math.inf]
 
@@ -55,3 +57,15 @@ def test_more_readings_than_anybody_takes_are_refused(noise: float, wanted: floa
     with pytest.raises(ta.errors.ArgumentError, match=r"takes more than 1e\+12 readings"):
         readings_needed(noise, wanted)
     assert readings_needed(1.0, 1.5e-6) == pytest.approx(2.0 / 1.5e-6**2)
+
+
+@pytest.mark.parametrize("readings", [None, 1, 7, 7.0])
+def test_whole_numbers_of_readings_from_one_to_the_most_are_taken(readings: float | None) -> None:
+    check_readings(readings, 7)
+
+
+@pytest.mark.parametrize("readings", [0, 8, 2.5, -1])
+def test_other_numbers_of_readings_are_refused_with_the_most(readings: float) -> None:
+    told = rf"^readings must be a whole number from 1 to 7, got {re.escape(repr(readings))}$"
+    with pytest.raises(ArgumentError, match=told):
+        check_readings(readings, 7)
