@@ -10,9 +10,9 @@ from trueangle.fitting.orders.evidence import (
     examine_orders,
     fit_chosen_orders,
     held_out_gains,
-    log_chance,
 )
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
+from trueangle.fitting.orders.noisespectrum import NoiseSpectrum, log_chance
 from trueangle.fitting.orders.zerogroups import ZeroGroupReadings, zero_groups
 from trueangle.runs.aliasing import distinct_positions
 
@@ -103,7 +103,7 @@ def test_statistics_are_those_of_least_squares():
     coefficients, _, squares = fit_chosen_orders(sums, [2, 0])
     np.testing.assert_allclose(coefficients, solution[:4], rtol=1e-8)
     assert squares == pytest.approx(left)
-    test = examine_orders(sums, [2, 0], [0, 4], (0.01, 50.0), None)
+    test = examine_orders(sums, [2, 0], [0, 4], NoiseSpectrum.flat(0.01, 50.0, 2), None)
     assert test.statistic[0] == pytest.approx((residual((3,))[1] - left) / 0.01)
     assert test.statistic[1] == pytest.approx((left - residual((3, 1, 5))[1]) / 0.01)
 
@@ -134,7 +134,7 @@ def test_forward_choice_takes_the_lowest_of_aliases():
     turns = np.arange(36) / 36.0
     unit = ZeroGroupReadings(turns, np.sin(2 * np.pi * 202 * turns), np.ones(36), "")
     sums = harmonic_sums([unit], (14, 202, 22))
-    assert choose_forward(sums, np.full(3, -3.0), 35, (0.01, 100.0)) == [0]
+    assert choose_forward(sums, np.full(3, -3.0), 35, NoiseSpectrum.flat(0.01, 100.0, 3)) == [0]
 
 
 def test_tail_of_the_f_distribution():

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...estimation.linear import pseudo_inverse
 from ...support.arrays import Array
 from .harmonicsums import HarmonicSums
+from .noisespectrum import NoiseSpectrum, log_chance
 
 Index = NDArray[np.intp]
 
@@ -31,12 +32,6 @@ _LEAST_DOF: Final = 3
 
 #: Scatter between runs counts as an order's own where chance makes it rarer than this.
 OVERDISPERSED: Final = 1e-3
-
-
-def log_chance(statistic: Array | float, dof: float) -> Array:
-    """Logarithm of the probability that noise alone reaches ``statistic``."""
-    t = np.maximum(np.asarray(statistic, dtype=np.float64), 0.0)
-    return np.asarray(-0.5 * t if math.isinf(dof) else -0.5 * dof * np.log1p(t / dof))
 
 
 def log_chi_squared_tail(x: Array, dof: int) -> Array:
@@ -58,17 +53,17 @@ def choose_forward(
     sums: HarmonicSums,
     log_limits: Array,
     readings: int,
-    noise: tuple[float, float] | None,
+    noise: NoiseSpectrum | None,
     forced: Sequence[int] = (),
     barred: Sequence[int] = (),
 ) -> list[int]:
     """Indices of orders, taken one by one while the best of the rest is significant.
 
     ``log_limits`` is the log of the false-alarm probability that each order may use up,
-    ``readings`` their number less that of the zeros, ``noise`` a variance and its degrees of
-    freedom (None: the residual of the orders chosen so far, the one on trial included). ``forced``
-    orders are taken first, whatever they bring, ``barred`` ones never; among aliases the lowest of
-    the likeliest is taken.
+    ``readings`` their number less that of the zeros, ``noise`` that of every order (None: the
+    residual of the orders chosen so far, the one on trial included). ``forced`` orders are taken
+    first, whatever they bring, ``barred`` ones never; among aliases the lowest of the likeliest is
+    taken.
     """
     gram, rhs, rest = sums.total()
     gram, rhs = gram.copy(), rhs.copy()
@@ -101,7 +96,7 @@ def choose_forward(
                 left = np.maximum(rest - gain, 1e-200)
                 score = log_chance(gain * dof / left, dof) - log_limits
             else:
-                score = log_chance(gain / max(noise[0], 1e-200), noise[1]) - log_limits
+                score = noise.log_chance(gain) - log_limits
             score = np.where(alive, score, math.inf)
             top = int(np.argmin(score))
             if not score[top] <= 0.0:
@@ -148,28 +143,24 @@ def examine_orders(
     sums: HarmonicSums,
     chosen: Sequence[int],
     orders: Sequence[int],
-    noise: tuple[float, float],
+    noise: NoiseSpectrum,
     scatter: Array | None,
-    freedom: int | None = None,
 ) -> OrderTest:
     """Significance of ``orders``, each beside the other chosen ones.
 
-    ``scatter`` (from `run_scatter`, or `neighbour_scatter` with its ``freedom``) replaces the
-    noise for an order where it is more than the noise.
+    ``noise`` is that of these orders; ``scatter`` (from `run_scatter`) replaces it for an order
+    where it is more.
     """
     total, rhs, _ = sums.total()
     n = len(orders)
     # Of orders that are aliases of the chosen ones nothing is known.
     cosine, sine, of_one = np.full((3, n), math.nan)
     gain = np.zeros(n)
-    level = np.full(n, noise[0])
-    dof = np.full(n, noise[1])
+    level, own, each = noise.variance, np.zeros(n, dtype=bool), max(1, 2 * (sums.units - 1))
     if scatter is not None:
-        each = 2 * (sums.units - 1) if freedom is None else freedom
-        ratio = np.maximum(scatter, 0.0) / noise[0] * each
+        ratio = np.maximum(scatter, 0.0) / level * each
         own = np.isfinite(scatter) & (log_chi_squared_tail(ratio, each) < math.log(OVERDISPERSED))
         np.copyto(level, scatter, where=own)
-        dof[own] = each
     position = {k: i for i, k in enumerate(chosen)}
     coefficients, inverse, _ = fit_chosen_orders(sums, chosen)
     base = sums.columns(chosen)
@@ -212,7 +203,8 @@ def examine_orders(
     with np.errstate(divide="ignore", invalid="ignore"):
         statistic = np.where(level > 0.0, gain / level, math.inf)
     statistic[np.isnan(cosine)] = 0.0
-    log_p = np.array([float(log_chance(t, v)) for t, v in zip(statistic, dof, strict=True)])
+    gain[np.isnan(cosine)] = 0.0
+    log_p = np.where(own, log_chance(statistic, each), noise.log_chance(gain))
     return OrderTest(cosine, sine, variance, statistic, log_p)
 
 

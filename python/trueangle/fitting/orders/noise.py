@@ -1,4 +1,4 @@
-"""The noise of readings: pure error of repeats, scatter by units, runs and neighbouring orders."""
+"""The noise of readings: pure error of repeats, scatter by units, runs and orders."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ...runs.aliasing import Positions
 from ...support.arrays import Array
-from ...support.quantiles import median
-from .evidence import COLLINEAR, OVERDISPERSED, fit_chosen_orders, log_chi_squared_tail
+from .evidence import COLLINEAR, fit_chosen_orders
 from .harmonicsums import HarmonicSums
 from .zerogroups import ZeroGroupReadings
 
@@ -21,9 +20,6 @@ _SWEEPS: Final = 20
 
 #: Possible pairs of unit and position for each reading up to which they are counted.
 _ROOM: Final = 8
-
-#: Orders next to one that tell the noise there.
-NEIGHBOURS: Final = 12
 
 
 class ReadingVariance(NamedTuple):
@@ -137,26 +133,25 @@ def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
     return np.asarray(quadratic / (2.0 * (sums.units - 1)))
 
 
-def neighbour_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array | None:
-    """Variance of one reading as the orders next to each say it, for noise that has a colour.
+def remaining_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array:
+    """Variance of one reading as each order that was not chosen tells it.
 
     ::
 
-        s_k² = median_{j~k}{T_j} / (2 ln 2)
+        v_k = T_k / 2
 
-    with the reduction ``T`` of the sum of squares by each of the `NEIGHBOURS` nearest orders
-    that are not chosen: two squares of normal numbers each, the noise at about that order. None
-    where there are too few of them.
+    with the reduction ``T`` of the sum of squares by the order beside the chosen ones: two degrees
+    of freedom. nan for the chosen ones, and where an order is nearly one of them.
     """
     taken = set(chosen)
     others = np.array([i for i in range(sums.orders.size) if i not in taken], dtype=np.intp)
-    if others.size < 2 * NEIGHBOURS:
-        return None
+    found = np.full(sums.orders.size, math.nan)
+    if others.size == 0:
+        return found
     total, rhs, _ = sums.total()
     coefficients, inverse, _ = fit_chosen_orders(sums, chosen)
     base = sums.columns(chosen)
-    n = sums.orders.size
-    cosine, sine = others, others + n
+    cosine, sine = others, others + sums.orders.size
     to_cosine, to_sine = total[np.ix_(base, cosine)], total[np.ix_(base, sine)]
     by_cosine, by_sine = inverse @ to_cosine, inverse @ to_sine
     aa = total[cosine, cosine] - np.einsum("bk,bk->k", to_cosine, by_cosine)
@@ -166,32 +161,6 @@ def neighbour_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array | None
     b = rhs[sine] - to_sine.T @ coefficients
     det = aa * bb - ab * ab
     seen = det > (COLLINEAR * (total[cosine, cosine] + total[sine, sine])) ** 2
-    others, gain = others[seen], (bb * a * a - 2.0 * ab * a * b + aa * b * b)[seen] / det[seen]
-    if others.size < 2 * NEIGHBOURS:
-        return None
-    places = sums.orders[others]
-    found = np.empty(n)
-    half = NEIGHBOURS // 2
-    for k in range(n):
-        low = int(np.searchsorted(places, sums.orders[k]))
-        first = min(max(0, low - half), others.size - NEIGHBOURS - 1)
-        window = np.arange(first, first + NEIGHBOURS + 1)
-        window = window[others[window] != k][:NEIGHBOURS]
-        found[k] = median(gain[window])
-    return np.asarray(np.maximum(found, 0.0) / (2.0 * math.log(2.0)))
-
-
-def pooled_scatter(scatter: Array, units: int) -> tuple[float, float] | None:
-    """Noise common to most orders: mean of their scatter, the overdispersed left out."""
-    finite = scatter[np.isfinite(scatter)]
-    each = 2 * (units - 1)
-    if finite.size * each < 20:
-        return None
-    # Median of chi-square over its mean (Wilson and Hilferty).
-    middle = float(median(finite)) / (1.0 - 2.0 / (9.0 * each)) ** 3
-    if middle <= 0.0:  # copies of one run
-        return None
-    usual = finite[log_chi_squared_tail(finite / middle * each, each) > math.log(OVERDISPERSED)]
-    if usual.size * each < 20:
-        return None
-    return float(usual.mean()), float(usual.size * each)
+    gain = (bb * a * a - 2.0 * ab * a * b + aa * b * b)[seen] / det[seen]
+    found[others[seen]] = 0.5 * np.maximum(gain, 0.0)
+    return found

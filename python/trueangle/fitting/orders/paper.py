@@ -20,9 +20,9 @@ from ...runs.run import CalibrationRun
 from ...support.arrays import Array
 from ...support.quantiles import median
 from .candidates import Candidates
-from .evidence import log_chance
 from .lookalikes import find_lookalikes
 from .noise import ReadingVariance
+from .noisespectrum import log_chance
 from .phases import circular_range_deg
 from .result import OrderSelection
 from .table import OrderRow

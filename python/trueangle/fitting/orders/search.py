@@ -8,26 +8,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from ...model.validity import greatest_slope
 from ...support.arrays import Array
-from ..uncertainty import CovarianceKind
 from .evidence import OrderTest, choose_forward, examine_orders, fit_chosen_orders, held_out_gains
 from .harmonicsums import HarmonicSums
-from .noise import NEIGHBOURS, ReadingVariance, neighbour_scatter, pooled_scatter, run_scatter
+from .noise import ReadingVariance
+from .noisespectrum import NoiseSpectrum
+from .ordernoise import DOUBTED, OrderNoise
 
 #: Chance, over the whole search, that noise alone makes any order significant. Half of
 #: the 1 % promised: the rest covers what the noise estimate itself does not know.
 FALSE_ALARM: Final = 0.005
-
-#: Rounding of a sum.
-_EPSILON = float(np.finfo(np.float64).eps)
-
-#: Least degrees of freedom for which a noise estimate is used on its own.
-_ENOUGH_DOF: Final = 20
 
 #: An order is left out as negligible when its amplitude is below this share of the whole
 #: error (root sum of squares of the amplitudes) ...
@@ -47,67 +42,61 @@ _ROUNDING: Final = 1e-12
 _AGAIN: Final = 3
 
 
-class _Level(NamedTuple):
-    """Variance of a reading and its freedom; each order's own, and the freedom of that."""
-
-    noise: tuple[float, float]
-    scatter: Array | None
-    freedom: int | None
-
-
 class EvidenceSearch:
     """One search for orders.
 
     Parameters
     ----------
-    sums : HarmonicSums
+    noise_of_orders : OrderNoise
+        What orders have to stand out of; its sums are searched.
     limits : ndarray
         Log of the false-alarm chance that each order may use up.
     period : float
-    free : int
-        Readings less zeros.
     folds : HarmonicSums or None
         Units that are held out one by one; None where nothing can be.
-    repeats : Noise or None
-        Noise from readings at the same position.
     forced : sequence of int
         Orders that are in every model and never retained.
-    covariance : {"auto", "white", "cluster", "hac"}
-    rounding : float
-        Variance of one reading by what a coarse sensor repeats at each position, of which no
-        scatter tells.
     """
 
     def __init__(
         self,
-        sums: HarmonicSums,
+        noise_of_orders: OrderNoise,
         limits: Array,
         period: float,
-        free: int,
         folds: HarmonicSums | None,
-        repeats: ReadingVariance | None = None,
         forced: Sequence[int] = (),
-        covariance: CovarianceKind = "auto",
-        rounding: float = 0.0,
     ) -> None:
-        self.rounding = rounding
-        self.sums, self.folds, self.repeats = sums, folds, repeats
+        self.noise_of_orders, self.sums = noise_of_orders, noise_of_orders.sums
         # Whole orders as whole numbers: results show and compare them.
-        self.orders: list[float] = [int(m) if m == int(m) else m for m in sums.orders.tolist()]
-        self.limits, self.period, self.free = limits, period, free
-        self.forced, self.covariance = list(forced), covariance
+        self.orders: list[float] = [int(m) if m == int(m) else m for m in self.sums.orders.tolist()]
+        self.limits, self.period, self.folds = limits, period, folds
+        self.forced = list(forced)
         #: Orders too steep to be retained.
         self.barred: list[int] = []
 
     def search(self) -> tuple[list[int], dict[int, str]]:
         """Places of the orders that stand, and the verdict on each that was dropped."""
+        noise = self.noise_of_orders
+        if not noise.by_orders:
+            return self._search()
+        # What stands out of white noise may be a line: the others tell whether the noise is white.
+        asked, noise.kind = noise.kind, "white"
+        found = self._search()
+        told = noise.beside(found[0])
+        if told is None or (asked == "auto" and told.white > DOUBTED):
+            return found
+        noise.kind, self.barred, noise.barring = "hac", [], False
+        noise.settle(found[0], self.forced)
+        return self._search()
+
+    def _search(self) -> tuple[list[int], dict[int, str]]:
         chosen, dropped = self._backward(self._forward())
         # What made the error too steep held others' places: choose again without it.
         for _ in range(_AGAIN):
             steep = [i for i, verdict in dropped.items() if verdict == "too steep"]
             if not steep:
                 break
-            self.barred = steep
+            self.barred, self.noise_of_orders.barring = steep, True
             again, others = self._backward(self._forward())
             dropped |= others
             if not any(verdict == "too steep" for verdict in others.values()):
@@ -116,54 +105,30 @@ class EvidenceSearch:
         return chosen, {i: verdict for i, verdict in dropped.items() if i not in chosen}
 
     def noise(self, chosen: Sequence[int]) -> ReadingVariance:
-        """Repeats, or the residual of all candidates, or of the chosen orders.
-
-        Real orders that may not be retained disturb the others as noise does: the residual
-        of the chosen ones holds them.
-        """
-        if self.barred:
-            dof = max(1, self.free - 2 * len(chosen))
-            return ReadingVariance(fit_chosen_orders(self.sums, chosen)[2] / dof, dof, "model")
-        repeats = self.repeats
-        # Copies of the same readings repeat to the last digit, which says nothing of noise.
-        known = repeats is not None and repeats.degrees_of_freedom >= _ENOUGH_DOF
-        if repeats is not None and known and repeats.variance > 0.0:
-            return repeats
-        # Of readings without noise rounding is left, which sums of squares do not resolve.
-        rounding = _EPSILON * self.sums.total()[2]
-        everything = len(self.orders)
-        if self.free - 2 * everything >= max(_ENOUGH_DOF, 2 * everything):
-            _, _, squares = fit_chosen_orders(self.sums, range(everything))
-            dof = self.free - 2 * everything
-            return ReadingVariance(max(squares, rounding) / dof, dof, "residual")
-        dof = max(1, self.free - 2 * len(chosen))
-        squares = fit_chosen_orders(self.sums, chosen)[2]
-        return ReadingVariance(max(squares, rounding) / dof, dof, "model")
-
-    def _level(self, chosen: Sequence[int]) -> _Level:
-        """Noise of the coefficients: common to all orders, and each order's own."""
-        noise = self.noise(chosen)
-        level = (noise.variance + self.rounding, float(noise.degrees_of_freedom))
-        if self.covariance == "hac":
-            near = neighbour_scatter(self.sums, chosen)
-            return _Level(level, None if near is None else near + self.rounding, NEIGHBOURS)
-        if self.sums.units < 2 or self.covariance == "white":
-            return _Level(level, None, None)
-        scatter = run_scatter(self.sums, chosen, range(len(self.orders))) + self.rounding
-        return _Level(pooled_scatter(scatter, self.sums.units) or level, scatter, None)
+        """What one reading scatters beside the chosen orders."""
+        return self.noise_of_orders.of_reading(chosen)
 
     def examined(self, chosen: Sequence[int], orders: Sequence[int]) -> OrderTest:
         """Significance of orders under the noise that each has."""
-        level = self._level(chosen)
-        own = None if level.scatter is None else level.scatter[list(orders)]
-        return examine_orders(self.sums, chosen, orders, level.noise, own, level.freedom)
+        noise, scatter = self.noise_of_orders.near(chosen)
+        own = None if scatter is None else scatter[list(orders)]
+        return examine_orders(self.sums, chosen, orders, noise.among(orders), own)
 
     def _forward(self) -> list[int]:
-        noise = self.noise(())
-        known = None
-        if noise.source != "model":
-            known = (noise.variance + self.rounding, float(noise.degrees_of_freedom))
-        return choose_forward(self.sums, self.limits, self.free, known, self.forced, self.barred)
+        noise = self.noise_of_orders
+        if noise.kind == "hac":
+            return self._taken(noise.near(())[0])
+        known = self.noise(()).source != "model"
+        chosen = self._taken(noise.white(()) if known else None)
+        near, _ = noise.near(chosen)
+        if near.white > DOUBTED:
+            return chosen
+        # Where there is less noise than on average weaker orders stand out.
+        return [*chosen, *(i for i in self._taken(near) if i not in chosen)]
+
+    def _taken(self, noise: NoiseSpectrum | None) -> list[int]:
+        free = self.noise_of_orders.free
+        return choose_forward(self.sums, self.limits, free, noise, self.forced, self.barred)
 
     def _backward(self, chosen: list[int]) -> tuple[list[int], dict[int, str]]:
         """Drop, worst first, what does not stand beside the others."""

@@ -73,10 +73,11 @@ def select_orders(
         Which angle the orders are sought in. ``"auto"``: the true angle, unless every run has
         an arbitrary zero of the reference (`trueangle.fitting.argument.choose_argument`).
     covariance : {"auto", "white", "cluster", "hac"}
-        Of what an order must stand out: of independent noise (``"white"``), of its own scatter
-        between the runs (``"cluster"``), or of what its neighbours among the orders scatter
-        (``"hac"``), where that is more. ``"auto"``: between runs where there are several, of
-        independent noise in a single run, where the held-out gain alone guards against its memory.
+        Of what an order must stand out: of independent noise (``"white"``), of what scatters
+        between the runs at the orders near it, and at itself where that is more (``"cluster"``), or
+        of what the orders near it take off the residual (``"hac"``). ``"auto"``: between runs where
+        there are several; in a single run of independent noise, unless the other orders show that
+        it remembers the reading before. Over part of a turn one run cannot show that.
     shafts : mapping of str to float, optional
         Further shafts and their cycles per output turn (a worm: 144): once, twice, three and
         four times per turn of theirs are candidates, and are named.
@@ -103,10 +104,11 @@ def select_orders(
 
     Notes
     -----
-    The noise comes from repeats of the same position where there are enough (pure error,
-    no model enters), else from the residual. An order that varies from run to run by more
-    than that is judged by its own scatter between the runs. One pass over the readings,
-    whatever the number of candidates.
+    The noise comes from the scatter between the runs, smooth over the orders
+    (`trueangle.fitting.orders.noisespectrum`). An order that varies from run to run by more than
+    that is judged by its own scatter. With one run it comes from repeats of the same position where
+    there are enough (pure error, no model enters), else from the residual. One pass over the
+    readings, whatever the number of candidates.
 
     Examples
     --------

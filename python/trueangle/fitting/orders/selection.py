@@ -17,6 +17,7 @@ from .candidates import Candidates
 from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
 from .noise import pure_error
+from .ordernoise import OrderNoise
 from .phases import circular_range_deg, unit_phases
 from .result import OrderSelection
 from .rounding import orders_beyond_rounding
@@ -64,17 +65,17 @@ class EvidenceSelection(EvidenceSearch):
         repeats = pure_error(self.units, self.positions)
         self.samples = int(sums.count.sum())
         self.step = rounding_step(runs, self.positions)
-        super().__init__(
+        noise = OrderNoise(
             sums,
-            candidates.log_limits(FALSE_ALARM),
-            runs[0].period,
             self.samples - units,
-            folds,
             repeats,
-            [i for i, k in enumerate(candidates.orders) if k in reference],
             covariance,
             rounding_over_repeats(self.step, repeats, self.samples / len(self.positions)),
+            min(1.0, self.positions.span),
         )
+        forced = [i for i, k in enumerate(candidates.orders) if k in reference]
+        limits = candidates.log_limits(FALSE_ALARM)
+        super().__init__(noise, limits, runs[0].period, folds, forced)
 
     def result(self) -> OrderSelection:
         """The selection with its table."""

@@ -4,18 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 import trueangle as ta
 from trueangle.fitting.orders.evidence import (
-    OVERDISPERSED,
     choose_forward,
     examine_orders,
     fit_chosen_orders,
-    log_chance,
 )
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
-from trueangle.fitting.orders.noise import neighbour_scatter, pooled_scatter, run_scatter
+from trueangle.fitting.orders.noise import remaining_scatter, run_scatter
+from trueangle.fitting.orders.noisespectrum import NoiseSpectrum, log_chance
 from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 SIGMA = 0.3
@@ -43,44 +41,33 @@ def test_scatter_between_units_is_the_noise():
     assert np.mean(found) == pytest.approx(SIGMA**2, rel=0.08)
 
 
-def test_the_orders_beside_one_tell_the_noise():
-    """The median of twelve: its mean is known to 3 %, and lies 4 % above by its skewness."""
-    found = [
-        np.mean(neighbour_scatter(harmonic_sums(noise_units(s, 1, 400), tuple(range(1, 60))), []))
-        for s in range(40)
-    ]
-    assert np.mean(found) == pytest.approx(1.04 * SIGMA**2, rel=0.1)
+def test_each_order_left_tells_the_noise_of_a_reading():
+    """Two degrees of freedom each: the mean of 40 sets of 57 is known to 2 %."""
+    orders, told = tuple(range(1, 60)), []
+    for seed in range(40):
+        sums = harmonic_sums(noise_units(seed, 1, 400, line=3), orders)
+        left = remaining_scatter(sums, [2])
+        assert np.isnan(left).tolist() == [k == 3 for k in orders]
+        told.append(np.nanmean(left))
+    assert np.mean(told) == pytest.approx(SIGMA**2, rel=0.08)
 
 
-def test_pooled_noise_leaves_out_what_disagrees_and_counts_the_rest():
-    rng = np.random.default_rng(4)
-    scatter = SIGMA**2 * rng.chisquare(4, 40) / 4.0
-    variance, freedom = pooled_scatter(scatter, 3)
-    assert variance == pytest.approx(scatter.mean(), rel=1e-12)
-    assert freedom == 40 * 4
-    loud = np.append(scatter, 1000.0 * SIGMA**2)
-    variance, freedom = pooled_scatter(loud, 3)
-    assert variance == pytest.approx(scatter.mean(), rel=1e-12)
-    assert freedom == 40 * 4
-    assert pooled_scatter(scatter[:4], 3) is None
-
-
-@pytest.mark.parametrize("units", [2, 3, 4, 8])
-def test_of_noise_one_order_in_a_thousand_is_left_out_of_the_pool(units):
-    """Quantiles of chi-square themselves; its median is known to 1.3 % (2 degrees of freedom)."""
-    each, count = 2 * (units - 1), 20_000
-    scatter = SIGMA**2 * chi2.ppf((np.arange(count) + 0.5) / count, each) / each
-    variance, freedom = pooled_scatter(scatter, units)
-    left_out = count - round(freedom / each)
-    assert left_out == pytest.approx(OVERDISPERSED * count, rel=0.12)
-    assert variance == pytest.approx(scatter[: count - left_out].mean(), rel=1e-12)
+def test_what_an_order_tells_is_half_of_what_it_takes_off_the_squares():
+    sums = harmonic_sums(noise_units(8, 2, 40), (1, 2, 3, 4, 5))
+    _, _, squares = fit_chosen_orders(sums, [1, 3])
+    told = remaining_scatter(sums, [1, 3])
+    for k in (0, 2, 4):
+        _, _, left = fit_chosen_orders(sums, [1, 3, k])
+        assert told[k] == pytest.approx((squares - left) / 2.0, rel=1e-9)
+    assert np.isnan(told[[1, 3]]).all()
+    assert np.isnan(remaining_scatter(sums, range(5))).all()
 
 
 def test_an_order_that_differs_between_units_has_its_own_noise_and_freedom():
     units = noise_units(5, line=3)
     sums = harmonic_sums(units, (1, 2, 3, 4))
     scatter = run_scatter(sums, [], range(4))
-    noise = (SIGMA**2, 200.0)
+    noise = NoiseSpectrum.flat(SIGMA**2, 200.0, 2)
     test = examine_orders(sums, [], [0, 2], noise, np.array([SIGMA**2, scatter[2]]))
     _, _, left = fit_chosen_orders(sums, [])
     gains = [left - fit_chosen_orders(sums, [k])[2] for k in (0, 2)]

@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
-from trueangle.fitting.orders.noise import pooled_scatter, run_scatter
+from trueangle.fitting.orders.ordernoise import OrderNoise
 from trueangle.fitting.orders.search import EvidenceSearch
 from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 from trueangle.fitting.uncertainty import CovarianceKind
@@ -36,9 +36,8 @@ def search(units: int, covariance: CovarianceKind, rounding: float) -> EvidenceS
         readings.append(ZeroGroupReadings(turns, error, np.ones(160), str(k)))
     sums = harmonic_sums(readings, tuple(range(1, HIGHEST + 1)))
     limits = np.full(HIGHEST, np.log(1e-3))
-    return EvidenceSearch(
-        sums, limits, 1.0, 159 * units, None, covariance=covariance, rounding=rounding
-    )
+    noise = OrderNoise(sums, 159 * units, covariance=covariance, rounding=rounding)
+    return EvidenceSearch(noise, limits, 1.0, None)
 
 
 @pytest.mark.parametrize("units", [1, 3])
@@ -48,19 +47,17 @@ def test_what_a_coarse_sensor_repeats_adds_to_every_variance(
 ) -> None:
     print("seed", SEED)
     fine, coarse = (search(units, covariance, rounding) for rounding in (0.0, 0.07))
-    chosen = [2]
-    before, after = fine._level(chosen), coarse._level(chosen)
-    own = covariance == "hac" or (units > 1 and covariance != "white")
-    assert [x.scatter is not None for x in (before, after)] == [own, own]
-    if before.scatter is None or after.scatter is None:
-        assert after.noise[0] == pytest.approx(before.noise[0] + 0.07, rel=1e-12)
-        assert after.noise[1] == before.noise[1]
-        return
-    np.testing.assert_allclose(after.scatter, before.scatter + 0.07, rtol=1e-12)
-    if covariance != "hac":
-        # What most orders share is pooled from these; which take part may change by it.
-        pooled = pooled_scatter(run_scatter(fine.sums, chosen, range(HIGHEST)) + 0.07, units)
-        assert pooled is not None
-        assert after.noise == pytest.approx(pooled, rel=1e-12)
-    statistic = [s.examined(chosen, chosen).statistic[0] for s in (fine, coarse)]
-    assert statistic[1] < statistic[0]
+    chosen, orders = [2], range(HIGHEST)
+    before, after = (s.noise_of_orders.near(chosen) for s in (fine, coarse))
+    own = units > 1 and covariance in ("auto", "cluster")
+    assert [scatter is not None for _, scatter in (before, after)] == [own, own]
+    if before[1] is not None and after[1] is not None:
+        np.testing.assert_allclose(after[1], before[1] + 0.07, rtol=1e-12)
+    elif covariance != "hac":
+        np.testing.assert_allclose(after[0].variances, before[0].variances + 0.07, rtol=1e-12)
+        np.testing.assert_array_equal(after[0].freedoms, before[0].freedoms)
+    # What the orders tell together is fitted to variances that are all larger.
+    assert (after[0].variance > before[0].variance).all()
+    assert np.median(after[0].variance - before[0].variance) == pytest.approx(0.07, rel=0.25)
+    statistic = [s.examined(chosen, orders).statistic for s in (fine, coarse)]
+    assert (statistic[1] < statistic[0]).all()

@@ -6,6 +6,7 @@ import pytest
 import trueangle as ta
 from trueangle.fitting.orders.evidence import examine_orders
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
+from trueangle.fitting.orders.noisespectrum import NoiseSpectrum
 from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 ORDERS = [*range(1, 18), 225.0, 450.0, 675.0, 900.0]
@@ -23,9 +24,10 @@ def test_variances_of_orders_on_an_arc_are_not_negative(seed):
         for _ in range(rng.integers(1, 4))
     ]
     sums = harmonic_sums(units, ORDERS)
+    noise = NoiseSpectrum.flat(1.0, 100.0, len(ORDERS))
     for _ in range(20):
         chosen = rng.choice(len(ORDERS), rng.integers(2, 14), replace=False).tolist()
-        test = examine_orders(sums, chosen, range(len(ORDERS)), (1.0, 100.0), None)
+        test = examine_orders(sums, chosen, range(len(ORDERS)), noise, None)
         assert not (test.variance < 0.0).any()
         assert not (test.statistic < 0.0).any()
 

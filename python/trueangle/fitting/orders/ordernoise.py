@@ -1,0 +1,141 @@
+"""The noise that orders have to stand out of: common to all, near each, and each order's own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from typing import Final
+
+import numpy as np
+
+from ...support.arrays import Array
+from ..uncertainty import CovarianceKind
+from .evidence import examine_orders, fit_chosen_orders
+from .harmonicsums import HarmonicSums
+from .noise import ReadingVariance, remaining_scatter, run_scatter
+from .noisespectrum import NoiseSpectrum, noise_spectrum
+
+#: Rounding of a sum.
+_EPSILON = float(np.finfo(np.float64).eps)
+
+#: Least degrees of freedom for which a noise estimate is used on its own.
+_ENOUGH_DOF: Final = 20
+
+#: Order below which noise that one run tells is taken to be no more: it forgets within an
+#: eighth of a turn (its memory in turns is 1 / (pi x this)). Slower drift is not told from an
+#: error of the joint by orders beside it.
+_SLOWEST: Final = 2.5
+
+#: Belief in white noise below which noise is one with a memory.
+DOUBTED: Final = 0.02
+
+#: Chance of noise near an order from which that order is part of it.
+_OFTEN: Final = 0.05
+
+
+class OrderNoise:
+    """Noise of the readings of some runs, as the search for orders asks for it.
+
+    Parameters
+    ----------
+    sums : HarmonicSums
+    free : int
+        Readings less zeros.
+    repeats : ReadingVariance or None
+        Noise from readings at the same position.
+    covariance : {"auto", "white", "cluster", "hac"}
+    rounding : float
+        Variance of one reading by what a coarse sensor repeats at each position, of which no
+        scatter tells.
+    independent : float
+        Part of the orders that are independent of each other: less than 1 over part of a turn.
+    """
+
+    def __init__(
+        self,
+        sums: HarmonicSums,
+        free: int,
+        repeats: ReadingVariance | None = None,
+        covariance: CovarianceKind = "auto",
+        rounding: float = 0.0,
+        independent: float = 1.0,
+    ) -> None:
+        self.sums, self.free, self.repeats = sums, free, repeats
+        self.rounding, self.independent = rounding, independent
+        #: What orders have to stand out of.
+        self.kind = covariance
+        #: Orders that are no noise, where the others tell it.
+        self.lines: list[int] = []
+        #: Whether real orders may be barred: the residual of the chosen ones holds them.
+        self.barring = False
+
+    @property
+    def by_orders(self) -> bool:
+        """Whether orders are asked what noise there is.
+
+        Over part of a turn a line is seen at the orders beside it, and these tell no noise.
+        """
+        if self.kind == "auto":
+            return self.sums.units < 2 and self.independent >= 1.0
+        return self.kind == "hac"
+
+    def of_reading(self, chosen: Sequence[int]) -> ReadingVariance:
+        """Repeats, or the residual of all candidates, or of the chosen orders.
+
+        Real orders that may not be retained disturb the others as noise does: the residual
+        of the chosen ones holds them.
+        """
+        if self.barring:
+            dof = max(1, self.free - 2 * len(chosen))
+            return ReadingVariance(fit_chosen_orders(self.sums, chosen)[2] / dof, dof, "model")
+        repeats = self.repeats
+        # Copies of the same readings repeat to the last digit, which says nothing of noise.
+        known = repeats is not None and repeats.degrees_of_freedom >= _ENOUGH_DOF
+        if repeats is not None and known and repeats.variance > 0.0:
+            return repeats
+        # Of readings without noise rounding is left, which sums of squares do not resolve.
+        rounding = _EPSILON * self.sums.total()[2]
+        everything = self.sums.orders.size
+        if self.free - 2 * everything >= max(_ENOUGH_DOF, 2 * everything):
+            _, _, squares = fit_chosen_orders(self.sums, range(everything))
+            dof = self.free - 2 * everything
+            return ReadingVariance(max(squares, rounding) / dof, dof, "residual")
+        dof = max(1, self.free - 2 * len(chosen))
+        squares = fit_chosen_orders(self.sums, chosen)[2]
+        return ReadingVariance(max(squares, rounding) / dof, dof, "model")
+
+    def white(self, chosen: Sequence[int]) -> NoiseSpectrum:
+        """That of a reading at every order."""
+        noise = self.of_reading(chosen)
+        variance, freedom = noise.variance + self.rounding, float(noise.degrees_of_freedom)
+        return NoiseSpectrum.flat(variance, freedom, self.sums.orders.size)
+
+    def near(self, chosen: Sequence[int]) -> tuple[NoiseSpectrum, Array | None]:
+        """Noise near each order, and each order's own scatter between runs."""
+        if self.kind == "hac":
+            return self.beside({*self.lines, *chosen}) or self.white(chosen), None
+        if self.sums.units < 2 or self.kind == "white":
+            return self.white(chosen), None
+        scatter = run_scatter(self.sums, chosen, range(self.sums.orders.size)) + self.rounding
+        freedom = 2 * (self.sums.units - 1)
+        told = noise_spectrum(self.sums.orders, scatter, freedom, self.independent)
+        return told or self.white(chosen), scatter
+
+    def beside(self, lines: Collection[int]) -> NoiseSpectrum | None:
+        """What the orders that are no lines tell of the noise, which is to forget in a turn."""
+        told = remaining_scatter(self.sums, sorted(lines)) + self.rounding
+        return noise_spectrum(self.sums.orders, told, 2, self.independent, _SLOWEST)
+
+    def settle(self, lines: Sequence[int], forced: Collection[int]) -> NoiseSpectrum:
+        """The noise beside these orders, of which those that noise makes often are none after all.
+
+        They tell the noise as others do. The ``forced`` ones are lines in any case.
+        """
+        while True:
+            self.lines = list(lines)
+            noise, _ = self.near(())
+            test = examine_orders(self.sums, lines, lines, noise.among(lines), None)
+            far = test.log_p < math.log(_OFTEN)
+            lines = [i for i, out in zip(lines, far, strict=True) if out or i in forced]
+            if len(lines) == len(self.lines):
+                return noise
