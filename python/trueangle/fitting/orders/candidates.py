@@ -96,6 +96,12 @@ class Candidates:
         return all(float(k).is_integer() for k in self.orders)
 
     @property
+    def closed(self) -> bool:
+        """Whether all shafts that were declared are back where they were after a turn."""
+        cycles = [*self.shafts.values(), *(() if self.gear_ratio is None else (self.gear_ratio,))]
+        return all(float(f).is_integer() for f in cycles)
+
+    @property
     def main_indices(self) -> list[int]:
         """Indices of the orders looked at closely."""
         return [i for i, k in enumerate(self.orders) if k in self.main]

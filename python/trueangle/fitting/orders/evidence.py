@@ -145,18 +145,19 @@ def examine_orders(
     orders: Sequence[int],
     noise: NoiseSpectrum,
     scatter: Array | None,
+    each: int = 1,
 ) -> OrderTest:
     """Significance of ``orders``, each beside the other chosen ones.
 
-    ``noise`` is that of these orders; ``scatter`` (from `run_scatter`) replaces it for an order
-    where it is more.
+    ``noise`` is that of these orders; ``scatter`` (from `run_scatter`), of so many degrees of
+    freedom ``each``, replaces it for an order where it is more.
     """
     total, rhs, _ = sums.total()
     n = len(orders)
     # Of orders that are aliases of the chosen ones nothing is known.
     cosine, sine, of_one = np.full((3, n), math.nan)
     gain = np.zeros(n)
-    level, own, each = noise.variance, np.zeros(n, dtype=bool), max(1, 2 * (sums.units - 1))
+    level, own = noise.variance, np.zeros(n, dtype=bool)
     if scatter is not None:
         ratio = np.maximum(scatter, 0.0) / level * each
         own = np.isfinite(scatter) & (log_chi_squared_tail(ratio, each) < math.log(OVERDISPERSED))

@@ -21,10 +21,13 @@ _EPSILON = float(np.finfo(np.float64).eps)
 #: Least degrees of freedom for which a noise estimate is used on its own.
 _ENOUGH_DOF: Final = 20
 
-#: Order below which noise that one run tells is taken to be no more: it forgets within an
-#: eighth of a turn (its memory in turns is 1 / (pi x this)). Slower drift is not told from an
-#: error of the joint by orders beside it.
+#: Order below which noise that one pass tells is taken to be no more: it forgets within an
+#: eighth of a turn (its memory in turns is 1 / (pi x this)). What is slower is not told from an
+#: error of the joint by orders beside it ...
 _SLOWEST: Final = 2.5
+#: ... and is neither taken for noise where there is so many times more at this order than at
+#: twice of it: half the steepness of noise whose corner is there.
+_SLOWER: Final = 2.0
 
 #: Belief in white noise below which noise is one with a memory.
 DOUBTED: Final = 0.02
@@ -49,6 +52,11 @@ class OrderNoise:
         scatter tells.
     independent : float
         Part of the orders that are independent of each other: less than 1 over part of a turn.
+    passes : HarmonicSums or None
+        Turns that a single run took one after the other: over a whole turn they tell the noise as
+        runs do.
+    closed : bool
+        Whether the error is the same after a turn. Else its lines are seen at every order.
     """
 
     def __init__(
@@ -59,9 +67,13 @@ class OrderNoise:
         covariance: CovarianceKind = "auto",
         rounding: float = 0.0,
         independent: float = 1.0,
+        passes: HarmonicSums | None = None,
+        closed: bool = True,
     ) -> None:
+        #: What tells the scatter of an order: runs, or the passes of one.
+        self.repeated = sums if sums.units > 1 else passes
         self.sums, self.free, self.repeats = sums, free, repeats
-        self.rounding, self.independent = rounding, independent
+        self.rounding, self.independent, self.closed = rounding, independent, closed
         #: What orders have to stand out of.
         self.kind = covariance
         #: Orders that are no noise, where the others tell it.
@@ -73,10 +85,11 @@ class OrderNoise:
     def by_orders(self) -> bool:
         """Whether orders are asked what noise there is.
 
-        Over part of a turn a line is seen at the orders beside it, and these tell no noise.
+        Where a line is seen at the orders beside it these tell no noise: over part of a turn, and
+        where the error does not close.
         """
         if self.kind == "auto":
-            return self.sums.units < 2 and self.independent >= 1.0
+            return self.repeated is None and self.closed and self.independent >= 1.0
         return self.kind == "hac"
 
     def of_reading(self, chosen: Sequence[int]) -> ReadingVariance:
@@ -114,17 +127,31 @@ class OrderNoise:
         """Noise near each order, and each order's own scatter between runs."""
         if self.kind == "hac":
             return self.beside({*self.lines, *chosen}) or self.white(chosen), None
-        if self.sums.units < 2 or self.kind == "white":
+        if self.repeated is None or self.kind == "white":
             return self.white(chosen), None
-        scatter = run_scatter(self.sums, chosen, range(self.sums.orders.size)) + self.rounding
-        freedom = 2 * (self.sums.units - 1)
+        every = range(self.sums.orders.size)
+        scatter = run_scatter(self.repeated, chosen, every) + self.rounding
+        freedom = 2 * (self.repeated.units - 1)
         told = noise_spectrum(self.sums.orders, scatter, freedom, self.independent)
         return told or self.white(chosen), scatter
 
+    @property
+    def own_freedom(self) -> int:
+        """Degrees of freedom of each order's own scatter."""
+        return 1 if self.repeated is None else 2 * (self.repeated.units - 1)
+
     def beside(self, lines: Collection[int]) -> NoiseSpectrum | None:
-        """What the orders that are no lines tell of the noise, which is to forget in a turn."""
+        """What the orders that are no lines tell of noise that forgets within a turn."""
         told = remaining_scatter(self.sums, sorted(lines)) + self.rounding
         return noise_spectrum(self.sums.orders, told, 2, self.independent, _SLOWEST)
+
+    def remembers(self, lines: Collection[int]) -> bool:
+        """Whether orders that are no lines show that noise remembers, and forgets within a turn."""
+        noise = self.beside(lines)
+        if noise is None or noise.white > DOUBTED:
+            return False
+        low, high = np.interp([_SLOWEST, 2.0 * _SLOWEST], self.sums.orders, noise.variance)
+        return bool(low < _SLOWER * high)
 
     def settle(self, lines: Sequence[int], forced: Collection[int]) -> NoiseSpectrum:
         """The noise beside these orders, of which those that noise makes often are none after all.

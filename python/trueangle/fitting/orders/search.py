@@ -82,8 +82,7 @@ class EvidenceSearch:
         # What stands out of white noise may be a line: the others tell whether the noise is white.
         asked, noise.kind = noise.kind, "white"
         found = self._search()
-        told = noise.beside(found[0])
-        if told is None or (asked == "auto" and told.white > DOUBTED):
+        if asked == "auto" and not noise.remembers(found[0]):
             return found
         noise.kind, self.barred, noise.barring = "hac", [], False
         noise.settle(found[0], self.forced)
@@ -112,7 +111,8 @@ class EvidenceSearch:
         """Significance of orders under the noise that each has."""
         noise, scatter = self.noise_of_orders.near(chosen)
         own = None if scatter is None else scatter[list(orders)]
-        return examine_orders(self.sums, chosen, orders, noise.among(orders), own)
+        each = self.noise_of_orders.own_freedom
+        return examine_orders(self.sums, chosen, orders, noise.among(orders), own, each)
 
     def _forward(self) -> list[int]:
         noise = self.noise_of_orders

@@ -24,7 +24,7 @@ from .rounding import orders_beyond_rounding
 from .search import FALSE_ALARM, EvidenceSearch
 from .table import OrderRow
 from .verdicts import row_with_verdict, selection_notes, verdict_reason
-from .zerogroups import folds_of_run, zero_groups
+from .zerogroups import folds_of_run, passes_of_run, zero_groups
 
 if TYPE_CHECKING:
     from ..summed import SummedReadings
@@ -51,6 +51,7 @@ class EvidenceSelection(EvidenceSearch):
         sums = harmonic_sums(self.units, orders) if summed is None else summed.sums(orders)
         units = len(self.units) if summed is None else len(runs)
         reference = set(candidates.reference)
+        passes = None
         if units > 1:
             self.holdout = "one run at a time"
             if units > len(runs):
@@ -62,6 +63,9 @@ class EvidenceSelection(EvidenceSearch):
             parts = folds_of_run(self.units[0], self.positions)
             self.holdout = "whole blocks of neighbouring positions (single run)"
             folds = harmonic_sums(parts, candidates.orders) if parts else None
+            path = runs[0].unwrapped_reference / runs[0].period
+            turns = passes_of_run(self.units[0], path) if positions.span >= 1.0 else []
+            passes = harmonic_sums(turns, candidates.orders) if turns else None
         repeats = pure_error(self.units, self.positions)
         self.samples = int(sums.count.sum())
         self.step = rounding_step(runs, self.positions)
@@ -72,6 +76,8 @@ class EvidenceSelection(EvidenceSearch):
             covariance,
             rounding_over_repeats(self.step, repeats, self.samples / len(self.positions)),
             min(1.0, self.positions.span),
+            passes,
+            candidates.closed,
         )
         forced = [i for i, k in enumerate(candidates.orders) if k in reference]
         limits = candidates.log_limits(FALSE_ALARM)

@@ -19,6 +19,11 @@ from ...support.arrays import Array
 _FOLDS: Final = 6
 _BLOCKS: Final = 24
 
+#: Passes of a run: whole turns of its way, the last of half a turn at least; most steps are shorter
+#: than this part of a turn, or the readings are not in the order of the places.
+_HALF: Final = 0.5
+_STEP: Final = 0.125
+
 #: Readings a run up to which the call of a function costs more than what it computes.
 _SHORT: Final = 1000
 
@@ -97,3 +102,28 @@ def folds_of_run(unit: ZeroGroupReadings, positions: Positions) -> list[ZeroGrou
         return []
     fold = (positions.index * blocks // len(positions)) % folds
     return [unit.part(fold == f, f"block {f + 1}") for f in range(folds)]
+
+
+def passes_of_run(unit: ZeroGroupReadings, path: Array) -> list[ZeroGroupReadings]:
+    """Whole turns that a run took one after the other, to and fro too; none where it took one.
+
+    ``path`` are the angles of its readings in turns, in the order they were read. Where readings
+    are left out between them a new pass begins.
+    """
+    if path.size < 3:
+        return []
+    steps = np.abs(np.diff(path))
+    far = steps > _STEP
+    if far.mean() > _STEP:
+        return []
+    way = np.concatenate([[0.0], np.cumsum(np.where(far, 0.0, steps))])
+    part = np.concatenate([[0], np.cumsum(far)])
+    starts = way[np.searchsorted(part, np.arange(part[-1] + 1))]
+    number = np.floor(way - starts[part] + _HALF / path.size).astype(np.intp)
+    label = part * (number.max() + 1) + number
+    found: list[ZeroGroupReadings] = []
+    for k in np.unique(label):
+        mask = label == k
+        if np.ptp(way[mask]) >= _HALF:
+            found.append(unit.part(mask, f"pass {len(found) + 1}"))
+    return found if len(found) > 1 else []

@@ -73,6 +73,38 @@ def test_one_run_over_part_of_a_turn_is_asked_in_white_noise() -> None:
     assert chances[2] != chances[1]
 
 
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_turns_of_one_run_tell_its_noise_as_runs_do(memory: float) -> None:
+    """Five turns, 20 seeds: no order that is not there, and both that are."""
+    print("seed", SEED)
+    x = np.linspace(0.0, 5.0 * 360.0, 600, endpoint=False)
+    wrong, found = 0, 0
+    for seed in range(20):
+        rng = np.random.default_rng([SEED, seed])
+        error: NDArray[np.float64] = SIGMA * correlated(rng, memory, x.size)
+        wrong += bool(ta.select_orders(ta.CalibrationRun(x, x + error, 360.0)).orders)
+        for order, arcsec in LINES:
+            error = error + arcsec / 3600.0 * np.sin(np.radians(order * x))
+        found += {1, 17} <= set(ta.select_orders(ta.CalibrationRun(x, x + error, 360.0)).orders)
+    assert wrong <= 2
+    assert found >= 16
+
+
+@pytest.mark.parametrize(("ratio", "asked"), [(None, True), (100.0, True), (1.94, False)])
+def test_other_orders_tell_the_noise_of_an_error_that_closes(
+    ratio: float | None, asked: bool
+) -> None:
+    """Lines of a shaft that is elsewhere after a turn are seen at every order."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    (run,) = runs_of(rng, 1, 400, 0.6, True)
+    kinds = ("auto", "white", "hac")
+    tables = [ta.select_orders(run, gear_ratio=ratio, covariance=kind).table for kind in kinds]
+    auto, white, near = ([row.log10_false_alarm for row in table] for table in tables)
+    assert auto == (near if asked else white)
+    assert near != white
+
+
 def test_the_noise_near_an_order_makes_its_error() -> None:
     """Memory of 0.9 makes 19 times the variance at the lowest orders, a nineteenth at the highest.
 

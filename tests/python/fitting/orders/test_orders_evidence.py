@@ -68,7 +68,7 @@ def test_an_order_that_differs_between_units_has_its_own_noise_and_freedom():
     sums = harmonic_sums(units, (1, 2, 3, 4))
     scatter = run_scatter(sums, [], range(4))
     noise = NoiseSpectrum.flat(SIGMA**2, 200.0, 2)
-    test = examine_orders(sums, [], [0, 2], noise, np.array([SIGMA**2, scatter[2]]))
+    test = examine_orders(sums, [], [0, 2], noise, np.array([SIGMA**2, scatter[2]]), 4)
     _, _, left = fit_chosen_orders(sums, [])
     gains = [left - fit_chosen_orders(sums, [k])[2] for k in (0, 2)]
     assert scatter[2] > 50.0 * SIGMA**2
