@@ -75,9 +75,9 @@ def select_orders(
     covariance : {"auto", "white", "cluster", "hac"}
         Of what an order must stand out: of independent noise (``"white"``), of what scatters
         between the runs at the orders near it, and at itself where that is more (``"cluster"``), or
-        of what the orders near it take off the residual (``"hac"``). ``"auto"``: between runs where
-        there are several; in a single run of independent noise, unless the other orders show that
-        it remembers the reading before. Over part of a turn one run cannot show that.
+        of what the orders near it take off the residual (``"hac"``). ``"auto"``: between runs, or
+        between the whole turns of a single run; in a single turn of independent noise, unless the
+        other orders show that it remembers the reading before.
     shafts : mapping of str to float, optional
         Further shafts and their cycles per output turn (a worm: 144): once, twice, three and
         four times per turn of theirs are candidates, and are named.
@@ -104,9 +104,9 @@ def select_orders(
 
     Notes
     -----
-    The noise comes from the scatter between the runs, smooth over the orders
-    (`trueangle.fitting.orders.noisespectrum`). An order that varies from run to run by more than
-    that is judged by its own scatter. With one run it comes from repeats of the same position where
+    The noise comes from the scatter between runs or turns, smooth over the orders
+    (`trueangle.fitting.orders.noisespectrum`). An order that varies by more than that is judged by
+    its own scatter. In a single turn it comes from repeats of the same position where
     there are enough (pure error, no model enters), else from the residual. One pass over the
     readings, whatever the number of candidates.
 
