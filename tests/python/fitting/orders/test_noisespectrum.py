@@ -7,13 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy import integrate, optimize, stats
 
-from trueangle.fitting.orders.noisespectrum import (
-    NoiseSpectrum,
-    _bend,
-    _fitted,
-    log_chance,
-    noise_spectrum,
-)
+from trueangle.fitting.orders.noiseshapes import bend_of, fit_shapes
+from trueangle.fitting.orders.noisespectrum import NoiseSpectrum, log_chance, noise_spectrum
 
 Array = NDArray[np.float64]
 SEED = 70_412
@@ -135,7 +130,7 @@ def test_white_noise_is_told_by_all_orders(independent: float) -> None:
     assert found.white > 0.8
     assert np.ptp(found.variances[white]) < 1e-12
     assert found.variances[white, 0] == pytest.approx(told.mean(), rel=0.02)
-    expected = independent * 50 * 8 / _bend(8).widening
+    expected = independent * 50 * 8 / bend_of(8).widening
     np.testing.assert_allclose(found.freedoms[white], expected, rtol=1e-9)
 
 
@@ -155,7 +150,7 @@ def test_below_an_order_no_more_noise_is_believed() -> None:
 
 @pytest.mark.parametrize("freedom", [2, 4, 14])
 def test_moments_of_what_is_bent(freedom: int) -> None:
-    bend = _bend(freedom)
+    bend = bend_of(freedom)
     law = stats.chi2(freedom, scale=1.0 / freedom)
     assert law.sf(bend.at) == pytest.approx(0.05)
     mean, square = (
@@ -177,7 +172,7 @@ def test_coefficients_have_the_least_loss() -> None:
     basis = np.column_stack([np.ones(40), np.linspace(-1.0, 1.0, 40)])
     values = told_by_orders(rng, np.exp(basis @ [0.4, -1.5]), 4)
     values[3] = 500.0
-    bend = _bend(4)
+    bend = bend_of(4)
 
     def loss(c: Array) -> float:
         log = basis @ c
@@ -190,9 +185,9 @@ def test_coefficients_have_the_least_loss() -> None:
         return float((log + bent).sum())
 
     least = optimize.minimize(loss, np.zeros(2), method="Nelder-Mead", tol=1e-10)
-    found, told = _fitted(basis, values, bend)
-    np.testing.assert_allclose(found, least.x, atol=1e-3)
-    assert told == pytest.approx(least.fun, abs=1e-5)
+    found, told = fit_shapes(np.array([basis]), values[None], bend)
+    np.testing.assert_allclose(found[0], least.x, atol=1e-3)
+    assert told == pytest.approx([least.fun], abs=1e-5)
 
 
 def test_the_chance_is_that_of_every_shape_by_its_belief() -> None:
