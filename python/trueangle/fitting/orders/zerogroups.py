@@ -116,7 +116,7 @@ def passes_of_run(unit: ZeroGroupReadings, path: Array) -> list[ZeroGroupReading
     far = steps > _STEP
     if far.mean() > _STEP:
         return []
-    way = np.concatenate([[0.0], np.cumsum(np.where(far, 0.0, steps))])
+    way = np.concatenate([[0.0], np.cumsum(steps)])
     part = np.concatenate([[0], np.cumsum(far)])
     starts = way[np.searchsorted(part, np.arange(part[-1] + 1))]
     number = np.floor(way - starts[part] + _HALF / path.size).astype(np.intp)

@@ -134,6 +134,20 @@ def test_white_noise_is_told_by_all_orders(independent: float) -> None:
     np.testing.assert_allclose(found.freedoms[white], expected, rtol=1e-9)
 
 
+def test_a_shape_takes_its_coefficients_from_the_orders() -> None:
+    """Leverages of the orders that tell it have the sum of its coefficients."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    orders = np.arange(1.0, 81.0)
+    told = told_by_orders(rng, np.exp(2.0 * np.cos(np.pi * orders / 80.0)) / orders, 6)
+    found = noise_spectrum(orders, told, 6)
+    assert found is not None
+    taken = (6.0 / bend_of(6).widening / found.freedoms).sum(axis=1)
+    np.testing.assert_allclose(taken, np.rint(taken), atol=1e-9)
+    assert taken.min() >= 2.0
+    assert taken.max() <= 6.0 + 1e-9
+
+
 def test_below_an_order_no_more_noise_is_believed() -> None:
     """Noise that forgets has half of its spectrum at the corner: no more than twice that below."""
     print("seed", SEED)
