@@ -22,6 +22,9 @@ SLIP: Final = 0.05
 #: Steps whose mean says the direction.
 _WIDTH: Final = 5
 
+#: Readings to either side that tell the speed.
+_SPREAD: Final = 10
+
 #: Speed is a regressor of its own where it varies by this share of the highest.
 _VARIED: Final = 0.2
 
@@ -138,13 +141,15 @@ def gear_motion(theta: Array, time: Array | None) -> tuple[Array, Array]:
     way = sign[last]
     if time is None:
         return np.asarray(way), np.zeros(theta.size)
-    spread = max(1, min(10, theta.size // 10))
-    speed = np.zeros(theta.size)
-    dt = time[2 * spread :] - time[: -2 * spread]
-    speed[spread:-spread] = (theta[2 * spread :] - theta[: -2 * spread]) / np.where(
-        dt > 0.0, dt, np.inf
-    )
-    speed[:spread], speed[-spread:] = speed[spread], speed[-spread - 1]
+    spread = max(2, min(_SPREAD, theta.size // 10))
+    if theta.size < 2 * spread + 1:
+        return np.asarray(way), np.zeros(theta.size)
+    # A cubic has the slope of a swing where a difference over as many readings is too small.
+    powers = np.vander(np.arange(-spread, spread + 1.0), 4, increasing=True)
+    slope = np.linalg.pinv(powers)[1]
+    turned, passed = (np.correlate(values, slope, "valid") for values in (theta, time))
+    inner = turned / np.where(passed > 0.0, passed, np.inf)
+    speed = np.pad(inner, spread, mode="edge")
     return np.asarray(way), speed
 
 
