@@ -47,6 +47,11 @@ def test_the_first_size_that_keeps_the_difference_is_taken(target):
     assert wanted not in (sizes[0], sizes[-1])
 
 
+def kept_by_lines(model, entries):
+    options = {"bits": 12, "method": "linear", "entries": entries}
+    return ta.export_model(model, "c", **options).max_difference_arcsec
+
+
 def test_who_asks_for_lines_gets_many_and_who_does_not_gets_cubics_where_these_are_smaller(model):
     """With a model so well known that lines of 32 bits are taken."""
     size = 1 + 2 * len(model.orders)
@@ -66,6 +71,8 @@ def test_who_asks_for_lines_gets_many_and_who_does_not_gets_cubics_where_these_a
             sure, "c", max_arcsec=largest, bits=12, method="linear", entries=lines.entries // 2
         )
     assert lines.entries > 1024
-    rough = ta.export_model(sure, "c", max_arcsec=1.0, bits=12)
-    assert {row["method"] for row in rough.tables} == {"linear"}
-    assert rough.entries <= 1024
+    at_most = kept_by_lines(sure, 1024)
+    for largest, method in ((1.0, "linear"), (1.001 * at_most, "linear"), (0.9 * at_most, "cubic")):
+        made = ta.export_model(sure, "c", max_arcsec=largest, bits=12)
+        assert {row["method"] for row in made.tables} == {method}
+        assert (made.entries == 1024) == (largest == 1.001 * at_most)
