@@ -32,6 +32,7 @@ TERMS = {
     "compliance": lambda o: ta.TorsionalCompliance(A, *lines(o).values()),
     "a gear under load": lambda o: ta.LoadDependentGearError(*lines(o).values(), "absolute"),
     "a line of the speed": lambda o: VaryingLine(**lines(o), follows="speed"),
+    "skew of channels": lambda o: ChannelSkew(0.1, o[-1], 20.0),
 }
 
 
@@ -91,3 +92,30 @@ def test_a_term_is_built_on_harmonics_where_it_changes_with_them():
         assert term.is_built_on_harmonics == changes, term
     own = {kind for kind, made in KINDS.items() if made.__module__.startswith("trueangle.")}
     assert {term.kind for term in every_term()} == own
+
+
+#: A term by one of its parameters, the values next to a border that are taken, and the border's
+#: or those beyond that are not.
+BORDERS = {
+    "cutoff_hz": (ta.FilterLag, (1e-300,), (0.0, -1.0)),
+    "damping": (lambda x: ta.FilterLag(1.0, x), (1e-300, 5.0), (0.0, -0.5)),
+    "order": (lambda x: ChannelSkew(0.1, x), (1e-300,), (0.0, -1.0)),
+    "orders": (lambda x: ta.Backlash(0.1, (1.0, x), (A, A), (A, A)), (1e-300,), (0.0, -1.0)),
+    "length": (lambda x: ta.PreslidingHysteresis(0.1, x), (1e-300,), (0.0, -1.0)),
+    "start": (lambda x: ta.PreslidingHysteresis(0.1, 1.0, x), (0.0, 1.0), (-1e-300, 1.0 + 1e-15)),
+    "knee_Nm": (lambda x: ta.StiffeningCompliance(A, A, A, x), (0.0, 1.0), (-1e-300,)),
+    "width": (lambda x: ta.LocalDefect(1.0, x, A), (1e-300,), (0.0, -1.0)),
+    "cycles_per_turn": (lambda x: ta.LocalDefect(1.0, 1.0, A, x), (1e-300,), (0.0, -1.0)),
+    "relative_error": (lambda x: ScaleError(x, 0.0, 1.0), (1.0 - 1e-15, -1.0 + 1e-15), (1.0, -1.0)),
+    "stop": (lambda x: ScaleError(A, 1.0, x), (1.0 + 1e-15,), (1.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("name", BORDERS)
+def test_a_parameter_is_refused_from_its_border_on(name):
+    make, taken, refused = BORDERS[name]
+    for value in taken:
+        make(value)
+    for value in refused:
+        with pytest.raises(errors.ArgumentError, match=rf"\b{name} must be "):
+            make(value)
