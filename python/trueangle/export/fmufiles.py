@@ -88,7 +88,6 @@ def fmu_source(
     instance = _part(
         "instance",
         count=len(variables),
-        inputs=sum(v.causality == "input" for v in variables),
         output=next(v.reference for v in variables if v.causality == "output"),
         noise=by_name.get("noise_std", 0),
         seed=by_name.get("seed", 0),

@@ -54,8 +54,8 @@ def still_picture(
 ) -> str:
     """A chart as SVG: ``share`` is its part of the page's width, lines stand at ``uprights``."""
     width, height = max(_WIDTH * share, 90.0), _REM * height_rem
-    names = list(up.categories or ())
-    left = max(_LEFT, _LETTER * max(map(len, names), default=0) + 8.0) if up.visible else 8.0
+    names = (_LETTER * len(name) + 8.0 for name in up.categories or ())
+    left = max([_LEFT, *names]) if up.visible else 8.0
     place = _Placement(marks, across, up, (left, width - _RIGHT), (height - _BOTTOM, _TOP))
     parts = [_axes(place, across, up, width, height)]
     parts += [_drawn(mark, place) for mark in _together(marks)]

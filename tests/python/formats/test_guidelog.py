@@ -174,3 +174,88 @@ def test_what_is_missing_is_told_by_its_line(line, other, told, tmp_path):
     path = written(tmp_path, text.split("\n"))
     with pytest.raises(FileError, match=told):
         ta.read_runs(path)
+
+
+def frames(rng, count=40):
+    """Lines of frames with pulses either way and none, and their distances and moves in pixels."""
+    raw, pulse = rng.normal(0.0, 2.0, count).round(3), rng.integers(-900, 900, count)
+    pulse[rng.random(count) < 0.3] = 0
+    lines = [
+        f'{k + 1},{2.0 * (k + 1):.3f},"Mount",,,{raw[k]:.3f},,,,{abs(pulse[k]) or ""},'
+        f"{'W' if pulse[k] > 0 else 'E'},,,,,,,0"
+        for k in range(count)
+    ]
+    return lines, raw, RATE * pulse / 1000.0
+
+
+def errors_of(folder, lines):
+    """Errors in arcsec, and so many as the file is said to hold."""
+    path = written(folder, lines)
+    wanted = Selection(["time_s", "error_arcsec", "declination_arcsec"])
+    (batch,) = guidelog.read(path, wanted)
+    assert guidelog.contents(path).rows == batch["error_arcsec"].size
+    assert np.isnan(batch["declination_arcsec"]).all()  # nothing was written there
+    return batch["error_arcsec"]
+
+
+@pytest.mark.parametrize("dithered", [False, True])
+def test_the_error_is_the_distance_and_all_that_pulses_and_dithers_moved(dithered, tmp_path):
+    """The sum written out; a pulse counts from the next frame on, a dither at once."""
+    print(f"seed {SEED}")
+    lines, raw, moves = frames(np.random.default_rng(SEED))
+    before = np.concatenate([[0.0], np.cumsum(moves)[:-1]])
+    if dithered:
+        way = np.radians(ANGLE)
+        for at, (x, y) in ((30, (497.0, 405.5)), (10, (502.0, 401.0))):
+            lines.insert(at, f"INFO: SET LOCK POSITION, new lock pos = {x:.3f}, {y:.3f}")
+        moved = np.array([[2.0, 1.0], [-5.0, 4.5]]) @ (np.cos(way), np.sin(way))
+        before[10:] += moved[0]
+        before[30:] += moved[1]
+    found = errors_of(tmp_path, [*header("2026-11-20 22:10:00"), *lines])
+    wanted = (raw + before) * SCALE / np.cos(np.radians(DECLINATION))
+    np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12)
+
+
+def test_the_order_of_what_stands_before_frames_does_not_matter(tmp_path):
+    """Of declinations that of the sky counts, of rates that of the mount, which is the first."""
+    print(f"seed {SEED}")
+    lines, _, _ = frames(np.random.default_rng(SEED))
+    begin, *middle, names = header("2026-11-20 22:10:00")
+    told = errors_of(tmp_path, [begin, *middle, names, *lines])
+    more = ["AO = a device, xAngle = 12.0, xRate = 9.000", "Cal Dec = 20.0 deg"]
+    again = errors_of(tmp_path, [begin, *middle[::-1], *more, names, *lines])
+    np.testing.assert_array_equal(told, again)
+
+
+def test_a_calibration_ends_guiding_that_was_broken_off(tmp_path):
+    print(f"seed {SEED}")
+    lines, _, _ = frames(np.random.default_rng(SEED))
+    section = [*header("2026-11-20 22:10:00"), *lines]
+    calibration = [
+        "Calibration Begins at 2026-11-20 22:30:00", "Direction,Step,dx,dy,x,y,Dist",
+        "West,0,0.000,0.000,500.0,400.0,0.000",
+    ]  # fmt: skip
+    np.testing.assert_array_equal(
+        errors_of(tmp_path, section), errors_of(tmp_path, [*section, *calibration])
+    )
+
+
+@pytest.mark.parametrize(("scale", "taken"), [("0.00100", True), ("0.00099", False)])
+def test_a_scale_of_nothing_is_refused(scale, taken, tmp_path):
+    lines, _, _ = frames(np.random.default_rng(SEED), 3)
+    before = [line.replace(f"{SCALE:.2f}", scale) for line in header("2026-11-20 22:10:00")]
+    if taken:
+        assert errors_of(tmp_path, [*before, *lines]).size == 3
+    else:
+        with pytest.raises(FileError, match=r"line 10: the guiding .* states no pixel scale"):
+            errors_of(tmp_path, [*before, *lines])
+
+
+@pytest.mark.parametrize(("column", "name"), [(1, "Time"), (5, "RARawDistance")])
+def test_a_frame_without_a_number_that_is_needed_is_named(column, name, tmp_path):
+    lines, _, _ = frames(np.random.default_rng(SEED), 3)
+    cells = lines[1].split(",")
+    cells[column] = ""
+    lines[1] = ",".join(cells)
+    with pytest.raises(FileError, match=f"line 12, column '{name}': a number is needed"):
+        errors_of(tmp_path, [*header("2026-11-20 22:10:00"), *lines])

@@ -5,7 +5,15 @@ import pytest
 
 import trueangle as ta
 from trueangle import errors
-from trueangle.model.terms import DirectionalPattern, VaryingLine
+from trueangle.model.term import TERMS as KINDS
+from trueangle.model.terms import (
+    ChannelSkew,
+    CurrentCoupling,
+    DirectionalPattern,
+    JointCoupling,
+    ScaleError,
+    VaryingLine,
+)
 
 A = 1e-3
 ORDERS = ((1.0, 2.0), (1.0, 2.5), (2.5, 1.0), (3.0, 0.5, 2.0), (4.0,), (0.25,))
@@ -24,6 +32,7 @@ TERMS = {
     "compliance": lambda o: ta.TorsionalCompliance(A, *lines(o).values()),
     "a gear under load": lambda o: ta.LoadDependentGearError(*lines(o).values(), "absolute"),
     "a line of the speed": lambda o: VaryingLine(**lines(o), follows="speed"),
+    "skew of channels": lambda o: ChannelSkew(0.1, o[-1], 20.0),
 }
 
 
@@ -51,3 +60,62 @@ def test_a_direction_is_needed_where_play_may_be_negative(half_width, sizes):
             model.correct([1.0, 2.0])
     else:
         model.correct([1.0, 2.0])
+
+
+def every_term():
+    """One of each kind, of each way that its parameters may take."""
+    own = lines((1.0, 2.0))
+    return (
+        *(make((1.0, 2.0)) for make in TERMS.values()),
+        ta.ThermalDrift(A), ta.ThermalDrift(A, 2e-3), ta.FilterLag(4.0), ta.FilterLag(4.0, 0.6),
+        ta.Latency(0.002), ChannelSkew(0.002, 3.0), ta.LocalDefect(100.0, 8.0, 0.01, 3.0),
+        ta.StiffeningCompliance(A, A, A, 1.0, 30.0), ScaleError(2e-4, -90.0, 250.0),
+        ta.PreslidingHysteresis(0.02, 3.0), CurrentCoupling(A), VaryingLine(**own),
+        JointCoupling("elbow", A),
+    )  # fmt: skip
+
+
+def test_a_term_is_built_on_harmonics_where_it_changes_with_them():
+    """At the same angle that the encoder saw; of every kind that there is."""
+    shaft = ta.Shaft("output", 1, [1, 3], [0.2, 0.0], [0.0, 0.1])
+    for term in every_term():
+        given = {name: np.full(PLACES.size, value) for name, value in SIGNALS.items()}
+        added = []
+        for shafts in ((), (shaft,)):
+            plain = ta.HarmonicModel(shafts, period=360.0)
+            model = plain.replace(terms=(term,))
+            told = {name: given.get(name, PLACES) for name in model.signals}
+            late = getattr(term, "delay_s", 0.0) if term.kind == "latency" else 0.0
+            seen = PLACES - late * SIGNALS["velocity"]
+            added.append(model.error(PLACES, **told) - plain.error(seen))
+        changes = not np.allclose(*added, rtol=0.0, atol=1e-9)
+        assert term.is_built_on_harmonics == changes, term
+    own = {kind for kind, made in KINDS.items() if made.__module__.startswith("trueangle.")}
+    assert {term.kind for term in every_term()} == own
+
+
+#: A term by one of its parameters, the values next to a border that are taken, and the border's
+#: or those beyond that are not.
+BORDERS = {
+    "cutoff_hz": (ta.FilterLag, (1e-300,), (0.0, -1.0)),
+    "damping": (lambda x: ta.FilterLag(1.0, x), (1e-300, 5.0), (0.0, -0.5)),
+    "order": (lambda x: ChannelSkew(0.1, x), (1e-300,), (0.0, -1.0)),
+    "orders": (lambda x: ta.Backlash(0.1, (1.0, x), (A, A), (A, A)), (1e-300,), (0.0, -1.0)),
+    "length": (lambda x: ta.PreslidingHysteresis(0.1, x), (1e-300,), (0.0, -1.0)),
+    "start": (lambda x: ta.PreslidingHysteresis(0.1, 1.0, x), (0.0, 1.0), (-1e-300, 1.0 + 1e-15)),
+    "knee_Nm": (lambda x: ta.StiffeningCompliance(A, A, A, x), (0.0, 1.0), (-1e-300,)),
+    "width": (lambda x: ta.LocalDefect(1.0, x, A), (1e-300,), (0.0, -1.0)),
+    "cycles_per_turn": (lambda x: ta.LocalDefect(1.0, 1.0, A, x), (1e-300,), (0.0, -1.0)),
+    "relative_error": (lambda x: ScaleError(x, 0.0, 1.0), (1.0 - 1e-15, -1.0 + 1e-15), (1.0, -1.0)),
+    "stop": (lambda x: ScaleError(A, 1.0, x), (1.0 + 1e-15,), (1.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("name", BORDERS)
+def test_a_parameter_is_refused_from_its_border_on(name):
+    make, taken, refused = BORDERS[name]
+    for value in taken:
+        make(value)
+    for value in refused:
+        with pytest.raises(errors.ArgumentError, match=rf"\b{name} must be "):
+            make(value)

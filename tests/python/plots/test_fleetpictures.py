@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
 import trueangle as ta
-from fleets.made import units
+from fleets.made import MEAN, units
 from model.test_windows import PER, model, readings
+from trueangle.plots import text_alternative
 from trueangle.plots.controlcharts import watched_windows
 
 matplotlib = pytest.importorskip("matplotlib")
@@ -94,6 +97,80 @@ def test_patterns_are_the_units_and_the_common_one(fleet, errors_in, per):
         np.testing.assert_allclose(own, per * wave, atol=1e-9)
         assert np.ptp(own) == pytest.approx(per * unit.peak_to_peak, rel=1e-2)
         assert ax.get_xlim() == (0.0, 360.0)
+
+
+@pytest.fixture(scope="module")
+def many():
+    """Units that differ most in order 4, then 3; of three the last state is another one."""
+    print("seed", SEED)
+
+    def own(u, t, b):
+        more = np.array([3.0, 0.2, 5.0, 9.0])[:, None] * (b - MEAN) + MEAN
+        return more + np.array([[400.0, 0.0]] + 3 * [[0.0, 0.0]]) * (u < 3 and t == 2), 0.0
+
+    made = units(np.random.default_rng(SEED), 12, dates=DATES, change=own, runs=1)
+    return ta.fleet(made, orders=[1, 2, 3, 4])
+
+
+def test_an_overview_has_the_three_orders_in_which_units_differ_most(many):
+    between = {row.order: row.std for row in many.between}
+    ranked = sorted(between, key=lambda order: -between[order])
+    sizes, *polars = many.plot("overview").figure.axes
+    named = [float(ax.get_title().split()[1].rstrip(":")) for ax in polars]
+    assert named == ranked[:3]
+    assert many.plot("phasors").get_title().startswith(f"order {ranked[0]:g}: ")
+    odd = [unit.unit for unit in many.units if unit.verdict != "fine"]
+    assert len(odd) >= 3
+    assert text_alternative(sizes).endswith(f"differ most; not fine: {', '.join(odd)}.")
+    for order, ax in zip(named, polars, strict=True):
+        told = text_alternative(ax)
+        assert told.startswith(f"Order {order:g} of 12 units as phasors")
+        assert told.endswith(f"; not fine: {', '.join(odd)}.")
+        # All of it is within the rim, and the picture is not much larger than what is drawn.
+        farthest = max(np.max(line.get_ydata()) for line in ax.lines)
+        assert ax.get_rmin() == 0.0
+        assert 1.02 * farthest < ax.get_rmax() < 1.3 * farthest
+
+
+def test_a_fleet_that_is_fine_is_said_to_be(many):
+    fine = replace(many, units=tuple(u for u in many.units if u.verdict == "fine"))
+    for kind in ("overview", "phasors"):
+        assert text_alternative(fine.plot(kind)).endswith("; all are fine.")
+
+
+def test_the_band_is_named_by_its_share_and_confidence(many):
+    band = many.tolerance._replace(share=0.8, confidence=0.99, peak_to_peak=0.1)
+    ax = replace(many, tolerance=band).plot("sizes")
+    assert "80 % of units, 99 % confidence" in [patch.get_label() for patch in ax.patches]
+    assert text_alternative(ax).endswith("12 units and the band that holds the fleet.")
+    none = many.tolerance._replace(peak_to_peak=np.inf)
+    ax = replace(many, tolerance=none).plot("sizes")
+    assert not ax.patches
+    assert text_alternative(ax) == "Peak-to-peak of 12 units."
+
+
+@pytest.mark.parametrize(("most", "drawn"), [(0, 1), (1, 1), (7, 7), (99, 12)])
+def test_patterns_stand_in_rows_of_five_with_angles_below_the_last_of_each_column(
+    many, most, drawn
+):
+    moved = replace(many.units[0], verdict="zero_moved")
+    many = replace(many, units=(moved, *many.units[1:]))
+    first = many.plot("patterns", most=most)
+    axes = [ax for ax in first.figure.axes if ax.get_visible()]
+    assert len(axes) == drawn
+    for i, (unit, ax) in enumerate(zip(many.units, axes, strict=False)):
+        verdict = "" if unit.verdict == "fine" else f": {unit.verdict.replace('_', ' ')}"
+        assert ax.get_title() == unit.unit + verdict
+        lowest = i + min(drawn, 5) >= drawn
+        told = [text.get_text() for text in ax.get_xticklabels()]
+        assert told == (["0", "180", "360"] if lowest else ["", "", ""])
+    assert text_alternative(first).startswith(f"Error over a turn of {drawn} of 12 units")
+
+
+def test_fine_patterns_have_eight_points_a_wave(many):
+    fast = replace(many, common=(*many.common[:-1], many.common[-1]._replace(order=100.0)))
+    (ax, *_) = fast.plot("patterns").figure.axes
+    assert {line.get_xdata().size for line in ax.lines} == {801}
 
 
 def test_the_charts_of_a_unit_have_each_their_statistic_and_its_limit(fleet):

@@ -111,7 +111,7 @@ if (state->known && fabs(away) > 0.5) {
 //@ instance
 /* -- the instance ----------------------------------------------------------------------- */
 
-enum { VARIABLES = @count@, INPUTS = @inputs@, OUTPUT = @output@, NOISE = @noise@, SEED = @seed@ };
+enum { VARIABLES = @count@, OUTPUT = @output@, NOISE = @noise@, SEED = @seed@ };
 
 typedef struct {
     m_state state;

@@ -1,0 +1,134 @@
+"""What stands before the readings of a text file: where names, units and readings begin."""
+
+import io
+from pathlib import Path
+
+import pytest
+
+from trueangle.errors import FileError
+from trueangle.formats.csvheader import Header
+
+PATH = Path("rig.csv")
+THREE = "0.0,1.5,2.5\n0.1,1.6,2.6\n0.2,1.7,2.7\n0.3,1.8,2.8\n"
+
+
+def header(text, encoding="utf-8"):
+    file = io.BytesIO(text.encode(encoding))
+    found = Header(PATH, file)
+    rest = file.read().decode(encoding)
+    # What is left to be read begins at the line that it says, and nothing is lost.
+    assert b"".join(found.head) + rest.encode(encoding) == text.encode(encoding)
+    assert found.line == len(found.head) + 1
+    return found
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
+@pytest.mark.parametrize("width", [2, 3, 5])
+@pytest.mark.parametrize("words", [1, 2, 3, 4, 5, 6, 8])
+def test_words_above_readings_are_names_where_they_are_as_many(words, width, delimiter):
+    """One cell more or less is an end of the line that was forgotten, but not among blanks; one
+    word alone above several columns is what a firmware says."""
+    told = delimiter.join("abcdefgh"[:words])
+    rows = [delimiter.join(f"{k}.{c}" for c in range(1, width + 1)) for k in range(6)]
+    found = header("\n".join([told, *rows, ""]))
+    near = 0 if delimiter == " " else 1
+    named = abs(words - width) <= near and words > 1
+    assert found.place == (0 if named else -1)
+    assert found.delimiter == delimiter
+    assert found.line == 2
+    wanted = list("abcdefgh"[:words]) if named else [f"column{k + 1}" for k in range(width)]
+    assert found.names == wanted
+
+
+def test_one_name_above_one_column_that_ends_with_a_delimiter_is_a_name():
+    found = header("angle\n1.5,\n2.5,\n3.5,\n4.5,\n")
+    assert (found.names, found.place, found.trailing) == (["angle"], 0, True)
+    assert found.width == 2
+
+
+@pytest.mark.parametrize(("last", "trailing"), [("", True), ("4.5", False)])
+def test_a_cell_more_than_names_is_the_end_of_a_line_where_it_is_empty(last, trailing):
+    rows = "".join(f"{line},{last}\n" for line in THREE.splitlines())
+    assert header("t,ref,enc\n" + rows).trailing is trailing
+
+
+@pytest.mark.parametrize(
+    ("units", "line", "names"),
+    [
+        (
+            "s,deg,deg,Nm",
+            3,
+            ["time_s [s]", "reference_deg [deg]", "indicated_deg [deg]", "load [Nm]"],
+        ),
+        ("s,deg,deg", 3, ["time_s [s]", "reference_deg [deg]", "indicated_deg [deg]", "load"]),
+        ("s,deg", 2, ["time_s", "reference_deg", "indicated_deg", "load"]),
+    ],
+)
+def test_a_line_of_units_may_lack_its_last_cell(units, line, names):
+    rows = "".join(f"{row},1.0\n" for row in THREE.splitlines())
+    found = header(f"time_s,reference_deg,indicated_deg,load\n{units}\n{rows}")
+    assert (found.line, found.names) == (line, names)
+
+
+@pytest.mark.parametrize(("more", "begins"), [("on,off", 4), ("on,off,up", 2)])
+def test_readings_are_lines_of_which_half_are_numbers(more, begins):
+    """With 2 numbers of 4 below a preamble of other lines; with 2 of 5 they are words."""
+    words = [f"w{k}" for k in range(len(more.split(",")))]
+    rows = "".join(f"{k}.5,{k}.25,{more}\n" for k in range(5))
+    found = header("Model,DSO-X\nSource,CH1\n" + ",".join(["t", "ref", *words]) + "\n" + rows)
+    assert found.line == begins
+    if begins == 4:
+        assert found.names == ["t", "ref", *words]
+
+
+def test_time_columns_of_twincat_are_numbered_and_all_in_milliseconds():
+    """The last line of names counts; a unit stands before the blank of what it means."""
+    cells = ("Name", "axis.ref", "Name", "axis.enc", "axis.load")
+    lines = [
+        "Name\tProject\tName\tother\tmore", "Data-Type\tREAL64\tData-Type\tREAL64\tREAL64",
+        "\t".join(cells), "Unit\tdeg (degrees)\tUnit\t(None)\tNm",
+        *("\t".join(f"{k}.{c}" for c in range(5)) for k in range(6)), "",
+    ]  # fmt: skip
+    found = header("\n".join(lines))
+    assert found.place == 2
+    assert found.names == [
+        "time [ms]", "axis.ref [deg]", "time 2 [ms]", "axis.enc", "axis.load [Nm]"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_lines_end_as_the_line_of_names_does(ending):
+    text = ("# a note\nt,ref,enc\n" + THREE).replace("\n", ending)
+    found = header(text)
+    assert found.ending == ending
+    assert found.with_names(["more"]) == f"# a note{ending}t,ref,enc,more{ending}".encode()
+
+
+def test_two_names_among_blanks_are_two():
+    found = header("reference_deg indicated_deg\n1.5 2.5\n1.6 2.6\n")
+    assert found.delimiter == " "
+    assert found.names == ["reference_deg", "indicated_deg"]
+
+
+@pytest.mark.parametrize(
+    ("sign", "known"),
+    [("\u00b0", True), ("\u00b5", True), ("\u00fc", True), ("\u2019", False), ("\u0192", False)],
+)
+def test_letters_of_western_europe_are_read_and_signs_of_a_code_page_are_not(sign, known):
+    """Bytes from 0xA0 on; those below are curly quotes, or another code page's letters."""
+    text = f"t,ref [{sign}],enc\n{THREE}"
+    assert header(text).names[1] == f"ref [{sign}]"
+    if known:
+        found = header(text, "cp1252")
+        assert found.encoding == "cp1252"
+        assert found.names[1] == f"ref [{sign}]"
+    else:
+        with pytest.raises(FileError, match="is not UTF-8 text"):
+            header(text, "cp1252")
+
+
+@pytest.mark.parametrize("text", ["", "\n", "  \n\n"])
+def test_an_empty_file_is_said_to_be_at_its_first_line(text):
+    with pytest.raises(FileError, match="is empty") as refused:
+        header(text)
+    assert refused.value.line == 1
