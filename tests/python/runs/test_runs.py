@@ -43,6 +43,10 @@ def test_wrapped_angles_differ_by_whole_turns_and_lie_in_one(period):
         ({"time": -THETA}, r"time must not decrease.*time\[1\] = -10 after"),
         ({"temperature": [1.0, 2.0]}, "temperature has 2"),
         ({"weights": np.where(THETA == 50.0, -1.0, 1.0)}, r"weights\[5\]"),
+        # The first of several.
+        ({"weights": np.where(THETA < 50.0, 1.0, -THETA)}, r"weights\[5\] .* got -50"),
+        ({"time": np.abs(THETA - 50.0)}, r"time\[1\] = 40 after 50"),
+        ({"reference": np.where(THETA < 50.0, THETA, np.inf)}, r"reference\[5\] is inf"),
     ],
 )
 def test_bad_arguments_are_named(change, message):
