@@ -1,4 +1,4 @@
-"""Columns of what forms leave, the evidence beside them, and errors widened by them: by definition."""
+"""Bends of causes, the evidence beside them and the errors widened by them: by definition."""
 
 from __future__ import annotations
 
