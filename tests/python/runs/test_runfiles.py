@@ -187,3 +187,22 @@ def test_of_columns_that_appear_twice_that_one_is_named(doubled, tmp_path):
     path = written(tmp_path, "\n".join(lines) + "\n")
     with pytest.raises(FileError, match=rf"{doubled}.*appears twice"):
         ta.read_runs(path)
+
+
+@pytest.mark.parametrize(
+    ("times", "told"),
+    [
+        ((5, 1, 5, 1, 6, 2), None),  # stamps that repeat, and runs that overlap
+        ((5, 1, 6, 2, 5.5, 1.5), r"line 6, column 'time_s': .*: 5.5 after 6;"),
+        ((5, 3, 6, 2, 7, 1), r"line 5, column 'time_s': .*: 2 after 3;"),  # the first of two
+    ],
+)
+def test_time_of_each_run_may_stand_still_but_not_run_back(tmp_path, times, told):
+    rows = [f"{'ab'[i % 2]},{10 * i},{10 * i}.5,{t}" for i, t in enumerate(times)]
+    path = written(tmp_path, "\n".join(["run,reference_deg,indicated_deg,time_s", *rows]))
+    if told is not None:
+        with pytest.raises(FileError, match=told):
+            ta.read_runs(path)
+        return
+    for run, k in zip(ta.read_runs(path), (0, 1), strict=True):
+        np.testing.assert_array_equal(run.time, times[k::2])
