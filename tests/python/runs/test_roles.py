@@ -298,6 +298,8 @@ def test_days_of_tables_in_memory(kind):
         table = pytest.importorskip("pandas").DataFrame(table)
     runs = ta.read_runs(table)
     assert [(len(run), run.when[:10]) for run in runs] == [(15, "2026-11-21"), (21, "2026-11-22")]
+    # When the first of its readings was taken.
+    assert [np.datetime64(run.when[:19]) for run in runs] == [when[0], when[15]]
 
 
 def test_a_column_called_when_that_holds_no_dates(tmp_path):
