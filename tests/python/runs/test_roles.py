@@ -142,6 +142,9 @@ def test_deviations_of_facets_are_added_where_they_lie(mounts, tmp_path):
     assert np.hypot(*np.subtract(each_door(path, tmp_path), (0.0, 20.0))) > 0.01
     order = np.random.default_rng(3).permutation(12)  # in any order, by any turn
     polygon(tmp_path, mounts, FACETS[order] - 360.0, DEVIATIONS[order])
+    # The mount stays what a run knows of itself.
+    runs = ta.read_runs(path, facets=tmp_path / "facets.csv")
+    assert [set(run.mount) for run in runs] == [{mount} for mount in mounts]
     again = each_door(path, tmp_path, facets=tmp_path / "facets.csv")
     np.testing.assert_allclose(again, found, atol=1e-9)
 
