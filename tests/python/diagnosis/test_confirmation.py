@@ -123,7 +123,7 @@ def test_a_whole_order_that_changes_from_run_to_run_is_no_other_order(
 @pytest.mark.parametrize(
     ("part", "follows"), [(0.0, False), (0.02, False), (0.3, True), (-0.3, True)]
 )
-@pytest.mark.parametrize("channel", ["direction", "speed"])
+@pytest.mark.parametrize("channel", ["direction", "speed", "direction and speed"])
 def test_a_fixed_line_does_not_follow_what_else_is_recorded(
     channel: str, part: float, follows: bool
 ) -> None:
@@ -132,7 +132,8 @@ def test_a_fixed_line_does_not_follow_what_else_is_recorded(
     runs = tuple(replace(d, speed_deg_s=v) for d, v in zip(SIM.runs, (5.0, 40.0) * 2, strict=True))
     signals = join_runs(ta.simulate(replace(SIM, runs=runs), 3))
     speed = np.abs(signals.velocity)
-    factor = signals.direction if channel == "direction" else (speed - speed.mean()) / speed.std()
+    factor = (speed - speed.mean()) / speed.std() if "speed" in channel else 1.0
+    factor = factor * signals.direction if "direction" in channel else factor
     line = 60.0 * np.cos(3.0 * signals.theta) * (1.0 + part * factor)
     noise = np.random.default_rng(20).normal(size=len(signals))
     start = Regression.of(signals, line + noise, SIM.surroundings, rho=0.0)
