@@ -187,7 +187,8 @@ class GearedLines:
             moved[part] = lines[part, 0::2] @ b - lines[part, 1::2] @ a
         column = self._centred(angle * moved)
         for part in parts:
-            column[part] -= beside[part] @ np.linalg.lstsq(beside[part], column[part], rcond=None)[0]
+            known = beside[part]
+            column[part] -= known @ np.linalg.lstsq(known, column[part], rcond=None)[0]
         power = float(column @ column)
         if power == 0.0 or freedom <= 0:
             return 0.0, 0.0

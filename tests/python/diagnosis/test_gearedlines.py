@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -35,7 +36,7 @@ def geared_of(
     lines = tuple(replace(x, amplitude_arcsec=unit * x.amplitude_arcsec) for x in LINES)
     sim = replace(SIM, joint=replace(SIM.joint, gear_ratio=ratio), harmonics=lines)
     y, theta = unit * np.concatenate(errors), np.concatenate(thetas)
-    return GearedLines(sim, lines, y, theta, tuple(zip(ends[:-1], ends[1:], strict=True)))
+    return GearedLines(sim, lines, y, theta, tuple(itertools.pairwise(ends)))
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-3])
