@@ -103,8 +103,8 @@ def test_a_spring_that_stiffens_is_softer_by_a_quarter_at_the_largest_load():
         assert effect.arcsec_per_Nm3 == -size
     # Where no load was recorded there is no error.
     bare = replace(SIGNALS, torque=None)
-    kind = EFFECTS["stiffening_compliance"]
-    assert not kind.drawn(0.3, bare, SIM.surroundings, rng).signal(bare, SIM.surroundings, rng).any()
+    free = EFFECTS["stiffening_compliance"].drawn(0.3, bare, SIM.surroundings, rng)
+    assert not free.signal(bare, SIM.surroundings, rng).any()
 
 
 def test_what_these_runs_cannot_have_is_not_drawn():

@@ -81,7 +81,7 @@ def test_a_range_of_ratios_is_told_where_teeth_are_not(
     ("how", "ratio", "told"),
     [
         (GIVEN, 50.2, ""),
-        (ASKED, 50.2, "the readings do not tell the gear ratio from orders of the output: {} is kept"),
+        (ASKED, 50.2, "do not tell the gear ratio from orders of the output: {} is kept"),
         (FREE, 50.0, "tell the gear ratio from orders of the output; give it as `gear_ratio=`"),
     ],
 )  # fmt: skip
