@@ -180,6 +180,7 @@ def _follows(regression: Regression, group: Sequence[int]) -> str:
     else:
         return ""
     signals = regression.signals
+    found, most = "", FOLLOWS
     for name, (mean, spread) in modulators(signals).items():
         g = modulator(signals, name, mean, spread)
         if g is None:
@@ -187,9 +188,10 @@ def _follows(regression: Regression, group: Sequence[int]) -> str:
         moved = g[:, None] * columns
         gain, sizes = named.gain(moved)
         slight = FORM * float(np.var(term.columns @ coefficients))
-        if gain > FOLLOWS and float(np.var(moved @ sizes)) > slight:
-            return name.replace("direction ", "direction and ")
-    return ""
+        # Of several that are alike the one that explains most is named.
+        if gain > most and float(np.var(moved @ sizes)) > slight:
+            found, most = name.replace("direction ", "direction and "), gain
+    return found
 
 
 def _of_scatter(cause: str) -> bool:

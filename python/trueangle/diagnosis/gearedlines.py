@@ -5,7 +5,7 @@ With orders ``m_k(r)`` and the sums of each run
 
 ::
 
-    S(r) = [Σ_k |a_k|² Σ_j 4 |Z_jk(r)|² / n_j] / [Σ_k |a_k|² Σ_j n_j |a_k|²]
+    S(r) = [Σ_k Σ_j min(4 |Z_jk(r)|² / n_j, n_j |a_k|²)] / [Σ_k Σ_j n_j |a_k|²]
 
 is about 1 at the right ratio and 0 elsewhere. Phases are free, as a ratio that is no whole
 number gives each run its own.
@@ -176,23 +176,23 @@ class GearedLines:
         lines = np.hstack([line_columns(self.theta, order) for order in self.orders(ratio)])
         beside, error = self._centred(lines), self._error
         angle = self.theta if common else self._centred(self.theta)
-        product = power = left = 0.0
+        rest, moved = np.empty_like(error), np.empty_like(error)
         freedom = self.y.size - len(self.bounds)
-        for start, stop in self._parts(common):
-            known = beside[start:stop]
-            fit, _, rank, _ = np.linalg.lstsq(known, error[start:stop], rcond=None)
+        parts = [slice(*bounds) for bounds in self._parts(common)]
+        for part in parts:
+            fit, _, rank, _ = np.linalg.lstsq(beside[part], error[part], rcond=None)
             freedom -= int(rank)
-            rest = error[start:stop] - known @ fit
+            rest[part] = error[part] - beside[part] @ fit
             a, b = cycles * fit[0::2], cycles * fit[1::2]
-            moved = lines[start:stop, 0::2] @ b - lines[start:stop, 1::2] @ a
-            column = angle[start:stop] * moved
-            column = column - known @ np.linalg.lstsq(known, column, rcond=None)[0]
-            product += float(column @ rest)
-            power += float(column @ column)
-            left += float(rest @ rest)
+            moved[part] = lines[part, 0::2] @ b - lines[part, 1::2] @ a
+        column = self._centred(angle * moved)
+        for part in parts:
+            known = beside[part]
+            column[part] -= known @ np.linalg.lstsq(known, column[part], rcond=None)[0]
+        power = float(column @ column)
         if power == 0.0 or freedom <= 0:
             return 0.0, 0.0
-        return product / power, float(np.sqrt(left / freedom / power))
+        return float(column @ rest) / power, float(np.sqrt(rest @ rest / freedom / power))
 
     def refined(self, ratio: float, common: bool, width: float | None = None) -> float:
         """The ratio within a width of a trial that explains most.

@@ -99,8 +99,7 @@ class StiffeningCompliance(Effect):
         cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
         # What is taken off at the largest load is a quarter of the linear part there.
-        torque = signals.torque
-        largest = 0.0 if torque is None else float(np.abs(torque).max(initial=0.0))
+        largest = float(np.abs(torque_of(signals)).max())
         return cls(4.0 * size * largest**2, -size)
 
     @classmethod

@@ -205,7 +205,7 @@ def _fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
     odd = [unit for unit in fleet.units if unit.verdict != "fine"]
     verb = "needs" if len(odd) <= 1 else "need"
     lines = [f"{counted(fleet.units, 'unit')}; {len(odd) or 'none'} {verb} attention", ""]
-    width = max([4, *(len(unit.unit) for unit in fleet.units)])
+    width = max(map(len, ("unit", *(unit.unit for unit in fleet.units))))
     told = [unit for unit in fleet.units if unit.because]
     for unit in told:
         lines.append(f"  {unit.unit:<{width}}  {unit.verdict:<11}  {shown.spoken(unit.because)}")

@@ -47,7 +47,7 @@ class ArcDesign:
         number of readings and p the number of coefficients: 0 for the optimum (Kiefer and
         Wolfowitz).
     log_det : float
-        ``ln det M`` of the design, with columns as in `Columns.of`.
+        ``ln det M`` of the design, with plain cosine and sine columns.
     """
 
     places: Array
@@ -139,7 +139,8 @@ def d_optimal(columns: OrthonormalColumns) -> ArcDesign:
             break
         weights *= variances / p
     places, shares = _merged(grid, weights, p)
-    if places.size == p:
+    # Even places may be such that two orders are the same numbers there: no start for a search.
+    if places.size == p and np.linalg.cond(columns.at(places)) * _SINGULAR < 1.0:
         places, shares, settled = _settled(columns, places)
         if settled < max(excess, _GRID_EXCESS):
             return ArcDesign(places, shares, settled, columns.log_det(places, shares))

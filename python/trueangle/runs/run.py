@@ -218,11 +218,11 @@ class CalibrationRun:
 
     @property
     def direction(self) -> Array:
-        """Direction of travel per reading: -1 or +1, 0 before the first motion.
+        """Direction of travel per reading: -1 or +1, 0 of a run that does not move.
 
         The signal ``direction`` where given, else the sign of ``velocity``, else of the
         last step of the reference that was not zero; a reading belongs to the step that
-        led to it, the first reading to the step that leaves it.
+        led to it, those before the first motion to that.
         """
         given = self.signals.get("direction", self.velocity)
         if given is not None:

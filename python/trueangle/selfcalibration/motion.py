@@ -73,6 +73,7 @@ class MotionFit:
     evidence: float
     """Restricted log likelihood, comparable between grids and stiffnesses."""
     knots: Knots
+    readings: float
 
     @property
     def roughness(self) -> float:
@@ -87,9 +88,8 @@ class MotionFit:
         until knots are too far apart for it.
         """
         intervals = sum(self.knots.intervals)
-        fixed = 2 * len(self.knots.intervals) + len(self.projected.columns)
-        per_knot = (self.projected.freedom + fixed) / max(intervals, 1)
-        turned = math.pow(10.0 * per_knot / self.stiffness, 1.0 / 6.0) / self.knots.spacing
+        weight = self.readings / max(intervals, 1) / self.stiffness
+        turned = math.pow(10.0 * weight, 1.0 / 6.0) / self.knots.spacing
         slowest = _ENDS / (intervals * self.knots.spacing)
         return max(min(turned / (2.0 * math.pi), 0.5 / self.knots.spacing), slowest)
 
@@ -261,6 +261,7 @@ class MotionSearch:
                 _nothing(self.columns),
                 -math.inf,
                 grid.sums.knots,
+                sums.weighty,
             )
         eliminated = factor.solve(grid.cross)
         information = grid.common - grid.cross.T @ eliminated
@@ -321,8 +322,9 @@ class MotionSearch:
             penalised / freedom,
             freedom,
         )
+        evidence, knots = -0.5 * twice, grid.sums.knots
         return MotionFit(
-            level, stiffness, memory, fine, found, projected, -0.5 * twice, grid.sums.knots
+            level, stiffness, memory, fine, found, projected, evidence, knots, sums.weighty
         )
 
 

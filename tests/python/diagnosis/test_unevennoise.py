@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.diagnosis.account import _uneven
 from trueangle.diagnosis.penalty import NEW_CAUSE
 from trueangle.diagnosis.unevennoise import uneven_noise
 from trueangle.effects.noiselaw import noise_law
@@ -147,3 +148,28 @@ def test_the_account_says_by_how_much_they_differ_and_what_each_would_be(seed):
     assert "per_deg_s" in spot.estimates[UNEVEN]
     assert "timestamp_jitter" in result.summary().split("Measured minus")[0]
     assert not result.extended.effects
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+def test_outliers_are_put_aside_before_it_is_asked_what_the_noise_follows(scale):
+    """As though each had been read where the fit is, in any unit; and the noise tells the same."""
+    print(f"seed {SEEDS[0]}")
+    signals = signals_of((1.0, 6.0, 13.0, 24.0, 41.0, 66.0, 90.0) * 2)
+    deviation = deviations(UNEVEN, signals, 3.0)
+    clean = scale * np.random.default_rng(SEEDS[0]).normal(0.0, deviation)
+    spikes = np.arange(11, len(signals), 17)
+    error = clean.copy()
+    error[spikes] += 300.0 * scale * (-1.0) ** np.arange(spikes.size)
+
+    def fitted(y):
+        return Regression.of(signals, y, Simulation().surroundings, rho=0.0)
+
+    start = fitted(error)
+    found = _uneven(start, start)
+    # Beside them it is hardly seen.
+    assert uneven_noise(start)[0].bic_gain < 0.6 * found[0].bic_gain
+    error[spikes] -= start.left[spikes]
+    for other in (uneven_noise(fitted(error)), uneven_noise(fitted(clean))):
+        assert [item.cause for item in found] == [item.cause for item in other]
+        gains = [[item.bic_gain for item in items] for items in (found, other)]
+        np.testing.assert_allclose(*gains, rtol=0.1)

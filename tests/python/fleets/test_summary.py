@@ -1,11 +1,13 @@
 """What a fleet prints are the numbers of its object, and its file gives them back."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.fleets.result import _LISTED
 from trueangle.support.angles import arcsec
 
 from .made import units
@@ -114,3 +116,61 @@ def test_units_that_tell_nothing_are_named_up_to_five_and_counted(count):
     more = f" and {count - 5} more" if count > 5 else ""
     listed = ", ".join(f"s{i}" for i in range(min(count, 5))) + more
     assert f"The readings of {listed} do not tell the orders apart; left out." in found.notes
+
+
+def test_units_that_need_attention_stand_first_and_are_counted(fleet):
+    odd = [unit for unit in fleet.units if unit.verdict != "fine"]
+    fine = [unit for unit in fleet.units if unit.verdict == "fine"]
+    assert len(odd) == 2
+    many = tuple(replace(fine[0], unit=f"v{i}") for i in range(40))
+    for some, told in (
+        ((*odd, *fine), "14 units; 2 need attention"),
+        ((*odd[1:], *fine), "13 units; 1 needs attention"),
+        (tuple(fine), "12 units; none needs attention"),
+        (tuple(fine[:3]), "3 units; none needs attention"),
+        ((*odd, *many), "42 units; 2 need attention"),
+    ):
+        text = replace(fleet, units=some).summary("arcsec")
+        assert text.splitlines()[0] == told
+        table = text[text.index("peak-to-peak  ") :]
+        listed = [unit for unit in some if re.search(rf"^  {unit.unit} ", table, re.M)]
+        most = len([unit for unit in some if unit in odd]) + _LISTED
+        assert listed == list(some[:most])
+        rest = f"  and {len(some) - len(listed)} that are fine"
+        assert (rest in text) == (len(some) > len(listed))
+        reasons = re.findall(r"^  (\S+) +(?:recalibrate|zero_moved|fine) +[^\d\s]", text, re.M)
+        assert reasons == [unit.unit for unit in some if unit.because]
+
+
+@pytest.mark.parametrize("name", ["a", "u31", "name", "axis-2-of-arm-left"])
+def test_the_table_of_units_is_as_wide_as_its_names(fleet, name):
+    """Numbers end where their heads do, and verdicts begin there."""
+    units = (replace(fleet.units[0], unit=name), *fleet.units[1:])
+    lines = replace(fleet, units=units).summary("arcsec").splitlines()
+    top = next(k for k, line in enumerate(lines) if line.startswith("  unit "))
+    head = lines[top]
+    assert head.index("verdict") == 2 + max(len("unit"), len(name)) + 2
+    for row, unit in zip(lines[top + 2 :], units[:3], strict=False):
+        assert row.startswith(f"  {unit.unit} ")
+        assert row.index(unit.verdict) == head.index("verdict")
+        ends = [found.end() for found in re.finditer(r"\S+", row)]
+        heads = [found.end() for found in re.finditer(r"\S+", head)]
+        assert ends[2:] == heads[2:]
+
+
+def test_words_of_a_fleet_are_those_of_its_numbers(fleet):
+    text = replace(fleet, notes=("first", "second"), aligned=True).summary()
+    assert "  [1] first\n  [2] second" in text
+    assert "common pattern: the mean of the units" in text
+    assert "none: the units share no direction" in replace(fleet, aligned=False).summary()
+    (due,) = [row for row in fleet.history if row.next_calibration and not row.extrapolated]
+    assert f"at most until {due.when[:10]}" in " ".join(text.split())
+    # The unit of all is that of the largest.
+    large = replace(fleet.units[0], peak_to_peak=20.0)
+    small = [replace(unit, peak_to_peak=1e-4, left=1e-5) for unit in fleet.units]
+    assert unit_told(replace(fleet, units=(*small, large))) == "deg"
+    assert unit_told(replace(fleet, units=tuple(small))) == "arcsec"
+
+
+def unit_told(fleet):
+    return fleet.summary().split("(standard deviations of cosine and sine, ")[1].split(")")[0]

@@ -60,6 +60,30 @@ def test_no_place_has_more_variance_than_the_equivalence_theorem_allows(orders, 
     p = 1 + 2 * len(orders)
     assert np.einsum("ij,jk,ik->i", rows, inverse, rows).max() <= p * (1.0 + 1e-6)
     np.testing.assert_allclose(np.einsum("ij,jk,ik->i", own, inverse, own), p, rtol=1e-6)
+    assert found.excess == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("orders", "arc"), [([2], 180), ([2, 5], 170), ([1, 17], 60), ([1, 101, 202], 340)]
+)
+def test_weight_that_stays_spread_is_told_as_it_is(orders, arc):
+    """Of gaps between the orders: many places; even ones, a seventh of a turn apart, may fail."""
+    found = d_optimal(OrthonormalColumns(orders, 0.0, arc / 360.0))
+    x = 2.0 * np.pi * np.linspace(0.0, arc / 360.0, 9001)
+    own = design(2.0 * np.pi * found.places, orders)
+    information = own.T @ (found.weights[:, None] * own)
+    p = 1 + 2 * len(orders)
+
+    def variances(rows):
+        return np.einsum("ij,ij->i", rows @ np.linalg.inv(information), rows)
+
+    assert found.places.size > p
+    assert np.diff(found.places).min() > 0.0
+    assert found.weights.min() > 0.0
+    assert found.weights.sum() == pytest.approx(1.0, abs=1e-12)
+    assert found.excess < 1e-3
+    assert variances(design(x, orders)).max() / p - 1.0 == pytest.approx(found.excess, abs=1e-4)
+    assert found.log_det == pytest.approx(np.linalg.slogdet(information)[1], abs=1e-9)
 
 
 @pytest.mark.parametrize("half", [30.0, 60.0, 90.0, 110.0])
@@ -178,6 +202,13 @@ def test_what_an_arc_does_not_tell_is_said_before():
     assert "no better than a thousandth" in asked.notes[0]
     with pytest.raises(ArgumentError, match="look alike over 10 deg"):
         ta.plan_arc(0.0, 10.0, range(1, 9))
+
+
+def test_even_places_that_do_not_tell_the_orders_are_no_end_of_a_plan():
+    """Orders 1, 101 and 202 at sevenths of a turn, 101 and 202 being 3 and -1 there."""
+    plan = ta.plan_arc(0.0, 340.0, [1, 101, 202], readings=60)
+    assert sum(plan.counts) == 60
+    assert 0.999 < plan.d_efficiency <= 1.0
 
 
 @pytest.mark.parametrize(

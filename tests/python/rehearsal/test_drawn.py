@@ -93,6 +93,20 @@ def test_twice_the_size_is_twice_the_error(kind):
         np.testing.assert_allclose(errors[1], 2.0 * errors[0], rtol=1e-6, atol=1e-9)
 
 
+def test_a_spring_that_stiffens_is_softer_by_a_quarter_at_the_largest_load():
+    for size in (0.02, 0.3):
+        effect, rng = drawn("stiffening_compliance", size, 0)
+        error = effect.signal(SIGNALS, SIM.surroundings, rng)
+        loads = np.abs(SIGNALS.torque)
+        k = int(np.argmax(loads))
+        assert abs(error[k]) == pytest.approx(0.75 * effect.arcsec_per_Nm * loads[k])
+        assert effect.arcsec_per_Nm3 == -size
+    # Where no load was recorded there is no error.
+    bare = replace(SIGNALS, torque=None)
+    free = EFFECTS["stiffening_compliance"].drawn(0.3, bare, SIM.surroundings, rng)
+    assert not free.signal(bare, SIM.surroundings, rng).any()
+
+
 def test_what_these_runs_cannot_have_is_not_drawn():
     still = replace(SIM, runs=(RunDesign(label="a", turns=1.0, samples=90),))
     signals = measured_signals(still)

@@ -273,6 +273,8 @@ def test_positions_in_words_and_their_span():
         return found.describe(), found.span
 
     assert described([0.25]) == ("1 distinct position", 1.0)
+    assert described([0.25, 0.75]) == ("2 distinct positions", 1.0)  # two make no grid
+    assert described([0.25, 7.0 / 12.0, 11.0 / 12.0])[0] == "3 distinct positions, 120 deg apart"
     assert described(np.arange(36) / 36.0) == ("36 distinct positions, 10 deg apart", 1.0)
     two = np.concatenate([np.arange(12) / 12.0, np.arange(12) / 12.0 + 0.01])
     assert described(two)[0] == "24 distinct positions: 2 grids of 30 deg, shifted by 0, 3.6 deg"
@@ -306,3 +308,32 @@ def test_a_turn_that_closes_from_both_sides_of_its_tolerance(turn):
     assert closure_errors(ta.CalibrationRun([0.0, turn], [0.0, turn], turn)).size == 0
     half = np.array([0.0, 90.0, 180.0]) * unit
     assert closure_errors(ta.CalibrationRun(half, half, turn)).size == 0
+
+
+@pytest.mark.parametrize("unit", [360.0, 1.0, 2.0 * np.pi])
+def test_a_tolerance_is_above_nothing_and_below_half_a_turn(unit):
+    run = run_at(np.array([0.0, 0.2, 0.6]) * unit, unit)
+    for wrong in (0.0, -1e-3 * unit, 0.5 * unit, np.nan):
+        with pytest.raises(ArgumentError, match="between 0 and half a turn"):
+            distinct_positions(run, tolerance=wrong)
+    assert len(distinct_positions(run, tolerance=0.19 * unit)) == 3
+    assert len(distinct_positions(run, tolerance=0.21 * unit)) == 2
+
+
+def test_positions_lie_in_a_turn_however_they_are_rounded():
+    """Just below nothing is nothing, no whole turn: one place with those that are."""
+    for just_below in (-1e-17, -1e-14, 360.0 - 1e-13, 720.0):
+        found = distinct_positions(run_at([just_below, 90.0, 180.0, 270.0]))
+        assert found.turns[0] == 0.0
+        assert found.turns.max() < 1.0
+        np.testing.assert_allclose(found.turns[found.index], [0.0, 0.25, 0.5, 0.75], atol=1e-9)
+
+
+@pytest.mark.parametrize(("width", "clear", "merged"), [
+    (0.020, 5.1, True), (0.020, 4.9, False), (0.027, 9.0, True), (0.029, 9.0, False),
+])  # fmt: skip
+def test_places_that_stand_clear_are_met_again_within_what_an_order_tells(width, clear, merged):
+    """Five times as far apart as each is wide, up to 0.2 radians of order 404: 0.0284 degrees."""
+    first = 40.0 + np.arange(8) * width * (1.0 + clear)
+    found = distinct_positions(run_at(np.concatenate([first, first + width])))
+    assert len(found) == (8 if merged else 16)

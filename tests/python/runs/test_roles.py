@@ -142,6 +142,9 @@ def test_deviations_of_facets_are_added_where_they_lie(mounts, tmp_path):
     assert np.hypot(*np.subtract(each_door(path, tmp_path), (0.0, 20.0))) > 0.01
     order = np.random.default_rng(3).permutation(12)  # in any order, by any turn
     polygon(tmp_path, mounts, FACETS[order] - 360.0, DEVIATIONS[order])
+    # The mount stays what a run knows of itself.
+    runs = ta.read_runs(path, facets=tmp_path / "facets.csv")
+    assert [set(run.mount) for run in runs] == [{mount} for mount in mounts]
     again = each_door(path, tmp_path, facets=tmp_path / "facets.csv")
     np.testing.assert_allclose(again, found, atol=1e-9)
 
@@ -298,6 +301,8 @@ def test_days_of_tables_in_memory(kind):
         table = pytest.importorskip("pandas").DataFrame(table)
     runs = ta.read_runs(table)
     assert [(len(run), run.when[:10]) for run in runs] == [(15, "2026-11-21"), (21, "2026-11-22")]
+    # When the first of its readings was taken.
+    assert [np.datetime64(run.when[:19]) for run in runs] == [when[0], when[15]]
 
 
 def test_a_column_called_when_that_holds_no_dates(tmp_path):

@@ -137,6 +137,21 @@ def test_rows_with_an_empty_cell_are_counted_left_out_and_said(tmp_path):
         first, second = ta.read_runs(path)
     assert [first.left_out, second.left_out] == [1, 0]
     assert first.columns["note"].tolist() == ["x"]
+    # Of several the first.
+    path = written(tmp_path, f"{GOOD}b,,0.5,1,z\nb,20,20.5,,z\n")
+    told = r"2 of 5 rows have an empty cell and are left out, the first at line 5, .*reference_deg"
+    with pytest.warns(EmptyCellsWarning, match=told):
+        assert [run.left_out for run in ta.read_runs(path)] == [0, 2]
+
+
+def test_entries_of_a_turn_stand_at_even_places():
+    """Entry i of n at i/n of a turn, whether those before it hold a number or not."""
+    table = {"entry_deg": [0.5, 90.5, None, 270.5]}
+    with pytest.warns(EmptyCellsWarning, match="1 of 4 rows has an empty cell and is left out"):
+        (run,) = ta.read_runs(table)
+    np.testing.assert_array_equal(run.reference, [0.0, 90.0, 270.0])
+    np.testing.assert_array_equal(run.indicated, [0.5, 90.5, 270.5])
+    assert (run.period, run.left_out) == (360.0, 1)
 
 
 NUMBERS = ["1_0", "\u0661", "0x10", "1,5", "1e", "--1", "True", "\x00", "1\u00b2"]
@@ -187,3 +202,22 @@ def test_of_columns_that_appear_twice_that_one_is_named(doubled, tmp_path):
     path = written(tmp_path, "\n".join(lines) + "\n")
     with pytest.raises(FileError, match=rf"{doubled}.*appears twice"):
         ta.read_runs(path)
+
+
+@pytest.mark.parametrize(
+    ("times", "told"),
+    [
+        ((5, 1, 5, 1, 6, 2), None),  # stamps that repeat, and runs that overlap
+        ((5, 1, 6, 2, 5.5, 1.5), r"line 6, column 'time_s': .*: 5.5 after 6;"),
+        ((5, 3, 6, 2, 7, 1), r"line 5, column 'time_s': .*: 2 after 3;"),  # the first of two
+    ],
+)
+def test_time_of_each_run_may_stand_still_but_not_run_back(tmp_path, times, told):
+    rows = [f"{'ab'[i % 2]},{10 * i},{10 * i}.5,{t}" for i, t in enumerate(times)]
+    path = written(tmp_path, "\n".join(["run,reference_deg,indicated_deg,time_s", *rows]))
+    if told is not None:
+        with pytest.raises(FileError, match=told):
+            ta.read_runs(path)
+        return
+    for run, k in zip(ta.read_runs(path), (0, 1), strict=True):
+        np.testing.assert_array_equal(run.time, times[k::2])

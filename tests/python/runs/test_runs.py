@@ -43,6 +43,10 @@ def test_wrapped_angles_differ_by_whole_turns_and_lie_in_one(period):
         ({"time": -THETA}, r"time must not decrease.*time\[1\] = -10 after"),
         ({"temperature": [1.0, 2.0]}, "temperature has 2"),
         ({"weights": np.where(THETA == 50.0, -1.0, 1.0)}, r"weights\[5\]"),
+        # The first of several.
+        ({"weights": np.where(THETA < 50.0, 1.0, -THETA)}, r"weights\[5\] .* got -50"),
+        ({"time": np.abs(THETA - 50.0)}, r"time\[1\] = 40 after 50"),
+        ({"reference": np.where(THETA < 50.0, THETA, np.inf)}, r"reference\[5\] is inf"),
     ],
 )
 def test_bad_arguments_are_named(change, message):
@@ -149,3 +153,27 @@ def test_further_signals_are_of_one_container():
 def test_signals_that_are_none(signals, message):
     with pytest.raises(ArgumentError, match=message):
         ta.CalibrationRun(THETA, THETA, period=360.0, signals=signals)
+
+
+def test_readings_before_the_first_motion_belong_to_it():
+    reference = [350.0, 350.0, 345.0, 345.0, 350.0]
+    run = ta.CalibrationRun(reference, reference, 360.0)
+    np.testing.assert_array_equal(run.direction, [-1, -1, -1, -1, 1])
+    still = ta.CalibrationRun([5.0, 5.0], [5.0, 5.0], 360.0, time=[0.0, 2.0])
+    np.testing.assert_array_equal(still.direction, [0, 0])
+    moved = ta.CalibrationRun([5.0, 15.0], [5.0, 15.0], 360.0, time=[0.0, 2.0])
+    np.testing.assert_array_equal(moved.speed, [5.0, 5.0])
+
+
+@pytest.mark.parametrize("zero", [100.0, -179.9, 0.0])
+def test_a_centred_error_is_the_error_but_for_whole_turns(zero):
+    run = ta.CalibrationRun(THETA, np.mod(THETA + zero + np.sin(THETA), 360.0), period=360.0)
+    turns = (run.centred_error - run.error) / 360.0
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-12)
+    assert abs(run.centred_error - run.zero).max() < 2.0
+
+
+def test_heads_stand_in_the_order_of_their_numbers():
+    names = {f"head{k}": THETA + k for k in (10, 2, 1)}
+    run = ta.CalibrationRun(THETA, THETA, period=360.0, signals=names)
+    assert list(run.heads) == ["head1", "head2", "head10"]

@@ -125,8 +125,16 @@ def test_the_speed_over_a_turn_holds_no_error_of_the_encoder(sign: float) -> Non
     speed = 2.0 * np.exp(-0.1 * time)
     found = segment(time, sign * (true + 0.02 * np.sin(true))).turn_speed()
     np.testing.assert_allclose(found, speed, rtol=0.01)
+    # Beyond the middle of the first and the last turn as it changes there, not elsewhere.
+    even = segment(time, sign * TURN * (2.0 * time - 0.05 * time**2)).turn_speed()
+    np.testing.assert_allclose(even, 2.0 - 0.1 * time, rtol=3e-3)
     short = segment(time, sign * np.linspace(0.0, 1.2 * TURN, 4000))
     np.testing.assert_allclose(short.turn_speed(), 0.12)
+    # Up to a turn and a quarter the mean, however the speed changes; beyond it, not.
+    for turns, even in ((0.9, True), (1.24, True), (1.26, False)):
+        found = segment(time, sign * TURN * turns * (time / 10.0) ** 2).turn_speed()
+        assert (np.ptp(found) == 0.0) == even
+        assert not even or found[0] == pytest.approx(turns / 10.0)
 
 
 def test_the_lead_of_ripple_is_that_of_its_friction() -> None:

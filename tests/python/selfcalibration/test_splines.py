@@ -243,3 +243,27 @@ def test_grids_end_where_they_would_be_too_coarse() -> None:
     assert stiff.level == 1
     assert stiff.stiffness == pytest.approx(140.0 / 12.0 * 1e7)
     assert search.best(shortest=0.9).level == 1
+
+
+def test_motion_takes_a_tenth_of_a_wave_where_it_is_said_to_end() -> None:
+    """By fitting that wave; and never below what a log shows, nor beyond what knots follow."""
+    knots, t = Knots((0.0,), (160,), 0.5), np.linspace(0.0, 80.0, 1601)
+    index, place = knots.place(0, t)
+
+    def search(y: np.ndarray) -> MotionSearch:
+        def none(part: slice, out: np.ndarray) -> None:
+            pass
+
+        sums = ordered_motion_sums(knots, index, place, y, np.ones(t.size), none, 0, None)
+        return MotionSearch(sums, np.zeros(knots.size), (), (0,))
+
+    for stiffness in (3e4, 3e3):
+        fastest = search(t).fit(0, stiffness, 1e6).fastest
+        wave = np.cos(2.0 * math.pi * fastest * (t - 40.0))
+        spline = search(wave).fit(0, stiffness, 1e6).coefficients
+        inner = np.abs(t - 40.0) < 2.0 / fastest
+        motion = spline_values(spline, index, spline_basis(place))
+        taken = motion[inner] @ wave[inner] / (wave[inner] @ wave[inner])
+        assert taken == pytest.approx(1.0 / 11.0, rel=0.05)
+    assert search(t).fit(0, 1e9, 1e6).fastest == pytest.approx(4.0 / 80.0)
+    assert search(t).fit(0, 1e-3, 1e6).fastest == 1.0

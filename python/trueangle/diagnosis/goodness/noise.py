@@ -93,9 +93,8 @@ def estimate_noise(left: Leftover) -> Noise:
     bounds = _some(left.bounds)
     stop = bounds[-1][1]
     e = left.residual[:stop]
-    spread = 1.4826 * float(np.median(np.abs(e - np.median(e))))
     # Wild readings would hide a correlation; what is slow keeps its size.
-    e = _without_spikes(e, max(spread, 1e-300), bounds)
+    e = _without_spikes(e, bounds)
     columns = left.kept.get("pattern")
     if columns is None:
         pattern = _centred(_pattern(left, stop, len(bounds)), bounds)
@@ -145,7 +144,7 @@ def _some(bounds: list[tuple[int, int]]) -> list[tuple[int, int]]:
     return kept
 
 
-def _without_spikes(e: Array, spread: float, bounds: list[tuple[int, int]]) -> Array:
+def _without_spikes(e: Array, bounds: list[tuple[int, int]]) -> Array:
     """Readings far from the mean of their neighbours in the run put back to it."""
     if e.size < 3:
         return e
@@ -159,7 +158,7 @@ def _without_spikes(e: Array, spread: float, bounds: list[tuple[int, int]]) -> A
     after[last] = e[np.maximum(last - 1, first)]
     beside = 0.5 * (before + after)
     away = e - beside
-    limit = CLIP * max(1.4826 * float(np.median(np.abs(away))), 1e-12 * spread)
+    limit = CLIP * 1.4826 * float(np.median(np.abs(away)))
     return np.where(np.abs(away) > limit, beside + np.clip(away, -limit, limit), e)
 
 

@@ -80,7 +80,7 @@ def ratio_suggestion(ratio: float | None) -> str:
                 return name + sign
     for denominator in DENOMINATORS:
         best = Fraction(round(size * denominator), denominator)
-        if best > 0 and abs(float(best) / size - 1.0) < RATIONAL:
+        if abs(float(best) - size) < RATIONAL * size:
             return f"a gear of ratio {best} between the two that is not reduced{sign}"
     return f"the indicated angle moves {size:.4g} times as far as the reference{sign}"
 

@@ -44,6 +44,8 @@ def record(reference: np.ndarray, indicated: np.ndarray | None = None, label: st
         (1.16, "the indicated angle moves 1.16 times as far"),
         (2.0 * 1.0019, "a gear of ratio 2 between"),
         (0.0123, "the indicated angle moves 0.0123 times as far"),
+        (1.0021 / 2.0, "the indicated angle moves 0.501 times as far"),
+        (1.0019 / 2.0, "a gear of ratio 1/2 between"),
     ],
 )
 def test_what_a_ratio_suggests(size: float, says: str, sign: float) -> None:
@@ -53,6 +55,8 @@ def test_what_a_ratio_suggests(size: float, says: str, sign: float) -> None:
     assert found.startswith("a gear of ratio" if "70/11" in says else says.format(way))
     assert near or ("other way" in found) == (sign < 0)
     assert ratio_suggestion(None) == "the joint hardly moved"
+    # An angle that stands still has no ratio of teeth.
+    assert ratio_suggestion(0.0) == "the indicated angle moves 0 times as far as the reference"
 
 
 def test_the_ratio_is_the_median_of_the_runs() -> None:
