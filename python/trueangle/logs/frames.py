@@ -246,7 +246,7 @@ def _from_dask_frame(dd: Any, data: Any, settings: LogSettings) -> Any:
         raise ArgumentError(_OUT_OF_ORDER.format("a Dask DataFrame", "correct its files instead"))
     import pandas as pd
 
-    meta = _from_pandas(pd, data._meta_nonempty, settings).iloc[:0]
+    meta = _from_pandas(pd, data._meta_nonempty, settings)
     return data.map_partitions(_partition, settings, meta=meta)
 
 

@@ -135,6 +135,7 @@ def test_dask_frames_stay_lazy_and_give_the_same_numbers(model):
     lazy = ta.correct(frame, model)
     assert isinstance(lazy, dd.DataFrame)
     assert lazy["corrected_deg"].dtype == np.float64
+    assert len(lazy._meta) == 0
     found = lazy.compute(scheduler="threads")["corrected_deg"]
     np.testing.assert_array_equal(found, model.correct(ANGLES))
     with pytest.raises(ArgumentError, match="rows in their order"):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.errors import ArgumentError
 from trueangle.fitting.orders.select import select_orders
 
 SEED = 49_300
@@ -79,3 +80,15 @@ def test_all_that_the_paper_tells_is_the_same_in_every_unit(unit):
         error = runs[-1].centred_error
         assert told == pytest.approx(np.ptp(error) / period * 1_296_000.0, abs=0.006)
     np.testing.assert_allclose(tables[1], tables[0], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_the_paper_takes_three_runs_two_to_compare_and_one_held_out(count: int) -> None:
+    rng = np.random.default_rng(SEED)
+    print("seed", SEED)
+    runs = groups(rng, 3, 1.0)[:count]
+    if count < 3:
+        with pytest.raises(ArgumentError, match=f"three or more, got {count}"):
+            select_orders(runs, range(1, 6), method="paper")
+    else:
+        assert select_orders(runs, range(1, 6), method="paper").runs == 3

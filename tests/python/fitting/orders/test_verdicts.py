@@ -123,3 +123,15 @@ def test_the_summary_lists_the_strongest_of_those_rejected() -> None:
     )
     assert len(shown) == 8
     assert shown == {row.order for row in others[:8]}
+
+
+@pytest.mark.parametrize("seed", range(1, 13))
+def test_a_refusal_tells_the_chance_of_its_strongest_order(seed: int) -> None:
+    """In percent of the whole search, to the digits that are shown, and how many were searched."""
+    print("seed", seed)
+    found = ta.select_orders(runs_of(noise(seed, 6, THETA.size)))
+    best = min(found.table, key=lambda row: row.log10_false_alarm)
+    said = re.search(r"of (\d+) orders searched, (\d+), .* in ([\d.]+) % of such", found.reason)
+    assert said is not None
+    assert (int(said[1]), int(said[2])) == (len(found.table), best.order)
+    assert float(said[3]) == float(f"{100.0 * 10.0**best.log10_false_alarm:.2g}")
