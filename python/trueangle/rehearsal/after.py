@@ -144,10 +144,16 @@ def _rehearsed(
             trial.counted(plan, k, entry, to_the_end=full) for k, entry in enumerate(plan.between)
         )
         plan = replace(plan, between=entries)
-        failed = any(e.trials and (e.chance_named or 0.0) < WANTED for e in entries)
-        if not failed or full or current_deadline().over:
+        failed = [bool(e.trials) and (e.chance_named or 0.0) < WANTED for e in entries]
+        if not any(failed) or full or current_deadline().over:
             untried = any(e.seen and e.told and not e.trials for e in entries)
-            return replace(plan, notes=(*plan.notes, UNTRIED)) if untried else plan
+            # What trials name too seldom these runs do not tell, whatever was expected of them.
+            told = (
+                replace(e, told=False) if short else e
+                for e, short in zip(entries, failed, strict=True)
+            )
+            notes = (*plan.notes, UNTRIED) if untried else plan.notes
+            return replace(plan, between=tuple(told), notes=notes)
         plan = plan.with_readings(
             [min(math.ceil(MORE * design.samples), most) for design in plan.runs]
         )

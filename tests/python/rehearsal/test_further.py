@@ -176,6 +176,8 @@ def test_readings_grow_to_the_most_and_are_counted_to_the_end(
     grown = [(20, 33), (30, 40), (40, 40)]
     assert calls == [(k, n, n == (40, 40)) for n in grown for k in (0, 1)]
     assert tuple(design.samples for design in plan.runs) == (40, 40)
+    # What is named too seldom with all the readings that there may be is not told.
+    assert [(e.told, e.chance_named) for e in plan.between] == [(False, 0.0), (True, 1.0)]
 
 
 def test_readings_do_not_grow_once_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -183,6 +185,7 @@ def test_readings_do_not_grow_once_time_is_up(monkeypatch: pytest.MonkeyPatch) -
     plan, calls = rehearsed(monkeypatch, lambda k, n: 0.0, 40, clock=lambda: next(times))
     assert plan.runs == DESIGNS
     assert len(calls) == 2
+    assert not any(entry.told for entry in plan.between)
 
 
 @pytest.mark.parametrize("missing", [None, 0, 1])
