@@ -153,8 +153,8 @@ class OrderNoise:
         low, high = np.interp([_SLOWEST, 2.0 * _SLOWEST], self.sums.orders, noise.variance)
         return bool(low < _SLOWER * high)
 
-    def settle(self, lines: Sequence[int], forced: Collection[int]) -> NoiseSpectrum:
-        """The noise beside these orders, of which those that noise makes often are none after all.
+    def settle(self, lines: Sequence[int], forced: Collection[int]) -> None:
+        """Ask the orders beside these; those of them that noise makes often are no lines after all.
 
         They tell the noise as others do. The ``forced`` ones are lines in any case.
         """
@@ -165,4 +165,4 @@ class OrderNoise:
             far = test.log_p < math.log(_OFTEN)
             lines = [i for i, out in zip(lines, far, strict=True) if out or i in forced]
             if len(lines) == len(self.lines):
-                return noise
+                return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -23,6 +24,9 @@ _BLOCKS: Final = 24
 #: than this part of a turn, or the readings are not in the order of the places.
 _HALF: Final = 0.5
 _STEP: Final = 0.125
+
+#: Passes of a run, at most about.
+_PASSES: Final = 32
 
 #: Readings a run up to which the call of a function costs more than what it computes.
 _SHORT: Final = 1000
@@ -47,8 +51,8 @@ class ZeroGroupReadings(NamedTuple):
     weights: Array
     label: str
 
-    def part(self, mask: NDArray[np.bool_], label: str) -> ZeroGroupReadings:
-        """The readings where ``mask`` is true."""
+    def part(self, mask: NDArray[np.bool_] | slice, label: str) -> ZeroGroupReadings:
+        """The readings where ``mask`` is true, or of a slice."""
         return ZeroGroupReadings(self.turns[mask], self.error[mask], self.weights[mask], label)
 
 
@@ -107,6 +111,8 @@ def folds_of_run(unit: ZeroGroupReadings, positions: Positions) -> list[ZeroGrou
 def passes_of_run(unit: ZeroGroupReadings, path: Array) -> list[ZeroGroupReadings]:
     """Whole turns that a run took one after the other, to and fro too; none where it took one.
 
+    Of more than 32 as many are taken together.
+
     ``path`` are the angles of its readings in turns, in the order they were read. Where readings
     are left out between them a new pass begins.
     """
@@ -119,11 +125,12 @@ def passes_of_run(unit: ZeroGroupReadings, path: Array) -> list[ZeroGroupReading
     way = np.concatenate([[0.0], np.cumsum(steps)])
     part = np.concatenate([[0], np.cumsum(far)])
     starts = way[np.searchsorted(part, np.arange(part[-1] + 1))]
-    number = np.floor(way - starts[part] + _HALF / path.size).astype(np.intp)
-    label = part * (number.max() + 1) + number
+    # Of many turns several are taken together.
+    turns = max(1.0, math.ceil(way[-1] / _PASSES))
+    number = np.floor((way - starts[part] + _HALF / path.size) / turns)
+    first = np.flatnonzero(np.concatenate([[True], (np.diff(number) != 0.0) | far]))
     found: list[ZeroGroupReadings] = []
-    for k in np.unique(label):
-        mask = label == k
-        if np.ptp(way[mask]) >= _HALF:
-            found.append(unit.part(mask, f"pass {len(found) + 1}"))
+    for begin, end in pairwise([*first.tolist(), path.size]):
+        if way[end - 1] - way[begin] >= _HALF:
+            found.append(unit.part(slice(begin, end), f"pass {len(found) + 1}"))
     return found if len(found) > 1 else []

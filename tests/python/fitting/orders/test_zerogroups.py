@@ -40,6 +40,13 @@ def test_half_a_turn_at_the_end_is_a_pass_and_less_is_none(readings: int, sizes:
     assert [part.size for part in passes(np.arange(readings) / 40.0)] == sizes
 
 
+@pytest.mark.parametrize(("turns", "each"), [(32, 1), (33, 2), (65, 3), (640, 20)])
+def test_of_many_turns_as_many_are_taken_together(turns: int, each: int) -> None:
+    found = passes(np.arange(40 * turns) / 40.0)
+    assert {part.size for part in found[:-1]} == {40 * each}
+    assert sum(part.size for part in found) == 40 * turns
+
+
 def test_places_in_any_order_are_no_passes() -> None:
     rng = np.random.default_rng(3)
     assert passes(rng.permutation(np.tile(TURN, 5))) == []
