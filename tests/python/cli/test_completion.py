@@ -1,5 +1,6 @@
 """Completion of commands and options, asked of the shells themselves."""
 
+import math
 import os
 import pty
 import select
@@ -150,7 +151,7 @@ def test_a_command_that_is_called_alone_has_its_arguments():
 @pytest.mark.parametrize("command", [["--help"], ["fit", "runs.csv"]])
 def test_small_work_starts_without_what_it_does_not_need(command, tmp_path):
     """No package is imported that takes longer to start than such a command runs."""
-    rows = "".join(f"{x},{x + 0.1 * (x % 7)}\n" for x in range(0, 360, 10))
+    rows = "".join(f"{x},{x + 0.1 * math.cos(math.radians(x))}\n" for x in range(0, 360, 10))
     (tmp_path / "runs.csv").write_text("reference_deg,indicated_deg\n" + rows)
     script = (
         "import sys\nfrom trueangle.cli import main\n"

@@ -100,7 +100,7 @@ def fit_shapes(basis: Array, values: Array, bend: Bend) -> tuple[Array, Array]:
     """
     scoring = np.linalg.pinv(basis)
     found = np.zeros((basis.shape[0], basis.shape[2]))
-    found[:, 0] = np.log(np.median(values, axis=1))
+    found[:, 0] = np.log(np.sort(values, axis=1)[:, values.shape[1] // 2])
     for _ in range(_STEPS):
         ratio = values * np.exp(-np.einsum("mkp,mp->mk", basis, found))
         step = np.einsum("mpk,mk->mp", scoring, np.minimum(ratio, bend.at) / bend.mean - 1.0)
