@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ..fitting.orders.result import OrderSelection
-from ..fitting.orders.selection import FALSE_ALARM
 from ..fitting.orders.table import OrderRow
 from ..support.angles import ARCSEC_PER_TURN
-from ..support.arrays import Array
 from ..support.display_units import ErrorUnit, significant_digits
 from .curves import CONFIDENCE
 
@@ -54,7 +52,8 @@ def order_lines(result: OrderSelection | FitResult) -> list[OrderLine]:
     selection = result if isinstance(result, OrderSelection) else result.selection
     if selection is not None:
         factor = ARCSEC_PER_TURN / selection.period
-        limits = np.nan_to_num(factor * significance_amplitudes(selection), posinf=0.0)
+        needed = np.array([row.needed for row in selection.table])
+        limits = np.nan_to_num(factor * needed, posinf=0.0)
         return [
             OrderLine(
                 float(row.order), factor * row.amplitude, 0.0, float(limit), row.retained, row
@@ -91,28 +90,6 @@ def largest_orders_text(lines: Sequence[OrderLine], unit: ErrorUnit) -> str:
     ]
     more = f" and {len(kept) - _TOLD} smaller ones" if len(kept) > _TOLD else ""
     return (", ".join(told) or "none") + more
-
-
-def significance_amplitudes(selection: OrderSelection) -> Array:
-    """Amplitude at which each order of the table would just be significant.
-
-    ::
-
-        C = C_k √(T / T_k),    (1 + T/v)^(-v/2) = α / K
-
-    with the order's amplitude and statistic, v degrees of freedom of the noise and the chance
-    alpha of a false alarm shared by the K orders of the table. Orders found by a wider scan
-    had to pass more.
-    """
-    v = float(selection.noise.degrees_of_freedom)
-    log_share = math.log(max(1, len(selection.table)) / FALSE_ALARM)
-    needed = v * math.expm1(2.0 / v * log_share) if v > 0.0 else math.nan
-    return np.array(
-        [
-            row.amplitude * math.sqrt(needed / row.statistic) if row.statistic > 0.0 else math.nan
-            for row in selection.table
-        ]
-    )
 
 
 def likely_aliases(row: OrderRow) -> tuple[float, ...]:

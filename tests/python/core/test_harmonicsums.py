@@ -5,14 +5,10 @@ import pytest
 
 import trueangle as ta
 from trueangle.fitting.orders import harmonicsums, noise
-from trueangle.fitting.orders.evidence import (
-    choose_forward,
-    examine_orders,
-    fit_chosen_orders,
-    held_out_gains,
-)
+from trueangle.fitting.orders.evidence import choose_forward, fit_chosen_orders, held_out_gains
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
 from trueangle.fitting.orders.noisespectrum import NoiseSpectrum, log_chance
+from trueangle.fitting.orders.significance import examine_orders
 from trueangle.fitting.orders.zerogroups import ZeroGroupReadings, zero_groups
 from trueangle.runs.aliasing import distinct_positions
 

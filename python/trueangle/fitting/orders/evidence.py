@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +28,6 @@ COLLINEAR: Final = 1e-8
 
 #: Least degrees of freedom that a residual must keep.
 _LEAST_DOF: Final = 3
-
-
-#: Scatter between runs counts as an order's own where chance makes it rarer than this.
-OVERDISPERSED: Final = 1e-3
 
 
 def log_chi_squared_tail(x: Array, dof: int) -> Array:
@@ -123,90 +119,6 @@ def fit_chosen_orders(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array,
     inverse = pseudo_inverse(gram[columns[:, None], columns])
     coefficients = inverse @ rhs[columns]
     return coefficients, inverse, max(0.0, squares - float(rhs[columns] @ coefficients))
-
-
-class OrderTest(NamedTuple):
-    """Statistics of orders beside the chosen ones (or among them).
-
-    Arrays have one entry per order asked for; ``cosine``/``sine`` are the coefficients
-    with all chosen orders in the model.
-    """
-
-    cosine: Array
-    sine: Array
-    variance: Array
-    statistic: Array
-    log_p: Array
-
-
-def examine_orders(
-    sums: HarmonicSums,
-    chosen: Sequence[int],
-    orders: Sequence[int],
-    noise: NoiseSpectrum,
-    scatter: Array | None,
-    each: int = 1,
-) -> OrderTest:
-    """Significance of ``orders``, each beside the other chosen ones.
-
-    ``noise`` is that of these orders; ``scatter`` (from `run_scatter`), of so many degrees of
-    freedom ``each``, replaces it for an order where it is more.
-    """
-    total, rhs, _ = sums.total()
-    n = len(orders)
-    # Of orders that are aliases of the chosen ones nothing is known.
-    cosine, sine, of_one = np.full((3, n), math.nan)
-    gain = np.zeros(n)
-    level, own = noise.variance, np.zeros(n, dtype=bool)
-    if scatter is not None:
-        ratio = np.maximum(scatter, 0.0) / level * each
-        own = np.isfinite(scatter) & (log_chi_squared_tail(ratio, each) < math.log(OVERDISPERSED))
-        np.copyto(level, scatter, where=own)
-    position = {k: i for i, k in enumerate(chosen)}
-    coefficients, inverse, _ = fit_chosen_orders(sums, chosen)
-    base = sums.columns(chosen)
-    size = len(chosen)
-    outside = [k for k in orders if k not in position]
-    if outside:
-        other = sums.columns(outside)
-        cross = total[np.ix_(base, other)]
-        slope = inverse @ cross
-        blocks = total[np.ix_(other, other)] - cross.T @ slope
-        scores = rhs[other] - cross.T @ coefficients
-    # Those among the chosen ones, and those that would join them.
-    mine = np.array([i for i, k in enumerate(orders) if k in position], dtype=np.intp)
-    others = np.array([i for i, k in enumerate(orders) if k not in position], dtype=np.intp)
-    if mine.size:
-        place = np.array([position[orders[i]] for i in mine])
-        pair = np.stack([place, place + size], axis=1)
-        inverses = inverse[pair[:, :, None], pair[:, None, :]]
-        value = coefficients[pair]
-        gain[mine] = np.einsum("ki,kij,kj->k", value, np.linalg.pinv(inverses), value)
-        cosine[mine], sine[mine] = value.T
-        of_one[mine] = 0.5 * np.trace(inverses, axis1=1, axis2=2)
-    if others.size:
-        pair = np.stack([np.arange(others.size), np.arange(others.size) + others.size], axis=1)
-        block = blocks[pair[:, :, None], pair[:, None, :]]
-        energy = total.diagonal()[other][pair].sum(axis=1)
-        # Where orders nearly cancel, rounding leaves no symmetric block, and its inverse no
-        # positive variances: those of its symmetric part are.
-        values, vectors = np.linalg.eigh(0.5 * (block + block.transpose(0, 2, 1)))
-        told = values[:, 0] > COLLINEAR * energy
-        others, score, vectors = others[told], scores[pair][told], vectors[told]
-        inverses = (vectors / values[told][:, None, :]) @ vectors.transpose(0, 2, 1)
-        value = np.einsum("kij,kj->ki", inverses, score)
-        gain[others] = np.einsum("ki,ki->k", value, score)
-        cosine[others], sine[others] = value.T
-        of_one[others] = 0.5 * np.trace(inverses, axis1=1, axis2=2)
-    variance = level * of_one
-    # Of orders that nearly are each other rounding leaves nothing, or less.
-    variance = np.maximum(variance, 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        statistic = np.where(level > 0.0, gain / level, math.inf)
-    statistic[np.isnan(cosine)] = 0.0
-    gain[np.isnan(cosine)] = 0.0
-    log_p = np.where(own, log_chance(statistic, each), noise.log_chance(gain))
-    return OrderTest(cosine, sine, variance, statistic, log_p)
 
 
 def held_out_gains(

@@ -10,10 +10,11 @@ import numpy as np
 
 from ...support.arrays import Array
 from ..uncertainty import CovarianceKind
-from .evidence import examine_orders, fit_chosen_orders
+from .evidence import fit_chosen_orders
 from .harmonicsums import HarmonicSums
 from .noise import ReadingVariance, remaining_scatter, run_scatter
 from .noisespectrum import NoiseSpectrum, noise_spectrum
+from .significance import examine_orders
 
 #: Rounding of a sum.
 _EPSILON = float(np.finfo(np.float64).eps)

@@ -25,6 +25,7 @@ from .noise import ReadingVariance
 from .noisespectrum import log_chance
 from .phases import circular_range_deg
 from .result import OrderSelection
+from .search import FALSE_ALARM
 from .table import OrderRow
 from .verdicts import row_with_verdict, selection_notes
 from .zerogroups import ZeroGroupReadings, zero_groups
@@ -123,7 +124,7 @@ def select_by_paper(
     retained = [orders[n] for n in np.flatnonzero(kept)]
     alike = find_lookalikes(units, placed, retained, noise.variance, candidates.highest_alias)
     aliases = dict(zip(retained, alike, strict=True))
-    rows = []
+    rows, share = [], math.log(len(orders) / FALSE_ALARM)
     for n, k in enumerate(orders):
         t = float(amplitude[n] ** 2 / scatter[n]) if scatter[n] > 0.0 else math.inf
         chance = (float(log_chance(t, dof)) + math.log(len(orders))) / math.log(10.0)
@@ -140,6 +141,7 @@ def select_by_paper(
             holdout_gain=float(gains[n]),
             phase_spread_deg=float(spread[n]),
             aliases=tuple(aliases.get(k, ())),
+            needed=math.sqrt(float(scatter[n]) * dof * math.expm1(2.0 / dof * share)),
         )
         rows.append(row)
     amplitudes = {row.order: row.amplitude for row in rows if row.retained}

@@ -14,11 +14,12 @@ import numpy as np
 
 from ...model.validity import greatest_slope
 from ...support.arrays import Array
-from .evidence import OrderTest, choose_forward, examine_orders, fit_chosen_orders, held_out_gains
+from .evidence import choose_forward, fit_chosen_orders, held_out_gains
 from .harmonicsums import HarmonicSums
 from .noise import ReadingVariance
 from .noisespectrum import NoiseSpectrum
 from .ordernoise import DOUBTED, OrderNoise
+from .significance import OrderTest, examine_orders
 
 #: Chance, over the whole search, that noise alone makes any order significant. Half of
 #: the 1 % promised: the rest covers what the noise estimate itself does not know.

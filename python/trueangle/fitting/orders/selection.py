@@ -146,6 +146,7 @@ class EvidenceSelection(EvidenceSearch):
     ) -> OrderSelection:
         shown = sorted({*chosen, *dropped, *self.candidates.main_indices})
         test = self.examined(chosen, shown)
+        needed = test.needed(self.limits[shown])
         gains, model = self.gains_and_model(chosen, shown)
         phases = unit_phases(self.sums, chosen, shown)
         verdicts = {**dict.fromkeys(chosen, "retained"), **dict.fromkeys(self.forced, "reference")}
@@ -168,6 +169,7 @@ class EvidenceSelection(EvidenceSearch):
                     holdout_gain=float(gains[n]),
                     phase_spread_deg=circular_range_deg(phases[:, n]),
                     aliases=tuple(lookalikes.get(i, ())),
+                    needed=float(needed[n]) if usable else math.nan,
                 )
             )
         retained = {row.order: row.amplitude for row in rows if row.retained}

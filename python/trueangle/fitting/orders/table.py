@@ -54,6 +54,9 @@ class OrderRow:
         candidate too.
     phase_std : float
         Standard error of the phase in radians where a fit tells it, else NaN.
+    needed : float
+        Amplitude from which it would be significant in the whole search, at the phase that it has;
+        NaN where the readings do not tell it.
     """
 
     order: float
@@ -71,6 +74,7 @@ class OrderRow:
     reason: str = ""
     doubtful: bool = False
     phase_std: float = math.nan
+    needed: float = math.nan
 
     @property
     def amplitude(self) -> float:

@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fitting.orders.evidence import (
-    choose_forward,
-    examine_orders,
-    fit_chosen_orders,
-)
+from trueangle.fitting.orders.evidence import choose_forward, fit_chosen_orders
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
 from trueangle.fitting.orders.noise import remaining_scatter, run_scatter
 from trueangle.fitting.orders.noisespectrum import NoiseSpectrum, log_chance
+from trueangle.fitting.orders.significance import examine_orders
 from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 SIGMA = 0.3

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fitting.orders.evidence import examine_orders
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
 from trueangle.fitting.orders.noisespectrum import NoiseSpectrum
+from trueangle.fitting.orders.significance import examine_orders
 from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 ORDERS = [*range(1, 18), 225.0, 450.0, 675.0, 900.0]
