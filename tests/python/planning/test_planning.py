@@ -204,3 +204,14 @@ def test_mounts_without_a_gear_tell_what_one_of_them_takes_for_one(positions, mo
 
 def test_more_mounts_than_facets_are_planned():
     assert len(plan_mounts(None, 3, 6).facet_shifts) == 6
+
+
+@pytest.mark.parametrize(("ratio", "hidden"), [(36.0, [36, 72]), (100.0, [])])
+def test_orders_that_vanish_in_the_zero_of_each_mount_are_noted(
+    ratio: float, hidden: list[int]
+) -> None:
+    """Multiples of the positions are the same at each of them."""
+    notes = [note for note in plan_mounts(ratio, 36, 3).notes if "vanish" in note]
+    assert len(notes) == bool(hidden)
+    for order in hidden:
+        assert re.search(rf"\b{order}\b", notes[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import os
 import signal
 import subprocess
@@ -21,6 +22,7 @@ from trueangle.errors import ArgumentError
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
 from trueangle.support.deadline import (
     Deadline,
+    _clock_text,
     current_deadline,
     ending_early,
     under_deadline,
@@ -321,3 +323,14 @@ def test_within_of_the_command_line(files, capsys, monkeypatch):
     shown = capsys.readouterr()
     assert shown.out.startswith("INCOMPLETE: the 0.2 s given were up")
     assert shown.err == ""
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [(0.2, "1 s"), (59.0, "59 s"), (59.1, "1:00 min"), (60.0, "1:00 min"), (61.0, "1:01 min"),
+     (119.0, "1:59 min"), (119.5, "2:00 min"), (3725.0, "62:05 min")],
+)  # fmt: skip
+def test_what_is_left_is_told_in_minutes_and_seconds(seconds: float, said: str) -> None:
+    assert _clock_text(seconds) == said
+    minutes, _, rest = said.removesuffix(" min").removesuffix(" s").rpartition(":")
+    assert 60 * int(minutes or 0) + int(rest) == math.ceil(seconds)
