@@ -71,7 +71,7 @@ def check_follows(run: CalibrationRun) -> None:
     # than half a turn hide it, by what would make the differences agree.
     found = (
         text
-        for text, factor in _remedies().items()
+        for text, factor in _remedies(run.period).items()
         if (
             abs(factor * ratio - 1.0) < _NEAR
             if ratio is not None
@@ -112,12 +112,13 @@ def _warn_of_degrees(run: CalibrationRun, reference: Array, indicated: Array) ->
         )
 
 
-def _remedies() -> dict[str, float]:
+def _remedies(period: float) -> dict[str, float]:
     """What the indicated angle may be instead, with the factor that puts it right."""
     found = {"it runs backwards: change its sign": -1.0}
-    # A column is converted when it is read: its unit need not be that of the run. No two pairs
-    # have the same factor.
-    for column in _TURNS:
+    # A column is converted when it is read: its unit need not be that of the run, which
+    # is only the likeliest.
+    columns = sorted(_TURNS, key=lambda unit: not math.isclose(_TURNS[unit], period))
+    for column in columns:
         for unit, turn in _TURNS.items():
             if unit != column:
                 found[f"it looks like {unit} in a column of {column}"] = _TURNS[column] / turn
