@@ -43,6 +43,16 @@ _LEAST_ALIAS: Final = 404
 _SIDE_BANDS: Final = (-2, -1, 1, 2)
 
 
+def declared_cycles(gear_ratio: float | None, shafts: Mapping[str, float] | None) -> list[float]:
+    """Cycles per output turn of all shafts that were declared."""
+    return [*(shafts or {}).values(), *(() if gear_ratio is None else (gear_ratio,))]
+
+
+def are_whole(orders: Iterable[float]) -> bool:
+    """Whether all orders are whole."""
+    return all(float(k).is_integer() for k in orders)
+
+
 @dataclass(frozen=True)
 class Candidates:
     """Orders to look at.
@@ -93,13 +103,12 @@ class Candidates:
     @property
     def whole(self) -> bool:
         """Whether all orders are whole."""
-        return all(float(k).is_integer() for k in self.orders)
+        return are_whole(self.orders)
 
     @property
     def closed(self) -> bool:
         """Whether all shafts that were declared are back where they were after a turn."""
-        cycles = [*self.shafts.values(), *(() if self.gear_ratio is None else (self.gear_ratio,))]
-        return all(float(f).is_integer() for f in cycles)
+        return are_whole(declared_cycles(self.gear_ratio, self.shafts))
 
     @property
     def main_indices(self) -> list[int]:

@@ -18,7 +18,7 @@ from ...support.blas import one_blas_thread
 from ...support.suggestions import check_choice
 from ..argument import AnyArgument, choose_argument, run_at_indicated
 from ..uncertainty import CovarianceKind, check_covariance
-from .candidates import choose_candidates
+from .candidates import are_whole, choose_candidates, declared_cycles
 from .result import OrderSelection
 from .selection import EvidenceSelection
 
@@ -78,7 +78,7 @@ def selected_orders(
     # The ends of the travel are known of all readings.
     ends = [] if summed is None else [CalibrationRun(summed.ends, summed.ends, kept[0].period)]
     positions = distinct_positions([*kept, *ends], tolerance)
-    held_from, agree = held_orders(kept, _declared_cycles(gear_ratio, shafts))
+    held_from, agree = held_orders(kept, declared_cycles(gear_ratio, shafts))
     if agree and covariance == "auto":
         covariance = "hac"
     chosen = choose_candidates(
@@ -118,19 +118,13 @@ def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
     )
 
 
-def _declared_cycles(gear_ratio: float | None, shafts: Mapping[str, float] | None) -> list[float]:
-    """Cycles per output turn of all shafts that were declared."""
-    return [*(shafts or {}).values(), *(() if gear_ratio is None else (gear_ratio,))]
-
-
 def _travelled(
     runs: Sequence[CalibrationRun],
     gear_ratio: float | None,
     shafts: Mapping[str, float] | None,
 ) -> Array | None:
     """Angles of the readings in turns, whole turns kept; None where every order is whole."""
-    cycles = _declared_cycles(gear_ratio, shafts)
-    if all(float(f).is_integer() for f in cycles):
+    if are_whole(declared_cycles(gear_ratio, shafts)):
         return None
     turns = np.concatenate([over_turns(run).reference for run in runs]) / runs[0].period
     return np.asarray(turns[:: max(1, turns.size // _LOOKED_AT)])

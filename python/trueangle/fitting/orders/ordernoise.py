@@ -31,7 +31,7 @@ _SLOWEST: Final = 2.5
 _SLOWER: Final = 2.0
 
 #: Belief in white noise below which noise is one with a memory.
-DOUBTED: Final = 0.02
+LEAST_BELIEF: Final = 0.02
 
 #: Chance of noise near an order from which that order is part of it.
 _OFTEN: Final = 0.05
@@ -79,8 +79,8 @@ class OrderNoise:
         self.kind = covariance
         #: Orders that are no noise, where the others tell it.
         self.lines: list[int] = []
-        #: Whether real orders may be barred: the residual of the chosen ones holds them.
-        self.barring = False
+        #: Orders that may be real and are not chosen: the residual of the chosen ones holds them.
+        self.barred: list[int] = []
 
     @property
     def by_orders(self) -> bool:
@@ -99,7 +99,7 @@ class OrderNoise:
         Real orders that may not be retained disturb the others as noise does: the residual
         of the chosen ones holds them.
         """
-        if self.barring:
+        if self.barred:
             dof = max(1, self.free - 2 * len(chosen))
             return ReadingVariance(fit_chosen_orders(self.sums, chosen)[2] / dof, dof, "model")
         repeats = self.repeats
@@ -118,23 +118,22 @@ class OrderNoise:
         squares = fit_chosen_orders(self.sums, chosen)[2]
         return ReadingVariance(max(squares, rounding) / dof, dof, "model")
 
-    def white(self, chosen: Sequence[int]) -> NoiseSpectrum:
+    def white(self, noise: ReadingVariance) -> NoiseSpectrum:
         """That of a reading at every order."""
-        noise = self.of_reading(chosen)
         variance, freedom = noise.variance + self.rounding, float(noise.degrees_of_freedom)
         return NoiseSpectrum.flat(variance, freedom, self.sums.orders.size)
 
     def near(self, chosen: Sequence[int]) -> tuple[NoiseSpectrum, Array | None]:
         """Noise near each order, and each order's own scatter between runs."""
         if self.kind == "hac":
-            return self.beside({*self.lines, *chosen}) or self.white(chosen), None
+            return self.beside({*self.lines, *chosen}) or self.white(self.of_reading(chosen)), None
         if self.repeated is None or self.kind == "white":
-            return self.white(chosen), None
+            return self.white(self.of_reading(chosen)), None
         every = range(self.sums.orders.size)
         scatter = run_scatter(self.repeated, chosen, every) + self.rounding
         freedom = 2 * (self.repeated.units - 1)
         told = noise_spectrum(self.sums.orders, scatter, freedom, self.independent)
-        return told or self.white(chosen), scatter
+        return told or self.white(self.of_reading(chosen)), scatter
 
     @property
     def own_freedom(self) -> int:
@@ -149,7 +148,7 @@ class OrderNoise:
     def remembers(self, lines: Collection[int]) -> bool:
         """Whether orders that are no lines show that noise remembers, and forgets within a turn."""
         noise = self.beside(lines)
-        if noise is None or noise.white > DOUBTED:
+        if noise is None or noise.white > LEAST_BELIEF:
             return False
         low, high = np.interp([_SLOWEST, 2.0 * _SLOWEST], self.sums.orders, noise.variance)
         return bool(low < _SLOWER * high)

@@ -18,7 +18,7 @@ from .evidence import choose_forward, fit_chosen_orders, held_out_gains
 from .harmonicsums import HarmonicSums
 from .noise import ReadingVariance
 from .noisespectrum import NoiseSpectrum
-from .ordernoise import DOUBTED, OrderNoise
+from .ordernoise import LEAST_BELIEF, OrderNoise
 from .significance import OrderTest, examine_orders
 
 #: Chance, over the whole search, that noise alone makes any order significant. Half of
@@ -72,8 +72,6 @@ class EvidenceSearch:
         self.orders: list[float] = [int(m) if m == int(m) else m for m in self.sums.orders.tolist()]
         self.limits, self.period, self.folds = limits, period, folds
         self.forced = list(forced)
-        #: Orders too steep to be retained.
-        self.barred: list[int] = []
 
     def search(self) -> tuple[list[int], dict[int, str]]:
         """Places of the orders that stand, and the verdict on each that was dropped."""
@@ -85,7 +83,7 @@ class EvidenceSearch:
         found = self._search()
         if asked == "auto" and not noise.remembers(found[0]):
             return found
-        noise.kind, self.barred, noise.barring = "hac", [], False
+        noise.kind, noise.barred = "hac", []
         noise.settle(found[0], self.forced)
         return self._search()
 
@@ -96,7 +94,8 @@ class EvidenceSearch:
             steep = [i for i, verdict in dropped.items() if verdict == "too steep"]
             if not steep:
                 break
-            self.barred, self.noise_of_orders.barring = steep, True
+            # Orders too steep to be retained.
+            self.noise_of_orders.barred = steep
             again, others = self._backward(self._forward())
             dropped |= others
             if not any(verdict == "too steep" for verdict in others.values()):
@@ -119,17 +118,17 @@ class EvidenceSearch:
         noise = self.noise_of_orders
         if noise.kind == "hac":
             return self._taken(noise.near(())[0])
-        known = self.noise(()).source != "model"
-        chosen = self._taken(noise.white(()) if known else None)
+        common = self.noise(())
+        chosen = self._taken(None if common.source == "model" else noise.white(common))
         near, _ = noise.near(chosen)
-        if near.white > DOUBTED:
+        if near.white > LEAST_BELIEF:
             return chosen
         # Where there is less noise than on average weaker orders stand out.
         return [*chosen, *(i for i in self._taken(near) if i not in chosen)]
 
     def _taken(self, noise: NoiseSpectrum | None) -> list[int]:
-        free = self.noise_of_orders.free
-        return choose_forward(self.sums, self.limits, free, noise, self.forced, self.barred)
+        free, barred = self.noise_of_orders.free, self.noise_of_orders.barred
+        return choose_forward(self.sums, self.limits, free, noise, self.forced, barred)
 
     def _backward(self, chosen: list[int]) -> tuple[list[int], dict[int, str]]:
         """Drop, worst first, what does not stand beside the others."""

@@ -146,7 +146,7 @@ class EvidenceSelection(EvidenceSearch):
     ) -> OrderSelection:
         shown = sorted({*chosen, *dropped, *self.candidates.main_indices})
         test = self.examined(chosen, shown)
-        needed = test.needed(self.limits[shown])
+        log_p, needed = test.log_p, test.needed(self.limits[shown])
         gains, model = self.gains_and_model(chosen, shown)
         phases = unit_phases(self.sums, chosen, shown)
         verdicts = {**dict.fromkeys(chosen, "retained"), **dict.fromkeys(self.forced, "reference")}
@@ -154,7 +154,7 @@ class EvidenceSelection(EvidenceSearch):
         for n, i in enumerate(shown):
             usable = math.isfinite(test.cosine[n])
             verdict = verdicts.get(i) or dropped.get(i) or ("noise" if usable else "alias")
-            if verdict == "noise" and test.log_p[n] <= self.limits[i]:
+            if verdict == "noise" and log_p[n] <= self.limits[i]:
                 verdict = "no held-out gain" if not gains[n] > 0.0 else "weak"
             rows.append(
                 OrderRow(
@@ -165,7 +165,7 @@ class EvidenceSelection(EvidenceSearch):
                     sine=float(test.sine[n]) if usable else 0.0,
                     standard_error=math.sqrt(test.variance[n]) if usable else math.inf,
                     statistic=float(test.statistic[n]),
-                    log10_false_alarm=self._false_alarm(float(test.log_p[n]), i),
+                    log10_false_alarm=self._false_alarm(float(log_p[n]), i),
                     holdout_gain=float(gains[n]),
                     phase_spread_deg=circular_range_deg(phases[:, n]),
                     aliases=tuple(lookalikes.get(i, ())),
