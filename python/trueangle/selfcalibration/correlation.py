@@ -54,7 +54,7 @@ class Correlation:
         """Power relative to white noise, at frequencies in cycles per reading."""
         if self.is_white:
             return np.ones(np.shape(frequency))
-        return np.asarray(self._shape(frequency) / self._level)
+        return np.asarray(self._shape(frequency) / self.level)
 
     def _shape(self, frequency: NDArray[Any]) -> Array:
         turned = np.exp(-2j * math.pi * frequency)
@@ -65,7 +65,8 @@ class Correlation:
         return np.asarray(1.0 / np.abs(1.0 - sums) ** 2)
 
     @cached_property
-    def _level(self) -> float:
+    def level(self) -> float:
+        """Variance over that of what no reading before foretells: 1 of white noise."""
         return float(self._shape((np.arange(_GRID) + 0.5) / (2.0 * _GRID)).mean())
 
     def over_lags(self, count: int) -> Array:

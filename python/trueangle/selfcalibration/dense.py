@@ -71,7 +71,8 @@ def fit_dense(
     """Least squares by orthogonal triangles, the nuisances eliminated first.
 
     ``random`` nuisances are drawn anew in every run, with one variance: coefficients are averages
-    over what the evidence says of it, and their covariance holds how little few runs say.
+    over what the evidence says of it, and their covariance holds how little few runs say. Where
+    neighbouring residuals correlate it is asked of what no reading before foretells.
     ``freedom_lost`` counts rows that say nothing of their own (differences to a mean); combinations
     of patterns of which less than ``floor`` is left count as not seen, whatever the random
     nuisances hide of the others.
@@ -94,36 +95,36 @@ def fit_dense(
             design,
         )
 
-    variance, design = 0.0, None
+    variance, design, correlation = 0.0, None, WHITE
     possible: list[tuple[float, float]] = []
     if len(random):
-        possible = possible_variances(triangle, p, m, random, count)
-        variance = max(possible, key=lambda pair: pair[1])[0]
         design = projected_at(solved_triangle(triangle, p, m, random, 0.0, count), None)
-    solved = solved_triangle(triangle, p, m, random, variance, count)
-    projected = projected_at(solved, design)
-    patterns = projected.solution
-    nuisances = solved.inverse @ (solved.corner_right - solved.beside @ patterns)
-    through = solved.inverse @ solved.beside  # what the nuisances take of the patterns
-    residuals = np.concatenate(
-        [q.target - q.patterns @ patterns - q.nuisances @ nuisances for q in parts]
-    )
-    bread = np.block(
-        [
-            [
-                solved.inverse @ solved.inverse.T + through @ projected.inverse @ through.T,
-                -through @ projected.inverse,
-            ],
-            [-projected.inverse @ through.T, projected.inverse],
-        ]
-    )
-    correlation, spread = WHITE, bread
-    if residuals.size > _TOLD and float(residuals @ residuals) > 0.0:
-        series = DenseSeries(parts, bread, freedom_lost)
-        correlation = correlation_of(series.of(residuals), series.absorbed)
-        if not correlation.is_white:
-            spread, freedom = series.with_correlation(correlation, solved.freedom)
-            projected = replace(projected, variance=projected.variance * solved.freedom / freedom)
+    while True:
+        if len(random):
+            rows = [part.whitened(correlation) for part in parts]
+            independent = sum(part.target.size for part in rows) - freedom_lost
+            possible = possible_variances(triangle_of(rows), p, m, random, independent)
+            # The unit is the noise of a reading, of which neighbours foretell a share.
+            possible = [(v / correlation.level, chance) for v, chance in possible]
+            variance = max(possible, key=lambda pair: pair[1])[0]
+        solved = solved_triangle(triangle, p, m, random, variance, count)
+        projected = projected_at(solved, design)
+        patterns = projected.solution
+        nuisances = solved.inverse @ (solved.corner_right - solved.beside @ patterns)
+        residuals = np.concatenate(
+            [q.target - q.patterns @ patterns - q.nuisances @ nuisances for q in parts]
+        )
+        bread = spread = _bread(solved, projected)
+        before, correlation = correlation, WHITE
+        if residuals.size > _TOLD and float(residuals @ residuals) > 0.0:
+            series = DenseSeries(parts, bread, freedom_lost)
+            correlation = correlation_of(series.of(residuals), series.absorbed)
+            if not correlation.is_white:
+                spread, freedom = series.with_correlation(correlation, solved.freedom)
+                projected = replace(projected, variance=solved.noise * solved.freedom / freedom)
+        # Where readings correlate, what a variance was said to be was said of white ones.
+        if correlation.is_white or not before.is_white or not len(random):
+            break
     covariance = projected.variance * spread[p:, p:]
     if len(possible) > 1:
         others = [
@@ -149,6 +150,14 @@ def fit_dense(
         correlation,
         triangle,
     )
+
+
+def _bread(solved: SolvedTriangle, projected: Projected) -> Array:
+    """Of nuisances and patterns: their covariance in white noise of unit variance."""
+    through = solved.inverse @ solved.beside  # what the nuisances take of the patterns
+    mixed = -through @ projected.inverse
+    corner = solved.inverse @ solved.inverse.T - mixed @ through.T
+    return np.block([[corner, mixed], [mixed.T, projected.inverse]])
 
 
 def dense_fixed_point(fit_at: Callable[[Array, bool], DenseFit], size: int) -> DenseFit:

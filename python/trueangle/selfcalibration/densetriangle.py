@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from ..support.arrays import Array
+from .correlation import Correlation
 
 #: Variances of random terms that are tried, over that of their error in one run: from what the
 #: readings do not show on, two a decade.
@@ -43,6 +44,15 @@ class DenseRows:
         if self.alone is not None:
             return self.alone
         return np.asarray(np.einsum("ij,ij->j", self.patterns, self.patterns))
+
+    def whitened(self, correlation: Correlation) -> DenseRows:
+        """What rows hold beyond what those before them in a series foretell."""
+        if correlation.is_white:
+            return self
+        whole = np.column_stack([self.patterns, self.nuisances, self.target])
+        rows = np.concatenate([correlation.whitened(one) for one in np.split(whole, self.series)])
+        m = self.patterns.shape[1]
+        return DenseRows(rows[:, :m], rows[:, m:-1], rows[:, -1])
 
 
 def triangle_of(parts: Iterable[DenseRows]) -> Array:

@@ -314,7 +314,8 @@ def _chance_of_one_pattern(
     rows are those of white noise. None where a pattern for each leaves nothing.
     """
     runs, m = len(design.joint), 2 * len(orders)
-    scale = math.sqrt(whole.random_variance)
+    # The noise of whitened rows is what no reading before foretells.
+    scale = math.sqrt(whole.random_variance * whole.correlation.level)
     common, apart = [], []
     for j in range(runs):
         rows = _rows(design, j, j, runs, orders, whole.patterns, True)
