@@ -50,7 +50,8 @@ TEXTS = "tests/python/transcripts/"
 def reaching(lines: dict[int, list[str]], fault: Drawn) -> list[str]:
     """Tests that reach a fault, those in files named after its module first."""
     stem = Path(fault.file).stem.strip("_")
-    return sorted(of_line(lines, fault.line), key=lambda test: stem not in test.split("::")[0])
+    tests = of_line(lines, fault.line, fault.text)
+    return sorted(tests, key=lambda test: stem not in test.split("::")[0])
 
 
 def judged(copy: Copy, fault: Drawn, asked: list[list[str]], unfit: set[str]) -> tuple[str, str]:

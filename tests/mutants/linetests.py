@@ -5,6 +5,7 @@ In one run of everything with two workers a part of the contexts is lost; a room
 
 from __future__ import annotations
 
+import ast
 import itertools
 import sqlite3
 import subprocess
@@ -119,10 +120,22 @@ class LineTests(NamedTuple):
         return lines
 
 
-def of_line(places: dict[int, list[str]], line: int) -> list[str]:
-    """Tests that reach a line; of one that runs at import alone, those of the module."""
-    if line in places:
+def of_line(places: dict[int, list[str]], line: int, code: str) -> list[str]:
+    """Tests that reach a line; of one that runs at import, those of the module.
+
+    The first test that imports a module runs its constants, and others are wrong by them.
+    """
+    if line in places and line not in run_at_import(code):
         return places[line]
     # The narrowest of every line first: a constant may matter to any of them.
     turns = itertools.zip_longest(*(places[number] for number in sorted(places)))
     return list(dict.fromkeys(name for turn in turns for name in turn if name is not None))
+
+
+def run_at_import(code: str) -> set[int]:
+    """Lines outside of the bodies of functions: constants, fields, defaults of arguments."""
+    found = set(range(1, code.count("\n") + 2))
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.FunctionDef):
+            found.difference_update(range(node.body[0].lineno, (node.end_lineno or 0) + 1))
+    return found
