@@ -5,7 +5,7 @@ square 1; every p value is even where nothing is the matter. Kept tests ask that
 some numbers. Here each room asks it of all of its own, and prints a row for each: how many seeds
 told the number, mean and rms with their errors, or the p of Kolmogorov and Smirnov. What misses is
 marked and asked again with other seeds, three times as many; what misses then too ends with exit
-status 1 after the whole table, unless ``known.toml`` says why.
+status 1 after the whole table.
 ``--first`` begins with another seed.
 """
 
@@ -14,8 +14,6 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -44,35 +42,34 @@ def main() -> int:
     rooms = args.room or list(ROOMS)
     print(f"seeds {seeds.start} to {seeds.stop - 1} of each case of {', '.join(rooms)}")
     misses: list[str] = []
-    rows, known = 0, table.known_rows()
+    rows = 0
     for room in rooms:
         begun = time.monotonic()
         for name, case in of_room(room).items():
             if args.case not in name:
                 continue
             print(f"\n{room}: {name}", flush=True)
-            why = known.get(room, {}).get(name, {})
-            found = printed(name, case, seeds, why)
+            found = printed(name, case, seeds)
             rows += len(found)
-            wrong = {row.name for row in found if row.misses and not row.known}
+            wrong = {row.name for row in found if row.misses}
             if wrong:
                 # Of some hundred rows one misses by chance: it would not with others, and more.
                 more = range(seeds.stop, seeds.stop + AGAIN * len(seeds))
                 print(f"  again, seeds {more.start} to {more.stop - 1}", flush=True)
-                for row in printed(name, case, more, why):
+                for row in printed(name, case, more):
                     if row.name in wrong and row.misses:
                         misses.append(f"{room}: {name}: {row.name}: {row.misses}")
         print(f"\n{room}: {time.monotonic() - begun:.0f} s", flush=True)
-    print(f"\n{rows} rows, {len(misses)} that miss twice and are not known", *misses, sep="\n  ")
+    print(f"\n{rows} rows, {len(misses)} that miss twice", *misses, sep="\n  ")
     return 1 if misses else 0
 
 
-def printed(name: str, case: Case, seeds: range, why: Mapping[str, str]) -> list[table.Row]:
-    """Rows of a case, each with what is known of it."""
+def printed(name: str, case: Case, seeds: range) -> list[table.Row]:
+    """Rows of a case, each as soon as it is found."""
     found = []
     for row in table.rows_of(name, case, seeds):
-        found.append(replace(row, known=why.get(row.name, "")))
-        print(f"  {found[-1].line()}", flush=True)
+        found.append(row)
+        print(f"  {row.line()}", flush=True)
     return found
 
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import tomllib
 import warnings
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +24,6 @@ COMPATIBLE = 3.5
 #: Chance (of Kolmogorov and Smirnov, or of a count) below which p values are not even.
 UNEVEN = 1e-3
 
-#: Rows that are known to miss.
-KNOWN = Path(__file__).parent / "known.toml"
-
 #: Levels at which p values that are careful are counted.
 LEVELS = (0.01, 0.05, 0.1)
 
@@ -38,24 +33,16 @@ TELLING = 0.95
 
 @dataclass(frozen=True)
 class Row:
-    """One number over the seeds; ``known`` says why it misses where that is known."""
+    """One number over the seeds."""
 
     name: str
     text: str
     misses: str
-    known: str = ""
 
     def line(self) -> str:
         """As it stands in the table."""
-        if not self.misses:
-            return f"{self.name:<42} {self.text}"
-        told = f"  (known: {self.known})" if self.known else ""
-        return f"{self.name:<42} {self.text}  MISSES: {self.misses}{told}"
-
-
-def known_rows() -> dict[str, dict[str, dict[str, str]]]:
-    """Why rows miss, by room, case and row."""
-    return tomllib.loads(KNOWN.read_text(encoding="utf-8"))
+        missed = f"  MISSES: {self.misses}" if self.misses else ""
+        return f"{self.name:<42} {self.text}{missed}"
 
 
 def rows_of(name: str, case: Case, seeds: range) -> Iterator[Row]:
