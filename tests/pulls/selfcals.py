@@ -16,10 +16,6 @@ from selfcalibration.test_pulls import DESIGNS, LINES
 COUPLING = "averaged over what few clampings tell of the coupling"
 
 
-#: Why p of parts held out may be too large.
-CAREFUL = {"blocks": "0.55 on average, of white noise too: why is not known"}
-
-
 def design(name: str) -> Case:
     """One of the kept designs, under seeds of its own."""
     make, options, _ = DESIGNS[name]
@@ -33,7 +29,7 @@ def design(name: str) -> Case:
                 for value, truth in ((o.cosine, np.sin(phase)), (o.sine, np.cos(phase))):
                     yield Pull(f"order {k}", (value - size * truth) / o.std, careful)
         for part, held in found.held_out.items():
-            yield Chance(f"held out: {part}", held.p, CAREFUL.get(part, ""))
+            yield Chance(f"held out: {part}", held.p)
 
     return case
 
@@ -44,7 +40,7 @@ def beside(seed: int) -> Told:
     for name, (std, hidden) in dual.HIDDEN.items():
         yield Pull(name, (found.beside[name] - hidden) / found.beside[std])
     for part, held in found.held_out.items():
-        yield Chance(f"held out: {part}", held.p, CAREFUL.get(part, ""))
+        yield Chance(f"held out: {part}", held.p)
 
 
 def facets(seed: int) -> Told:

@@ -51,20 +51,20 @@ def chance_of_parts(fit: DenseFit) -> float:
 
 
 def chance_of_difference(gap: Array, covariance: Array, freedom: float = math.inf) -> float:
-    """Probability that noise makes so great a difference of patterns (Hotelling).
+    """Probability that noise makes so great a difference of patterns.
 
     ::
 
-        T² = g' V⁻¹ g,    T² (ν - d + 1) / (ν d) ~ F(d, ν - d + 1)
+        g' V⁻¹ g / d ~ F(d, ν)
 
-    with the degrees of freedom of V; chi-squared where they are infinite.
+    with the degrees of freedom of the noise's variance, by which alone V is uncertain; chi-squared
+    where they are infinite.
     """
     size = float(gap @ np.linalg.pinv(covariance, hermitian=True) @ gap)
     count = float(max(gap.size, 1))
     if math.isinf(freedom):
         return chi_squared_tail(size, count)
-    left = max(freedom - count + 1.0, 1.0)
-    return f_tail(size * left / (freedom * count), count, left)
+    return f_tail(size / count, count, freedom)
 
 
 def held_out_patterns(

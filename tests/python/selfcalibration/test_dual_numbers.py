@@ -133,7 +133,7 @@ def test_one_part_predicts_the_other_as_noise_says(found: list[ta.SelfCalibratio
 
 
 def test_p_is_that_of_patterns_fitted_to_each_part(found: list[ta.SelfCalibration]) -> None:
-    """Hotelling's T squared of two fits by themselves, with the freedom that both leave."""
+    """Fisher's F of two fits by themselves, with the freedom that both leave for the noise."""
     log = there_and_back(SEED)
     theta = log["motor_rad"] / RATIO
     way, speed = gear_motion(theta, log["time_s"])
@@ -144,18 +144,17 @@ def test_p_is_that_of_patterns_fitted_to_each_part(found: list[ta.SelfCalibratio
         for f in (np.cos, np.sin)
     ]
     design = np.column_stack([*columns, way, speed, np.ones(theta.size)])
-    size, fits, spread, freedom = len(columns), [], 0.0, 0
+    size, fits, spread, left, freedom = len(columns), [], 0.0, 0.0, 0
     for first in (0, 1):  # even and odd ones of 20 blocks of the run
         part = (np.arange(700) // 35 % 2 == first) & ~near_reversal(way)
         rows, target = design[part], (log["indicated_rad"] - theta)[part]
         x, squares, *_ = np.linalg.lstsq(rows, target, rcond=None)
-        left = len(rows) - rows.shape[1]
-        spread = spread + squares[0] / left * np.linalg.inv(rows.T @ rows)[:size, :size]
-        freedom += left
+        spread = spread + np.linalg.inv(rows.T @ rows)[:size, :size]
+        left += squares[0]
+        freedom += len(rows) - rows.shape[1]
         fits.append(x[:size])
     gap = fits[1] - fits[0]
-    rest = freedom - size + 1
-    told = stats.f.sf(gap @ np.linalg.solve(spread, gap) * rest / freedom / size, size, rest)
+    told = stats.f.sf(gap @ np.linalg.solve(spread, gap) / size / (left / freedom), size, freedom)
     assert found[0].held_out["blocks"].p == pytest.approx(told, rel=2e-3)
 
 
