@@ -12,14 +12,10 @@ from selfcalibration import test_dual_numbers as dual
 from selfcalibration import test_shifts as shifts
 from selfcalibration.test_pulls import DESIGNS, LINES
 
-#: Why errors beside a coupling may be wide.
-COUPLING = "averaged over what few clampings tell of the coupling"
-
 
 def design(name: str) -> Case:
     """One of the kept designs, under seeds of its own."""
     make, options, _ = DESIGNS[name]
-    careful = COUPLING if "couple" in name else ""
 
     def case(seed: int) -> Told:
         found = ta.selfcal(make(generator(seed, name)), orders=list(LINES), **options)
@@ -27,7 +23,7 @@ def design(name: str) -> Case:
         for k, (size, phase) in LINES.items():
             if (o := given.get(float(k))) is not None:
                 for value, truth in ((o.cosine, np.sin(phase)), (o.sine, np.cos(phase))):
-                    yield Pull(f"order {k}", (value - size * truth) / o.std, careful)
+                    yield Pull(f"order {k}", (value - size * truth) / o.std)
         for part, held in found.held_out.items():
             yield Chance(f"held out: {part}", held.p)
 
