@@ -155,11 +155,11 @@ def correlation_of(
     return found
 
 
-def correlation_above(series: Sequence[Array], cut: float) -> Correlation:
+def correlation_above(series: Sequence[Array], cut: float) -> tuple[Correlation, float]:
     """As `correlation_of`, where slow motion was fitted that took all below a frequency.
 
     There the power is taken for what it is above, up to twice of it; white where that is most of
-    the frequencies.
+    the frequencies. With the variance of a reading, what was taken included.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def correlation_above(series: Sequence[Array], cut: float) -> Correlation:
     lengths = [one.size for one in series]
     count, most = sum(lengths), _most_terms(lengths)
     if most < 1 or cut > _HIGHEST_CUT:
-        return WHITE
+        return WHITE, sum(float(one @ one) for one in series) / max(count, 1)
     left = np.zeros(most + 1)
     for one in series:
         n = 1 << (2 * one.size - 1).bit_length()
@@ -182,9 +182,9 @@ def correlation_above(series: Sequence[Array], cut: float) -> Correlation:
         found = np.fft.irfft(power, n)[: most + 1]
         left[: found.size] += found
     if not left[0] > 0.0:
-        return WHITE
+        return WHITE, 0.0
     lags = left / np.maximum(lag_pairs(lengths, most), 1.0)
-    return _autoregression(lags / lags[0], count)
+    return _autoregression(lags / lags[0], count), float(lags[0])
 
 
 def _autoregression(lags: Array, count: int) -> Correlation:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail
@@ -52,12 +53,18 @@ def spectrum_at(theta: Array, values: Array, orders: Array) -> Array:
     return np.asarray((real**2 + imaginary**2) * (2.0 / total))
 
 
-def noise_spectrum_at(fit: SteadyFit, orders: Sequence[float]) -> Array:
+def noise_spectrum_at(
+    fit: SteadyFit, orders: Sequence[float], groups: NDArray[np.int64] | None = None
+) -> Array:
     """Noise power at each order relative to white noise.
 
     An order passes at a frequency that follows the speed: there what the residuals' correlation in
     time says, on average. Where there are turns enough to look between orders, and noise beside an
     order is louder than that, as loud as it is there.
+
+    Returns
+    -------
+    ndarray, shape (orders,), or (2, orders) of readings in groups 0 and 1
     """
     readings = fit.readings
     x = readings.angle - pattern_series(fit.orders, fit.pattern, readings.angle)
@@ -68,14 +75,21 @@ def noise_spectrum_at(fit: SteadyFit, orders: Sequence[float]) -> Array:
         series.append(left[rows][:_MOST])
         steps[rows] = np.median(np.diff(readings.time[rows]))
     cut = fit.motion.fastest * float(np.median(steps))
-    correlation = correlation_above(series, cut)
+    correlation, variance = correlation_above(series, cut)
     part = slice(None, None, max(1, readings.size // _LOOKED_AT))
     passing = readings.speed[part] * steps[part]
-    factors = np.array([float(correlation.spectrum(k * passing).mean()) for k in orders])
-    if sum(stretch.turns for stretch in readings.stretches) < _TURNS:
-        return factors
-    few = slice(0, _MOST)
-    return louder_beside(x[few], left[few], orders, factors)
+    power = correlation.spectrum(np.multiply.outer(np.asarray(orders, dtype=np.float64), passing))
+    if not correlation.is_white:
+        # What motion took of the noise is no less where the noise is slow, but more.
+        power *= variance / fit.projected.variance
+    factors = louder = np.asarray(power.mean(axis=1))
+    if sum(stretch.turns for stretch in readings.stretches) >= _TURNS:
+        few = slice(0, _MOST)
+        louder = louder_beside(x[few], left[few], orders, factors)
+    if groups is None:
+        return louder
+    apart = np.array([power[:, groups[part] == g].mean(axis=1) for g in (0, 1)])
+    return np.asarray(louder / factors * apart)
 
 
 def louder_beside(theta: Array, residuals: Array, orders: Sequence[float], factors: Array) -> Array:

@@ -122,7 +122,7 @@ def spin_down(
             f"{first:g} and less of those above: the standard errors allow for it"
         )
     notes += _notes(fit, readings, colour, chosen, given, sums, separable, ripple)
-    tests = held_out_patterns(fit, [o.order for o in given or sums or table], colour)
+    tests = held_out_patterns(fit, [o.order for o in given or sums or table])
     notes += _test_notes(tests, rippling)
     in_model = list(given)
     if loop == "open":

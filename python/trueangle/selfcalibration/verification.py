@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, f_tail
 from .dense import DenseFit
+from .noisespectrum import noise_spectrum_at
 from .readings import SegmentReadings
 from .result import ARCSEC, HeldOutPattern
 from .steady import SteadyFit, fit_steady
@@ -67,9 +68,7 @@ def chance_of_difference(gap: Array, covariance: Array, freedom: float = math.in
     return f_tail(size / count, count, freedom)
 
 
-def held_out_patterns(
-    fit: SteadyFit, tested: Sequence[float], colour: Array
-) -> dict[str, HeldOutPattern]:
+def held_out_patterns(fit: SteadyFit, tested: Sequence[float]) -> dict[str, HeldOutPattern]:
     """Odd turns against even ones, fast against slow, one direction against the other.
 
     Both parts share the motion; each has a pattern of its own. Slow against fast is made
@@ -80,21 +79,19 @@ def held_out_patterns(
     turn = _turn_numbers(readings)
     turns = sum(s.turns for s in readings.stretches)
     if turns >= _TURNS:
-        found["odd_even_turns"] = _compare(
-            fit, turn & 1, tested, ("odd turns", "even turns"), colour
-        )
+        found["odd_even_turns"] = _compare(fit, turn & 1, tested, ("odd turns", "even turns"))
     low, high = np.quantile(readings.speed, [0.05, 0.95])
     if high / low >= _SPEEDS:
         middle = math.sqrt(low * high)
         slow = (readings.speed < middle).astype(np.int64)
         if 0.1 < slow.mean() < 0.9:
             found["speeds"] = _compare(
-                fit, slow, tested, ("the faster part", "the slower part"), colour, ripple=False
+                fit, slow, tested, ("the faster part", "the slower part"), ripple=False
             )
     directions = np.array([s.direction for s in readings.stretches])
     if (directions > 0).any() and (directions < 0).any():
         back = (directions[readings.stretch] < 0).astype(np.int64)
-        found["directions"] = _compare(fit, back, tested, ("forward", "backward"), colour)
+        found["directions"] = _compare(fit, back, tested, ("forward", "backward"))
     return found
 
 
@@ -117,7 +114,6 @@ def _compare(
     groups: NDArray[np.int64],
     tested: Sequence[float],
     names: tuple[str, str],
-    colour: Array,
     *,
     ripple: bool = True,
 ) -> HeldOutPattern:
@@ -135,7 +131,8 @@ def _compare(
         [2 * i + j for i, k in enumerate(fit.orders) if k in tested for j in (0, 1)], dtype=np.int64
     )
     scale = np.ones(len(parts.unknowns))
-    scale[: 2 * m] = np.sqrt(np.tile(np.repeat(colour, 2), 2))
+    # Each part by the noise at its own speeds.
+    scale[: 2 * m] = np.sqrt(np.repeat(noise_spectrum_at(fit, fit.orders, groups).ravel(), 2))
     covariance = parts.projected.covariance * np.outer(scale, scale)
     difference = (
         covariance[np.ix_(rows, rows)]

@@ -199,8 +199,8 @@ def test_parts_are_held_against_the_noise_beside_their_orders(log, found, monkey
     sizes = {}
     for loud in ((5.0, 5.0, 5.0), (5.0, 1.0, 1.0), (1.0, 5.0, 1.0), (1.0, 1.0, 5.0)):
         monkeypatch.setattr(
-            "trueangle.selfcalibration.spindown.noise_spectrum_at",
-            lambda *_, colour=loud: np.array(colour),
+            "trueangle.selfcalibration.verification.noise_spectrum_at",
+            lambda *_, colour=loud: np.array([colour, colour]),
         )
         wide = ta.selfcal(log, **OPTIONS).held_out
         assert wide.keys() == found.held_out.keys()

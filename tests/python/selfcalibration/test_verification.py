@@ -38,7 +38,7 @@ def selfcal(log: dict[str, np.ndarray], **more) -> ta.SelfCalibration:
 def test_a_difference_is_worth_what_both_patterns_and_their_link_say(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """By the contrast (-1, 1) of the whole covariance, louder where the noise has a colour."""
+    """By the contrast (-1, 1) of the whole covariance, each part as loud as its noise."""
     print("seed", SEED)
     fits: list[SteadyFit] = []
     taken: list[tuple[np.ndarray, np.ndarray]] = []
@@ -53,13 +53,14 @@ def test_a_difference_is_worth_what_both_patterns_and_their_link_say(
 
     monkeypatch.setattr(verification, "fit_steady", fitted)
     monkeypatch.setattr(verification, "chance_of_difference", chance)
-    monkeypatch.setattr(spindown, "noise_spectrum_at", lambda *_: np.array([4.0, 1.0]))
+    loud = np.array([[4.0, 1.0], [9.0, 16.0]])
+    monkeypatch.setattr(verification, "noise_spectrum_at", lambda *_: loud)
     assert set(selfcal(log_of(SEED)).held_out) == {"odd_even_turns", "speeds"}
     contrast = np.hstack([-np.eye(4), np.eye(4)])
     for fit, (gap, covariance) in zip(fits, taken, strict=True):
         np.testing.assert_allclose(gap, contrast @ fit.unknowns[:8], rtol=1e-9)
-        whole = contrast @ fit.projected.covariance[:8, :8] @ contrast.T
-        whole *= np.outer([2.0, 2.0, 1.0, 1.0], [2.0, 2.0, 1.0, 1.0])
+        scaled = contrast * [2.0, 2.0, 1.0, 1.0, 3.0, 3.0, 4.0, 4.0]
+        whole = scaled @ fit.projected.covariance[:8, :8] @ scaled.T
         np.testing.assert_allclose(covariance, whole, rtol=1e-9, atol=1e-9 * whole.max())
 
 
