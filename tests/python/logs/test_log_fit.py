@@ -201,6 +201,27 @@ def test_orders_are_selected_by_evidence(folder):
     assert "in one pass" in found.notes[1]
 
 
+def test_the_note_of_one_pass_tells_how_many_readings_were_kept(folder, monkeypatch):
+    """By the blocks of 256 of each run, in memory as many as the pass may keep."""
+    from trueangle.logs import fitting
+
+    kept = []
+
+    def fitted(runs, *given, _fit=fitting.fitted_to, **options):
+        kept.append(sum(len(run) for run in runs))
+        return _fit(runs, *given, **options)
+
+    monkeypatch.setattr(fitting, "fitted_to", fitted)
+    notes = ta.fit_logs(folder, gear_ratio=50.0).notes
+    assert any(
+        f"are of all 59998 readings, in one pass; what needs readings in their order "
+        f"(positions, repeats, correlation, the ridge) is estimated from {kept[-1]} of them" in note
+        for note in notes
+    )
+    # Four runs of a block each at least; halves go where they are more than 2000.
+    assert 1000 < kept[-1] <= 2000
+
+
 def test_no_order_is_selected_from_noise(tmp_path):
     flat = ta.HarmonicModel([], period=360.0)
     for i in range(4):

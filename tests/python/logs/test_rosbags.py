@@ -290,6 +290,31 @@ def test_a_bag_of_packed_files_takes_no_more_of_the_disk_than_the_limit(
     assert list(work.iterdir()) == []
 
 
+def test_packed_files_of_a_bag_share_the_limit(tmp_path, monkeypatch):
+    """Three files of 100, 200 and 50 bytes need 350 together; one less, and nothing is left."""
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(work))
+    sizes = {"a.db3": 100, "b.db3": 200, "c.db3": 50}
+    for name, size in sizes.items():
+        (tmp_path / f"{name}.zstd").write_bytes(unpacking.zstd.compress(b"x" * size))
+    names = "".join(f"  - {name}.zstd\n" for name in sizes)
+    (tmp_path / "metadata.yaml").write_text(
+        "rosbag2_bagfile_information:\n  compression_format: zstd\n  compression_mode: FILE\n"
+        f"  relative_file_paths:\n{names}"
+    )
+    monkeypatch.setenv("TRUEANGLE_UNPACKED_BYTES", "350")
+    folder = unpacking.unpacked_folder(tmp_path)
+    assert folder is not None
+    with folder:
+        assert {name: Path(folder.name, name).stat().st_size for name in sizes} == sizes
+    monkeypatch.setenv("TRUEANGLE_UNPACKED_BYTES", "349")
+    with pytest.raises(FileError, match=r"may take 349 bytes together") as told:
+        unpacking.unpacked_folder(tmp_path)
+    assert "c.db3.zstd" in str(told.value)
+    assert list(work.iterdir()) == []
+
+
 @pytest.mark.parametrize("codec", ["bz2", "lz4", "zstd"])
 def test_a_part_that_unpacks_to_gigabytes_takes_no_more_than_the_budget(codec, monkeypatch):
     """Whatever its header says: the unpacking itself is bounded."""
