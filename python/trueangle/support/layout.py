@@ -17,6 +17,9 @@ _NARROWEST, _WIDEST, _USUAL = 60, 100, 80
 _ENDLESS: Final = 1_000_000
 _UNFOLDED: Final = ContextVar("unfolded", default=False)
 
+#: Columns that words have behind a label at least; else they stand below it.
+_ROOM: Final = 20
+
 #: How a line begins that is there to be copied, and stays whole.
 _COPIED: Final = ("--", "trueangle ")
 
@@ -91,7 +94,8 @@ def laid_out(lines: Iterable[str]) -> str:
             found.append(line)
             continue
         lead = _LEAD.match(line)
-        found += _folded(line, width, max(lead.end() if lead else 0, 2))
+        indent = max(lead.end() if lead else 0, 2)
+        found += _folded(line, width, indent if indent <= width - _ROOM else 2)
     return "\n".join(found)
 
 

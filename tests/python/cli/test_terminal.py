@@ -58,6 +58,18 @@ def test_a_folded_line_loses_no_word_and_stands_under_its_text(monkeypatch):
     assert laid_out([option]) == option  # there to be copied
 
 
+@pytest.mark.parametrize("blanks", [0, 28, 38, 39, 78, 120])
+@pytest.mark.parametrize("label", ["unit", "u" * 90, "noise of one", ""])
+def test_words_behind_a_wide_label_stand_below_it(label, blanks, monkeypatch):
+    """No word is lost, and no line is wider than words make it, however wide a table's column."""
+    monkeypatch.setenv("COLUMNS", "60")
+    line = f"  {label}{'' if not label else ' ' * max(blanks, 2)}" + "some words " * 12
+    rows = laid_out([line]).splitlines()
+    assert " ".join(rows).split() == line.split()
+    assert all(len(row) <= 60 or " " not in row.strip() for row in rows)
+    assert all(len(row) - len(row.lstrip()) <= 40 for row in rows[1:])
+
+
 class Terminal(list):
     encoding = "utf-8"
     write = list.append
