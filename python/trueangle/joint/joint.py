@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ..errors import ArgumentError
@@ -128,7 +129,10 @@ class Joint:
             cycles = self.shafts.get(shaft)
             if cycles is None:
                 continue
-            k = round(order / cycles)
+            multiple = order / cycles
+            if not math.isfinite(multiple):
+                continue
+            k = round(multiple)
             low_multiple = shaft == "output" or k <= 8 * self.pole_pairs
             if k >= 1 and low_multiple and abs(order - k * cycles) <= tolerance * max(order, 1.0):
                 return shaft, k

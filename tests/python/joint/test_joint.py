@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from trueangle.errors import ArgumentError
@@ -126,6 +128,8 @@ def test_an_order_has_the_name_of_its_fastest_shaft() -> None:
     assert joint.name_order(5.0) == ("output", 5)
     assert joint.name_order(5.5) is None
     assert joint.name_order(0.0) is None
+    assert joint.name_order(math.inf) is None
+    assert Joint(5e-324).name_order(1.0) == ("output", 1)
     # 20 is once the worm and twice the belt, whichever is declared first.
     both = (DeclaredShaft("worm", 20.0), DeclaredShaft("belt", 10.0))
     for declared in (both, both[::-1]):
