@@ -164,6 +164,14 @@ def test_the_summary_is_a_table_for_the_rig(plan, found):
     assert "Next: 1 run of" in found.summary()
 
 
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [(0.6, "1 s"), (119.4, "119 s"), (120.0, "2 min"), (179.0, "3 min"), (5971.0, "100 min")],
+)
+def test_the_time_of_motion_is_to_the_nearest_second_or_minute(plan, seconds, told):
+    assert f" in all, {told} of motion" in replace(plan, seconds=seconds).summary()
+
+
 def test_what_one_run_shows_is_shared_out_over_as_many_as_hold_out_each_other():
     """Of ten runs a diagnosis holds out two at a time: these must not be all that tell."""
     sim = replace(SIM, runs=tuple(RunDesign(f"{k}", samples=60, torque_Nm=5.0) for k in range(10)))
