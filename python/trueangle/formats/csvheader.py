@@ -164,8 +164,13 @@ class Header:
         plain = [i for i in solid if not is_comment(lines[i].text)]
         first = plain[0] if plain else solid[0]
         self.delimiter = _delimiter(lines[first].text)
-        # Names of this package are taken at their word, wherever the readings begin.
-        known = [i for i in plain if _STANDARD.search(lines[i].text)] or [-1]
+        # Names of this package are taken at their word, wherever the readings begin; one among
+        # readings is a remark.
+        known = [
+            i
+            for i in plain
+            if _STANDARD.search(lines[i].text) and (i == first or self._is_of_words(lines[i].text))
+        ] or [-1]
         if known[-1] >= 0 and (known[-1] == first or self._is_names(lines, plain, known[-1])):
             self.delimiter = _delimiter(lines[known[-1]].text)
             return known[-1], self._after_units(lines, known[-1])
@@ -197,6 +202,11 @@ class Header:
         if len(plain) == 1 and cell_number(lines[first].text.strip(), ",") is not None:
             return -1, first
         return first, self._after_units(lines, first)
+
+    def _is_of_words(self, text: str) -> bool:
+        """Whether a line holds fewer numbers than words."""
+        delimiter = _delimiter(text)
+        return not _are_readings(self._split(text, delimiter), "." if delimiter == "," else ",")
 
     def _is_names(self, lines: list[_TextLine], plain: list[int], place: int) -> bool:
         """Whether a line has as many cells as each of those that follow it."""

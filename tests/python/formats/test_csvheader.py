@@ -40,6 +40,20 @@ def test_words_above_readings_are_names_where_they_are_as_many(words, width, del
     assert found.names == wanted
 
 
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("before", ["", "made at the rig\n", "# rig 3\n\n"])
+@pytest.mark.parametrize("row", [0, 3, 5])
+@pytest.mark.parametrize("end", [0, 1])
+def test_a_remark_that_is_a_name_makes_no_line_of_names(row, before, end, delimiter):
+    names = ["run", "time_s", "indicated_deg", "note"]
+    rows = [["a", str(0.5 * k), f"{9.5 * k}", "ok"] for k in range(6)]
+    rows[row][3] = "time_s"
+    text = "\n".join(delimiter.join([*cells, *[""] * end]) for cells in (names, *rows))
+    found = header(before + text + "\n")
+    assert found.names == names
+    assert found.line == before.count("\n") + 2
+
+
 def test_one_name_above_one_column_that_ends_with_a_delimiter_is_a_name():
     found = header("angle\n1.5,\n2.5,\n3.5,\n4.5,\n")
     assert (found.names, found.place, found.trailing) == (["angle"], 0, True)
