@@ -72,7 +72,7 @@ def stretches(path: Path) -> list[BatchRange | None]:
         _check_batches(path, True)
         with pa.memory_map(str(path), "r") as source:
             batches = pa.ipc.open_file(source).num_record_batches
-        size = max(path.stat().st_size, 1)
+        size = path.stat().st_size
         each = max(1, batches * _STRETCH // size)
         parts = 1
         # A part of a packed batch needs all of it unpacked.

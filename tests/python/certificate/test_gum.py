@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -112,3 +113,10 @@ def test_numbers_of_a_contribution(name: str, allowed: list[float], refused: lis
     for value in refused:
         with pytest.raises(ArgumentError, match=r"^contribution 'a': "):
             Contribution("a", **{"standard": 2.0, name: value})
+
+
+@pytest.mark.parametrize("shape", [(4,), (1, 3), (0, 3), (2, 3, 4), ()])
+def test_observations_are_a_table_of_two_rows_at_least(shape: tuple[int, ...]) -> None:
+    said = re.escape(f"got shape {shape}")
+    with pytest.raises(ArgumentError, match=f"two rows or more, .*{said}"):
+        Estimates.from_observations(np.zeros(shape))
