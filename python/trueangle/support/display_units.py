@@ -159,10 +159,10 @@ def rounded_phase(phase_deg: float, std_deg: float | None) -> tuple[str, str]:
     (('0.00', '0.14'), ('264.28', '0.75'))
     """
     spread = math.nan if std_deg is None else min(std_deg, 180.0)
-    if not spread > 0.0:
-        return f"{round(phase_deg % 360.0, 2) % 360.0:.2f}", "-"
-    decimals = _decimals(spread, _UNCERTAIN_DIGITS)
-    return _fixed(round(phase_deg % 360.0, decimals) % 360.0, decimals), _fixed(spread, decimals)
+    known = spread > 0.0
+    decimals = _decimals(spread, _UNCERTAIN_DIGITS) if known else 2
+    shown = _fixed(round(phase_deg % 360.0, decimals) % 360.0, decimals)
+    return shown, _fixed(spread, decimals) if known else "-"
 
 
 def significant_digits(value: float, digits: int = _DIGITS) -> str:

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from trueangle.errors import ArgumentError
@@ -54,6 +54,7 @@ def test_significant_digits_are_so_many(value: float, digits: int) -> None:
     assert not shown.startswith("-0.") or float(shown) < 0.0
 
 
+@example(phase=359.996, std=0.1)
 @given(phase=st.floats(-720.0, 720.0), std=st.floats(1e-3, 500.0))
 def test_a_phase_lies_in_one_turn_and_is_known_to_half_of_it_at_least(phase, std) -> None:
     shown, spread = rounded_phase(phase, std)
@@ -62,6 +63,7 @@ def test_a_phase_lies_in_one_turn_and_is_known_to_half_of_it_at_least(phase, std
     assert abs(away) <= 0.5000001 * 10.0 ** -len(spread.partition(".")[2])
     assert float(spread) == pytest.approx(min(std, 180.0), rel=0.051)
     assert rounded_phase(phase, None)[1] == "-"
+    assert 0.0 <= float(rounded_phase(phase, None)[0]) < 360.0
 
 
 def test_the_unit_by_itself_is_arcsec_below_a_degree() -> None:
