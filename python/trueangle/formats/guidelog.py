@@ -34,7 +34,8 @@ SIDEREAL: Final = 360.0 / 86164.0905
 _COLUMNS = ("run", "when", "time_s", "indicated_deg", "error_arcsec", "declination_arcsec", "snr")
 _LABELS = ("run", "when")
 _BEGINS = re.compile(r"Guiding Begins at (\d{4}-\d\d-\d\d \d\d:\d\d:\d\d)")
-_NUMBER = r"(-?\d+(?:\.\d+)?)"
+#: Of so many digits at most: no angle, scale or rate has more.
+_NUMBER = r"(-?\d{1,9}(?:\.\d+)?)\b"
 _SCALE = re.compile(rf"Pixel scale = {_NUMBER} arc-sec/px")
 _DECLINATION = re.compile(rf"\bDec = {_NUMBER} deg")
 _RATE = re.compile(rf"xAngle = {_NUMBER}, xRate = {_NUMBER}")

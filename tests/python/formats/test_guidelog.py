@@ -162,6 +162,8 @@ def test_a_worm_is_found_by_one_command(log, tmp_path, capsys):
     [
         ("Pixel scale = 1.50 arc-sec/px, B", "B", r"line 18: the guiding that begins at line 9 "),
         (f"Dec = {DECLINATION} deg", "Dec = Unknown", "states no declination"),
+        (f"Dec = {DECLINATION} deg", f"Dec = {'9' * 400} deg", "states no declination"),
+        ("Pixel scale = 1.50", f"Pixel scale = {'9' * 400}", "states no pixel scale"),
         ("xRate = 3.750", "xRate = none", "states no guide rate"),
         ('"Mount",0.1', '"AO",0.1', "line 19, column 'mount': frames of .* are not read"),
         ("RARawDistance,", "RawDistance,", "line 18: frames have no column RARawDistance"),
