@@ -19,7 +19,7 @@ from .densetriangle import (
     solved_triangle,
     triangle_of,
 )
-from .projected import NOT_SEEN, Projected, Unknown
+from .projected import NOT_SEEN, Projected, Unknown, combinations
 
 #: Readings from which residuals tell their correlation, and blocks whose means are looked at.
 _TOLD: Final = 60
@@ -82,27 +82,32 @@ def fit_dense(
     alone = np.sum([part.squares for part in parts], axis=0)
     alone = np.where(alone > 1e-12 * max(float(alone.max(initial=0.0)), 1e-300), alone, 0.0)
 
+    plain = solved_triangle(triangle, p, m, random, 0.0)
+    scale, _, vectors, _ = combinations(plain.information, alone, floor)
+    seen = scale[:, None] * vectors
+    freedom = max(count - (p - len(random) + seen.shape[1]), 1.0)
+
     def projected_at(solved: SolvedTriangle, design: Projected | None) -> Projected:
         return Projected(
             tuple(columns),
-            solved.root.T @ solved.root,
+            solved.information,
             solved.root.T @ solved.right,
             alone,
-            solved.noise,
-            solved.freedom,
+            solved.squares(seen) / freedom,
+            freedom,
             floor,
             design,
         )
 
-    variance, design = 0.0, None
+    variance, design, solved = 0.0, None, plain
     possible: list[tuple[float, float]] = []
     if len(random):
-        possible = possible_variances(triangle, p, m, random, count)
+        possible = possible_variances(triangle, p, seen, random, count)
         variance = max(possible, key=lambda pair: pair[1])[0]
-        design = projected_at(solved_triangle(triangle, p, m, random, 0.0, count), None)
-    solved = solved_triangle(triangle, p, m, random, variance, count)
+        design = projected_at(plain, None)
+        solved = solved_triangle(triangle, p, m, random, variance)
     projected = projected_at(solved, design)
-    patterns = projected.solution
+    noise, patterns = projected.variance, projected.solution
     nuisances = solved.inverse @ (solved.corner_right - solved.beside @ patterns)
     through = solved.inverse @ solved.beside  # what the nuisances take of the patterns
     residuals = np.concatenate(
@@ -122,12 +127,12 @@ def fit_dense(
         series = DenseSeries(parts, bread, freedom_lost)
         correlation = correlation_of(series.of(residuals), series.absorbed)
         if not correlation.is_white:
-            spread, freedom = series.with_correlation(correlation, solved.freedom)
-            projected = replace(projected, variance=projected.variance * solved.freedom / freedom)
+            spread, own = series.with_correlation(correlation, freedom)
+            projected = replace(projected, variance=projected.variance * freedom / own)
     covariance = projected.variance * spread[p:, p:]
     if len(possible) > 1:
         others = [
-            (projected_at(solved_triangle(triangle, p, m, random, v, count), design), chance)
+            (projected_at(solved_triangle(triangle, p, m, random, v), design), chance)
             for v, chance in possible
         ]
         patterns = np.sum([chance * one.solution for one, chance in others], axis=0)
@@ -136,7 +141,7 @@ def fit_dense(
             chance * np.outer(one.solution - patterns, one.solution - patterns)
             for one, chance in others
         ]
-        covariance = covariance + np.sum(wider, axis=0) - solved.noise * projected.inverse
+        covariance = covariance + np.sum(wider, axis=0) - noise * projected.inverse
         nuisances = solved.inverse @ (solved.corner_right - solved.beside @ patterns)
     return DenseFit(
         projected,
