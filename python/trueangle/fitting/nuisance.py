@@ -43,9 +43,8 @@ _INTERVALS: Final = (1, 2, 4, 6)
 #: of the stiffest spline that they may judge. An odd number: way and return differ in fold.
 _STRETCHES: Final = 13
 
-#: Readings that the choice is made from.
+#: Of twice as many readings and more every second, third, ... one is looked at.
 _LOOKED_AT: Final = 24_000
-
 
 #: Runs of which each may drift by itself, or have lines of the reference of its own.
 _MOST_DRIFTING: Final = 24
@@ -187,7 +186,7 @@ def take_out_nuisance(
 
     ``kinds`` of None are chosen by the error of stretches held out.
     """
-    stride = max(1, sum(map(len, runs)) // _LOOKED_AT)
+    stride = _stride(runs)
     orders = [k * s.cycles_per_turn for s in shafts for k in s.orders]
     rows = _columns(runs, orders, argument, stride, kinds, reference_orders)
     forced = [_lines_of_reference(rows)] if reference_orders else []
@@ -237,7 +236,7 @@ def taken_columns(
     Each about its run's mean and of size 1. None where there are none, and where they came from
     a part of the readings.
     """
-    if not nuisance.kinds or sum(map(len, runs)) > _LOOKED_AT:
+    if not nuisance.kinds or _stride(runs) > 1:
         return None
     lines = [order for order, *_ in (*nuisance.reference, *nuisance.turned)]
     plain = [replace(run, weights=None) for run in runs]
@@ -254,6 +253,11 @@ def taken_columns(
         np.split(np.hstack(shared), ends),
         [part[:, np.abs(part).max(axis=0) > 0.0] for part in alone],
     )
+
+
+def _stride(runs: Sequence[CalibrationRun]) -> int:
+    """Every how many readings one is looked at."""
+    return max(1, sum(map(len, runs)) // _LOOKED_AT)
 
 
 def _lines_of_reference(rows: FoldRows) -> str:

@@ -19,7 +19,7 @@ from .densetriangle import (
     solved_triangle,
     triangle_of,
 )
-from .projected import NOT_SEEN, Projected, Unknown
+from .projected import NOT_SEEN, Projected, Unknown, combinations
 
 #: Readings from which residuals tell their correlation, and blocks whose means are looked at.
 _TOLD: Final = 60
@@ -83,33 +83,37 @@ def fit_dense(
     alone = np.sum([part.squares for part in parts], axis=0)
     alone = np.where(alone > 1e-12 * max(float(alone.max(initial=0.0)), 1e-300), alone, 0.0)
 
+    plain = solved_triangle(triangle, p, m, random, 0.0)
+    scale, _, vectors, _ = combinations(plain.information, alone, floor)
+    seen = scale[:, None] * vectors
+    freedom = max(count - (p - len(random) + seen.shape[1]), 1.0)
+
     def projected_at(solved: SolvedTriangle, design: Projected | None) -> Projected:
         return Projected(
             tuple(columns),
-            solved.root.T @ solved.root,
+            solved.information,
             solved.root.T @ solved.right,
             alone,
-            solved.noise,
-            solved.freedom,
+            solved.squares(seen) / freedom,
+            freedom,
             floor,
             design,
         )
 
-    variance, design, correlation = 0.0, None, WHITE
+    variance, solved, correlation = 0.0, plain, WHITE
+    design = projected_at(plain, None) if len(random) else None
     possible: list[tuple[float, float]] = []
-    if len(random):
-        design = projected_at(solved_triangle(triangle, p, m, random, 0.0, count), None)
     while True:
         if len(random):
             rows = [part.whitened(correlation) for part in parts]
             independent = sum(part.target.size for part in rows) - freedom_lost
-            possible = possible_variances(triangle_of(rows), p, m, random, independent)
+            possible = possible_variances(triangle_of(rows), p, seen, random, independent)
             # The unit is the noise of a reading, of which neighbours foretell a share.
             possible = [(v / correlation.level, chance) for v, chance in possible]
             variance = max(possible, key=lambda pair: pair[1])[0]
-        solved = solved_triangle(triangle, p, m, random, variance, count)
+            solved = solved_triangle(triangle, p, m, random, variance)
         projected = projected_at(solved, design)
-        patterns = projected.solution
+        noise, patterns = projected.variance, projected.solution
         nuisances = solved.inverse @ (solved.corner_right - solved.beside @ patterns)
         residuals = np.concatenate(
             [q.target - q.patterns @ patterns - q.nuisances @ nuisances for q in parts]
@@ -120,15 +124,15 @@ def fit_dense(
             series = DenseSeries(parts, bread, freedom_lost)
             correlation = correlation_of(series.of(residuals), series.absorbed)
             if not correlation.is_white:
-                spread, freedom = series.with_correlation(correlation, solved.freedom)
-                projected = replace(projected, variance=solved.noise * solved.freedom / freedom)
+                spread, own = series.with_correlation(correlation, freedom)
+                projected = replace(projected, variance=noise * freedom / own)
         # Where readings correlate, what a variance was said to be was said of white ones.
         if correlation.is_white or not before.is_white or not len(random):
             break
     covariance = projected.variance * spread[p:, p:]
     if len(possible) > 1:
         others = [
-            (projected_at(solved_triangle(triangle, p, m, random, v, count), design), chance)
+            (projected_at(solved_triangle(triangle, p, m, random, v), design), chance)
             for v, chance in possible
         ]
         patterns = np.sum([chance * one.solution for one, chance in others], axis=0)
@@ -137,7 +141,7 @@ def fit_dense(
             chance * np.outer(one.solution - patterns, one.solution - patterns)
             for one, chance in others
         ]
-        covariance = covariance + np.sum(wider, axis=0) - solved.noise * projected.inverse
+        covariance = covariance + np.sum(wider, axis=0) - noise * projected.inverse
         nuisances = solved.inverse @ (solved.corner_right - solved.beside @ patterns)
     return DenseFit(
         projected,

@@ -76,12 +76,25 @@ class SolvedTriangle:
     corner_right: Array
     root: Array  # of the patterns
     right: Array
-    noise: float
-    freedom: float
+    beyond: float  # squares that no pattern could explain
+
+    @property
+    def information(self) -> Array:
+        """Of the patterns beside the nuisances."""
+        return np.asarray(self.root.T @ self.root)
+
+    def squares(self, seen: Array) -> float:
+        """Sum of squares left by a fit of these combinations of the patterns, columns of ``seen``.
+
+        Others may be there by the noise of places alone, and would be made of what is left.
+        """
+        basis = np.linalg.qr(self.root @ seen)[0]
+        lost = self.right - basis @ (basis.T @ self.right)
+        return self.beyond + float(lost @ lost)
 
 
 def solved_triangle(
-    triangle: Array, p: int, m: int, random: Sequence[int], variance: float, count: float
+    triangle: Array, p: int, m: int, random: Sequence[int], variance: float
 ) -> SolvedTriangle:
     """The triangle of ``p`` nuisances and ``m`` patterns, with random ones of a variance."""
     # In units of their own deviation random nuisances have the prior 1, of any variance, and
@@ -93,20 +106,15 @@ def solved_triangle(
     prior = np.zeros((len(random), triangle.shape[1]))
     prior[np.arange(len(random)), list(random)] = 1.0
     r: Array = np.asarray(np.linalg.qr(np.concatenate([scaled, prior]), mode="r"))
-    root, right, left = r[p : p + m, p : p + m], r[p : p + m, -1:], r[p + m :, -1]
-    # Patterns that nothing shows leave the sum of squares as it is: pseudo-inverse.
-    seen, lost = _split(root, right)
-    freedom = max(count - (p - len(random) + seen.size), 1.0)
-    squares = float(left @ left) + float(np.sum(lost**2))
+    left = r[p + m :, -1]
     inverse: Array = np.asarray(np.linalg.pinv(r[:p, :p], 1e-12), dtype=np.float64)
     return SolvedTriangle(
         scale[:, None] * inverse,
         r[:p, p : p + m],
         r[:p, -1],
-        root,
-        right[:, 0],
-        squares / freedom,
-        freedom,
+        r[p : p + m, p : p + m],
+        r[p : p + m, -1],
+        float(left @ left),
     )
 
 
@@ -120,16 +128,19 @@ def _split(root: Array, right: Array) -> tuple[Array, Array]:
 
 
 def possible_variances(
-    triangle: Array, p: int, m: int, random: Sequence[int], count: float
+    triangle: Array, p: int, seen: Array, random: Sequence[int], count: float
 ) -> list[tuple[float, float]]:
     """Variances of the random nuisances with their probabilities, the improbable ones left out.
+
+    Of the patterns take part the combinations that are seen, columns of ``seen``.
 
     Before the readings there is none with probability one half, else any that they would show, as
     probable in each octave.
     """
     shown = float((triangle[:, list(random)] ** 2).sum()) / len(random)
     tried = np.concatenate([[0.0], _SIZES / max(shown, 1e-300)])
-    evidence = _evidence(triangle, p, m, random, count)
+    combined = np.hstack([triangle[:, :p], triangle[:, p:-1] @ seen, triangle[:, -1:]])
+    evidence = _evidence(combined, p, seen.shape[1], random, count)
     log = np.array([evidence(float(variance)) for variance in tried])
     log[1:] -= math.log(_SIZES.size)
     weights = np.exp(log - log.max())

@@ -77,6 +77,20 @@ def harmonic_sum(
     return out
 
 
+def combinations(
+    information: Array, alone: Array, floor: float
+) -> tuple[Array, Array, Array, Array]:
+    """Columns' scale; what is left of combinations of them that are seen, these; and the others."""
+    scale = _scale(alone)
+    values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+    kept = values >= floor
+    return scale, values[kept], vectors[:, kept], vectors[:, ~kept]
+
+
+def _scale(alone: Array) -> Array:
+    return np.asarray(1.0 / np.sqrt(np.where(alone > 0.0, alone, 1.0)))
+
+
 @dataclass(frozen=True)
 class Projected:
     """Least squares for the columns that matter, after the nuisances are eliminated.
@@ -110,12 +124,10 @@ class Projected:
     @cached_property
     def _eigen(self) -> tuple[Array, Array, Array, Array]:
         """Columns' scale; what is left of combinations that are seen, these; and the others."""
-        scale = 1.0 / np.sqrt(np.where(self.alone > 0.0, self.alone, 1.0))
-        scaled = self.information * np.outer(scale, scale)
         if self.design is None:
-            values, vectors = np.linalg.eigh(scaled)
-            kept = values >= self.floor
-            return scale, values[kept], vectors[:, kept], vectors[:, ~kept]
+            return combinations(self.information, self.alone, self.floor)
+        scale = _scale(self.alone)
+        scaled = self.information * np.outer(scale, scale)
         _, _, basis, lost = self.design._eigen
         values, vectors = np.linalg.eigh(basis.T @ scaled @ basis)
         return scale, np.maximum(values, np.finfo(float).tiny), basis @ vectors, lost

@@ -90,6 +90,12 @@ def shift_patterns(
             )
         )
     count = sum(a.size for a in design.joint)
+    if count <= len(design.joint) + fit.projected.rank:
+        raise NoModelError(
+            f"{recordings[0].named}: {count} readings are no more than there are unknowns (zeros, "
+            "orders, facets), so no error can be stated: clamp at one more angle, or give fewer "
+            "orders"
+        )
     noise = math.sqrt(fit.projected.variance)
     limit = noise * math.sqrt(2.0 / count)
     at = [i for k in kept for i in fit.projected.index(ENCODER, k)]

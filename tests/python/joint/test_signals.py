@@ -298,3 +298,17 @@ def test_a_dead_zone_turns_at_the_first_reading_beyond_it_where_that_is_the_fart
     angle = sign * np.concatenate([[0.0], first - 2.0 * np.arange(30.0)])
     wanted = sign * np.concatenate([[1.0, 1.0], np.full(29, -1.0)])
     np.testing.assert_array_equal(_dead_zone_direction(angle), wanted)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("peak", "turns"), [(2, 0), (3, 0), (4, 1)])
+def test_the_first_direction_is_that_of_the_first_reading_beyond_the_dead_zone(
+    peak: int, turns: int, sign: float
+) -> None:
+    """In counts of one, of which three are within it; what went before has that direction too."""
+    angle = sign * np.concatenate([np.arange(peak + 1.0), np.arange(peak - 1.0, -30.0, -1.0)])
+    found = _dead_zone_direction(angle)
+    expected = np.full(angle.size, -sign)
+    if turns:
+        expected[: peak + 1] = sign
+    np.testing.assert_array_equal(found, expected)

@@ -14,6 +14,7 @@ from trueangle.effects import EFFECTS
 from trueangle.effects.ambiguity import Ambiguity
 from trueangle.errors import ArgumentError
 from trueangle.planning.evidence import ReadingNoise
+from trueangle.planning.nextruns import NextRuns, RivalEvidence
 from trueangle.rehearsal.rehearse import FORMS, rehearse
 from trueangle.rehearsal.trial import FAILED, NAMED, NOTHING, Trial, TrialOutcome
 from trueangle.rehearsal.visibility import SizeRange
@@ -176,6 +177,39 @@ def test_runs_are_asked_for_what_is_blind_in_groups(asked: dict[str, Any]) -> No
     said = "these runs of this joint show nothing of it, however large it is"
     assert found["thermal_drift"].blind_because == said
     assert found["thermal_drift"].measure == (EFFECTS["thermal_drift"].measure or None)
+
+
+@pytest.mark.parametrize("runs", [(), (RunDesign("more", samples=9),)])
+def test_runs_that_were_found_are_told_with_what_they_tell(
+    asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch, runs: tuple[RunDesign, ...]
+) -> None:
+    asked["hidden"] = {"thermal_drift"}
+    evidence = RivalEvidence(("thermal_drift",), True, True, 12.0, 0.5)
+    found = NextRuns(runs, (evidence,), False, (), 1.0, SIM)
+    monkeypatch.setattr(room, "next_runs", lambda *given: found)
+    told = rehearse(SIM, causes=["thermal_drift"], seeds=2).next_runs
+    assert told == (found if runs else None)
+
+
+def test_a_rehearsal_is_whole_where_all_of_its_causes_are(
+    asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two causes the trials of one alone are answered before the time is up."""
+
+    def answers(self: Asked) -> Iterator[tuple[Trial, TrialOutcome]]:
+        while trials := [trial for trial in self.ready if trial.cause == "latency"]:
+            self.ready.remove(trials[0])
+            yield trials[0], self.answer
+
+    monkeypatch.setattr(Asked, "answers", answers)
+    found = rehearse(SIM, causes=["latency", "backlash"], seeds=3, within=70.0)
+    assert (found["latency"].trials, found["backlash"].trials) == (3, 0)
+    assert not found.complete
+    assert found.notes == [
+        "INCOMPLETE: the 70 s given were up before all trials of 1 cause were made; not tried at "
+        "all: backlash",
+        FORMS,
+    ]
 
 
 def test_where_nothing_is_to_be_tried_nobody_is_asked(asked: dict[str, Any]) -> None:

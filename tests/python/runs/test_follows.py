@@ -84,3 +84,103 @@ def test_degrees_that_were_given_as_radians_warn(top: float, warned: bool) -> No
         warnings.simplefilter("error")
         check_follows(CalibrationRun(radians, radians + 0.5 * np.sin(radians)))
         check_follows(CalibrationRun(degrees[:14] * 14, (degrees + error)[:14] * 14))
+
+
+def message(reference: np.ndarray, indicated: np.ndarray, period: float = 360.0) -> str:
+    with pytest.raises(ArgumentError) as told:
+        check_follows(CalibrationRun(reference, indicated, period))
+    return str(told.value)
+
+
+@pytest.mark.parametrize("column", UNITS)
+@pytest.mark.parametrize("other", UNITS)
+def test_of_two_units_that_fit_few_readings_that_of_the_runs_own_column_is_told(
+    column: str, other: str
+) -> None:
+    """Where both factors put a reading at the same angle, they differ by whole turns."""
+    if other == column:
+        return
+    print("seed 911")
+    steps = np.random.default_rng(911).integers(-40_000, 40_000, 12)
+    period = UNITS[column]
+    for unit in set(UNITS) - {column}:
+        mine = period / UNITS[unit]
+        for wrong in set(UNITS) - {other}:
+            apart = mine - UNITS[other] / UNITS[wrong]
+            indicated = steps * period / apart
+            told = message(np.mod(mine * indicated, period), indicated, period)
+            assert f"in a column of {column}" in told
+
+
+def test_a_ratio_is_that_of_two_units_to_a_hundredth() -> None:
+    reference = np.linspace(0.0, 700.0, 3000)
+    for near, unit in ((0.991, True), (1.009, True), (0.988, False), (1.012, False)):
+        told = message(reference, reference * near / 360.0 * 2.0 * math.pi)
+        assert told.endswith("looks like radians in a column of degrees") == unit
+        assert ("times as far" in told) == (not unit)
+
+
+@pytest.mark.parametrize(("noise", "told"), [(15.0, True), (22.0, False)])
+def test_a_remedy_must_make_the_readings_agree(noise: float, told: bool) -> None:
+    """Normal noise of s radians leaves a resultant of exp(-s^2 / 2): 0.95 at 18.4 deg."""
+    print("seed 912")
+    rng = np.random.default_rng(912)
+    reference = rng.uniform(0.0, 360.0, 900)
+    found = message(reference, np.mod(noise * rng.normal(size=900) - reference, 360.0))
+    assert ("change its sign" in found) == told
+    assert ("check units, sign, gear ratio" in found) == (not told)
+
+
+def test_four_readings_are_the_fewest_that_are_looked_at() -> None:
+    reference = np.array([0.0, 100.0, 200.0, 300.0])
+    assert "change its sign" in message(reference, -reference)
+    check_follows(CalibrationRun(reference[:3], -reference[:3], 360.0))
+
+
+@pytest.mark.parametrize(("size", "told"), [(60.0, True), (130.0, False)])
+def test_a_ratio_is_only_told_where_all_readings_keep_to_it(size: float, told: bool) -> None:
+    """About the ratio a wave of amplitude a leaves a resultant of J0(a): 0.93 and 0.71 here."""
+    reference = np.linspace(0.0, 1500.0, 4000)
+    indicated = -3.0 * reference + size * np.sin(reference / 20.0)
+    assert ("times as far" in message(reference, indicated)) == told
+
+
+@pytest.mark.parametrize(("step", "told"), [(50.0, True), (85.0, False)])
+def test_steps_that_may_be_a_turn_more_or_less_tell_no_ratio(step: float, told: bool) -> None:
+    """2.3 times 50 deg is a step of 115 deg; 195 look like 165 deg back."""
+    reference = step * np.arange(40.0)
+    found = message(np.mod(reference, 360.0), np.mod(2.3 * reference, 360.0))
+    assert ("it moves 2.3 times as far" in found) == told
+    assert ("check units, sign, gear ratio" in found) == (not told)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_ratio_near_one_is_no_gear(sign: float) -> None:
+    reference = np.linspace(0.0, 20_000.0, 3000)
+    for away, gear in ((0.14, False), (0.16, True)):
+        found = message(reference, (1.0 + sign * away) * reference)
+        assert (f"it moves {1.0 + sign * away:.6g} times as far" in found) == gear
+        assert ("check units, sign, gear ratio" in found) == (not gear)
+
+
+@pytest.mark.parametrize(
+    ("top", "size", "noise", "warned"),
+    [
+        (64.0, 200, 0.0, True),
+        (350.0, 15, 0.0, True),
+        (350.0, 14, 0.0, False),
+        (350.0, 800, 0.15, True),
+        (350.0, 800, 0.3, False),
+    ],
+)
+def test_degrees_must_leave_a_quarter_of_what_radians_leave(
+    top: float, size: int, noise: float, warned: bool
+) -> None:
+    """From ten turns and 15 readings on; noise of 0.3 about a wave of 0.35 rms is half of it."""
+    print("seed 913")
+    degrees = np.linspace(0.0, top, size)
+    error = 0.5 * np.sin(np.radians(degrees)) + noise * np.random.default_rng(913).normal(size=size)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        check_follows(CalibrationRun(degrees, degrees + error))
+    assert [warning.category for warning in told] == [UnitWarning] * warned

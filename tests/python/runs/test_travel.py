@@ -39,6 +39,8 @@ def test_a_short_pass_holds_lines_that_come_back(period: float) -> None:
     assert held_orders([short(travel, period=period)], []) == (0.0, False)
     wave = short(travel, period=period, error=lambda x: 1e-3 * np.sin(600.0 * x))
     assert held_orders([wave], []) == (pytest.approx(20.0), True)
+    turned = short(travel, period=period, error=lambda x: 1e-3 * (-1.0) ** np.arange(x.size))
+    assert held_orders([turned], []) == (0.0, False)
     # What is slow in it is none of the noise, nor are four harmonics of a declared line.
     drift = short(travel, period=period, error=lambda x: 1e-3 * (x / 0.1) ** 3)
     assert held_orders([drift], []) == (0.0, False)
@@ -68,6 +70,9 @@ def test_what_is_slow_is_taken_out_beside_the_lines(period: float) -> None:
     run = CalibrationRun(theta, theta + line + slow + 0.01 * period, period)
     left = without_drift(run, [90.5]).centred_error
     np.testing.assert_allclose(left, line + 0.01 * period, atol=1e-9 * period)
+    # An even part has its mean about the middle of the travel in any unit.
+    even = CalibrationRun(theta, theta + 1e-3 * period * (3.0 * x**2 - 1.0), period)
+    np.testing.assert_allclose(without_drift(even, [90.5]).centred_error, 0.0, atol=1e-9 * period)
     # Of degree six a part stays.
     more = CalibrationRun(theta, theta + line + 1e-3 * period * x**6, period)
     rest = without_drift(more, [90.5]).centred_error - line
@@ -102,6 +107,7 @@ def test_spans_in_words_and_over_the_turns() -> None:
     assert Span(0.0, 420.0, False).describe(360.0) == "0 to 420 deg"
     assert Span(0.0, 360.0, True).describe(360.0) == "0 to 360 deg"
     assert Span(180.0, 360.0, False).describe(360.0) == "180 to 360 deg"
+    assert Span(20.0, 380.0, False).describe(360.0) == "20 to 380 deg"
     assert Span(0.02, 280.0, False).describe(360.0) == "0 to 280 deg"
     assert Span(0.03, 280.0, False).describe(360.0) == "0.03 to 280 deg"
     two = [np.linspace(30.0, 90.0, 40), np.linspace(-400.0, -300.0, 40)]
@@ -111,3 +117,38 @@ def test_spans_in_words_and_over_the_turns() -> None:
     assert (found.start, found.stop) == (pytest.approx(320.0), pytest.approx(450.0))
     whole = covered_span([np.linspace(0.0, 360.0, 96)], 360.0)
     assert whole == Span(0.0, 360.0, True)
+
+
+@pytest.mark.parametrize("period", UNITS)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_step_of_half_a_turn_is_no_jump_over_the_border(period: float, sign: float) -> None:
+    """Of ten readings one step may be a jump: beside one no other counts."""
+    turns = np.array([0.1, 0.3, 0.5, 0.0, 0.5, 0.7, 0.9, 0.1, 0.3, 0.5])
+    angle = sign * np.where(turns == 0.0, 0.0, turns) * period
+    run = CalibrationRun(angle, angle, period)
+    steps = np.diff(over_turns(run).reference)
+    expected = sign * np.array([0.2, 0.2, -0.5, 0.5, 0.2, 0.2, 0.2, 0.2, 0.2]) * period
+    np.testing.assert_allclose(steps, expected, atol=1e-9 * period)
+    twice = sign * np.array([0.9, 0.1, 0.3, 0.5, 0.7, 0.9, 0.1, 0.2, 0.3, 0.4]) * period
+    given = CalibrationRun(twice, twice, period)
+    assert over_turns(given) is given
+    halves = sign * np.array([0.0, 0.5, 0.0, 0.5]) * period
+    given = CalibrationRun(halves, halves, period)
+    assert over_turns(given) is given
+
+
+@pytest.mark.parametrize("period", UNITS)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_run_with_turns_has_the_error_that_it_had(period: float, sign: float) -> None:
+    """The indicated angle goes along, its zero with it, and all that was recorded stays."""
+    theta = sign * np.linspace(0.2, 1.7, 50)
+    time = np.arange(50.0)
+    run = CalibrationRun(
+        np.mod(theta, 1.0) * period, np.mod(theta + 0.3, 1.0) * period, period, time=time
+    )
+    found = over_turns(run)
+    np.testing.assert_allclose(np.diff(found.reference), np.diff(theta) * period, atol=1e-9)
+    np.testing.assert_allclose(found.indicated - found.reference, 0.3 * period, atol=1e-9 * period)
+    np.testing.assert_array_equal(found.time, time)
+    assert found.reference[0] == run.reference[0]
+    assert found.period == period

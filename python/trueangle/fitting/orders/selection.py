@@ -181,7 +181,7 @@ class EvidenceSelection(EvidenceSearch):
             table=tuple(rows),
             reason="" if orders else self._refusal(rows),
             method="evidence",
-            period=self.runs[0].period,
+            period=self.period,
             positions=self.positions,
             samples=self.samples,
             runs=len(self.runs),
