@@ -120,7 +120,7 @@ class PortableTarget(Target):
         return RunTimeTerms.of(pattern.source, terms, options["direction"])
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
-        from .reading import portable_model
+        from .portablereading import portable_model
 
         return portable_model(text, path, self)
 

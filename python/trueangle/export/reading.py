@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,10 +14,9 @@ from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance, TableRecord
 from ..support.arrays import Array
 from ..support.files import InputFile, sha256_of
-from .chain import Chain
 from .inversion import inverse_rising
 from .proof import Correction
-from .table import TURN, Table
+from .table import TURN
 
 if TYPE_CHECKING:
     from .target import Target
@@ -221,82 +219,3 @@ def _harmonics(table: ReadTable, at_indicated: bool) -> tuple[Array, Array, floa
     spectrum = np.fft.rfft(error) / points
     top = (table.entries - 1) // 2
     return 2.0 * spectrum.real[1 : top + 1], -2.0 * spectrum.imag[1 : top + 1], spectrum[0].real
-
-
-_TABLE = re.compile(
-    r"Table (?P<shaft>\w+): (?P<entries>\d+) entries, \d+ bytes, (?P<method>linear|cubic), "
-    r"(?P<number>q15|q31|f32), shift (?P<shift>\d+), (?P<cycles>[-+.e\d]+) cycles"
-)
-_ZERO = re.compile(r"Zero: (-?\d+) ")
-_TYPES = {"q15": np.int16, "q31": np.int32, "f32": np.float32}
-
-
-def portable_model(text: str, path: str, target: Target) -> HarmonicModel:
-    """Model of the tables of an exported C header or Rust module."""
-    flowing = re.sub(r"\n(?: \*|//!) ?", " ", text)
-    found = list(_TABLE.finditer(flowing))
-    zero = _ZERO.search(flowing)
-    if not found or zero is None:
-        raise table_error(path, "no export of trueangle: its comment names no table")
-    at_indicated = "all tables at the same" in flowing
-    # Before turns were counted, the zero was written modulo one.
-    whole = int(zero[1]) if int(zero[1]) < 1 << 31 else int(zero[1]) - (1 << 32)
-    tables, read = [], []
-    for match in found:
-        shaft, number = match["shaft"], match["number"]
-        entries, cycles = int(match["entries"]), float(match["cycles"])
-        body = re.search(
-            rf"(?:\b(?:\w+_)?{shaft}_knots\[\d+\][^=]*|const {shaft.upper()}(?:_KNOTS)?: [^=]*)"
-            r"= [{\[](.*?)[}\]];",
-            text,
-            re.S,
-        )
-        wide = 2 if match["method"] == "cubic" else 1
-        try:
-            numbers = [float(n) for n in re.findall(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?", body[1])]  # type: ignore[index]
-            knots = np.array(numbers).astype(_TYPES[number])
-            if len(knots) != wide * (entries + 1):
-                raise ValueError
-        except (TypeError, ValueError, OverflowError):
-            raise table_error(
-                path, f"the table of shaft {shaft} does not hold {wide * (entries + 1)} numbers"
-            ) from None
-        table = Table(
-            shaft,
-            cycles,
-            match["method"],
-            number,
-            entries.bit_length() - 1,
-            int(match["shift"]),
-            knots.reshape(-1, 2) if wide == 2 else knots,
-        )
-        # Tables are looked up at the zeroed reading; an indicated argument is the reading.
-        move = whole / TURN * cycles if at_indicated else 0.0
-        read.append(table)
-        tables.append(ReadTable(shaft, cycles, _function(table, move), entries, table.step))
-    chain = Chain(whole, tuple(read), at_indicated)
-    computed = re.search(r"With ([\w, ]+): \w*step\(", flowing)
-    note = (
-        f"read from the tables of {target.name}; {computed[1]}, which its step computes at run "
-        "time, is not in the model"
-        if computed
-        else ""
-    )
-    return function_model(
-        tables,
-        path,
-        target,
-        chain.correction,
-        zero=whole / TURN,
-        at_indicated=at_indicated,
-        turns=chain.turns[0],
-        note=note,
-    )
-
-
-def _function(table: Table, move: float) -> Function:
-    def function(x: Array) -> Array:
-        angles = np.floor(((x - move) % 1.0) * TURN).astype(np.uint64).astype(np.uint32)
-        return table.correction(angles) / TURN
-
-    return function
