@@ -96,7 +96,14 @@ def _parts(
         return other.bic - best.bic, other
 
     is_jitter = best.form == JITTER
-    gap, rival = gain_over(lambda one: not one.is_even and (one.form == JITTER) != is_jitter)
+
+    def is_instead(one: _NoiseAccount) -> bool:
+        if one.is_even or (one.form == JITTER) == is_jitter:
+            return False
+        # Beside the same angles the speed would come as well, not in the place of anything.
+        return bool(best.form) or one.blocks != best.blocks
+
+    gap, rival = gain_over(is_instead)
     other = UNEVEN if is_jitter else JITTER
     instead = _jitter(regression, rival) if rival.form == JITTER else _uneven(rival)
     assert instead is not None

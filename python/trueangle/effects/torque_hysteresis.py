@@ -25,7 +25,7 @@ from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 #: Torque in which the loop builds up, in shares of the largest torque: those searched.
 SPANS = np.geomspace(0.02, 1.0, 8)
 
-#: Elements of different spans at most, and the ratio of spans that keeps them apart.
+#: Elements of different spans at most, and the ratio by which trial spans keep apart from them.
 MOST_ELEMENTS = 3
 APART = 2.5
 

@@ -99,3 +99,28 @@ def test_noise_whose_neighbours_share_nearly_all_has_no_zeros_of_its_own() -> No
             runs.append(ta.CalibrationRun(angle, indicated, period=360.0, time=time))
         result = ta.diagnose(runs, ta.Simulation())
         assert [f.cause for f in result.findings if f.confirmed] == [], result.summary()
+
+
+def test_an_effect_of_another_size_than_believed_is_that_size_and_no_further_cause() -> None:
+    """Of those to be put right the one is taken that leaves the least to be explained."""
+    play, delay = ta.simulation.Backlash, ta.simulation.Latency
+    runs = tuple(
+        ta.simulation.RunDesign(
+            samples=150, reversals=(0.3, 0.6), start_deg=40.0 * k, speed_deg_s=(5.0, 30.0)[k % 2]
+        )
+        for k in range(4)
+    )
+    truth = ta.Simulation(sigma_arcsec=1.0, runs=runs, effects=(play(2.0), delay(5e-5)))
+    print("seed 6413")
+    measured = ta.simulate(truth, 6413)
+    for half, seconds in ((6.0, 5e-5), (2.0, 2e-5)):
+        believed = ta.Simulation(sigma_arcsec=1.0, effects=(play(half), delay(seconds)))
+        found = ta.diagnose(measured, believed)
+        assert [f.cause for f in found.findings] == []
+        verdicts = {belief.what: belief.verdict for belief in found.beliefs}
+        assert verdicts["backlash"] == ("overestimated" if half > 2.0 else "confirmed")
+        assert verdicts["latency"] == ("underestimated" if seconds < 5e-5 else "confirmed")
+        (width,) = [e.half_width_arcsec for e in found.extended.effects if isinstance(e, play)]
+        (lag,) = [e.delay_s for e in found.extended.effects if isinstance(e, delay)]
+        assert abs(width - 2.0) < 0.2
+        assert abs(lag - 5e-5) < 4e-6

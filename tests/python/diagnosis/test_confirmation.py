@@ -146,3 +146,18 @@ def test_a_fixed_line_does_not_follow_what_else_is_recorded(
     assert reason == (
         f"something is unexplained, and this follows the {channel}" if follows else ""
     )
+
+
+@pytest.mark.parametrize("runs", [1, 2])
+def test_a_line_in_time_of_one_run_alone_is_not_confirmed_by_what_is_seen(runs: int) -> None:
+    """Another phase in another run is what tells it from an order."""
+    print(f"seed {SEED}")
+    signals = join_runs(ta.simulate(replace(SIM, runs=SIM.runs[:runs]), 3))
+    line = 2.0 * np.cos(2.0 * np.pi * 0.9 * signals.clock + PHASES[signals.run])
+    noise = np.random.default_rng(SEED).normal(size=len(signals))
+    start = Regression.of(signals, noise + line, SIM.surroundings, rho=0.0)
+    waves = TimePeriodic.waves(signals, [0.9] * runs)
+    claimed = start.propose_run_effect("time_periodic", {"frequency_hz": [0.9] * runs}, waves)
+    left = Unexplained(True, 1.0, 0.1, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0))
+    status, _ = confirmation_status("time_periodic", None, start.with_terms([claimed]), [0], left)
+    assert (status == "confirmed") == (runs > 1)

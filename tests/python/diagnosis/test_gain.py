@@ -261,6 +261,7 @@ def test_a_gain_is_told_with_each_number_at_its_name() -> None:
     assert [told[name] for name in names] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
     assert (told["reducible_share"], told["reducible_share_interval"]) == (0.7, [0.6, 0.8])
     assert (told["control_share"], told["note"], told["holdout"]) == (0.09, "note", "runs")
+    assert str(gain) == repr(gain) == "Gain(rms 1 -> 4 arcsec, share 0.7, runs)"
     of_level = told["by_level"]
     assert (of_level["rms_before_arcsec"], of_level["rms_after_arcsec"]) == (21.0, 22.0)
     assert (of_level["levels"], of_level["held_out"]) == ([5.0, 30.0], [5.0])

@@ -54,3 +54,18 @@ def test_even_steps_of_a_load_are_levels_however_many_they_are(count):
     ).findings
     assert found.cause == "torsional_compliance"
     assert found.gain.by_level.held_out
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("rest", [0.0, 0.3, 0.9])
+def test_a_speed_is_that_of_the_readings_that_move(rest, sign):
+    """A run that mostly rests counts by how fast it went, and one that only rests as at rest."""
+    runs = []
+    for k, speed in enumerate((6.0, 15.0, 30.0, 15.0, 6.0, 0.0)):
+        velocity = np.full(100, sign * speed)
+        velocity[: round(100 * rest)] = 0.0
+        theta = np.cumsum(velocity) * 0.01
+        runs.append(ta.CalibrationRun(theta, theta, 360.0, velocity=velocity, label=f"{k}"))
+    level, values = levels_of_runs(join_runs(runs), "velocity")
+    assert values == pytest.approx([0.0, 6.0, 15.0, 30.0])
+    assert level[::100].tolist() == [1, 2, 3, 2, 1, 0]

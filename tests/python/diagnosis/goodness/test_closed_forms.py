@@ -14,7 +14,9 @@ from trueangle.diagnosis.goodness.noise import (
 )
 from trueangle.diagnosis.goodness.periodogram import _whitened, periodogram
 from trueangle.diagnosis.goodness.place import _smallest, unit_sums
-from trueangle.diagnosis.goodness.scatter import normal_kurtosis
+from trueangle.diagnosis.goodness.scatter import normal_kurtosis, scatter_of_repeats
+
+from . import readings as made
 
 SEED = 71
 BOUNDS = [(0, 30), (30, 75), (75, 120)]
@@ -196,3 +198,46 @@ def test_readings_are_whitened_as_the_covariance_of_neighbours_says(correlation)
     white = np.sqrt(1.0 - correlation**2) * over @ e
     np.testing.assert_allclose(_whitened(e, correlation), white - white.mean(), atol=1e-9)
     assert _whitened(e, 0.0) is e
+
+
+@pytest.mark.parametrize(
+    ("readings", "spread", "highest"),
+    [
+        # Half of the rate of even readings; 60 times the mean rate of others, up to 2^16 cells of
+        # which a period takes four.
+        (400, 0.0, 0.5 * 40.0),
+        (100, 0.9, 60.0 * 10.0),
+        (1000, 0.9, 2.0**16 / 40.0),
+    ],
+)
+def test_frequencies_go_as_far_as_readings_and_cells_resolve_them(readings, spread, highest):
+    chance = rng()
+    step = 10.0 / readings
+    axis = step * (np.arange(readings) + spread * chance.uniform(-0.5, 0.5, readings))
+    axis[-1] = axis[0] + 10.0
+    found = periodogram(chance.normal(size=readings), axis, [(0, readings)])
+    assert found.even == (spread == 0.0)
+    assert found.frequency[-1] == pytest.approx(highest, rel=0.02)
+    # From five resolution cells on, in steps of half a cell or less; no further than is asked.
+    assert found.frequency[0] == pytest.approx(0.5, abs=0.06)
+    assert np.diff(found.frequency).max() <= 0.05 + 1e-9
+    less = periodogram(chance.normal(size=readings), axis, [(0, readings)], top=7.0)
+    assert less.frequency[-1] == pytest.approx(7.0, rel=0.02)
+
+
+def test_repeats_scatter_about_the_mean_of_their_place_and_direction():
+    """Group by group, the zeros of the runs left out."""
+    left = made.leftover("grid", "gauss", 7_901)
+    e = left.residual.copy()
+    for start, stop in left.bounds:
+        e[start:stop] -= e[start:stop].mean()
+    groups: dict[tuple[float, float], list[float]] = {}
+    places = np.round(np.mod(np.degrees(left.theta), 360.0), 3) % 360.0
+    for place, direction, value in zip(places, left.direction, e, strict=True):
+        groups.setdefault((float(place), float(direction)), []).append(float(value))
+    freedom = sum(len(group) - 1 for group in groups.values()) - (len(left.bounds) - 1)
+    power = sum(float(np.var(group)) * len(group) for group in groups.values())
+    found = scatter_of_repeats(left)
+    assert found is not None
+    assert found == pytest.approx((np.sqrt(power / freedom), freedom))
+    assert {direction for _, direction in groups} == {-1.0, 1.0}
