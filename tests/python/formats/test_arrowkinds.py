@@ -106,3 +106,14 @@ def test_columns_stay_in_dictionaries_in_which_they_were_whole(kind: str, tmp_pa
         for i in range(chunks.num_columns)
     }
     assert kept == {"indicated_deg": False, "few": True, "many": False, "corrected_deg": False}
+
+
+@pytest.mark.parametrize("index", [False, True])
+def test_an_index_of_pages_is_kept_where_there_is_one(index: bool, tmp_path: Path) -> None:
+    table = pa.table({"indicated_deg": np.linspace(0.0, 360.0, 100)})
+    source, target = tmp_path / "a.parquet", tmp_path / "b.parquet"
+    pq.write_table(table, source, write_page_index=index)
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.1])], period=360.0)
+    assert ta.correct_logs(source, model, target).logs[0].error is None
+    chunks = pq.ParquetFile(target).metadata.row_group(0)
+    assert [chunks.column(i).has_offset_index for i in range(2)] == [index, index]
