@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -20,7 +21,7 @@ def by_loop(angle: list[float], time: list[float], last: float) -> list[float]:
     """
     found = [math.nan] * len(angle)
     known = [i for i in range(len(angle)) if math.isfinite(angle[i]) and math.isfinite(time[i])]
-    for before, i in zip(known, known[1:], strict=False):
+    for before, i in itertools.pairwise(known):
         if time[i] > time[before]:
             step = math.remainder(angle[i] - angle[before], PERIOD)
             last = step / (time[i] - time[before])
@@ -60,7 +61,7 @@ def test_batches_of_any_size_give_what_all_give_at_once(seed: int) -> None:
     rng = np.random.default_rng(seed)
     ends = [0, 12, *sorted(rng.integers(12, len(angle), 6).tolist()), len(angle)]
     parts, state = [], (math.nan, math.nan, math.nan)
-    for start, stop in zip(ends, ends[1:], strict=False):
+    for start, stop in itertools.pairwise(ends):
         velocity = _Velocity(PERIOD)
         velocity.state = state
         parts.append(velocity(angle[start:stop], time[start:stop]))
