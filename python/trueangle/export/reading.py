@@ -190,10 +190,11 @@ def _arithmetic(
     travel: tuple[float, float] | None,
 ) -> tuple[float, float]:
     """Rms and maximum, in turns, of what a device does beside its model, their zeros apart."""
-    places = np.arange(_PROBES, dtype=np.int64) * (turns * 2**32 // _PROBES)
+    probes = np.arange(_PROBES, dtype=np.int64)
+    places = probes * (turns * 2**32 // _PROBES)
     if travel is not None:
         start, stop = (round(end / 360.0 * TURN) for end in travel)
-        places = start + places * (stop - start) // 2**32
+        places = start + probes * (stop - start) // _PROBES
     x = places / TURN
     if target.argument == "indicated":
         difference = x - np.asarray(model.correct(x * 360.0)) / 360.0 - device(places)

@@ -128,7 +128,7 @@ def changes_of(
     # The zero has no mean of its own where every remounting is new: a common one is the fixture's.
     zero = deviates([zeros], [zero_own], aligned=True, level=0.5 * LEVEL)
     limit = f_quantile(1.0 - 0.5 * LEVEL / pattern.chance.size, 2.0, 2.0 * (len(dated) - 1.0)) * 2.0
-    zero_limit = f_quantile(1.0 - 0.5 * LEVEL / len(dated), 1.0, max(len(dated) - 2.0, 1.0))
+    zero_limit = f_quantile(1.0 - 0.5 * LEVEL / len(dated), 1.0, len(dated) - 2.0)
     sum_limit = chart_limit(ALLOWANCE, LENGTH * 2 * orders.size)
     found = []
     for u, calibrations in enumerate(dated):
@@ -148,6 +148,7 @@ def changes_of(
         rows = []
         for at, (later, _) in enumerate(calibrations[1:]):
             last = later is calibrations[-1][0]
+            of_zero = about_zero and last
             squares_of = [
                 _statistic(later, calibrations, k, pattern.variances[k]) for k in range(orders.size)
             ]
@@ -156,9 +157,9 @@ def changes_of(
                 HistoryRow(
                     calibrations[0][0].unit,
                     later.when or "",
-                    None if about_zero else float(orders[places[0]]),
-                    float(zero.size[u, 0] ** 2) if about_zero and last else square,
-                    zero_limit if about_zero else limit,
+                    None if of_zero else float(orders[places[0]]),
+                    float(zero.size[u, 0] ** 2) if of_zero else square,
+                    zero_limit if of_zero else limit,
                     verdict if last else "recalibrate" if square > limit else "fine",
                     due[0] if last else None,
                     due[1] if last else False,

@@ -219,8 +219,7 @@ class Header:
 
     def _is_talk(self, cells: list[str], reading: _TextLine) -> bool:
         """One cell above several that are filled: words of a firmware, no names."""
-        below = self._cells(reading.text)
-        return len(cells) == 1 and len(below) > 1 and bool(below[-1])
+        return len(cells) == 1 and bool(self._cells(reading.text)[-1])
 
     def _scope(self, lines: list[_TextLine], before: list[int], width: int, last: int) -> int:
         """The line of names in a preamble of TwinCAT's exports, else ``last``."""

@@ -16,7 +16,8 @@ _HEAD: Final = 24
 
 #: Links of a block that lead to its successor or to what it holds, and what must stand there
 #: (ASAM MDF 4.2; None: any): a tree, but for conversions that channels share. Those that refer
-#: back (master, scope, element) are not among them.
+#: back (master, scope, element) are not among them. Further links of a conversion lead to
+#: conversions or texts.
 _LEADS: Final[Mapping[bytes, Mapping[int, bytes | None]]] = {
     b"##HD": {0: b"##DG", 1: b"##FH", 2: b"##CH", 3: b"##AT", 4: b"##EV"},
     b"##FH": {0: b"##FH"},
@@ -32,8 +33,6 @@ _LEADS: Final[Mapping[bytes, Mapping[int, bytes | None]]] = {
     b"##DL": {0: b"##DL"},
     b"##LD": {0: b"##LD"},
 }
-#: Links of a conversion from here on lead to conversions or texts.
-_REFERENCES: Final = 4
 
 
 def check_chains(path: Path) -> None:
@@ -68,18 +67,19 @@ def check_chains(path: Path) -> None:
 
 def _leads(path: Path, file: BinaryIO, block: int, size: int) -> list[int]:
     """Where the blocks are that this one leads to."""
-    file.seek(block)
+    file.seek(min(block, size))
     kind, length, count = struct.unpack("<4s4xQQ", file.read(_HEAD).ljust(_HEAD, b"\0"))
     leads = _LEADS.get(kind, {})
     # The library reads the links of most kinds where they must stand, whatever number is said.
-    said = min(count, max(length - _HEAD, 0) // 8, (size - block) // 8)
-    count = max(said, max(leads) + 1) if leads and kind != b"##CC" else said if leads else 0
-    data = file.read(8 * count)
+    room = 8 * (max(leads, default=-1) + 1)
+    if kind == b"##CC":
+        room = min(8 * count, max(length, _HEAD) - _HEAD, size)
+    data = file.read(room)
     links = struct.unpack(f"<{len(data) // 8}Q", data[: len(data) // 8 * 8])
     found = []
     for at, link in enumerate(links):
         wanted = leads.get(at)
-        if not link or (at not in leads and not (kind == b"##CC" and at >= _REFERENCES)):
+        if not link or (at not in leads and not (kind == b"##CC" and at > max(leads))):
             continue
         if wanted is not None:
             file.seek(min(link, size))
@@ -90,6 +90,5 @@ def _leads(path: Path, file: BinaryIO, block: int, size: int) -> list[int]:
                     f"is damaged: the {kind[2:].decode()} block at byte {block} leads to byte "
                     f"{link}, where no {wanted[2:].decode()} block stands",
                 )
-        if link <= size - _HEAD:
-            found.append(link)
+        found.append(link)
     return found

@@ -280,8 +280,6 @@ class DesignScales:
 
 
 def _thinned(signals: Signals) -> Signals:
-    if len(signals) <= MOST_READINGS:
-        return signals
     return signals.take(np.arange(0, len(signals), -(-len(signals) // MOST_READINGS)))
 
 

@@ -68,6 +68,17 @@ def test_of_a_model_that_states_no_uncertainty_a_thousandth_of_its_pattern_is_le
         assert made.entries == smallest(model, 1e-3 * pattern, method)
 
 
+@pytest.mark.parametrize("top", [1, 3, 4, 9])
+def test_a_shaft_without_an_error_has_the_fewest_entries(top):
+    """Any hold it: two a wave and one more, of eight at least."""
+    still = ta.Shaft("motor", 3, (top,), (0.0,), (0.0,))
+    model = ta.HarmonicModel((*golden_model().shafts, still))
+    made = ta.export_model(model, "c", bits=BITS)
+    assert [table["shaft"] for table in made.tables] == ["output", "motor"]
+    entries = made.tables[1]["entries"]
+    assert entries == next(size for size in (8, 16, 32) if size > 2 * top)
+
+
 @pytest.mark.parametrize(("top", "largest"), [(8, 4096), (1000, 4096), (1024, 8192)])
 def test_a_default_table_has_eight_entries_a_wave_at_most_and_4096_anyway(top, largest):
     """However little it should leave; and more than two a wave however much."""

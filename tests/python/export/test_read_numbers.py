@@ -101,6 +101,8 @@ def test_numbers_are_known_to_the_last_digit_of_any_column(finest, decimals, tmp
     step = 10.0**-decimals
     assert model.fit.residual == pytest.approx(step / np.sqrt(12.0))
     np.testing.assert_allclose(np.diag(model.covariance)[1:], step**2 / 12.0 * 2.0 / 36.0)
+    assert model.covariance[0, 0] == pytest.approx(step**2 / 12.0 / 36.0)  # that of a mean
+    assert model.fit.samples == 36
 
 
 @pytest.mark.parametrize("decimals", [2, 4])

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 import trueangle as ta
 from trueangle.fleets.charts import charted
+from trueangle.fleets.history import changes_of
 from trueangle.support.runlength import chart_limit
 
 from .made import alone, units
@@ -108,6 +110,60 @@ def test_the_charts_are_sums_of_independent_normal_numbers_where_nothing_moves()
     assert passed <= 4
     text = json.loads(found.to_json())["history"][0]
     assert set(text["orders"][0]) == {"order", "statistic", "cusum"}
+
+
+def moved_by_hand(rng, count, zero=0.0, step=0.0):
+    """Units of two orders on three dates; the zero and the first order of the last one moved."""
+    found = []
+    for u in range(count):
+        dates, last = [], u == count - 1
+        for t, when in enumerate(FOUR[:3]):
+            coefficients = rng.normal(0.0, 1.0, 4) + np.eye(4)[0] * (step * last * (t > 0))
+            made = replace(alone(0.0, 0.0, when), inverse=np.zeros((4, 4)), unit=f"u{u}")
+            shift = rng.normal() + zero * last * (t == 2)
+            dates.append((replace(made, coefficients=coefficients, zero=shift), 1.0))
+        found.append(dates)
+    return found
+
+
+@pytest.mark.parametrize("count", [6, 7, 12])
+def test_a_zero_that_moved_is_told_by_students_bound_of_all_units(count):
+    """Externally studentized: against mean and scatter of the others, a half of 1 % for all."""
+    print("seed", SEED)
+    dated = moved_by_hand(np.random.default_rng(SEED + 77), count, zero=40.0)
+    found = changes_of(dated, np.array([1.0, 2.0]), 360.0, np.ones(2), None)
+    row = found[-1].rows[-1]
+    assert (row.verdict, row.order) == ("zero_moved", None)
+    bound = student.ppf(1.0 - 0.005 / (2 * count), count - 2)
+    assert row.limit == pytest.approx(bound**2, rel=1e-6)
+    *others, moved = [dates[-1][0].zero - dates[0][0].zero for dates in dated]
+    spread = np.std(others, ddof=1) * np.sqrt(1.0 + 1.0 / len(others))
+    assert row.statistic == pytest.approx(((moved - np.mean(others)) / spread) ** 2)
+    assert [one.unit for one in found if one.zero_moved] == [f"u{count - 1}"]
+
+
+@pytest.mark.parametrize("count", [6, 12])
+@pytest.mark.parametrize(("zero", "step"), [(0.0, 0.0), (40.0, 0.0), (0.0, 60.0), (40.0, 60.0)])
+def test_every_earlier_date_is_told_by_the_order_its_statistic_is_of(count, zero, step):
+    """The bound of T^2 by its closed form: the tail of F with 2 degrees of freedom above."""
+    print("seed", SEED)
+    dated = moved_by_hand(np.random.default_rng(SEED + 78), count, zero, step)
+    found = changes_of(dated, np.array([1.0, 2.0]), 360.0, np.ones(2), None)
+    freedom = 2.0 * (count - 1)
+    for change in found:
+        assert [row.when for row in change.rows] == [*FOUR[1:3]]
+        for row in change.rows:
+            of_zero = change.zero_moved and not change.moved and row is change.rows[-1]
+            assert (row.order is None) == of_zero
+            if not of_zero:
+                tail = (1.0 + row.limit / freedom) ** (-freedom / 2.0)
+                assert tail == pytest.approx(0.005 / (2 * count))
+                statistics = {one.order: one.statistic for one in row.orders}
+                assert row.statistic == statistics[row.order]
+        first = change.rows[0]
+        assert (first.verdict == "recalibrate") == (first.statistic > first.limit)
+        assert (first.next_calibration, first.bound, first.extrapolated) == (None, None, False)
+    assert (found[-1].rows[0].verdict == "recalibrate") == (step > 0.0)
 
 
 def test_the_sums_are_those_of_the_recursion():

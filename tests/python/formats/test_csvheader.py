@@ -110,6 +110,21 @@ def test_time_columns_of_twincat_are_numbered_and_all_in_milliseconds():
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("below", range(5))
+def test_known_names_are_taken_wherever_lines_of_their_width_follow(below):
+    """Also where these begin with words, as angles that come later do; else they are talk."""
+    names = "time_s,mode,reference_deg,load"
+    rows = ["0.5,on,no,up", "0.6,on,no,up", "0.7,off,no,up", "0.8,off,no,up"][:below]
+    found = header("\n".join(["rig", "of the lab", names, *rows, ""]))
+    assert (found.place, found.line) == ((2, 4) if below else (0, 2))
+    assert found.names == (names.split(",") if below else ["rig"])
+
+
+def test_known_names_in_words_below_the_readings_are_no_names():
+    found = header(f"t,ref,enc\n{THREE}the clock of time_s is off\n")
+    assert (found.place, found.names, found.line) == (0, ["t", "ref", "enc"], 2)
+
+
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])
 def test_lines_end_as_the_line_of_names_does(ending):
     text = ("# a note\nt,ref,enc\n" + THREE).replace("\n", ending)

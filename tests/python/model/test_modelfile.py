@@ -94,6 +94,10 @@ REFUSED = {
         {"change": lambda c: c.update(fit={**FIT, "span": [5e300, -5e300]})},
         r"fit\.span",
     ),
+    "a span a little backwards": (
+        {"change": lambda c: c.update(fit={**FIT, "span": [10.0, 9.999]})},
+        r"fit\.span.*first the smaller, are needed, got \(10\.0, 9\.999\)",
+    ),
     "no correction": (
         {"change": lambda c: c.update(terms=[{"kind": "thermal_drift", "pattern_per_K": 1e9}])},
         "terms",

@@ -103,12 +103,16 @@ def test_every_run_stays_within_limits(plan):
 
 
 def test_designs_that_were_weighed_are_worth_what_they_were(found, plan, monkeypatch):
+    """And of two that tell as much the shorter and plainer one is worth more."""
     weighed, known = DesignScales.weighed, []
 
-    def anew(self, *given):
+    def anew(self, designs, start, changes=0, least=0):
         known.append(len(self._known))
         self._known.clear()
-        return weighed(self, *given)
+        worth = weighed(self, designs, start, changes, least)
+        assert worth.seconds == pytest.approx(-sum(run_seconds(design) for design in designs))
+        assert worth.plain == -changes
+        return worth
 
     monkeypatch.setattr(DesignScales, "weighed", anew)
     assert found.plan().to_dict() == plan.to_dict()

@@ -182,6 +182,9 @@ def test_the_charts_of_a_unit_have_each_their_statistic_and_its_limit(fleet):
     ):
         drawn = lines(ax)
         assert set(drawn["limit"][1]) == {limit}
+        assert ax.get_ylim()[0] == 0.0
+        highest = max(getattr(one, name) for row in rows for one in row.orders)
+        assert ax.get_yscale() == ("symlog" if highest > 10.0 * limit else "linear")
         for k, order in enumerate((1, 2)):
             wanted = [getattr(row.orders[k], name) for row in rows]
             assert drawn[f"order {order}"][1].tolist() == pytest.approx(wanted)

@@ -94,6 +94,7 @@ def test_names_are_turned_inwards_near_the_borders_and_stand_on_their_side(below
         ("row", (170, 510)),
         ("joined", (170, 510)),
         ("stacked", (680, 680)),
+        ("above", (680, 680)),
         ("multiples", (227, 227)),
     ],
 )

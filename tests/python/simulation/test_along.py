@@ -10,6 +10,9 @@ from trueangle.errors import ArgumentError
 from trueangle.simulation import (
     Backlash,
     Harmonic,
+    HeteroscedasticNoise,
+    Latency,
+    MissingOrder,
     RunDesign,
     Simulation,
     simulate,
@@ -62,3 +65,32 @@ def test_noise_is_correlated_within_runs_and_has_its_deviation():
 def test_what_is_no_correlation_is_refused():
     with pytest.raises(ArgumentError, match="correlation must be from 0 to below 1"):
         simulate_along(SIM, simulate(SIM, 1), correlation=1.0)
+
+
+def test_a_delay_moves_the_lines_that_an_effect_adds_as_well():
+    """By the chain of angles itself: what is read was so a moment before."""
+    effects = (MissingOrder("output", 7.0, 40.0, 25.0), Latency(2e-3))
+    believed = replace(SIM, harmonics=SIM.harmonics, effects=effects)
+    design = RunDesign("a", samples=300, speed_deg_s=50.0)
+    (run,) = simulate(believed, 4, [design])
+
+    def lines(angle):
+        first = 20.0 * np.sin(np.radians(3.0 * angle + 10.0))
+        return first + 40.0 * np.sin(np.radians(7.0 * angle + 25.0))
+
+    # To first order in the delay: the true angle moves by it, and the lines with it.
+    back = 2e-3 * run.velocity
+    wanted = lines(run.reference - back) - 3600.0 * back
+    np.testing.assert_allclose(3600.0 * run.error, wanted, atol=0.02)
+    (along,) = simulate_along(believed, [run])
+    np.testing.assert_allclose(3600.0 * along.error, wanted, atol=0.02)
+    np.testing.assert_allclose(believed.predict(run), wanted, atol=0.02)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5])
+def test_noise_that_grows_with_speed_has_the_deviation_of_its_law_along_runs(correlation):
+    sim = Simulation(sigma_arcsec=3.0, effects=(HeteroscedasticNoise(per_deg_s=0.05),))
+    speeds = np.array([0.0, 20.0, 60.0])
+    ideal = simulate(Simulation(), 7, [RunDesign(samples=4000, speed_deg_s=v) for v in speeds])
+    found = [3600.0 * np.std(run.error) for run in simulate_along(sim, ideal, 8, correlation)]
+    assert found == pytest.approx(3.0 * np.exp(0.025 * speeds), rel=0.08)

@@ -84,13 +84,14 @@ def test_an_encoder_that_was_turned_reads_with_its_own_error():
 def test_motor_and_heads_read_where_they_are():
     """A head sees the disc's error at its own place; the motor its own noise, not reduced."""
     line = Harmonic("output", 2, 50.0, 30.0)
-    joint = Joint(20.0, heads=(Head(0.0), Head(100.0)))
+    joint = Joint(20.0, heads=(Head(0.0), Head(100.0), Head(360.0)))
     sim = Simulation(joint, (line,), sigma_arcsec=0.0)
     run = only(RunDesign(samples=N, motor_sigma_arcsec=90.0), sim)
     there = np.radians(run.reference + 100.0)
     error = 3600.0 * (run.signals["head2"] - 100.0 - run.reference)
     np.testing.assert_allclose(error, 50.0 * np.sin(2.0 * there + np.radians(30.0)), atol=1e-6)
     np.testing.assert_allclose(run.signals["head1"], run.indicated, atol=1e-12)
+    np.testing.assert_allclose(run.signals["head3"], run.indicated + 360.0, atol=1e-12)
     noise = 3600.0 * (run.signals["motor"] - 20.0 * run.reference)
     # A deviation of 4000 is known to 1.1 %.
     assert np.std(noise) == pytest.approx(90.0, rel=0.05)
