@@ -54,6 +54,21 @@ def test_a_remark_that_is_a_name_makes_no_line_of_names(row, before, end, delimi
     assert found.line == before.count("\n") + 2
 
 
+@pytest.mark.parametrize(
+    ("notes", "names", "place"),
+    [
+        ("# t,x,y\n", ["t", "x", "y"], 0),
+        ("# rig 3\n# t,x,y\n", ["t", "x", "y"], 1),
+        ("# t,x,y\n# made at the rig\n", ["column1", "column2", "column3"], -1),
+        ("# t,x,y\n# a,b,c\n", ["a", "b", "c"], 1),
+    ],
+)
+def test_of_notes_the_last_above_the_readings_may_be_names(notes, names, place):
+    found = header(notes + THREE)
+    assert (found.names, found.place) == (names, place)
+    assert found.line == notes.count("\n") + 1
+
+
 def test_one_name_above_one_column_that_ends_with_a_delimiter_is_a_name():
     found = header("angle\n1.5,\n2.5,\n3.5,\n4.5,\n")
     assert (found.names, found.place, found.trailing) == (["angle"], 0, True)

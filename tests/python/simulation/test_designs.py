@@ -81,6 +81,18 @@ def test_an_encoder_that_was_turned_reads_with_its_own_error():
         np.testing.assert_allclose(error, wanted, atol=0.02)
 
 
+@pytest.mark.parametrize("angle", [0.0, 360.0, -360.0])
+def test_a_head_whole_turns_away_is_the_joints_own(angle):
+    """Its noise as well: it is one reading."""
+    sim = Simulation(Joint(heads=(Head(angle), Head(180.0))), sigma_arcsec=4.0)
+    run = only(RunDesign(samples=N), sim)
+    own, other = (run.signals[f"head{k}"] for k in (1, 2))
+    np.testing.assert_allclose(own - angle, run.indicated, atol=1e-9)
+    assert np.std(3600.0 * (other - 180.0 - run.indicated)) == pytest.approx(
+        4.0 * np.sqrt(2.0), rel=0.05
+    )
+
+
 def test_motor_and_heads_read_where_they_are():
     """A head sees the disc's error at its own place; the motor its own noise, not reduced."""
     line = Harmonic("output", 2, 50.0, 30.0)
