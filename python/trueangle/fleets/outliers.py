@@ -23,7 +23,7 @@ _HIDDEN: Final = 0.2
 #: Shares of the level of those orders of the output in which damage shows: eccentricity and tilt.
 _DAMAGE: Final = {1.0: 0.4, 2.0: 0.2}
 
-#: Of this share of the units, at most, an outlier can be told: the others are what it is told by.
+#: This share of the units and one more can be outliers: by the others they are told.
 _MOST: Final = 0.25
 
 #: Degrees of freedom of the scale that an order needs.
@@ -116,7 +116,7 @@ def deviates(
 
     Notes
     -----
-    n times orders for every unit set aside, a quarter of them at most.
+    n times orders for every unit set aside, a quarter of them and one more at most.
     """
     n = len(values[0])
     variances = np.array([_variance(v, s, aligned) for v, s in zip(values, own, strict=True)])
