@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
-from .csvheader import cell_number as read_number
+from .csvcells import cell_number as read_number
 from .format import Batch, Contents, CopyTask, Selection
 
 #: Name, date, time, value; what follows (alarms) is of no concern.

@@ -1,4 +1,4 @@
-"""What stands before the readings of a text file: preamble, names, units; how its cells are cut."""
+"""What stands before the readings of a text file: preamble, names, units."""
 
 from __future__ import annotations
 
@@ -6,11 +6,21 @@ import codecs
 import csv
 import itertools
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import IO, NamedTuple
 
 from ..errors import FileError
+from .csvcells import (
+    COMMA,
+    POINT,
+    are_readings,
+    cell_number,
+    cut_rows,
+    delimiter_of,
+    holds_number,
+    is_comment,
+)
 
 #: Bytes and lines within which the readings must begin.
 _HEAD = 1 << 18
@@ -20,12 +30,6 @@ LONGEST_LINE = 1 << 24
 #: Lines looked at to tell readings from a preamble.
 _LOOKED_AT = 4
 
-#: Fortran writes exponents with D, and those of three digits without a letter.
-_EXPONENT = r"(?:[eEdD][+-]?\d+|(?<=[\d.,])[+-]\d{3})?"
-_POINT = re.compile(rf"[+-]?(?:\d+\.?\d*|\.\d+){_EXPONENT}", re.ASCII)
-_COMMA = re.compile(rf"[+-]?(?:\d+[.,]?\d*|[.,]\d+){_EXPONENT}", re.ASCII)
-_LETTER = re.compile(r"[dD]|(?<=[\d.])(?=[+-])")
-_WORDS = frozenset({"nan", "inf", "infinity", "+inf", "-inf", "+infinity", "-infinity", "-nan"})
 #: A name at the head of a time column of TwinCAT's exports, before the names it is for.
 _SCOPE = "Name"
 #: What a line of units holds: units in brackets, or short words without digits.
@@ -163,7 +167,7 @@ class Header:
         solid = [i for i, line in enumerate(lines) if line.text.strip()]
         plain = [i for i in solid if not is_comment(lines[i].text)]
         first = plain[0] if plain else solid[0]
-        self.delimiter = _delimiter(lines[first].text)
+        self.delimiter = delimiter_of(lines[first].text)
         # Names of this package are taken at their word, wherever the readings begin; one among
         # readings is a remark.
         known = [
@@ -172,7 +176,7 @@ class Header:
             if _STANDARD.search(lines[i].text) and (i == first or self._is_of_words(lines[i].text))
         ] or [-1]
         if known[-1] >= 0 and (known[-1] == first or self._is_names(lines, plain, known[-1])):
-            self.delimiter = _delimiter(lines[known[-1]].text)
+            self.delimiter = delimiter_of(lines[known[-1]].text)
             return known[-1], self._after_units(lines, known[-1])
         for delimiter in (";", "\t", ",", " "):
             begin = self._first_reading(lines, plain, delimiter)
@@ -205,12 +209,12 @@ class Header:
 
     def _is_of_words(self, text: str) -> bool:
         """Whether a line holds fewer numbers than words."""
-        delimiter = _delimiter(text)
-        return not _are_readings(self._split(text, delimiter), "." if delimiter == "," else ",")
+        delimiter = delimiter_of(text)
+        return not are_readings(self._split(text, delimiter), "." if delimiter == "," else ",")
 
     def _is_names(self, lines: list[_TextLine], plain: list[int], place: int) -> bool:
         """Whether a line has as many cells as each of those that follow it."""
-        delimiter = _delimiter(lines[place].text)
+        delimiter = delimiter_of(lines[place].text)
         below = [i for i in plain if i > place][:_LOOKED_AT]
         width = len(self._split(lines[place].text, delimiter))
         return bool(below) and all(
@@ -250,13 +254,15 @@ class Header:
                 cell_number(cell, decimal) is not None for cell in cells
             )
 
-        good = [len(cells) > 1 and _are_readings(cells, decimal) for _i, cells in looked_at]
+        good = [len(cells) > 1 and are_readings(cells, decimal) for _i, cells in looked_at]
         for k in (k for k in range(len(looked_at)) if good[k]):
             width = len(looked_at[k][1])
             below = (j for j in range(k, len(looked_at)) if not is_words(looked_at[j][1], width))
             next_ones = list(itertools.islice(below, _LOOKED_AT))
             if all(good[j] and len(looked_at[j][1]) == width for j in next_ones):
-                kinds = [[_kind(cell, decimal) for cell in looked_at[j][1]] for j in next_ones]
+                kinds = [
+                    [holds_number(cell, decimal) for cell in looked_at[j][1]] for j in next_ones
+                ]
                 if all(len(set(column) - {None}) <= 1 for column in zip(*kinds, strict=True)):
                     return looked_at[k][0]
         return None
@@ -266,7 +272,7 @@ class Header:
             return "."
         for line in lines:
             for cell in () if is_comment(line.text) else self._cells(line.text):
-                if "," in cell and _COMMA.fullmatch(cell) and not _POINT.fullmatch(cell):
+                if "," in cell and COMMA.fullmatch(cell) and not POINT.fullmatch(cell):
                     return ","
         return "."
 
@@ -332,52 +338,9 @@ class Header:
         return [cell.strip() for cell in cells] or [""]
 
 
-def cut_rows(lines: Iterable[str], delimiter: str, *, strict: bool = False) -> Iterator[list[str]]:
-    """Cells of lines; blanks between cells count as one, however many."""
-    blanks = delimiter == " "
-    if blanks:  # and tabs among them
-        lines = (line.replace("\t", " ") for line in lines)
-    return csv.reader(lines, delimiter=delimiter, skipinitialspace=blanks, strict=strict)
-
-
-def _delimiter(text: str) -> str:
-    """What stands between the names of a line: the most frequent sign, else blanks."""
-    found = max(",;\t", key=text.count)
-    return found if found in text or len(text.split()) < 2 else " "
-
-
 #: Names that this package gives its columns: a line with one is the line of names.
 _STANDARD = re.compile(r"(reference|indicated|corrected)_(deg|rad|turn|count)\b|\btime_s\b")
 _BRACKETED = r"[\[(][^\])]*[\])]\s*$"
-
-
-def is_comment(text: str) -> bool:
-    """True for a note: a line that begins with #, and the mark of an end of file."""
-    start = text.lstrip()
-    return start.startswith("#") or (start.startswith("EOF") and start.rstrip() == "EOF")
-
-
-def cell_number(cell: str, decimal: str) -> float | None:
-    """The number that a cell holds, or None: no underscores, digits of ASCII only."""
-    pattern = _POINT if decimal == "." else _COMMA
-    if pattern.fullmatch(cell):
-        plain = cell.replace(",", ".") if decimal == "," else cell
-        try:
-            return float(plain)
-        except ValueError:
-            return float(_LETTER.sub("e", plain, 1))
-    return float(cell) if cell.lower() in _WORDS else None
-
-
-def _are_readings(cells: Sequence[str], decimal: str) -> bool:
-    filled = [cell for cell in cells if cell]
-    count = sum(cell_number(cell, decimal) is not None for cell in filled)
-    return count > 0 and 2 * count >= len(filled)
-
-
-def _kind(cell: str, decimal: str) -> bool | None:
-    """Whether a cell holds a number; None for an empty one."""
-    return cell_number(cell, decimal) is not None if cell else None
 
 
 def _split(data: bytes) -> list[bytes]:

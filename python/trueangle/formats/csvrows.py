@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .csvheader import LONGEST_LINE, Header, cell_number, cut_rows, is_comment
+from .csvcells import cell_number, cut_rows, is_comment
+from .csvheader import LONGEST_LINE, Header
 from .format import Labels, row_labels
 
 #: Numbers in lines, all without an exponent.

@@ -26,7 +26,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ..errors import FileError, MessageLinesWarning
-from .csvheader import cell_number
+from .csvcells import cell_number
 from .format import Batch, Contents, CopyTask, Selection, row_labels
 
 #: Degrees a second by which the sky turns.

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from ..formats.budget import DecodedSizeError, check_decoded
 from ..formats.columns import find_columns
-from ..formats.csvheader import cell_number
+from ..formats.csvcells import cell_number
 from ..formats.format import TEXTS, Batch, Format, Labels, Selection
 from ..formats.formats import format_of_content
 from ..support.files import (

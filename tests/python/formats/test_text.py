@@ -11,7 +11,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import FileError, MessageLinesWarning
-from trueangle.formats import csvheader
+from trueangle.formats import csvcells
 
 ROWS = 24
 REFERENCE = np.arange(ROWS) * 15.0
@@ -266,13 +266,13 @@ def test_bytes_that_are_no_text_are_refused_wherever_they_stand(way, column, tmp
     [("1.5D+01", 15.0), ("-.5d0", -0.5), ("0.25-100", 0.25e-100), ("1.+002", 100.0), ("2E3", 2e3)],
 )
 def test_numbers_as_fortran_writes_them(cell, number):
-    assert csvheader.cell_number(cell, ".") == number
-    assert csvheader.cell_number(cell.replace(".", ","), ",") == number
+    assert csvcells.cell_number(cell, ".") == number
+    assert csvcells.cell_number(cell.replace(".", ","), ",") == number
 
 
 @pytest.mark.parametrize("cell", ["1D", "D+01", "1-2", "1+02", "1D+", "0x1D"])
 def test_what_looks_like_a_number_of_fortran(cell):
-    assert csvheader.cell_number(cell, ".") is None
+    assert csvcells.cell_number(cell, ".") is None
 
 
 def test_words_among_readings_are_counted_and_said(tmp_path):

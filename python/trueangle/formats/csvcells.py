@@ -1,0 +1,59 @@
+"""How the cells of a line of text are cut, and which of them are numbers."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Iterator, Sequence
+
+#: Fortran writes exponents with D, and those of three digits without a letter.
+_EXPONENT = r"(?:[eEdD][+-]?\d+|(?<=[\d.,])[+-]\d{3})?"
+#: Numbers with a point; and those with a comma or a point.
+POINT = re.compile(rf"[+-]?(?:\d+\.?\d*|\.\d+){_EXPONENT}", re.ASCII)
+COMMA = re.compile(rf"[+-]?(?:\d+[.,]?\d*|[.,]\d+){_EXPONENT}", re.ASCII)
+_LETTER = re.compile(r"[dD]|(?<=[\d.])(?=[+-])")
+_WORDS = frozenset({"nan", "inf", "infinity", "+inf", "-inf", "+infinity", "-infinity", "-nan"})
+
+
+def cut_rows(lines: Iterable[str], delimiter: str, *, strict: bool = False) -> Iterator[list[str]]:
+    """Cells of lines; blanks between cells count as one, however many."""
+    blanks = delimiter == " "
+    if blanks:  # and tabs among them
+        lines = (line.replace("\t", " ") for line in lines)
+    return csv.reader(lines, delimiter=delimiter, skipinitialspace=blanks, strict=strict)
+
+
+def delimiter_of(text: str) -> str:
+    """What stands between the names of a line: the most frequent sign, else blanks."""
+    found = max(",;\t", key=text.count)
+    return found if found in text or len(text.split()) < 2 else " "
+
+
+def is_comment(text: str) -> bool:
+    """True for a note: a line that begins with #, and the mark of an end of file."""
+    start = text.lstrip()
+    return start.startswith("#") or (start.startswith("EOF") and start.rstrip() == "EOF")
+
+
+def cell_number(cell: str, decimal: str) -> float | None:
+    """The number that a cell holds, or None: no underscores, digits of ASCII only."""
+    pattern = POINT if decimal == "." else COMMA
+    if pattern.fullmatch(cell):
+        plain = cell.replace(",", ".") if decimal == "," else cell
+        try:
+            return float(plain)
+        except ValueError:
+            return float(_LETTER.sub("e", plain, 1))
+    return float(cell) if cell.lower() in _WORDS else None
+
+
+def are_readings(cells: Sequence[str], decimal: str) -> bool:
+    """Whether half of the cells that are filled, and more, hold numbers."""
+    filled = [cell for cell in cells if cell]
+    count = sum(cell_number(cell, decimal) is not None for cell in filled)
+    return count > 0 and 2 * count >= len(filled)
+
+
+def holds_number(cell: str, decimal: str) -> bool | None:
+    """Whether a cell holds a number; None for an empty one."""
+    return cell_number(cell, decimal) is not None if cell else None
