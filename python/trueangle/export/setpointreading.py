@@ -12,8 +12,9 @@ from .reading import ReadTable, function_model, table_error
 from .table import TURN
 from .target import Target
 
-#: Points to an entry on which the way back over a partial travel is laid.
-_WAY_BACK = 8
+#: Points to an entry on which the way back over a partial travel is laid, and entries at most: it
+#: is one cubic, however close the entries are.
+_WAY_BACK, _MOST_ENTRIES = 8, 1 << 14
 
 
 def travel_model(
@@ -91,7 +92,8 @@ def _closed(nominal: Array, pattern: Array, spacing: float) -> tuple[Array, Arra
     """A table and the way back from its end to its start a turn later: Hermite's cubic."""
     start, stop = nominal[-1], nominal[0] + 360.0
     width = stop - start
-    t = np.linspace(0.0, 1.0, _WAY_BACK * max(4, round(width / spacing)) + 1)[1:]
+    entries = min(max(4, round(width / spacing)), _MOST_ENTRIES)
+    t = np.linspace(0.0, 1.0, _WAY_BACK * entries + 1)[1:]
     # Slopes over the travel beside the ends, as lines have them.
     first = (pattern[-1] - pattern[-2]) / (nominal[-1] - nominal[-2]) * width
     last = (pattern[1] - pattern[0]) / (nominal[1] - nominal[0]) * width

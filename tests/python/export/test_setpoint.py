@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
+import tracemalloc
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +13,7 @@ import pytest
 import trueangle as ta
 from trueangle.export import TARGETS
 from trueangle.export.setpoint import axis_steepness
-from trueangle.export.setpointreading import travel_model
+from trueangle.export.setpointreading import _closed, travel_model
 
 DIGIT = 1e-4
 
@@ -70,6 +72,35 @@ def test_what_differs_between_the_ways_beside_its_mean_is_told(tmp_path, size: f
         told = float(model.fit.note.split("differ by a pattern of ")[1].split()[0])
         # A sine over both ends of the turn: 120 of 121 squares.
         assert told == pytest.approx(size * DIGIT * 3600.0 * np.sqrt(60.0 / 121.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("spacing", [0.0001, 0.03, 3.0])
+def test_a_table_over_an_arc_takes_no_more_memory_for_close_entries(tmp_path, spacing) -> None:
+    """The way back is a cubic: of 3.6 million places of 0.0001 deg it needs few."""
+    path = tmp_path / "a.nc"
+    path.write_text("table")
+    nominal = 20.0 + spacing * np.arange(40)
+    pattern = 0.01 * spacing * np.sin(np.arange(40) / 6.0)
+    table = np.column_stack([nominal, pattern, pattern])
+    tracemalloc.start()
+    with contextlib.suppress(ta.errors.TrueAngleError):
+        travel_model(table, str(path), TARGETS["linuxcnc"], 1e-9)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 100 << 20
+
+
+def test_the_way_back_over_the_rest_of_a_turn_keeps_values_and_slopes(tmp_path) -> None:
+    """A cubic table over 300 deg: its way back leaves and arrives as lines beside the ends do."""
+    nominal = np.arange(0.0, 301.0, 3.0)
+    pattern = 0.05 * np.sin(np.radians(nominal) + 0.4)
+    places, values = _closed(nominal, pattern, 3.0)
+    assert places[-1] == pytest.approx(360.0)
+    assert values[-1] == pytest.approx(pattern[0])
+    assert np.array_equal(places[:101], nominal)
+    for k, slope in ((100, np.diff(pattern)[-1] / 3.0), (-2, np.diff(pattern)[0] / 3.0)):
+        step = (values[k + 1] - values[k]) / (places[k + 1] - places[k])
+        assert step == pytest.approx(slope, abs=0.03 * np.abs(np.diff(pattern)).max())
 
 
 def shown(target: str, **options):
