@@ -17,6 +17,7 @@ from asammdf.blocks.v4_blocks import FileHistory
 from numpy.typing import NDArray
 
 from ..errors import FileError
+from ..support.layout import counted
 from .budget import FileExtent
 from .checksum import Checksum
 from .damage import damage_told
@@ -37,6 +38,9 @@ _VIRTUAL = (3, 6)
 _HAS_MARKS = 2
 #: Channels of values of any length stand elsewhere in the file.
 _ELSEWHERE = 1
+#: Flag of a group of records of any length: texts of a channel of another group, no channels. The
+#: library writes them beside that channel, and no such group.
+_OF_TEXTS = 1
 #: First bytes of a file, also of one that was not finished.
 _MAGIC = (b"MDF     ", b"UnFinMF ")
 #: Compression argument of asammdf by the type of data block found.
@@ -165,6 +169,11 @@ def _check_sizes(path: Path, mdf: MDF) -> None:
     for group in mdf.groups:
         record = group.channel_group.samples_byte_nr + group.channel_group.invalidation_bytes_nr
         said = int(group.channel_group.cycles_nr) * max(int(record), 1)
+        if group.channel_group.flags & _OF_TEXTS and group.channels:
+            raise FileError(
+                path,
+                f"is damaged: a group of texts says to hold {counted(group.channels, 'channel')}",
+            )
         if said > _MOST_COMPRESSED * size:
             raise FileError(path, f"is damaged: of {size} bytes it says to hold {said}")
         if record > _MOST_COMPRESSED * size:
@@ -284,9 +293,12 @@ def _part(path: Path, mdf: MDF, place: tuple[int, int], records: Any) -> Signal:
     """Readings of some records; those marked invalid become NaN and stay marked."""
     group, index = place
     part = mdf.get(group=group, index=index, data=records, ignore_invalidation_bits=True)
-    if part.samples.dtype.kind not in "fiu":
+    if part.samples.dtype.kind not in "fiu" or part.samples.ndim != 1:
+        shape = "".join(f"[{n}]" for n in part.samples.shape[1:])
         raise FileError(
-            path, f"numbers are needed, the channel holds {part.samples.dtype}", column=part.name
+            path,
+            f"numbers are needed, the channel holds {part.samples.dtype}{shape}",
+            column=part.name,
         )
     if part.invalidation_bits is None and mdf.groups[group].channels[index].flags & _HAS_MARKS:
         # Of records without a mark none are given, which a group that has them cannot be told.
@@ -322,9 +334,13 @@ def _is_ours(mdf: MDF, group: int) -> bool:
 def _kept(path: Path, mdf: MDF) -> dict[str, str]:
     """Checksums of corrected channels, rows and channels of every other group."""
     found: dict[str, str] = {}
+    of_texts = 0
     for index, group in enumerate(mdf.groups):
+        if group.channel_group.flags & _OF_TEXTS:
+            of_texts += 1
+            continue
         if not _is_ours(mdf, index):
-            found[f"group {index}"] = f"{_cycles(mdf, index)}:{len(group.channels)}"
+            found[f"group {index - of_texts}"] = f"{_cycles(mdf, index)}:{len(group.channels)}"
             continue
         for i, channel in enumerate(group.channels):
             if i == _master(mdf, index):

@@ -27,7 +27,9 @@ def group(cycles=10, record=8, marks=0, **channel):
         "name": "enc", "channel_type": 0, "byte_offset": 0, "bit_offset": 0,
         "bit_count": 8 * record, "flags": 0, "pos_invalidation_bit": 0,
     } | channel  # fmt: skip
-    about = SimpleNamespace(cycles_nr=cycles, samples_byte_nr=record, invalidation_bytes_nr=marks)
+    about = SimpleNamespace(
+        cycles_nr=cycles, samples_byte_nr=record, invalidation_bytes_nr=marks, flags=0
+    )
     return SimpleNamespace(channel_group=about, channels=[SimpleNamespace(**values)])
 
 
