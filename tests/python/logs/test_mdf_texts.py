@@ -10,9 +10,10 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import FileError
+from trueangle.formats.format import Selection
 
 pytest.importorskip("asammdf")
-pytest.importorskip("trueangle.formats.mdf")
+mdf = pytest.importorskip("trueangle.formats.mdf")
 
 ROWS = 12
 Block = tuple[str, list[str], bytes]
@@ -45,8 +46,8 @@ def channel(after: str, name: str, kind: int, data: int, at: int, texts: str = "
     return "CN", [after, "", name, "", "", texts, "", ""], made
 
 
-def recorded(path: Path, flags: int = 0) -> Path:
-    """Times, angles and notes; ``flags`` are further ones of the group of readings."""
+def recorded(path: Path, flags: int = 0, data: int = 4) -> Path:
+    """Times, angles of a type of ``data``, notes; ``flags`` are those of the group of readings."""
     records, stored = b"", 0
     for i in range(ROWS):
         word = WORDS[i % len(WORDS)]
@@ -59,7 +60,7 @@ def recorded(path: Path, flags: int = 0) -> Path:
         "CG": group("texts", "time", 1, ROWS, 24, flags),
         "texts": group("", "", 2, ROWS, stored, 1),
         "time": channel("angle", "time_s", 2, 4, 0),
-        "angle": channel("note", "indicated_deg", 0, 4, 8),
+        "angle": channel("note", "indicated_deg", 0, data, 8),
         "note": channel("", "notes", 1, 7, 16, "texts"),
         "DT": ("DT", [], records),
     }
@@ -92,3 +93,14 @@ def test_readings_in_a_group_of_texts_are_damage(tmp_path: Path) -> None:
     assert "a.mf4" in str(log.error)
     assert "a group of texts says to hold 3 channels" in str(log.error)
     assert not (tmp_path / "b.mf4").exists()
+
+
+def test_bytes_are_no_angles(tmp_path: Path) -> None:
+    """Eight to a record: an array of them, and not one number."""
+    source = recorded(tmp_path / "a.mf4", data=10)
+    said = "column 'indicated_deg': numbers are needed, the channel holds uint8[8]"
+    (log,) = ta.correct_logs(source, MODEL, tmp_path / "b.mf4").logs
+    assert said in str(log.error)
+    with pytest.raises(FileError) as error:
+        list(mdf.read(source, Selection(["indicated_deg"])))
+    assert said in str(error.value)
