@@ -1,6 +1,7 @@
 """Plans without a reference: closed forms, published optima, what is there against the best."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -144,3 +145,21 @@ def test_a_plan_speaks_of_what_a_simulation_designs(tmp_path, capsys):
     for method, words in (("spin-down", "speed_end_deg_s"), ("heads", "head"), ("dual", "gear")):
         assert cli.main(["plan", "--self", method, "--simulation", str(path)]) == 1
         assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("ratio", "whole", "turns"),
+    # Motor order j passes at j times the ratio: how near to an output order of 1 or 2 the nearest
+    # of eight comes, and two lines part after a wave of their difference.
+    [(101.0, True, 3), (-0.0, None, 0), (1.3, False, 4), (1.45, False, 3), (0.51, False, 50)],
+)
+def test_turns_of_a_geared_joint_part_lines_of_motor_and_output(ratio, whole, turns):
+    if whole is None:
+        with pytest.raises(ArgumentError, match="gear_ratio must be positive"):
+            plan_self("dual", [1, 2], gear_ratio=ratio)
+        return
+    plan = plan_self("dual", [1, 2], gear_ratio=ratio)
+    assert any("is whole" in note for note in plan.notes) == whole
+    gaps = [abs(j * ratio - k) for j in range(1, 9) for k in (1, 2)]
+    least = 3 if whole else max(3, math.ceil(1.0 / min(gaps)))
+    assert plan.turns == least == turns
