@@ -190,7 +190,9 @@ def _first_line(error: Exception) -> str:
 def _names(file: h5py.File) -> list[str]:
     found: list[str] = []
 
-    def visit(name: str, item: Any) -> None:
+    def visit(name: str | bytes, item: Any) -> None:
+        if isinstance(name, bytes):  # it is no text, and nobody can ask for it
+            return
         if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and item.ndim:
             found.append(name)
 

@@ -34,6 +34,19 @@ def made_file(path, angles, **options):
     return path
 
 
+def test_names_that_are_no_text_are_left_alone(tmp_path, model):
+    """In Latin-1, as some recorders write them: the others are read and corrected."""
+    angles = made_angles(ROWS)
+    source = made_file(tmp_path / "a.h5", angles)
+    with h5py.File(source, "a") as file:
+        file["joint3"][b"t\xe9_deg"] = angles
+    assert hdf5.columns(source) == ["joint3/indicated_deg", "joint3/time_s"]
+    report = ta.correct_logs(source, model, tmp_path / "b.h5")
+    assert report.logs[0].error is None
+    with h5py.File(tmp_path / "b.h5") as file:
+        assert file["joint3"][b"t\xe9_deg"][:].tolist() == angles.tolist()
+
+
 def test_data_sets_are_added_and_all_else_is_kept(tmp_path, model):
     angles = made_angles(ROWS)
     angles[[5, 2000]] = np.nan
