@@ -334,13 +334,11 @@ def _is_ours(mdf: MDF, group: int) -> bool:
 def _kept(path: Path, mdf: MDF) -> dict[str, str]:
     """Checksums of corrected channels, rows and channels of every other group."""
     found: dict[str, str] = {}
-    of_texts = 0
-    for index, group in enumerate(mdf.groups):
-        if group.channel_group.flags & _OF_TEXTS:
-            of_texts += 1
-            continue
+    holding = [i for i, g in enumerate(mdf.groups) if not g.channel_group.flags & _OF_TEXTS]
+    for number, index in enumerate(holding):
+        group = mdf.groups[index]
         if not _is_ours(mdf, index):
-            found[f"group {index - of_texts}"] = f"{_cycles(mdf, index)}:{len(group.channels)}"
+            found[f"group {number}"] = f"{_cycles(mdf, index)}:{len(group.channels)}"
             continue
         for i, channel in enumerate(group.channels):
             if i == _master(mdf, index):

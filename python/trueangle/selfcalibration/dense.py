@@ -105,9 +105,12 @@ def fit_dense(
     possible: list[tuple[float, float]] = []
     while True:
         if len(random):
-            rows = [part.whitened(correlation) for part in parts]
-            independent = sum(part.target.size for part in rows) - freedom_lost
-            possible = possible_variances(triangle_of(rows), p, seen, random, independent)
+            asked, independent = triangle, count
+            if not correlation.is_white:
+                rows = [part.whitened(correlation) for part in parts]
+                asked = triangle_of(rows)
+                independent = sum(part.target.size for part in rows) - freedom_lost
+            possible = possible_variances(asked, p, seen, random, independent)
             # The unit is the noise of a reading, of which neighbours foretell a share.
             possible = [(v / correlation.level, chance) for v, chance in possible]
             variance = max(possible, key=lambda pair: pair[1])[0]

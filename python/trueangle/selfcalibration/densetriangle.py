@@ -47,8 +47,6 @@ class DenseRows:
 
     def whitened(self, correlation: Correlation) -> DenseRows:
         """What rows hold beyond what those before them in a series foretell."""
-        if correlation.is_white:
-            return self
         whole = np.column_stack([self.patterns, self.nuisances, self.target])
         rows = np.concatenate([correlation.whitened(one) for one in np.split(whole, self.series)])
         m = self.patterns.shape[1]
