@@ -66,6 +66,8 @@ def main() -> int:
         from loaders import loaders
 
         names = list(loaders())
+    if args.keep:
+        Path(args.keep).mkdir(parents=True, exist_ok=True)
     print(f"seed {args.seed}, {args.cases} cases of each of {', '.join(names)}", flush=True)
     signal.signal(signal.SIGTERM, stop)
     signal.signal(signal.SIGINT, stop)

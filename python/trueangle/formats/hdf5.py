@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import json
-import math
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,16 +13,13 @@ from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import FileError
-from . import budget
 from .budget import FileExtent
 from .checksum import Checksum
 from .damage import damage_told
-from .format import Addition, Batch, Contents, CopyTask, Selection, check_lengths, note
-from .hdf5filters import check_filters
+from .format import Addition, Batch, Contents, CopyTask, Selection, note
 from .hdf5places import Hdf5Places
+from .hdf5sets import cached, data_sets, is_elsewhere, part, put
 from .stored import ROWS
 
 #: Readings taken together: what is read of them stays in the cache of the processor.
@@ -32,10 +28,6 @@ _BLOCK = 1 << 17
 _PART, _MOST_PARTS = 1 << 20, 64
 #: A multiple of so many parts, where there are as many: two or four threads end together.
 _EVEN = 4
-#: Places of HDF5's table of chunks in memory; a prime.
-_SLOTS = 521
-#: Share of a data set beyond the budget that must be stored.
-_LEAST_STORED = 0.5
 #: Attribute of a corrected data set that says how it was made.
 _ATTRIBUTE = "trueangle"
 
@@ -81,7 +73,7 @@ def stretches(path: Path) -> list[RowRange | None]:
 def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Data sets ``names`` in batches; see `format.FormatModule`."""
     with _opened(path) as file:
-        sets = _data_sets(path, file, wanted.names)
+        sets = data_sets(path, file, wanted.names)
         size = next(iter(sets.values())).size if sets else 0
         stretch: RowRange | None = wanted.stretch
         rows = range(size) if stretch is None else stretch.rows(size, sets.values())
@@ -94,10 +86,10 @@ def read(path: Path, wanted: Selection) -> Iterator[Batch]:
                     yield {name: data.read(raw, start, stop) for name, data in places.items()}
             return
         sets.clear()  # a data set that is open keeps the cache that it has
-        packed = {name: _cached(file, name) for name in wanted.names}
+        packed = {name: cached(file, name) for name in wanted.names}
         for start in rows[::_BLOCK]:
             stop = min(start + _BLOCK, rows.stop)
-            yield {name: _part(data, start, stop) for name, data in packed.items()}
+            yield {name: part(data, start, stop) for name, data in packed.items()}
 
 
 def copy(task: CopyTask) -> Contents:
@@ -105,7 +97,7 @@ def copy(task: CopyTask) -> Contents:
     with _opened(task.source) as file:  # refuse what cannot be corrected before it is copied
         channels = task.choose(_names(file))
         for channel in channels:
-            _data_sets(task.source, file, [channel.column, *channel.signals.values()])
+            data_sets(task.source, file, [channel.column, *channel.signals.values()])
         total = max(sum(file[channel.column].size for channel in channels), 1)
     shutil.copyfile(task.source, task.target)
     before = contents(task.source)  # an earlier correction, of another joint
@@ -113,18 +105,18 @@ def copy(task: CopyTask) -> Contents:
     sums: dict[str, Checksum] = {}
     with _opened(task.target, "r+") as file:
         for channel in channels:
-            indicated = _cached(file, channel.column)
-            used = {signal: _cached(file, name) for signal, name in channel.signals.items()}
+            indicated = cached(file, channel.column)
+            used = {signal: cached(file, name) for signal, name in channel.signals.items()}
             _create_like(file, indicated, channel)
-            corrected = _cached(file, channel.added)
+            corrected = cached(file, channel.added)
             checks = [sums.setdefault(name, Checksum()) for name in (channel.column, channel.added)]
             for start in range(0, indicated.size, _BLOCK):
                 stop = min(start + _BLOCK, indicated.size)
-                given = _part(indicated, start, stop)
-                signals = {signal: _part(data, start, stop) for signal, data in used.items()}
+                given = part(indicated, start, stop)
+                signals = {signal: part(data, start, stop) for signal, data in used.items()}
                 # Numbers of 16 bits are corrected to 32, and kept in 64.
                 after = channel.correct(given, signals).astype(corrected.dtype, copy=False)
-                _put(corrected, start, stop, after)
+                put(corrected, start, stop, after)
                 for check, values in zip(checks, (given, after), strict=True):
                     check.update(values)
                 done += stop - start
@@ -139,13 +131,14 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     rows = 0
     sums: dict[str, Checksum] = {}
     with _opened(path) as file:
-        corrected = [name for name in _names(file) if _ATTRIBUTE in file[name].attrs]
-        sources = [_source_of(file[name]) for name in corrected]
+        notes = {name: _text(file[name], _ATTRIBUTE) for name in _names(file)}
+        corrected = [name for name, told in notes.items() if told is not None]
+        sources = [_source_of(notes[name]) for name in corrected]
         for name in dict.fromkeys([*sources, *corrected]):
-            data = _cached(file, name)
+            data = cached(file, name)
             found = sums[name] = Checksum()
             for start in range(0, data.size, _BLOCK):
-                found.update(_part(data, start, min(start + _BLOCK, data.size)))
+                found.update(part(data, start, min(start + _BLOCK, data.size)))
             rows = max(rows, data.size)
     return Contents(rows, {name: found.text() for name, found in sums.items()})
 
@@ -159,7 +152,7 @@ def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[s
             for name in others
             if file[name].size in sizes
             and max(file[name].shape) == file[name].size
-            and not _is_elsewhere(file[name])
+            and not is_elsewhere(file[name])
         ]
 
 
@@ -200,104 +193,6 @@ def _names(file: h5py.File) -> list[str]:
     return found
 
 
-def _data_sets(path: Path, file: h5py.File, names: Sequence[str]) -> dict[str, h5py.Dataset]:
-    """Data sets that belong together."""
-    sets = {name: _data_set(path, file, name) for name in names}
-    check_lengths(path, "data sets", {name: data.size for name, data in sets.items()})
-    return sets
-
-
-def _data_set(path: Path, file: h5py.File, name: str) -> h5py.Dataset:
-    data = file[name]
-    if max(data.shape, default=0) != data.size:
-        raise FileError(
-            path, f"one angle after the other is needed, its shape is {data.shape}", column=name
-        )
-    if _is_elsewhere(data):
-        raise _elsewhere(path, name)
-    _check_stored(path, data, name)
-    return data
-
-
-def _is_elsewhere(data: h5py.Dataset) -> bool:
-    """Whether its values are those of other data sets or files.
-
-    The library follows such a chain without an end where it leads back to itself, until the
-    process ends; nothing is asked of its values before this.
-    """
-    return bool(data.is_virtual or data.external)
-
-
-def _elsewhere(path: Path, name: str) -> FileError:
-    return FileError(
-        path,
-        "its values are in other data sets or files (a virtual or external data set), which are "
-        "not followed; write them into this file (h5repack, or h5py with its values)",
-        column=name,
-    )
-
-
-def _check_stored(path: Path, data: h5py.Dataset, name: str) -> None:
-    """Refuse a large data set that is hardly stored: all else of it is filled in.
-
-    A file of kilobytes can call for terabytes of nothing, which a copy would write out.
-    """
-    size = int(data.size) * data.dtype.itemsize
-    if data.chunks is None:
-        share = 1.0 if data.id.get_storage_size() else 0.0
-    else:
-        budget.check_part(path, math.prod(data.chunks) * data.dtype.itemsize, "chunk", name)
-        check_filters(path, data, name)
-        most = math.prod(-(-n // c) for n, c in zip(data.shape, data.chunks, strict=True))
-        share = data.id.get_num_chunks() / most if size > budget.DECODED_BYTES else 1.0
-    if size > budget.DECODED_BYTES and share < _LEAST_STORED:
-        raise FileError(
-            path,
-            f"says to hold {data.size} values, but {100.0 * share:.2g} % of them are stored, the "
-            "others are filled in; write it with all of its values",
-            column=name,
-        )
-
-
-def _cached(file: h5py.File, name: str) -> h5py.Dataset:
-    """A data set that keeps its last chunk where chunks are packed, and none where they are not.
-
-    HDF5 itself keeps chunks of up to 1 MB: it would copy small ones once more on their way, and
-    unpack larger ones again for every block that takes a part of them.
-    """
-    data = file[name]
-    if _is_elsewhere(data):  # which a note may name
-        raise _elsewhere(Path(file.filename), name)
-    if data.chunks is None:
-        return data
-    check_filters(Path(file.filename), data, name)
-    chunk = math.prod(data.chunks) * data.dtype.itemsize
-    packed = data.id.get_create_plist().get_nfilters() > 0
-    access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
-    access.set_chunk_cache(_SLOTS, chunk if packed else 0, 1.0)
-    del data  # one that is open keeps the cache that it has
-    return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access))
-
-
-def _place(data: h5py.Dataset, start: int, stop: int) -> tuple[slice, ...]:
-    """Selection of a stretch of a vector, also of one stored as 1 x n or n x 1 (MATLAB)."""
-    along = int(np.argmax(data.shape))
-    return tuple(slice(start, stop) if i == along else slice(None) for i in range(data.ndim))
-
-
-def _part(data: h5py.Dataset, start: int, stop: int) -> NDArray[Any]:
-    values: NDArray[Any] = data[_place(data, start, stop)].reshape(-1)
-    return values.astype(values.dtype.newbyteorder("="), copy=False)
-
-
-def _put(data: h5py.Dataset, start: int, stop: int, values: NDArray[Any]) -> None:
-    place = _place(data, start, stop)
-    shape = tuple(
-        stop - start if s.start is not None else n for s, n in zip(place, data.shape, strict=True)
-    )
-    data[place] = values.reshape(shape)
-
-
 def _create_like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) -> None:
     """Make an empty data set beside ``indicated``, laid out and compressed like it."""
     kind = (
@@ -319,12 +214,24 @@ def _create_like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) ->
     if "MATLAB_class" in indicated.attrs:
         made.attrs["MATLAB_class"] = np.bytes_("single" if kind is np.float32 else "double")
     for name in ("units", "DIMENSION_LABELS"):
-        if name in indicated.attrs:
-            made.attrs[name] = indicated.attrs[name]
+        told = _text(indicated, name)
+        if told is not None:
+            made.attrs[name] = told
     made.attrs[_ATTRIBUTE] = note([channel])
 
 
-def _source_of(corrected: h5py.Dataset) -> str:
-    (entry,) = json.loads(corrected.attrs[_ATTRIBUTE])["corrected"]
+def _text(data: h5py.Dataset, attribute: str) -> Any | None:
+    """What an attribute says, one or more texts; None where it is something else.
+
+    Of values that are no text the library may end the process where the file is damaged.
+    """
+    if attribute not in data.attrs:
+        return None
+    kind = data.attrs.get_id(attribute).get_type()
+    return data.attrs[attribute] if kind.get_class() == h5py.h5t.STRING else None
+
+
+def _source_of(told: Any) -> str:
+    (entry,) = json.loads(told)["corrected"]
     name: str = entry["from"]
     return name

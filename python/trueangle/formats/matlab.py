@@ -69,8 +69,8 @@ def copy(task: CopyTask) -> Contents:
         column = found[addition.column]
         signals = {signal: _values(found[name]) for signal, name in addition.signals.items()}
         after = addition.correct(_values(column), signals)
-        name = addition.added.replace("/", "_")
-        if name in there:
+        name = _variable(addition.added)
+        if name in there or name in made:
             raise FileError(task.source, "is there already: corrected before", column=name)
         made[name] = after[:, None]
         rows = max(rows, len(column))
@@ -83,6 +83,12 @@ def copy(task: CopyTask) -> Contents:
         file.write(extra.getvalue()[_HEADER:])
     sums = {"source": f"{zlib.crc32(data):08x}:{len(data)}"}
     return Contents(rows, sums | {name: _sum(values) for name, values in made.items()})
+
+
+def _variable(name: str) -> str:
+    """A name that MATLAB takes: it begins with a letter, and what does not is left out unsaid."""
+    name = name.replace("/", "_")
+    return name if name[:1].isalpha() else f"x{name}"
 
 
 def contents(path: Path, topic: str | None = None) -> Contents:

@@ -101,3 +101,31 @@ def test_joints_are_corrected_one_after_the_other(version, tmp_path):
         corrected = MODEL.correct(kept[f"{joint}_indicated_deg"])
         np.testing.assert_array_equal(found[f"{joint}_corrected_deg"].ravel(), corrected)
         assert f'"column": "{joint}_corrected_deg"' in found[note][0]
+
+
+def test_a_name_that_begins_with_no_letter_is_given_one(tmp_path):
+    """Such variables are left out unsaid where they are written."""
+    io = pytest.importorskip("scipy.io")
+    path = tmp_path / "rig.mat"
+    io.savemat(path, {"qpos": {"deg": READ}})
+    path.write_bytes(path.read_bytes().replace(b"qpos", b"_pos"))
+    columns = {"indicated": ("_pos/deg", "deg")}
+    report = ta.correct_logs(path, MODEL, tmp_path / "out.mat", signals=columns)
+    assert report.is_done, report.logs[0].error
+    (name,) = (n for n in io.loadmat(tmp_path / "out.mat") if "corrected" in n)
+    assert name.startswith("x_pos")
+
+
+def test_two_corrected_variables_of_one_name_are_refused(tmp_path):
+    io = pytest.importorskip("scipy.io")
+    columns = {"elbow": {"indicated_deg": READ}, "elbow_indicated_deg": READ + 1.0}
+    io.savemat(tmp_path / "rig.mat", columns)
+    joints = {"elbow": MODEL, "other": MODEL}
+    signals = {
+        "elbow": {"indicated": ("elbow/indicated_deg", "deg")},
+        "other": {"indicated": ("elbow_indicated_deg", "deg")},
+    }
+    report = ta.correct_logs(tmp_path / "rig.mat", joints, tmp_path / "out.mat", signals=signals)
+    assert not report.is_done
+    assert "column 'elbow_corrected_deg': is there already" in str(report.logs[0].error)
+    assert not (tmp_path / "out.mat").exists()

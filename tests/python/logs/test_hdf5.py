@@ -11,7 +11,7 @@ from trueangle.formats.format import Selection
 from .conftest import made_angles, made_model, unwrapped_truth
 
 h5py = pytest.importorskip("h5py")
-from trueangle.formats import hdf5  # noqa: E402
+from trueangle.formats import hdf5, hdf5sets  # noqa: E402
 
 ROWS = 10_000
 
@@ -45,6 +45,24 @@ def test_names_that_are_no_text_are_left_alone(tmp_path, model):
     assert report.logs[0].error is None
     with h5py.File(tmp_path / "b.h5") as file:
         assert file["joint3"][b"t\xe9_deg"][:].tolist() == angles.tolist()
+
+
+def test_an_attribute_that_is_no_text_is_no_unit(tmp_path, model):
+    """Values of any length, of a damaged file, ended the process where they were read."""
+    source = made_file(tmp_path / "a.h5", made_angles(ROWS))
+    with h5py.File(source, "a") as file:
+        data = file["joint3/indicated_deg"]
+        lengths = np.empty(1, object)
+        lengths[0] = np.arange(3.0)
+        data.attrs.create("units", lengths, dtype=h5py.vlen_dtype(np.dtype("f8")))
+        data.attrs["DIMENSION_LABELS"] = ["reading"]
+    report = ta.correct_logs(source, model, tmp_path / "b.h5")
+    assert report.logs[0].error is None
+    with h5py.File(tmp_path / "b.h5") as file:
+        made = file["joint3/corrected_deg"].attrs
+        assert "units" not in made
+        assert "units" in file["joint3/indicated_deg"].attrs
+        assert list(made["DIMENSION_LABELS"]) == ["reading"]
 
 
 def test_data_sets_are_added_and_all_else_is_kept(tmp_path, model):
@@ -148,7 +166,7 @@ def test_a_chunk_is_unpacked_once_whatever_takes_parts_of_it(tmp_path, packed):
     options = {"compression": "gzip"} if packed else {}
     source = made_file(tmp_path / "a.h5", made_angles(ROWS), chunks=(ROWS,), **options)
     with h5py.File(source) as file:
-        data = hdf5._cached(file, "joint3/indicated_deg")
+        data = hdf5sets.cached(file, "joint3/indicated_deg")
         kept = data.id.get_access_plist().get_chunk_cache()[1]
     # HDF5 keeps a chunk that is not larger than that; one that is as it is is read in place.
     assert kept == (8 * ROWS if packed else 0)
