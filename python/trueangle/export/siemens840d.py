@@ -124,10 +124,12 @@ class Siemens840d(Target):
             what = f"$AA_ENC_COMP_{missing[0]}" if missing else "$AA_ENC_COMP"
             raise table_error(path, f"no table of {self.name}: {what} is missing")
         step = settings["STEP"]
-        count = round((settings["MAX"] - settings["MIN"]) / step) + 1 if step > 0.0 else 0
+        steps = (settings["MAX"] - settings["MIN"]) / step if step > 0.0 else 0.0
+        count = round(steps) + 1 if abs(steps) < MOST else 0  # a damaged span may be endless
         if not 4 <= count <= MOST or any(i not in points for i in range(count)):
             raise table_error(
-                path, f"STEP, MIN and MAX are of {count} points, and {len(points)} are there"
+                path,
+                f"STEP, MIN and MAX are of {steps + 1:.6g} points, and {len(points)} are there",
             )
         nominal = settings["MIN"] + step * np.arange(count)
         values = -np.array([points[i] for i in range(count)])

@@ -299,6 +299,14 @@ def test_max_arcsec_of_a_fixed_table_is_kept_or_refused(tmp_path):
         ("minicheetah", "int offset_lut[4] = {1, 2, 3, 4};"),
         ("siemens840d", "$AA_ENC_COMP[0,0,AX1]=0\n$AA_ENC_COMP_STEP[0,AX1]=1\n"),
         ("siemens840d", "$AA_ENC_COMP[0,x,AX1]=0\n"),
+        *(
+            (
+                "siemens840d",
+                f"$AA_ENC_COMP[0,0,AX1]=0\n$AA_ENC_COMP_STEP[0,AX1]=1e-300\n"
+                f"$AA_ENC_COMP_MIN[0,AX1]=0\n$AA_ENC_COMP_MAX[0,AX1]={last}\n",
+            )
+            for last in ("1e300", "-1e300", "360")
+        ),
         ("pmac", "#1 DEFINE COMP 8,4000\n1 2 3\n"),
         ("pmac", "#1 DEFINE COMP 4,4000\n1 2 x 0\n"),
         ("pmac", "DELETE COMP\n"),
