@@ -46,7 +46,7 @@ class BesideProblem(Problem):
 
         A part is looked at where there are too many.
         """
-        from .nuisance import taken_columns
+        from .nuisancecolumns import taken_columns
 
         columns = taken_columns(problem.runs, nuisance)
         return None if columns is None or problem.summed else cls(problem, *columns)

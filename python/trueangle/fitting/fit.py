@@ -229,7 +229,7 @@ def fitted_to(
         orders = evidence.by_shaft
     elif orders is None or isinstance(orders, str):
         if beside.wanted:
-            from .nuisance import orders_beside_nuisance, take_out_nuisance
+            from .nuisanceremoval import orders_beside_nuisance, take_out_nuisance
 
             likely = orders_beside_nuisance(found, gear_ratio, fixed_member, shafts)
             found, _ = take_out_nuisance(
@@ -247,7 +247,7 @@ def fitted_to(
     wanted = resolve_orders(orders, gear_ratio, fixed_member, shafts)
     taken = None
     if beside.wanted:
-        from .nuisance import orders_beside_nuisance, take_out_nuisance_beside
+        from .nuisanceremoval import orders_beside_nuisance, take_out_nuisance_beside
 
         likely = orders_beside_nuisance(given, gear_ratio, fixed_member, shafts)
         found, taken = take_out_nuisance_beside(

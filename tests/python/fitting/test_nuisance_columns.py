@@ -9,12 +9,9 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import ArgumentError
-from trueangle.fitting.nuisance import (
-    Nuisance,
-    orders_beside_nuisance,
-    take_out_nuisance,
-    taken_columns,
-)
+from trueangle.fitting.nuisance import Nuisance
+from trueangle.fitting.nuisancecolumns import taken_columns
+from trueangle.fitting.nuisanceremoval import orders_beside_nuisance, take_out_nuisance
 from trueangle.joint.shafts import ShaftOrders
 
 SEED = 48_950

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fitting.nuisance import take_out_nuisance
 from trueangle.fitting.nuisancechoice import (
     FOLDS,
     FoldRows,
@@ -14,6 +13,7 @@ from trueangle.fitting.nuisancechoice import (
     reference_lines_help,
     solve_with_groups,
 )
+from trueangle.fitting.nuisanceremoval import take_out_nuisance
 from trueangle.joint.shafts import ShaftOrders
 
 SEED = 48_900

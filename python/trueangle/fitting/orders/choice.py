@@ -61,7 +61,7 @@ def selected_orders(
 
         kinds = asked_nuisance(nuisance)
     if kinds != () or (lines and len(kept) > 1):
-        from ..nuisance import orders_beside_nuisance, take_out_nuisance
+        from ..nuisanceremoval import orders_beside_nuisance, take_out_nuisance
 
         likely = orders_beside_nuisance(kept, gear_ratio, fixed_member, shafts)
         angle = "indicated" if argument == "indicated" else "reference"
