@@ -5,6 +5,9 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from ..errors import FileError
 
 #: Fortran writes exponents with D, and those of three digits without a letter.
 _EXPONENT = r"(?:[eEdD][+-]?\d+|(?<=[\d.,])[+-]\d{3})?"
@@ -21,6 +24,25 @@ def cut_rows(lines: Iterable[str], delimiter: str, *, strict: bool = False) -> I
     if blanks:  # and tabs among them
         lines = (line.replace("\t", " ") for line in lines)
     return csv.reader(lines, delimiter=delimiter, skipinitialspace=blanks, strict=strict)
+
+
+def line_cells(path: Path, text: str, delimiter: str) -> list[str]:
+    """Cells of one line, without the blanks about them.
+
+    Raises
+    ------
+    FileError
+        An end of line within a cell, or a cell of more than 131 072 characters.
+    """
+    try:
+        cells = next(cut_rows([text], delimiter), [""])
+    except csv.Error as cause:
+        raise FileError(
+            path, f"is not readable as CSV: {cause}; save it with ends of lines", line=1
+        ) from None
+    if delimiter == " " and len(cells) > 1 and not cells[-1]:
+        cells = cells[:-1]  # blanks at the end are none between cells
+    return [cell.strip() for cell in cells] or [""]
 
 
 def delimiter_of(text: str) -> str:

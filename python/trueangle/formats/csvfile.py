@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from .._core import thread_count
 from ..errors import FileError
-from .csvheader import LONGEST_LINE, Header
+from .csvheader import Header
+from .csvlines import LONGEST_LINE
 from .csvrows import BLOCK, QuotedBlock, line_too_long, quoted_blocks
 from .format import Addition, Batch, Contents, CopyTask, Selection, refuse_corrected
 from .messages import warn_of_messages

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import codecs
-import csv
 import itertools
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO
 
 from ..errors import FileError
 from .csvcells import (
@@ -16,36 +14,16 @@ from .csvcells import (
     POINT,
     are_readings,
     cell_number,
-    cut_rows,
     delimiter_of,
     holds_number,
     is_comment,
+    line_cells,
 )
+from .csvlines import TextLine, first_lines
+from .csvunits import SCOPE, names_with_units, units_of
 
-#: Bytes and lines within which the readings must begin.
-_HEAD = 1 << 18
-_LINES = 1000
-#: Bytes of a line, at most: memory follows the longest.
-LONGEST_LINE = 1 << 24
 #: Lines looked at to tell readings from a preamble.
 _LOOKED_AT = 4
-
-#: A name at the head of a time column of TwinCAT's exports, before the names it is for.
-_SCOPE = "Name"
-#: What a line of units holds: units in brackets, or short words without digits.
-_UNIT = r"[\[(].*[\])]|[^\d\s]{0,8}(?:/[^\d\s]{1,4}\d?)?|-"
-# Compiled where a line asks for it: that takes longer than to read a small file.
-_KNOWN_UNITS = (
-    r"[\[(]?(deg(rees?)?|rad(ians?)?|turns?|rev(olutions?)?|counts?|arcsec|arcmin|°|"
-    r"m?s|us|µs|ns|sec(onds?)?|volts?|m?v|m?a|[mc]?nm|n·?m|°?c|k|rpm|(deg|rad|turn|°)/s)[\])]?"
-)
-
-
-class _TextLine(NamedTuple):
-    raw: bytes
-    text: str
-    #: Number of the line, from 1.
-    place: int
 
 
 class Header:
@@ -80,8 +58,7 @@ class Header:
 
     def __init__(self, path: Path, file: IO[bytes]) -> None:
         self.path = path
-        self.encoding = "utf-8"
-        lines = self._lines(file)
+        lines, self.encoding = first_lines(path, file)
         if not any(line.text.strip() for line in lines):
             raise FileError(path, "is empty; a header line and readings are needed", line=1)
         first, data = self._found(lines)
@@ -95,7 +72,11 @@ class Header:
         cells = self._cells(text.removeprefix("#").strip() if is_comment(text) else text)
         if first < 0:
             cells = [f"column{i + 1}" for i in range(len(cells))]
-        self.names = self._named(cells, lines[first + 1 : data] if first >= 0 else [])
+        self._is_open = len(cells) > 1 and not cells[-1]
+        between = lines[first + 1 : data] if first >= 0 else []
+        self.names = names_with_units(
+            cells[:-1] if self._is_open else cells, [self._cells(line.text) for line in between]
+        )
         self.trailing = self._trailing(lines[data : data + 1])
         self._all_numbers = data < len(lines) and all(
             cell_number(cell, self.decimal) is not None for cell in self._cells(lines[data].text)
@@ -133,36 +114,10 @@ class Header:
         return b"".join(head)
 
     def _is_units(self, raw: bytes) -> bool:
-        return self._units_of(raw.decode(self.encoding, "replace"), len(self.names)) is not None
+        cells = self._cells(raw.decode(self.encoding, "replace"))
+        return units_of(cells, len(self.names)) is not None
 
-    def _lines(self, file: IO[bytes]) -> list[_TextLine]:
-        found: list[_TextLine] = []
-        data = file.read(_HEAD)
-        if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-            raise FileError(self.path, "is UTF-16 text; save it as CSV in UTF-8", line=1)
-        parts = data.splitlines(keepends=True) if b"\n" not in data else _split(data)
-        if len(data) == _HEAD:
-            while len(parts) == 1 and not parts[0].endswith(b"\n"):
-                more = file.readline(LONGEST_LINE)
-                parts[0] += more
-                if not more or len(parts[0]) > LONGEST_LINE:
-                    break
-            parts = parts[:-1] if len(parts) > 1 else parts
-        for i, raw in enumerate(parts[:_LINES]):
-            body = raw.removeprefix(codecs.BOM_UTF8) if i == 0 else raw
-            try:
-                text = body.decode(self.encoding)
-            except UnicodeDecodeError:
-                if self.encoding != "utf-8" or not _is_western(data):
-                    raise FileError(
-                        self.path, "is not UTF-8 text; save it as CSV in UTF-8", line=i + 1
-                    ) from None
-                self.encoding = "cp1252"
-                text = body.decode("cp1252", "replace")
-            found.append(_TextLine(raw, text.rstrip("\r\n"), i + 1))
-        return found
-
-    def _found(self, lines: list[_TextLine]) -> tuple[int, int]:
+    def _found(self, lines: list[TextLine]) -> tuple[int, int]:
         """Index of the line of names, -1 without, and of the first line of readings."""
         solid = [i for i, line in enumerate(lines) if line.text.strip()]
         plain = [i for i in solid if not is_comment(lines[i].text)]
@@ -196,7 +151,7 @@ class Header:
                 off = abs(len(cells) - width)  # blanks say nothing of an end of the line
                 if off > (delimiter != " ") or self._is_talk(cells, lines[begin]):
                     continue
-                if self._units_of(text, width) is None:
+                if units_of(cells, width) is None:
                     return self._scope(lines, before, width, i), begin
                 units = i
             return units, begin  # names that look like units are names where nothing else is
@@ -212,7 +167,7 @@ class Header:
         delimiter = delimiter_of(text)
         return not are_readings(self._split(text, delimiter), "." if delimiter == "," else ",")
 
-    def _is_names(self, lines: list[_TextLine], plain: list[int], place: int) -> bool:
+    def _is_names(self, lines: list[TextLine], plain: list[int], place: int) -> bool:
         """Whether a line has as many cells as each of those that follow it."""
         delimiter = delimiter_of(lines[place].text)
         below = [i for i in plain if i > place][:_LOOKED_AT]
@@ -221,29 +176,27 @@ class Header:
             len(self._split(lines[i].text, delimiter)) == width for i in below
         )
 
-    def _is_talk(self, cells: list[str], reading: _TextLine) -> bool:
+    def _is_talk(self, cells: list[str], reading: TextLine) -> bool:
         """One cell above several that are filled: words of a firmware, no names."""
         return len(cells) == 1 and bool(self._cells(reading.text)[-1])
 
-    def _scope(self, lines: list[_TextLine], before: list[int], width: int, last: int) -> int:
+    def _scope(self, lines: list[TextLine], before: list[int], width: int, last: int) -> int:
         """The line of names in a preamble of TwinCAT's exports, else ``last``."""
         rows = {j: self._cells(lines[j].text) for j in before}
         if not any(cells[0] == "Data-Type" for cells in rows.values()):
             return last
-        names = [j for j, cells in rows.items() if cells[0] == _SCOPE and len(cells) == width]
+        names = [j for j, cells in rows.items() if cells[0] == SCOPE and len(cells) == width]
         return names[-1] if names else last
 
-    def _after_units(self, lines: list[_TextLine], first: int) -> int:
+    def _after_units(self, lines: list[TextLine], first: int) -> int:
         width = len(self._cells(lines[first].text))
         for i in range(first + 1, len(lines)):
             text = lines[i].text
             if text.strip() and not is_comment(text):
-                return i + 1 if self._units_of(text, width) is not None else first + 1
+                return i + 1 if units_of(self._cells(text), width) is not None else first + 1
         return first + 1
 
-    def _first_reading(
-        self, lines: list[_TextLine], plain: list[int], delimiter: str
-    ) -> int | None:
+    def _first_reading(self, lines: list[TextLine], plain: list[int], delimiter: str) -> int | None:
         """The first of some lines in a row that are equally wide and hold numbers."""
         looked_at = [(i, self._split(lines[i].text, delimiter)) for i in plain]
         decimal = "." if delimiter in ", " else ","
@@ -267,7 +220,7 @@ class Header:
                     return looked_at[k][0]
         return None
 
-    def _decimal(self, lines: list[_TextLine]) -> str:
+    def _decimal(self, lines: list[TextLine]) -> str:
         if self.delimiter == ",":
             return "."
         for line in lines:
@@ -276,48 +229,7 @@ class Header:
                     return ","
         return "."
 
-    def _named(self, cells: list[str], between: list[_TextLine]) -> list[str]:
-        self._is_open = len(cells) > 1 and not cells[-1]
-        if self._is_open:
-            cells = cells[:-1]
-        if cells[0] == _SCOPE and len(cells) > 1:
-            return self._scope_names(cells, between)
-        for line in between:
-            units = self._units_of(line.text, len(cells))
-            if units is not None:
-                cells = [
-                    f"{name} [{unit}]" if unit and not re.search(_BRACKETED, name) else name
-                    for name, unit in zip(cells, units, strict=False)
-                ] + cells[len(units) :]
-        return cells
-
-    def _scope_names(self, cells: list[str], between: list[_TextLine]) -> list[str]:
-        """Names of TwinCAT's exports: a time column before each group of channels."""
-        rows = {self._cells(line.text)[0]: self._cells(line.text) for line in between}
-        units = rows.get("Unit", [])
-        names, times = [], 0
-        for i, cell in enumerate(cells):
-            if cell == _SCOPE:
-                times += 1
-                names.append("time [ms]" if times == 1 else f"time {times} [ms]")
-            else:
-                unit = units[i].partition(" ")[0] if i < len(units) else ""
-                known = unit if unit not in ("", "(None)") else ""
-                names.append(f"{cell} [{known}]" if known else cell)
-        return names
-
-    def _units_of(self, text: str, width: int) -> list[str] | None:
-        """Units of a line of units, or None for another line."""
-        cells = self._cells(text)
-        if abs(len(cells) - width) > 1 or not any(
-            re.fullmatch(_KNOWN_UNITS, cell, re.IGNORECASE) for cell in cells
-        ):
-            return None
-        if not all(re.fullmatch(_UNIT, cell) for cell in cells):
-            return None
-        return [cell.strip("[]() ") for cell in cells]
-
-    def _trailing(self, first: list[_TextLine]) -> bool:
+    def _trailing(self, first: list[TextLine]) -> bool:
         if not first:
             return False
         cells = self._cells(first[0].text)
@@ -327,30 +239,8 @@ class Header:
         return self._split(text, self.delimiter)
 
     def _split(self, text: str, delimiter: str) -> list[str]:
-        try:
-            cells = next(cut_rows([text], delimiter), [""])
-        except csv.Error as cause:
-            raise FileError(
-                self.path, f"is not readable as CSV: {cause}; save it with ends of lines", line=1
-            ) from None
-        if delimiter == " " and len(cells) > 1 and not cells[-1]:
-            cells = cells[:-1]  # blanks at the end are none between cells
-        return [cell.strip() for cell in cells] or [""]
+        return line_cells(self.path, text, delimiter)
 
 
 #: Names that this package gives its columns: a line with one is the line of names.
 _STANDARD = re.compile(r"(reference|indicated|corrected)_(deg|rad|turn|count)\b|\btime_s\b")
-_BRACKETED = r"[\[(][^\])]*[\])]\s*$"
-
-
-def _split(data: bytes) -> list[bytes]:
-    parts = data.split(b"\n")
-    return [*(part + b"\n" for part in parts[:-1]), *([parts[-1]] if parts[-1] else [])]
-
-
-def _is_western(data: bytes) -> bool:
-    """True where every byte beyond ASCII is a letter or sign of Western Europe's code page.
-
-    Then it is °, µ, ± or a letter with an accent, in a preamble or a unit.
-    """
-    return all(byte < 0x80 or byte >= 0xA0 for byte in data) and data.count(b"\xff") == 0

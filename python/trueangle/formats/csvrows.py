@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from .csvcells import cell_number, cut_rows, is_comment
-from .csvheader import LONGEST_LINE, Header
+from .csvheader import Header
+from .csvlines import LONGEST_LINE
 from .format import Labels, row_labels
 
 #: Numbers in lines, all without an exponent.
