@@ -2,60 +2,41 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
 import numpy as np
 from asammdf import MDF, Signal
-from asammdf.blocks.mdf_v4 import MDF4
-from asammdf.blocks.utils import DataBlockInfo
 from asammdf.blocks.v4_blocks import FileHistory
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from ..support.layout import counted
 from .budget import FileExtent
 from .checksum import Checksum
-from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, note
-from .mdfblocks import check_chains
+from .openmdf import HAS_MARKS, OF_TEXTS, opened_mdf
 
-#: Bytes that one byte of a file can stand for: deflate reaches 1032.
-_MOST_COMPRESSED = 2000
 #: Readings taken together.
 _BLOCK = 1 << 19
-#: Bytes of a data block read at once: asammdf reads a block whole for each part of it.
-_PIECE = 1 << 22
 #: Acquisition name of the groups of corrected channels.
 _GROUP = "trueangle"
-#: Types of channels that have no place in a record: virtual master and data.
-_VIRTUAL = (3, 6)
-#: Flag of a channel whose readings may be marked invalid.
-_HAS_MARKS = 2
 #: Channels of values of any length stand elsewhere in the file.
 _ELSEWHERE = 1
-#: Flag of a group of records of any length: texts of a channel of another group, no channels. The
-#: library writes them beside that channel, and no such group.
-_OF_TEXTS = 1
-#: First bytes of a file, also of one that was not finished.
-_MAGIC = (b"MDF     ", b"UnFinMF ")
 #: Compression argument of asammdf by the type of data block found.
 _COMPRESSIONS = {0: 0, 1: 1, 2: 2, 3: 5, 4: 6, 5: 3, 6: 4}
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
     """Names of the channels that occur once; time channels left out."""
-    with _opened(path) as mdf:
+    with opened_mdf(path) as mdf:
         return _names(mdf)
 
 
 def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Channels ``names`` in batches; see `format.FormatModule`."""
-    with _opened(path) as mdf:
+    with opened_mdf(path) as mdf:
         _common_group(path, mdf, wanted.names)
         for parts in _parts(path, mdf, [_place(mdf, name) for name in wanted.names]):
             yield {name: part.samples for name, part in zip(wanted.names, parts, strict=True)}
@@ -67,7 +48,7 @@ def copy(task: CopyTask) -> Contents:
     Each goes into a new channel group with the times of its source; a reading marked
     invalid stays marked.
     """
-    with _opened(task.source) as mdf:
+    with opened_mdf(task.source) as mdf:
         channels = task.choose(_names(mdf))
         groups = [
             _common_group(task.source, mdf, [channel.column, *channel.signals.values()])
@@ -75,7 +56,7 @@ def copy(task: CopyTask) -> Contents:
         ]
         rows = [_cycles(mdf, group) for group in groups]
     # What is added is kept beside the output until it is saved.
-    with _opened(task.source, temporary_folder=str(task.target.parent)) as mdf:
+    with opened_mdf(task.source, temporary_folder=str(task.target.parent)) as mdf:
         sums = _kept(task.source, mdf)
         compression = _compression(mdf)
         done, total = 0, max(sum(rows), 1)
@@ -108,14 +89,14 @@ def _history(mdf: MDF, comment: str) -> FileHistory:
 
 def contents(path: Path, topic: str | None = None) -> Contents:
     """Checksums of the corrected channels and the rows of every other group."""
-    with _opened(path) as mdf:
+    with opened_mdf(path) as mdf:
         rows = [_cycles(mdf, i) for i in range(len(mdf.groups)) if _is_ours(mdf, i)]
         return Contents(max(rows, default=0), _kept(path, mdf))
 
 
 def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of channels; see `format.FormatModule`."""
-    with _opened(path) as mdf:
+    with opened_mdf(path) as mdf:
         groups = [_place(mdf, name)[0] for name in names] or range(len(mdf.groups))
         rows = [_cycles(mdf, group) for group in groups]
     return FileExtent(max(rows, default=0), 8 * sum(rows) if names else 0)
@@ -123,110 +104,9 @@ def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> F
 
 def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[str]:
     """Those of ``others`` that are in the channel group of the channels ``needed``."""
-    with _opened(path) as mdf:
+    with opened_mdf(path) as mdf:
         groups = {_place(mdf, name)[0] for name in needed}
         return [name for name in others if _place(mdf, name)[0] in groups]
-
-
-@contextmanager
-def _opened(path: Path, **options: Any) -> Iterator[MDF]:
-    """The file, its errors told with its name."""
-    with path.open("rb") as file:
-        if file.read(8) not in _MAGIC:
-            raise FileError(path, "is not MDF4")
-    check_chains(path)
-    with damage_told(path, "MDF4"), _told_once():
-        try:
-            with MDF(path, **options) as mdf:
-                if mdf.version < "4":
-                    raise FileError(path, f"is MDF {mdf.version}; convert it to MDF 4")
-                _check_sizes(path, mdf)
-                _take_in_pieces(mdf)
-                yield mdf
-        except Exception as cause:
-            _close_half_built(cause)
-            raise
-
-
-@contextmanager
-def _told_once() -> Iterator[None]:
-    """Without what the library prints of damage beside the error that it raises."""
-
-    def nothing(record: logging.LogRecord) -> bool:
-        return False
-
-    logger = logging.getLogger("asammdf")
-    logger.addFilter(nothing)
-    try:
-        yield
-    finally:
-        logger.removeFilter(nothing)
-
-
-def _check_sizes(path: Path, mdf: MDF) -> None:
-    """Refuse groups that say they hold more than the file can: reading them would not end."""
-    size = path.stat().st_size
-    for group in mdf.groups:
-        record = group.channel_group.samples_byte_nr + group.channel_group.invalidation_bytes_nr
-        said = int(group.channel_group.cycles_nr) * max(int(record), 1)
-        if group.channel_group.flags & _OF_TEXTS and group.channels:
-            raise FileError(
-                path,
-                f"is damaged: a group of texts says to hold {counted(group.channels, 'channel')}",
-            )
-        if said > _MOST_COMPRESSED * size:
-            raise FileError(path, f"is damaged: of {size} bytes it says to hold {said}")
-        if record > _MOST_COMPRESSED * size:
-            raise FileError(path, f"is damaged: of {size} bytes it says that records have {record}")
-        marks = 8 * int(group.channel_group.invalidation_bytes_nr)
-        for channel in group.channels:
-            if channel.channel_type not in _VIRTUAL:
-                bits = 8 * int(channel.byte_offset) + int(channel.bit_offset) + channel.bit_count
-                if bits > 8 * int(group.channel_group.samples_byte_nr):
-                    raise FileError(
-                        path,
-                        "is damaged: the channel ends behind its record of "
-                        f"{group.channel_group.samples_byte_nr} bytes",
-                        column=channel.name,
-                    )
-            if channel.flags & _HAS_MARKS and marks <= int(channel.pos_invalidation_bit):
-                raise FileError(
-                    path,
-                    f"is damaged: its mark is bit {channel.pos_invalidation_bit} of {marks}",
-                    column=channel.name,
-                )
-
-
-def _take_in_pieces(mdf: MDF) -> None:
-    """Let large data blocks that are not compressed count as many small ones in a row."""
-    for group in mdf.groups:
-        if group.sorted:
-            blocks = group.data_blocks
-            group.data_blocks = [piece for block in blocks for piece in _pieces(block)]
-
-
-def _pieces(block: DataBlockInfo) -> list[DataBlockInfo]:
-    size = block.original_size or 0
-    # What is compressed, has marks beside it or is cut short is taken as it is.
-    whole = block.block_type or block.invalidation_block or block.block_limit is not None
-    if whole or size <= _PIECE:
-        return [block]
-    return [
-        DataBlockInfo(block.address + at, 0, length, length, block.param, location=block.location)
-        for at in range(0, size, _PIECE)
-        for length in (min(_PIECE, size - at),)
-    ]
-
-
-def _close_half_built(error: Exception) -> None:
-    """A constructor of asammdf that fails leaves an object that cannot be closed."""
-    place = error.__traceback__
-    while place is not None:
-        half_built = place.tb_frame.f_locals.get("self")
-        if isinstance(half_built, MDF4) and not hasattr(half_built, "_file"):
-            half_built._tempfile.close()
-            half_built._closed = True
-        place = place.tb_next
 
 
 def _master(mdf: MDF, group: int) -> int | None:
@@ -300,7 +180,7 @@ def _part(path: Path, mdf: MDF, place: tuple[int, int], records: Any) -> Signal:
             f"numbers are needed, the channel holds {part.samples.dtype}{shape}",
             column=part.name,
         )
-    if part.invalidation_bits is None and mdf.groups[group].channels[index].flags & _HAS_MARKS:
+    if part.invalidation_bits is None and mdf.groups[group].channels[index].flags & HAS_MARKS:
         # Of records without a mark none are given, which a group that has them cannot be told.
         part.invalidation_bits = np.zeros(part.samples.size, dtype=bool)
     if part.invalidation_bits is not None and part.invalidation_bits.any():
@@ -334,7 +214,7 @@ def _is_ours(mdf: MDF, group: int) -> bool:
 def _kept(path: Path, mdf: MDF) -> dict[str, str]:
     """Checksums of corrected channels, rows and channels of every other group."""
     found: dict[str, str] = {}
-    holding = [i for i, g in enumerate(mdf.groups) if not g.channel_group.flags & _OF_TEXTS]
+    holding = [i for i, g in enumerate(mdf.groups) if not g.channel_group.flags & OF_TEXTS]
     for number, index in enumerate(holding):
         group = mdf.groups[index]
         if not _is_ours(mdf, index):

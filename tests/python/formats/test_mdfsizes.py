@@ -9,9 +9,10 @@ pytest.importorskip("asammdf")
 from asammdf.blocks.utils import DataBlockInfo
 
 from trueangle.errors import FileError
-from trueangle.formats import mdf
+from trueangle.formats import openmdf
 
 SIZE = 100
+PIECE = openmdf._PIECE
 
 
 @pytest.fixture
@@ -58,13 +59,13 @@ REFUSED = [
 
 @pytest.mark.parametrize("one", TAKEN)
 def test_what_a_file_can_hold_is_taken(one, path):
-    mdf._check_sizes(path, SimpleNamespace(groups=[group(), one]))
+    openmdf._check_sizes(path, SimpleNamespace(groups=[group(), one]))
 
 
 @pytest.mark.parametrize(("one", "told"), REFUSED)
 def test_what_no_file_of_its_size_can_hold_is_refused(one, told, path):
     with pytest.raises(FileError, match=f"is damaged: .*{told}"):
-        mdf._check_sizes(path, SimpleNamespace(groups=[group(), one]))
+        openmdf._check_sizes(path, SimpleNamespace(groups=[group(), one]))
 
 
 def block(size, **more):
@@ -74,21 +75,21 @@ def block(size, **more):
     return DataBlockInfo(**values)
 
 
-@pytest.mark.parametrize("over", [-1, 0, 1, mdf._PIECE - 1, mdf._PIECE, 3 * mdf._PIECE + 5])
+@pytest.mark.parametrize("over", [-1, 0, 1, PIECE - 1, PIECE, 3 * PIECE + 5])
 def test_pieces_of_a_large_block_are_the_block(over):
     """One after the other, none larger than a piece and none empty."""
-    size = mdf._PIECE + over
-    pieces = mdf._pieces(block(size))
-    assert len(pieces) == -(-size // mdf._PIECE)
+    size = PIECE + over
+    pieces = openmdf._pieces(block(size))
+    assert len(pieces) == -(-size // PIECE)
     place = 640
     for piece in pieces:
         assert piece.address == place
-        assert 0 < piece.original_size == piece.compressed_size <= mdf._PIECE
+        assert 0 < piece.original_size == piece.compressed_size <= PIECE
         place += piece.original_size
     assert place == 640 + size
 
 
 def test_what_is_compressed_or_cut_short_stays_whole():
-    size = 3 * mdf._PIECE
+    size = 3 * PIECE
     for whole in (block(size, block_type=1), block(size, block_limit=100), block(size // 3)):
-        assert mdf._pieces(whole) == [whole]
+        assert openmdf._pieces(whole) == [whole]

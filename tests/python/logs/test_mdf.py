@@ -13,6 +13,7 @@ from .conftest import made_angles, made_model, unwrapped_truth
 
 asammdf = pytest.importorskip("asammdf")
 mdf = pytest.importorskip("trueangle.formats.mdf")
+openmdf = pytest.importorskip("trueangle.formats.openmdf")
 
 ROWS = 5000
 
@@ -165,10 +166,10 @@ def test_records_are_gone_through_once(compression, tmp_path, monkeypatch):
 
 
 def test_a_large_block_is_taken_in_pieces(monkeypatch, tmp_path):
-    monkeypatch.setattr("trueangle.formats.mdf._PIECE", 1000)
+    monkeypatch.setattr("trueangle.formats.openmdf._PIECE", 1000)
     angles = made_angles(ROWS)
     path = made_file(tmp_path / "a.mf4", angles)
-    with mdf._opened(path) as opened:
+    with openmdf.opened_mdf(path) as opened:
         blocks = list(opened.groups[0].get_data_blocks())
         at = [block.address for block in blocks]
         sizes = [block.original_size for block in blocks]

@@ -1,0 +1,133 @@
+"""MDF4 files opened: sizes that they state are held to the file, large blocks read in pieces."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from asammdf import MDF
+from asammdf.blocks.mdf_v4 import MDF4
+from asammdf.blocks.utils import DataBlockInfo
+
+from ..errors import FileError
+from ..support.layout import counted
+from .damage import damage_told
+from .mdfblocks import check_chains
+
+#: Bytes that one byte of a file can stand for: deflate reaches 1032.
+_MOST_COMPRESSED = 2000
+#: Bytes of a data block read at once: asammdf reads a block whole for each part of it.
+_PIECE = 1 << 22
+#: Types of channels that have no place in a record: virtual master and data.
+_VIRTUAL = (3, 6)
+#: Flag of a channel whose readings may be marked invalid.
+HAS_MARKS = 2
+#: Flag of a group of records of any length: texts of a channel of another group, no channels. The
+#: library writes them beside that channel, and no such group.
+OF_TEXTS = 1
+#: First bytes of a file, also of one that was not finished.
+_MAGIC = (b"MDF     ", b"UnFinMF ")
+
+
+@contextmanager
+def opened_mdf(path: Path, **options: Any) -> Iterator[MDF]:
+    """The file, its errors told with its name."""
+    with path.open("rb") as file:
+        if file.read(8) not in _MAGIC:
+            raise FileError(path, "is not MDF4")
+    check_chains(path)
+    with damage_told(path, "MDF4"), _told_once():
+        try:
+            with MDF(path, **options) as mdf:
+                if mdf.version < "4":
+                    raise FileError(path, f"is MDF {mdf.version}; convert it to MDF 4")
+                _check_sizes(path, mdf)
+                _take_in_pieces(mdf)
+                yield mdf
+        except Exception as cause:
+            _close_half_built(cause)
+            raise
+
+
+@contextmanager
+def _told_once() -> Iterator[None]:
+    """Without what the library prints of damage beside the error that it raises."""
+
+    def nothing(record: logging.LogRecord) -> bool:
+        return False
+
+    logger = logging.getLogger("asammdf")
+    logger.addFilter(nothing)
+    try:
+        yield
+    finally:
+        logger.removeFilter(nothing)
+
+
+def _check_sizes(path: Path, mdf: MDF) -> None:
+    """Refuse groups that say they hold more than the file can: reading them would not end."""
+    size = path.stat().st_size
+    for group in mdf.groups:
+        record = group.channel_group.samples_byte_nr + group.channel_group.invalidation_bytes_nr
+        said = int(group.channel_group.cycles_nr) * max(int(record), 1)
+        if group.channel_group.flags & OF_TEXTS and group.channels:
+            raise FileError(
+                path,
+                f"is damaged: a group of texts says to hold {counted(group.channels, 'channel')}",
+            )
+        if said > _MOST_COMPRESSED * size:
+            raise FileError(path, f"is damaged: of {size} bytes it says to hold {said}")
+        if record > _MOST_COMPRESSED * size:
+            raise FileError(path, f"is damaged: of {size} bytes it says that records have {record}")
+        marks = 8 * int(group.channel_group.invalidation_bytes_nr)
+        for channel in group.channels:
+            if channel.channel_type not in _VIRTUAL:
+                bits = 8 * int(channel.byte_offset) + int(channel.bit_offset) + channel.bit_count
+                if bits > 8 * int(group.channel_group.samples_byte_nr):
+                    raise FileError(
+                        path,
+                        "is damaged: the channel ends behind its record of "
+                        f"{group.channel_group.samples_byte_nr} bytes",
+                        column=channel.name,
+                    )
+            if channel.flags & HAS_MARKS and marks <= int(channel.pos_invalidation_bit):
+                raise FileError(
+                    path,
+                    f"is damaged: its mark is bit {channel.pos_invalidation_bit} of {marks}",
+                    column=channel.name,
+                )
+
+
+def _take_in_pieces(mdf: MDF) -> None:
+    """Let large data blocks that are not compressed count as many small ones in a row."""
+    for group in mdf.groups:
+        if group.sorted:
+            blocks = group.data_blocks
+            group.data_blocks = [piece for block in blocks for piece in _pieces(block)]
+
+
+def _pieces(block: DataBlockInfo) -> list[DataBlockInfo]:
+    size = block.original_size or 0
+    # What is compressed, has marks beside it or is cut short is taken as it is.
+    whole = block.block_type or block.invalidation_block or block.block_limit is not None
+    if whole or size <= _PIECE:
+        return [block]
+    return [
+        DataBlockInfo(block.address + at, 0, length, length, block.param, location=block.location)
+        for at in range(0, size, _PIECE)
+        for length in (min(_PIECE, size - at),)
+    ]
+
+
+def _close_half_built(error: Exception) -> None:
+    """A constructor of asammdf that fails leaves an object that cannot be closed."""
+    place = error.__traceback__
+    while place is not None:
+        half_built = place.tb_frame.f_locals.get("self")
+        if isinstance(half_built, MDF4) and not hasattr(half_built, "_file"):
+            half_built._tempfile.close()
+            half_built._closed = True
+        place = place.tb_next
