@@ -79,6 +79,14 @@ def correct_log(task: CorrectionTask, watch: Watch = lambda rows, part: None) ->
                 for name in written.checksums.keys() | read_back.checksums.keys()
                 if written.checksums.get(name) != read_back.checksums.get(name)
             ]
+            moved = sorted({channel.column for channel in channels}.intersection(changed))
+            if moved:  # parts of a damaged file lie over each other
+                raise FileError(
+                    source,
+                    "is damaged: its readings are others once corrected ones are written beside "
+                    "them, which are not kept",
+                    column=moved[0],
+                )
             raise FileError(
                 target,
                 f"did not read back as written ({read_back.rows} of {written.rows} rows; "

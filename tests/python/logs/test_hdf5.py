@@ -1,5 +1,6 @@
 """HDF5 and MATLAB v7.3 logs: corrected data sets beside their sources, all else untouched."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,21 @@ def test_an_attribute_that_is_no_text_is_no_unit(tmp_path, model):
         assert "units" not in made
         assert "units" in file["joint3/indicated_deg"].attrs
         assert list(made["DIMENSION_LABELS"]) == ["reading"]
+
+
+def test_readings_that_lie_over_what_describes_them_are_damage(tmp_path, model):
+    """Nothing that is written there lies beside them."""
+    source = tmp_path / "a.h5"
+    with h5py.File(source, "w") as file:
+        file["indicated_deg"] = np.arange(40.0)
+        place = file["indicated_deg"].id.get_offset()
+    whole, where = source.read_bytes(), struct.pack("<QQ", place, 320)
+    assert whole.count(where) == 1
+    source.write_bytes(whole.replace(where, struct.pack("<QQ", 2, 320)))
+    report = ta.correct_logs(source, model, tmp_path / "b.h5")
+    told = str(report.logs[0].error)
+    assert told.startswith(f"{source}, column 'indicated_deg': is damaged: its readings are others")
+    assert not (tmp_path / "b.h5").exists()
 
 
 def test_data_sets_are_added_and_all_else_is_kept(tmp_path, model):
