@@ -72,6 +72,15 @@ def test_turns_and_readings_that_are_needed() -> None:
         assert len(cut_stretches(some)) == stretches
 
 
+def test_readings_of_one_time_stamp_do_not_move() -> None:
+    """A recorder that begins with what its buffer held stamps all of that alike."""
+    angle = np.linspace(0.0, 5.0 * TURN, 240)
+    time = np.arange(240) / 100.0
+    time[:12] = time[11]
+    (found,) = cut_stretches([log(angle, time=time)])
+    assert (found.rows.start, found.rows.stop) == (12, 240)
+
+
 def test_slow_motion_and_pauses_are_left_out() -> None:
     fast = np.linspace(0.0, 10.0 * TURN, 4000)
     for share, kept in ((0.25, True), (0.15, False)):
