@@ -82,8 +82,8 @@ class Simulation(ShownResult):
         put(self, "runs", all_of_type("runs", self.runs, RunDesign, DESIGN))
         if not 0.0 <= self.sigma_arcsec < float("inf"):
             raise ArgumentError(f"sigma_arcsec must not be negative, got {self.sigma_arcsec!r}")
-        for line in self.harmonics:
-            self.joint.output_order(line.shaft, line.order)
+        for part in (*self.harmonics, *self.effects):  # some effects are of one shaft as well
+            self.joint.output_order(getattr(part, "shaft", "output"), 1.0)
 
     @property
     def pattern(self) -> Pattern:

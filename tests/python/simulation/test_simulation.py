@@ -148,6 +148,14 @@ def test_added_effects_leave_the_text_of_the_file_alone(tmp_path):
         ('[[effect]]\nkind = "rust"', "[[effect]] number 1: kind must be one of"),
         ('[[effect]]\nkind = "backlash"', "needs the parameter 'half_width_arcsec'"),
         ('[[effect]]\nkind="backlash"\nwidth=1', "has no parameter 'width'"),
+        (
+            '[[effect]]\nkind="missing_order"\nshaft=""\norder=1\namplitude_arcsec=1',
+            "shaft must be one of",
+        ),
+        (
+            '[[effect]]\nkind="local_defect"\nshaft="x"\nplace_deg=1\nwidth_deg=1\nheight_arcsec=1',
+            "shaft must be one of",
+        ),
         ("[[run]]\nsamples = 1.5", "samples must be a whole number"),
         ("[[run]]\nreversals = [0.5, 0.2]", "reversals must be ascending"),
         ("[noise]\nsigma_arcsec = -1", "sigma_arcsec must not be negative"),
