@@ -103,7 +103,7 @@ class QuotedBlock:
         row_number = 0
         for text, row in zip(self.texts, self.cells, strict=True):
             if not row:
-                lines.append(text)
+                lines.append(self._kept(text, len(header.names) + len(columns)))
                 continue
             body = text.rstrip("\r\n")
             ending = text[len(body) :] or header.ending
@@ -117,6 +117,14 @@ class QuotedBlock:
             lines.append(header.delimiter.join([body, *values]) + ending)
             row_number += 1
         return "".join(lines).encode(errors="surrogateescape")
+
+    def _kept(self, text: str, width: int) -> str:
+        """A line without readings, which is none among more columns either."""
+        delimiter = self.header.delimiter
+        if is_comment(text) or len(next(cut_rows([text], delimiter), [])) != width:
+            return text
+        body = text.rstrip("\r\n")
+        return body + delimiter + text[len(body) :]
 
 
 def _plain_numbers(cells: list[str]) -> NDArray[np.float64] | None:

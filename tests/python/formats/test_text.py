@@ -134,6 +134,28 @@ def test_columns_are_found_whatever_stands_around_them(case, way, tmp_path, monk
     np.testing.assert_allclose(run.time, TIMES, rtol=1e-12)
 
 
+@pytest.mark.parametrize("way", ["fast", "slow"])
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
+def test_words_of_any_number_are_no_readings_of_a_copy_either(
+    delimiter, way, tmp_path, monkeypatch
+):
+    """As many as the copy has columns, one more than the log: it could not be corrected."""
+    if way == "slow":
+        monkeypatch.setattr("trueangle.formats.csvfile._plain_block", lambda: None)
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.25])], 0.5, 360.0)
+    for words in (3, 4, 5):
+        said = delimiter.join(["ready"] * words)
+        lines = [f"{i}{delimiter}{2.5 * i}" for i in range(12)]
+        lines[5:5] = [said, said + delimiter]
+        path, output = tmp_path / f"{words}.csv", tmp_path / f"{words} out.csv"
+        path.write_text("\n".join([f"time_s{delimiter}indicated_deg", *lines]) + "\n")
+        report = ta.correct_logs(path, model, output)
+        assert report.is_done, report.logs[0].error
+        assert report.logs[0].result["rows"] == 12
+        after = output.read_text().split("\n")
+        assert [line.rstrip(delimiter) for line in after[6:8]] == [said, said]
+
+
 @pytest.mark.parametrize("case", FILES)
 def test_a_correction_keeps_every_byte_that_it_does_not_change(case, tmp_path):
     text, signals = FILES[case]
