@@ -51,6 +51,24 @@ def delimiter_of(text: str) -> str:
     return found if found in text or len(text.split()) < 2 else " "
 
 
+def decimal_of(delimiter: str) -> str:
+    """Whether numbers may have a comma for the point: where it does not part the cells."""
+    return "." if delimiter == "," else ","
+
+
+def is_blank_between_commas(text: str) -> bool:
+    """Whether blanks part numbers some of which have a decimal comma: ``0,5 1 1,25``.
+
+    Commas would part them as well, into other numbers.
+    """
+    cells = text.split()
+    return (
+        len(cells) > 1
+        and any("," in cell for cell in cells)
+        and all(COMMA.fullmatch(cell) and cell[-1] != "," for cell in cells)
+    )
+
+
 def is_comment(text: str) -> bool:
     """True for a note: a line that begins with #, and the mark of an end of file."""
     start = text.lstrip()

@@ -14,8 +14,10 @@ from .csvcells import (
     POINT,
     are_readings,
     cell_number,
+    decimal_of,
     delimiter_of,
     holds_number,
+    is_blank_between_commas,
     is_comment,
     line_cells,
 )
@@ -165,7 +167,7 @@ class Header:
     def _is_of_words(self, text: str) -> bool:
         """Whether a line holds fewer numbers than words."""
         delimiter = delimiter_of(text)
-        return not are_readings(self._split(text, delimiter), "." if delimiter == "," else ",")
+        return not are_readings(self._split(text, delimiter), decimal_of(delimiter))
 
     def _is_names(self, lines: list[TextLine], plain: list[int], place: int) -> bool:
         """Whether a line has as many cells as each of those that follow it."""
@@ -199,7 +201,7 @@ class Header:
     def _first_reading(self, lines: list[TextLine], plain: list[int], delimiter: str) -> int | None:
         """The first of some lines in a row that are equally wide and hold numbers."""
         looked_at = [(i, self._split(lines[i].text, delimiter)) for i in plain]
-        decimal = "." if delimiter in ", " else ","
+        decimal = decimal_of(delimiter)
 
         def is_words(cells: list[str], width: int) -> bool:
             blanks = delimiter == " "  # which tell nothing of how many cells were meant
@@ -207,7 +209,12 @@ class Header:
                 cell_number(cell, decimal) is not None for cell in cells
             )
 
-        good = [len(cells) > 1 and are_readings(cells, decimal) for _i, cells in looked_at]
+        good = [
+            len(cells) > 1
+            and are_readings(cells, decimal)
+            and not (delimiter == "," and is_blank_between_commas(lines[i].text))
+            for i, cells in looked_at
+        ]
         for k in (k for k in range(len(looked_at)) if good[k]):
             width = len(looked_at[k][1])
             below = (j for j in range(k, len(looked_at)) if not is_words(looked_at[j][1], width))

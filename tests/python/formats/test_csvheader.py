@@ -40,6 +40,26 @@ def test_words_above_readings_are_names_where_they_are_as_many(words, width, del
     assert found.names == wanted
 
 
+@pytest.mark.parametrize(
+    ("row", "delimiter", "names"),
+    [
+        ("0,5 1,25 2", " ", 3),
+        ("0,5  1  2,5", " ", 3),
+        ("1 2 3", " ", 3),
+        ("0,5", ",", 2),
+        ("1, 2, 3", ",", 3),
+        ("0.5 ,1.25,2", ",", 3),
+        ("1,2,3 4", ",", 3),
+        ("1,2 ok,3", ",", 3),
+    ],
+)
+def test_commas_between_blanks_are_those_of_numbers(row, delimiter, names):
+    """But where one stands at the end of a number, or parts three of them."""
+    found = header(f"{row}\n" * 5)
+    assert (found.delimiter, len(found.names)) == (delimiter, names)
+    assert found.decimal == ("," if delimiter == " " and "," in row else ".")
+
+
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
 @pytest.mark.parametrize("before", ["", "made at the rig\n", "# rig 3\n\n"])
 @pytest.mark.parametrize("row", [0, 3, 5])

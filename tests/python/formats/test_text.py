@@ -59,6 +59,8 @@ FILES = {
         "Rig 7\nt\tref [deg]\tenc [deg]\n" + table("\t", ","),
         NAMES,
     ),
+    "decimal commas with blanks": ("Rig 7\nt ref[deg] enc[deg]\n" + table(" ", ","), NAMES),
+    "decimal commas with blanks alone": (table("  ", ","), COLUMNS),
     "notes": (
         "# made by a logger; with, delimiters\nt,ref,enc\n# 24 rows\n" + table() + "# end\n",
         {**NAMES, "reference": ("ref", "deg")},
