@@ -57,3 +57,17 @@ def test_a_table_takes_off_what_the_model_does_whichever_angle_it_is_of(case, ar
     target = case.partition(",")[0]
     if target not in ("simplefoc", "pmac"):  # whose tables have a zero of their own
         assert made.zero_deg == pytest.approx(0.0 if target in ("c", "rust") else 0.1, abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [0.5, 0.01])
+def test_numbers_of_24_bits_are_as_fine_as_their_neighbours(size):
+    """What rounding to the nearest of single precision leaves of the largest knot, in arcsec."""
+    print("seed", SEED)
+    cosine, sine = np.random.default_rng(SEED).uniform(0.4 * size, size, 2)
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [cosine], [sine])], period=360.0)
+    largest = np.float32(np.radians(np.hypot(cosine, sine)))
+    apart = float(np.nextafter(largest, np.float32(np.inf)) - largest)
+    for target in ("c", "rust"):
+        made = ta.export_model(model, target, number="f32", entries=4096)
+        step = made.floor_arcsec * np.sqrt(18.0)
+        assert step == pytest.approx(3600.0 * np.degrees(apart), rel=1e-6)

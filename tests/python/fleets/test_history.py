@@ -43,6 +43,20 @@ def test_three_drifted_units_of_forty_are_found_and_none_else(seed):
     assert verdicts(found) == {**drifted, "u30": "zero_moved"}
 
 
+def test_runs_of_one_day_are_one_calibration_whatever_the_hour():
+    print("seed", SEED)
+    runs = units(np.random.default_rng(SEED + 40), 12, dates=TWO, runs=2)
+    timed = [
+        replace(run, when=f"{run.when}T{8 + 5 * int(run.label[1:]):02d}:30:00") for run in runs
+    ]
+    found, same = (ta.fleet(those, orders=[1, 2]).to_dict() for those in (timed, runs))
+    for row in found["history"]:
+        row["when"] = row["when"][:10]
+    assert found == same
+    assert {row["when"] for row in found["history"]} == {TWO[1]}
+    assert len(found["history"]) == 12
+
+
 def test_clean_fleets_are_silent():
     print("seed", SEED)
     rng = np.random.default_rng(SEED + 50)

@@ -24,6 +24,23 @@ def test_the_greatest_slope_is_that_of_a_dense_grid(seed):
     assert dense * (1.0 - 1e-6) <= found <= dense / math.cos(math.pi / 32) * (1.0 + 1e-9)
 
 
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("period", [2.0 * math.pi, 360.0])
+def test_an_order_that_is_not_whole_comes_to_every_phase(period, seed):
+    """Over hundreds of turns its slope adds to the greatest one of the others."""
+    rng = np.random.default_rng(100 + seed)
+    orders = np.array([1.0, 3.0, 5.0, 7.0 + 1.0 / math.sqrt(3.0)])
+    a, b = rng.normal(size=(2, 4)) / 10.0 * period / 6.0
+    x = np.linspace(0.0, 600.0 * period, 1_200_001)
+    rate = 2.0 * math.pi / period * orders
+    slope = sum(
+        k * (q * np.cos(k * x) - p * np.sin(k * x)) for k, p, q in zip(rate, a, b, strict=True)
+    )
+    found = greatest_slope(orders.tolist(), a, b, period)
+    dense = np.abs(slope).max()
+    assert dense * (1.0 - 1e-6) <= found <= dense * 1.02
+
+
 def test_amplitudes_whose_sum_is_too_steep_but_not_their_slope_are_kept():
     """The slopes of orders 4 to 12 add up to 1.1 but never meet."""
     x = np.arange(0.0, 360.0, 0.5)

@@ -14,6 +14,8 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError, MissingExtraError
 from trueangle.fitting.heldout import hold_out
+from trueangle.joint.shafts import shaft_cycles
+from trueangle.reports.fitted import known_gear, known_joint
 from trueangle.reports.numbers import formatted_number, lookup
 from trueangle.reports.page import find_browser, print_pdf
 
@@ -26,6 +28,23 @@ TINY = 1e-9
 @pytest.fixture(scope="module")
 def fit(runs) -> ta.FitResult:
     return ta.fit(runs, ORDERS, gear_ratio=100.0)
+
+
+@pytest.mark.parametrize("shafts", [None, {"stepper": 7.5}, {"belt": 2.5, "worm": 90.0}])
+@pytest.mark.parametrize("member", ["circular_spline", "flexspline", "none"])
+@pytest.mark.parametrize("ratio", [None, 50.0])
+def test_the_joint_of_a_report_has_the_shafts_that_were_told(ratio, member, shafts) -> None:
+    known = known_joint(None, ratio, member, shafts)
+    if known is None:
+        assert ratio is None
+        assert shafts is None
+        assert known_gear(known) == {}
+        return
+    geared = {"output": 1.0} if ratio is None else shaft_cycles(ratio, member)
+    assert known.shafts == geared | (shafts or {})
+    fitted = known_gear(known)
+    assert fitted.pop("shafts") == shafts
+    assert fitted == ({} if ratio is None else {"gear_ratio": ratio, "fixed_member": member})
 
 
 def test_coefficients_are_those_of_the_fit(made, fit: ta.FitResult) -> None:
