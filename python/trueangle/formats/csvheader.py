@@ -125,16 +125,10 @@ class Header:
         plain = [i for i in solid if not is_comment(lines[i].text)]
         first = plain[0] if plain else solid[0]
         self.delimiter = delimiter_of(lines[first].text)
-        # Names of this package are taken at their word, wherever the readings begin; one among
-        # readings is a remark.
-        known = [
-            i
-            for i in plain
-            if _STANDARD.search(lines[i].text) and (i == first or self._is_of_words(lines[i].text))
-        ] or [-1]
-        if known[-1] >= 0 and (known[-1] == first or self._is_names(lines, plain, known[-1])):
-            self.delimiter = delimiter_of(lines[known[-1]].text)
-            return known[-1], self._after_units(lines, known[-1])
+        known = self._known(lines, plain, first)
+        if known is not None:
+            self.delimiter = delimiter_of(lines[known].text)
+            return known, self._after_units(lines, known)
         for delimiter in (";", "\t", ",", " "):
             begin = self._first_reading(lines, plain, delimiter)
             if begin is None:
@@ -163,6 +157,23 @@ class Header:
         if len(plain) == 1 and cell_number(lines[first].text.strip(), ",") is not None:
             return -1, first
         return first, self._after_units(lines, first)
+
+    def _known(self, lines: list[TextLine], plain: list[int], first: int) -> int | None:
+        """A line with names of this package, taken at its word wherever the readings begin.
+
+        One among readings is a remark, or begins another file that was put behind this one.
+        """
+        found, is_sure = None, False
+        for i in plain:
+            text = lines[i].text
+            if is_sure and not self._is_of_words(text):
+                break
+            if _STANDARD.search(text) and (i == first or self._is_of_words(text)):
+                if self._is_names(lines, plain, i):
+                    found, is_sure = i, True
+                elif i == first:
+                    found = i
+        return found
 
     def _is_of_words(self, text: str) -> bool:
         """Whether a line holds fewer numbers than words."""

@@ -60,6 +60,25 @@ def test_commas_between_blanks_are_those_of_numbers(row, delimiter, names):
     assert found.decimal == ("," if delimiter == " " and "," in row else ".")
 
 
+@pytest.mark.parametrize("first", ["time_s", "# made by a logger\ntime_s", "of the rig\n\ntime_s"])
+@pytest.mark.parametrize("rows", [4, 5, 200, 2000])
+@pytest.mark.parametrize("end", ["", ","])
+def test_names_that_stand_again_begin_no_other_table(end, rows, first):
+    """All readings above them were lost, of files that were put one behind the other."""
+    names = f"{first},reference_deg,indicated_deg{end}\n"
+    one = names + "".join(f"0.{k},{k}.5,{k}.7{end}\n" for k in range(rows))
+    found = header(2 * one)
+    assert found.names == ["time_s", "reference_deg", "indicated_deg"]
+    assert found.line == first.count("\n") + 2
+
+
+def test_a_preamble_that_speaks_of_columns_has_no_names():
+    told = "log of indicated_deg,2026\nrate,1000\ngain,2\n"
+    found = header(f"{told}time_s,reference_deg,indicated_deg\n{THREE}")
+    assert found.names == ["time_s", "reference_deg", "indicated_deg"]
+    assert found.line == 5
+
+
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
 @pytest.mark.parametrize("before", ["", "made at the rig\n", "# rig 3\n\n"])
 @pytest.mark.parametrize("row", [0, 3, 5])

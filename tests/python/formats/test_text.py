@@ -310,3 +310,24 @@ def test_words_among_readings_are_counted_and_said(tmp_path):
     path.write_text("\n".join([*lines, "1.5"]))
     with pytest.raises(FileError, match=r"line 27: 1 value where the header has 3 columns"):
         ta.read_runs(path, signals=COLUMNS)
+
+
+@pytest.mark.parametrize("way", ["fast", "slow"])
+@pytest.mark.parametrize("rows", [5, 1500])
+def test_files_that_were_put_together_are_not_read_in_part(rows, way, tmp_path, monkeypatch):
+    """All readings above the names that stand again were lost, and the output had them as notes."""
+    monkeypatch.setattr("trueangle.formats.csvfile.SMALL", 0)
+    if way == "slow":
+        monkeypatch.setattr("trueangle.formats.csvfile._plain_block", lambda: None)
+    one = "time_s,reference_deg,indicated_deg\n" + "".join(
+        f"{k},{k}.0,{k}.5\n" for k in range(rows)
+    )
+    path = tmp_path / "both.csv"
+    path.write_text(2 * one)
+    again = f"both.csv, line {rows + 2}, column 'reference_deg': .* names stand there again"
+    with pytest.raises(FileError, match=again):
+        ta.read_runs(path)
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.25])], 0.5, 360.0)
+    report = ta.correct_logs(path, model, tmp_path / "out.csv")
+    assert "names stand there again" in str(report.logs[0].error)
+    assert not (tmp_path / "out.csv").exists()
