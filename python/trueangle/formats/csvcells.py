@@ -37,12 +37,19 @@ def line_cells(path: Path, text: str, delimiter: str) -> list[str]:
     try:
         cells = next(cut_rows([text], delimiter), [""])
     except csv.Error as cause:
-        raise FileError(
-            path, f"is not readable as CSV: {cause}; save it with ends of lines", line=1
-        ) from None
+        raise not_cut(path, cause, 1) from None
     if delimiter == " " and len(cells) > 1 and not cells[-1]:
         cells = cells[:-1]  # blanks at the end are none between cells
     return [cell.strip() for cell in cells] or [""]
+
+
+def not_cut(path: Path, cause: csv.Error, line: int) -> FileError:
+    """The error of a line that csv does not cut."""
+    if "new-line" in str(cause):
+        return FileError(
+            path, "a line ends with CR alone; save it with LF or CRLF at the ends", line=line
+        )
+    return FileError(path, f"is not readable as CSV: {cause}", line=line)
 
 
 def delimiter_of(text: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .csvcells import cell_number, cut_rows, is_comment
+from .csvcells import cell_number, cut_rows, is_comment, not_cut
 from .csvheader import Header
 from .csvlines import LONGEST_LINE
 from .format import Labels, row_labels
@@ -191,9 +191,7 @@ def quoted_blocks(data: bytes, file: IO[bytes], header: Header, line: int) -> It
                 done, block, size = block, QuotedBlock(header), 0
                 yield done
     except csv.Error as cause:
-        raise FileError(
-            header.path, f"is not readable as CSV: {cause}", line=max(reached, line)
-        ) from None
+        raise not_cut(header.path, cause, max(reached, line)) from None
     if block.texts:
         yield block
 

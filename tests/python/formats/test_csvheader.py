@@ -82,12 +82,14 @@ def test_a_preamble_that_speaks_of_columns_has_no_names():
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
 @pytest.mark.parametrize("before", ["", "made at the rig\n", "# rig 3\n\n"])
 @pytest.mark.parametrize("row", [0, 3, 5])
-@pytest.mark.parametrize("end", [0, 1])
+@pytest.mark.parametrize("end", [(0, 0), (1, 1), (0, 1)])
 def test_a_remark_that_is_a_name_makes_no_line_of_names(row, before, end, delimiter):
     names = ["run", "time_s", "indicated_deg", "note"]
     rows = [["a", str(0.5 * k), f"{9.5 * k}", "ok"] for k in range(6)]
     rows[row][3] = "time_s"
-    text = "\n".join(delimiter.join([*cells, *[""] * end]) for cells in (names, *rows))
+    ends = [end[0], *[end[1]] * 6]
+    lines = zip((names, *rows), ends, strict=True)
+    text = "\n".join(delimiter.join([*cells, *[""] * more]) for cells, more in lines)
     found = header(before + text + "\n")
     assert found.names == names
     assert found.line == before.count("\n") + 2

@@ -245,7 +245,7 @@ def test_what_cannot_be_found_suggests_what_was_meant(signals, message, tmp_path
     ("text", "problem"),
     [
         (b"\xff\xfer\x00e\x00f\x00", "UTF-16"),
-        (b"reference_deg,indicated_deg\r1,1\r2,2\r", "CSV"),
+        (b"reference_deg,indicated_deg\r1,1\r2,2\r", "line 2: a line ends with CR alone"),
         (b"reference_deg,indicated_deg\n" + b"1" * (1 << 25), "longer than 16 MiB"),
         (b"reference_deg,indicated_deg\n1,1\n1,1,1\n", "line 3: 3 values"),
         (b"# only\n# notes\n", "no column reference_deg|no readings"),
