@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from .arrowtables import arrow_dtype
+from .arrowvalues import arrow_dtype
 from .stored import ROWS, stored_values
 
 

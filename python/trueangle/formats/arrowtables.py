@@ -12,46 +12,23 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from ..errors import FileError
+from .arrowvalues import (
+    arrow_numbers,
+    is_label,
+    is_list,
+    is_number,
+    is_string,
+    is_text,
+    label_codes,
+)
 from .checksum import Checksum
-from .format import Addition, Batch, Contents, Labels, Selection, note
+from .format import Addition, Batch, Contents, Selection, note
 
 #: Key of the schema's metadata under which the provenance is kept.
 METADATA_KEY = b"trueangle"
-#: Times count from 2000: a later start keeps more digits of a second.
-_STAMP, _EPOCH = pa.timestamp("us"), 946684800.0
 #: An element of a column of lists, and how many of them are columns, at most.
 _ELEMENT = re.compile(r"(.+)\[(\d+)\]", re.DOTALL)
 _MOST = 256
-
-
-def arrow_numbers(path: object, name: str, column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
-    """A column as an array without a copy where it has no nulls; nulls become NaN.
-
-    Raises
-    ------
-    FileError
-        The column holds neither numbers nor times, which are seconds since 2000.
-    """
-    if isinstance(column, pa.ChunkedArray):
-        column = column.chunk(0) if column.num_chunks == 1 else column.combine_chunks()
-    if isinstance(column, pa.ChunkedArray):  # an empty one stays chunked in some versions
-        column = pa.array([], column.type)
-    kind = column.type
-    if pa.types.is_dictionary(kind):
-        column = column.dictionary_decode()
-        kind = column.type
-    if pa.types.is_float16(kind):
-        column = column.cast(pa.float32())
-    elif pa.types.is_decimal(kind):
-        column = column.cast(pa.float64())
-    elif pa.types.is_boolean(kind):
-        column = column.cast(pa.uint8())
-    elif pa.types.is_timestamp(kind) or pa.types.is_date(kind):
-        return arrow_values(column.cast(_STAMP).cast(pa.int64())) * 1e-6 - _EPOCH
-    elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
-        raise FileError(path, f"numbers are needed, the column holds {kind}", column=name)
-    return arrow_values(column)
 
 
 def element_names(schema: pa.Schema, first: Callable[[str], int]) -> list[str]:
@@ -62,8 +39,10 @@ def element_names(schema: pa.Schema, first: Callable[[str], int]) -> list[str]:
     found: list[str] = []
     for field in schema:
         kind = field.type
-        if not _is_list(kind) or pa.types.is_map(kind):
+        if is_number(kind) or is_label(kind):
             found.append(field.name)
+        elif not is_list(kind):  # structures, bytes: nothing that could be read
+            continue
         elif pa.types.is_integer(kind.value_type) or pa.types.is_floating(kind.value_type):
             fixed = pa.types.is_fixed_size_list(kind)
             size = kind.list_size if fixed else first(field.name)
@@ -91,29 +70,6 @@ def _taken_column(table: Any, name: str) -> Any:
 def _top(schema: pa.Schema, name: str) -> tuple[str, int | None]:
     found = None if name in schema.names else _ELEMENT.fullmatch(name)
     return (name, None) if found is None else (found[1], int(found[2]))
-
-
-def arrow_dtype(kind: pa.DataType) -> np.dtype[Any]:
-    """What numpy calls whole numbers or floats of Arrow."""
-    letter = "f" if pa.types.is_floating(kind) else "iu"[pa.types.is_unsigned_integer(kind)]
-    return np.dtype(f"{letter}{kind.bit_width // 8}")
-
-
-def arrow_values(column: pa.Array) -> NDArray[Any]:
-    """Whole numbers or floats as `pyarrow.Array.to_numpy` gives them, nulls as NaN.
-
-    That method imports pandas where it is installed, which takes longer than a million numbers.
-    """
-    data, dtype = column.buffers()[1], arrow_dtype(column.type)
-    if data is None:  # nothing, or nulls alone
-        values: NDArray[Any] = np.zeros(len(column), dtype)
-    else:
-        values = np.frombuffer(data, dtype, len(column), column.offset * dtype.itemsize)
-    if column.null_count:
-        missing = column.is_null().cast(pa.uint8()).buffers()[1]
-        values = values.astype(dtype if dtype.kind == "f" else np.float64)
-        values[np.frombuffer(missing, np.bool_, len(column))] = np.nan
-    return values
 
 
 def corrected_schema(schema: pa.Schema, channels: Sequence[Addition], path: object) -> pa.Schema:
@@ -199,11 +155,14 @@ class ArrowDigest:
         elif pa.types.is_struct(kind):
             for i, child in enumerate(column.flatten()):
                 self._column(f"{name}.{kind.field(i).name}", child)
-        elif _is_list(kind):
+        elif pa.types.is_map(kind):
+            pairs = pa.struct([("key", kind.key_type), ("value", kind.item_type)])
+            self._column(name, column.cast(pa.list_(pairs)))
+        elif is_list(kind):
             lengths = pc.list_value_length(column)
             self._words(f"{name}:length", lengths.cast(pa.int64()).to_numpy())
             self._column(f"{name}[]", column.flatten())
-        elif _is_text(kind):
+        elif is_text(kind):
             self._text(name, column)
         elif pa.types.is_boolean(kind):
             self._words(name, column.cast(pa.uint8()).to_numpy())
@@ -216,7 +175,7 @@ class ArrowDigest:
 
     def _text(self, name: str, column: pa.Array) -> None:
         large = pa.large_binary()
-        if _is_string(column.type):
+        if is_string(column.type):
             column = column.cast(pa.large_string())
         column = column.cast(large)
         self._words(f"{name}:length", pc.binary_length(column).to_numpy())
@@ -233,27 +192,6 @@ class ArrowDigest:
         found.update(values)
 
 
-def _is_string(kind: pa.DataType) -> bool:
-    return bool(
-        pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind)
-    )
-
-
-def _is_text(kind: pa.DataType) -> bool:
-    return _is_string(kind) or bool(
-        pa.types.is_binary(kind) or pa.types.is_large_binary(kind) or pa.types.is_binary_view(kind)
-    )
-
-
-def _is_list(kind: pa.DataType) -> bool:
-    return bool(
-        pa.types.is_list(kind)
-        or pa.types.is_large_list(kind)
-        or pa.types.is_fixed_size_list(kind)
-        or pa.types.is_map(kind)
-    )
-
-
 def column_batches(path: object, batches: Iterable[Any], wanted: Selection) -> Iterator[Batch]:
     """What is wanted of record batches: numbers as arrays, texts and times asked for as labels."""
     for batch in batches:
@@ -266,24 +204,4 @@ def column_batches(path: object, batches: Iterable[Any], wanted: Selection) -> I
 def _values(path: object, name: str, column: Any, as_text: bool) -> Any:
     if as_text and pa.types.is_timestamp(column.type):
         column = column.cast(pa.string())
-    return label_codes(column) if _is_label(column.type) else arrow_numbers(path, name, column)
-
-
-def label_codes(column: pa.Array | pa.ChunkedArray) -> Labels:
-    """A column of texts by their place among the different ones; nulls are the last."""
-    if isinstance(column, pa.ChunkedArray):
-        column = column.combine_chunks()
-    if not pa.types.is_dictionary(column.type):
-        column = column.dictionary_encode()
-    names = column.dictionary.to_pylist()
-    codes = arrow_values(column.indices)
-    if column.indices.null_count:
-        codes = np.where(np.isnan(codes), len(names), codes)
-    codes = codes.astype(np.intp)
-    if codes.size and not 0 <= int(codes.min()) <= int(codes.max()) <= len(names):
-        raise pa.ArrowInvalid("indices beyond their dictionary")
-    return Labels(codes, [*names, None])
-
-
-def _is_label(kind: pa.DataType) -> bool:
-    return _is_string(kind.value_type if pa.types.is_dictionary(kind) else kind)
+    return label_codes(column) if is_label(column.type) else arrow_numbers(path, name, column)

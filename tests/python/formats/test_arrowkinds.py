@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 pa = pytest.importorskip("pyarrow")
+import pyarrow.feather  # noqa: E402
 import pyarrow.parquet as pq  # noqa: E402
 
 import trueangle as ta  # noqa: E402
 from trueangle.formats import parquet  # noqa: E402
-from trueangle.formats.arrowtables import (  # noqa: E402
-    ArrowDigest,
-    arrow_numbers,
-    element_names,
-)
+from trueangle.formats.arrowtables import ArrowDigest, element_names  # noqa: E402
+from trueangle.formats.arrowvalues import arrow_numbers  # noqa: E402
 
+ROWS = 60
 NOON = datetime.datetime(2000, 1, 1, 12, 0, 1, 500_000)
 
 
@@ -33,6 +33,80 @@ def test_times_are_seconds_since_2000(unit: str) -> None:
     np.testing.assert_array_equal(found, [43_201.0, 43_201.0 - 86_400.0 + half, np.nan])
     days = pa.array([datetime.date(2000, 1, 3), datetime.date(1999, 12, 31)])
     assert arrow_numbers("f", "t", days).tolist() == [172_800.0, -86_400.0]
+
+
+@pytest.mark.parametrize(
+    ("kind", "unit"),
+    [
+        *(("time32", unit) for unit in ("s", "ms")),
+        *(("time64", unit) for unit in ("us", "ns")),
+        *(("duration", unit) for unit in ("s", "ms", "us", "ns")),
+    ],
+)
+def test_durations_and_times_of_the_day_are_seconds(kind: str, unit: str) -> None:
+    per_second = {"s": 1, "ms": 1_000, "us": 1_000_000, "ns": 1_000_000_000}[unit]
+    whole = pa.array([0, 90 * per_second, 1, None], pa.int32() if kind == "time32" else pa.int64())
+    found = arrow_numbers("f", "t", whole.cast(getattr(pa, kind)(unit)))
+    np.testing.assert_array_equal(found, [0.0, 90.0, 1.0 / per_second, np.nan])
+
+
+def beside() -> dict[str, Any]:
+    """Columns that are no readings, of each kind of value that Arrow knows."""
+    n = np.arange(ROWS)
+    return {
+        "time32": pa.array(n.astype("i4"), pa.time32("ms")),
+        "time64": pa.array(n, pa.time64("us")),
+        "duration": pa.array(n, pa.duration("ns")),
+        "date": pa.array([datetime.date(2026, 1, 1)] * ROWS),
+        "struct": pa.array([{"a": 1.0, "b": "x"}] * ROWS),
+        "binary": pa.array([b"\x00\x01"] * ROWS),
+        "fixed": pa.array([b"ab"] * ROWS, pa.binary(2)),
+        "map": pa.array([[("k", 1)], []] * (ROWS // 2), pa.map_(pa.string(), pa.int64())),
+        "words": pa.array([["a"]] * ROWS),
+        "rows": pa.array([[{"a": 1}]] * ROWS),
+        "null": pa.nulls(ROWS),
+        "bool": pa.array([True, None] * (ROWS // 2)),
+        "decimal": pa.array([1] * ROWS, pa.decimal256(50, 3)),
+        "half": pa.array(n.astype("f2")),
+        "codes": pa.array([1, 2] * (ROWS // 2)).dictionary_encode(),
+        "bytes' codes": pa.array([b"a"] * ROWS).dictionary_encode(),
+        "largest": pa.array(np.full(ROWS, 2**64 - 1, dtype="u8")),
+    }
+
+
+@pytest.mark.parametrize("ending", ["parquet", "arrow"])
+@pytest.mark.parametrize("kind", beside())
+def test_columns_of_any_kind_do_not_stand_in_the_way_of_readings(kind, ending, tmp_path) -> None:
+    """Structures and bytes are no columns to read; a copy has them and what it is made of."""
+    reference = np.arange(ROWS) * 5.0
+    columns = {"reference_deg": reference, "indicated_deg": reference + 0.5, "x": beside()[kind]}
+    path, output = tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"
+    if ending == "parquet":
+        pq.write_table(pa.table(columns), path)
+    else:
+        pyarrow.feather.write_feather(pa.table(columns), path, "uncompressed")
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.25])], 0.5, 360.0)
+    report = ta.correct_logs(path, model, output)
+    assert report.is_done, report.logs[0].error
+    for file in (path, output):
+        (run,) = ta.read_runs(file)
+        np.testing.assert_array_equal(run.reference, reference)
+        unread = ("struct", "binary", "fixed", "map", "words", "rows", "bytes' codes")
+        assert ("x" in run.columns) == (kind not in unread)
+    read = pq.read_table if ending == "parquet" else pyarrow.feather.read_table
+    assert read(output)["x"].to_pylist() == columns["x"].to_pylist()
+
+
+def test_a_digest_tells_a_map_whose_key_or_value_is_another() -> None:
+    def digest(*maps: list[tuple[str, int]] | None) -> object:
+        found = ArrowDigest()
+        found.update(pa.table({"x": pa.array(maps, pa.map_(pa.string(), pa.int64()))}))
+        return found.contents()
+
+    whole = [[("a", 1), ("b", 2)], [], None, [("c", 3)]]
+    assert digest(*whole) == digest(*whole)
+    for place, other in ((0, [("a", 1), ("b", 7)]), (0, [("a", 1), ("d", 2)]), (1, None), (2, [])):
+        assert digest(*whole[:place], other, *whole[place + 1 :]) != digest(*whole)
 
 
 @pytest.mark.parametrize("size", [0, 1, 256, 257])
