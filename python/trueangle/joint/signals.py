@@ -163,7 +163,7 @@ class Signals:
         covered = [np.ptp(self.theta[start:stop]) for start, stop in self.run_bounds()]
         return np.array(covered) / (2.0 * np.pi)
 
-    def presliding(self, length_deg: float, start_state: float = 0.0) -> Array:
+    def presliding(self, length_deg: float, start_state: float) -> Array:
         """State z of a presliding spring of transition length L, in [-1, 1].
 
         ::

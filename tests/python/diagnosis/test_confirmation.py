@@ -23,7 +23,7 @@ SIM = Simulation(
     runs=tuple(RunDesign(samples=300, start_deg=40.0 * k, reversals=(0.3, 0.7)) for k in range(4)),
 )
 PHASES = np.array([0.3, 1.9, 4.0, 5.5])
-CALM = Unexplained(False, 1.0, 0.1, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0))
+CALM = Unexplained(False, 1.0, 0.1, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0, 0.0))
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_a_line_in_time_is_confirmed_at_the_frequency_that_is_seen_without_it(
     assert found is not None
     assert found.shape["frequency_hz"] == pytest.approx([0.9] * 4, rel=1e-3)
     claimed = replace(found, shape={**found.shape, "frequency_hz": [told] * 4})
-    left = Unexplained(unexplained, 1.0, 0.1, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0))
+    left = Unexplained(unexplained, 1.0, 0.1, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0, 0.0))
     status, reason = confirmation_status(
         "time_periodic", None, start.with_terms([claimed]), [0], left
     )
@@ -158,6 +158,6 @@ def test_a_line_in_time_of_one_run_alone_is_not_confirmed_by_what_is_seen(runs: 
     start = Regression.of(signals, noise + line, SIM.surroundings, rho=0.0)
     waves = TimePeriodic.waves(signals, [0.9] * runs)
     claimed = start.propose_run_effect("time_periodic", {"frequency_hz": [0.9] * runs}, waves)
-    left = Unexplained(True, 1.0, 0.1, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0))
+    left = Unexplained(True, 1.0, 0.1, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0, 0.0))
     status, _ = confirmation_status("time_periodic", None, start.with_terms([claimed]), [0], left)
     assert (status == "confirmed") == (runs > 1)

@@ -36,7 +36,8 @@ SIM = Simulation(
     ),
 )  # fmt: skip
 CALM, MORE = (
-    Unexplained(found, 1.0, 0.1, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0)) for found in (False, True)
+    Unexplained(found, 1.0, 0.1, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0, 0.0))
+    for found in (False, True)
 )
 
 

@@ -131,7 +131,7 @@ def test_a_mean_of_runs_that_all_show_noise_alone_is_drawn_from_all_of_them():
 def test_a_cause_is_confirmed_where_the_interval_of_its_gain_excludes_zero(interval, status):
     zeros = (0.0, 0.0, 0.0)
     gain = Gain("runs", zeros, zeros, sum(interval) / 2.0, interval, None, "")
-    nothing = Unexplained(False, 0.0, 0.0, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0))
+    nothing = Unexplained(False, 0.0, 0.0, [], Noise(1.0, 0.0, 0.0, 0.0, 100.0, 0.0))
     found, reason = confirmation_status("backlash", gain, None, (), nothing)
     assert found == status
     assert bool(reason) == (status == "not_confirmed")

@@ -197,3 +197,13 @@ def test_tables_of_a_controller_are_round_parts_of_a_turn(counts):
     for size in sizes:
         assert counts % size == 0
         assert 30**11 % size == 0
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "modulo"),
+    [(0.0, 360.0, 1), (-180.0, 180.0, 1), (90.0, 450.0, 1), (90.0, 270.0, 0), (170.0, 190.0, 0)],
+)
+def test_a_list_comes_round_where_it_is_of_a_whole_turn(start, stop, modulo):
+    made = ta.export_model(degrees(), "twincat", start=start, stop=stop, entries=360)
+    assert f"kw.ssfk.modulo {modulo}\n" in made.text
+    assert f"kw.ssfk.kw_startpos {round(start * 1e4)}\n" in made.text

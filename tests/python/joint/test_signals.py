@@ -169,7 +169,7 @@ def test_presliding_is_the_spring_of_its_equation(start: float) -> None:
             expected.append(z)
     np.testing.assert_allclose(signals.presliding(3.0, start), expected, atol=0.002)
     # So short a length that the exponential would overflow leaves the direction.
-    tiny = signals.presliding(1e-300)
+    tiny = signals.presliding(1e-300, 0.0)
     np.testing.assert_array_equal(tiny[signals.travel > 0], signals.direction[signals.travel > 0])
 
 

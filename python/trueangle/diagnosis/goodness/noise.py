@@ -74,7 +74,7 @@ class Noise:
     std: float
     deviance: float
     freedom: float
-    root: float = 0.0
+    root: float
 
 
 def estimate_noise(left: Leftover) -> Noise:

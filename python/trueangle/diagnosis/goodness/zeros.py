@@ -26,7 +26,7 @@ def variance_of_mean(readings: int, noise: Noise) -> float:
 
     Examples
     --------
-    >>> variance_of_mean(4, Noise(2.0, 0.0, 0.0, 0.0, 3.0))
+    >>> variance_of_mean(4, Noise(2.0, 0.0, 0.0, 0.0, 3.0, 0.0))
     1.0
     """
     n, rho = float(readings), noise.correlation

@@ -19,7 +19,7 @@ def item(p: float, rms: float = 1.0, decides: bool = True, looks_like: str = "")
 
 
 def made(*evidence: Evidence) -> Unexplained:
-    return Unexplained(True, 1.0, 1.0, list(evidence), Noise(1.0, 0.0, 0.1, 0.0, 10.0))
+    return Unexplained(True, 1.0, 1.0, list(evidence), Noise(1.0, 0.0, 0.1, 0.0, 10.0, 0.0))
 
 
 def test_tests_fire_at_one_percent_for_all_of_their_kind_together() -> None:
