@@ -9,8 +9,10 @@ import numpy as np
 import trueangle as ta
 from asked import Case, Chance, Pull, Told, generator
 from selfcalibration import test_dual_numbers as dual
+from selfcalibration import test_dual_ratio as dual_ratio
 from selfcalibration import test_shifts as shifts
 from selfcalibration.test_pulls import DESIGNS, LINES
+from trueangle.selfcalibration.dualfit import estimate_dual_ratio
 
 
 def design(name: str) -> Case:
@@ -39,6 +41,19 @@ def beside(seed: int) -> Told:
         yield Chance(f"held out: {part}", held.p)
 
 
+def ratio(turns: float) -> Case:
+    """The ratio over so many turns, with orders beyond those beside which it is estimated."""
+
+    def case(seed: int) -> Told:
+        rng = generator(seed, "ratio")
+        channels = dual_ratio.over_an_arc(rng, turns, (1, 2, 3, 5))
+        found = estimate_dual_ratio(channels, 50.25, "auto", turns)
+        if np.isfinite(found.std):
+            yield Pull("ratio", (found.value - 50.3) / found.std)
+
+    return case
+
+
 def facets(seed: int) -> Told:
     """Facets of a polygon about their mean, drawn anew in each seed."""
     rng = generator(seed, "facets")
@@ -55,5 +70,6 @@ def cases() -> Mapping[str, Case]:
     return {
         **{name: design(name) for name in DESIGNS},
         "geared, numbers beside": beside,
+        **{f"geared, {turns:g} turns": ratio(turns) for turns in (0.6, 0.9, 1.5)},
         "facets": facets,
     }

@@ -161,7 +161,9 @@ def choose_dual_lines(
     ``held`` are orders of the output that are kept whatever they bring.
 
     Of the output's own orders the first few are taken beyond which no higher one is missed;
-    of these, and of the motor's, those are left out that do not stand out.
+    of these, and of the motor's, those are left out that do not stand out. Beside a ratio
+    (``slope``) and ``held`` none is left out, and one more is taken: over an arc orders that the
+    readings do not ask for may make it another.
     """
     fit = fit_dual_lines(channels, ratio, lines, slope=slope, settled=False).dense
     scale = fit.projected.variance * low_frequency_inflation(fit)
@@ -183,10 +185,10 @@ def choose_dual_lines(
     for count in range(len(fixed), len(own)):
         limit = chi_squared_quantile(1.0 - _CHANCE, 2.0 * (len(own) - count))
         if squares(own[:count]) - everything < limit * scale:
-            kept = own[:count]
+            kept = own[: count + (slope and bool(held))]
             break
     limit = chi_squared_quantile(1.0 - _CHANCE / max(len(lines), 1), 2.0)
-    while droppable := [i for i in kept if i not in fixed]:
+    while not (slope and held) and (droppable := [i for i in kept if i not in fixed]):
         loss = [squares([i for i in kept if i != j]) for j in droppable]
         if min(loss) - squares(kept) >= limit * scale:
             break
@@ -244,4 +246,25 @@ def estimate_dual_ratio(
         ratio /= 1.0 + slope
         if abs(slope) < 0.1 * math.sqrt(variance):
             break
+    if isinstance(orders, str) and beside:
+        variance *= _doubt(channels, ratio, lines, beside)
     return RatioEstimate(ratio, abs(ratio) * math.sqrt(max(variance, 0.0)))
+
+
+def _doubt(
+    channels: GearedChannels, ratio: float, lines: Sequence[SharedLine], beside: Sequence[int]
+) -> float:
+    """By what the variance of a ratio grows where the highest order of the output moves it.
+
+    More than twice as far as the noise allows: then higher ones would move it on.
+    """
+    highest = max((line.output for line in lines if not line.motor), default=0)
+    if highest in (0, *beside):
+        return 1.0
+    fewer = [line for line in lines if line.motor or line.output != highest]
+    (after, wide), (before, narrow) = (
+        (float(fit.patterns[-1]), float(fit.covariance[-1, -1]))
+        for fit in (fit_dual_lines(channels, ratio, ls, slope=True).dense for ls in (lines, fewer))
+    )
+    allowed = 4.0 * max(wide - narrow, 0.0)
+    return max((after - before) ** 2 / allowed, 1.0) if allowed > 0.0 else 1.0
