@@ -26,7 +26,7 @@ _TIME = "time_s"
 _MAGIC = b"WPILOG"
 #: Types of entries that are numbers.
 _KINDS = {"double": "<f8", "float": "<f4", "int64": "<i8", "boolean": "?"}
-_ELEMENT = re.compile(r"(.*)\[(\d+)\]")
+_ELEMENT = re.compile(r"(.*)\[(\d+)\]", re.DOTALL)
 _STAMP = np.dtype("<i8")
 #: Elements of an array that become columns, at most.
 _MOST = 256

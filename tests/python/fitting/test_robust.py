@@ -42,6 +42,14 @@ def test_auto_names_the_rows_it_sets_aside():
     assert result.model.fit.wild == 8
 
 
+def test_one_outlier_is_one():
+    theta = np.arange(400) * 0.9
+    error = 0.01 * np.random.default_rng(3).normal(size=400)
+    error[100] += 5.0
+    told = ta.fit(ta.CalibrationRun(theta, theta + error, 360.0), orders=[1]).summary()
+    assert "1 outlier set aside" in told
+
+
 @pytest.mark.parametrize("noise", ["normal", "none", "counts"])
 def test_clean_data_are_plain_least_squares(noise):
     rng = np.random.default_rng(13)

@@ -138,3 +138,7 @@ def test_what_is_no_angle_is_refused_and_nothing_is_made_of_noise():
         corrector = AngleCorrector().fit(plain, true)
     assert corrector.models_ == [None]
     np.testing.assert_array_equal(corrector.transform(plain), plain)
+
+
+def test_true_angles_are_asked_for():
+    assert AngleCorrector().__sklearn_tags__().target_tags.required

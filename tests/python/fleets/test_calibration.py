@@ -57,3 +57,18 @@ def test_a_long_run_takes_no_memory_for_each_reading():
     finally:
         tracemalloc.stop()
     assert peak < MOST
+
+
+@pytest.mark.parametrize(("more", "told"), [(1, False), (2, True), (9, True)])
+def test_a_run_tells_a_scatter_where_it_has_readings_beyond_its_pattern(more: int, told: bool):
+    """Two orders and a zero are five numbers: a run with no more readings has no scatter."""
+    orders = np.array([1.0, 2.0])
+    sums = CalibrationSums()
+    rng = np.random.default_rng(more)
+    for size in (4 + more, 40):
+        place = np.sort(rng.uniform(0.0, 360.0, size))
+        run = ta.CalibrationRun(place, place + rng.normal(0.0, 0.01, size), 360.0)
+        sums.add(run, orders, True)
+    squares, freedom = sums.within()
+    assert freedom == (more - 1.0 + 35.0 if told else 0.0)
+    assert (squares > 0.0) == told

@@ -191,6 +191,19 @@ def test_numbers_of_every_kind_alone_and_in_arrays(kind, code, values, tmp_path)
     assert wpilog.contents(path).rows == 4
 
 
+@pytest.mark.parametrize("name", ["a\nb", "[0]", "a[1]", "\n"])
+def test_an_array_may_have_any_name(name, tmp_path):
+    path = log_of(
+        tmp_path / "a.wpilog",
+        record(0, 0, started(1, name, "double[]")),
+        record(1, 5, np.array([1.5, 2.5]).tobytes()),
+    )
+    assert wpilog.columns(path) == ["time_s", f"{name}[0]", f"{name}[1]"]
+    (batch,) = wpilog.read(path, Selection([f"{name}[1]"]))
+    assert batch[f"{name}[1]"].tolist() == [2.5]
+    assert wpilog.extent(path, [f"{name}[0]"]) == (1, 8)
+
+
 def test_an_entry_that_is_finished_may_be_started_anew(tmp_path):
     """Under another number, and its number under another name; a robot does so when it restarts."""
     values = [struct.pack("<d", x) for x in (1.0, 2.0, 3.0, 4.0)]

@@ -79,6 +79,21 @@ def test_channels_are_added_and_all_else_is_kept(compression, tmp_path, model):
     assert max(kinds) == compression
 
 
+@pytest.mark.parametrize("compression", [3, 4, 5, 6])
+def test_a_copy_is_compressed_as_its_source(compression, tmp_path, model):
+    """By the ways of MDF 4.3, where the library writes them."""
+    try:
+        source = made_file(tmp_path / "a.mf4", made_angles(ROWS), compression)
+    except (ImportError, NameError, ValueError, asammdf.blocks.utils.MdfException) as cause:
+        pytest.skip(f"asammdf cannot: {cause}")
+    kinds = []
+    ta.correct_logs(source, model, tmp_path / "b.mf4")
+    for path in (source, tmp_path / "b.mf4"):
+        with asammdf.MDF(path) as mdf:
+            kinds.append(max(b.block_type for g in mdf.groups for b in g.get_data_blocks()))
+    assert kinds[0] == kinds[1]
+
+
 def test_single_precision_and_turns(tmp_path):
     model = made_model(ratio=50.5)
     angles = made_angles(ROWS, turns=5.5)

@@ -70,6 +70,8 @@ REFUSED = {
     "a later version": ({"change": lambda c: c.update(version=99)}, "later.*upgrade"),
     "a text as version": ({"change": lambda c: c.update(version="1")}, "version"),
     "an unknown key": ({"change": lambda c: c.update(colour="red")}, "colour.*unknown"),
+    "no format": ({"change": lambda c: c.pop("format")}, "is not a model file"),
+    "no version": ({"change": lambda c: c.pop("version")}, "version.*whole number.*null"),
     "a missing key": ({"change": lambda c: c.pop("period")}, "period.*missing"),
     "an unknown shaft key": ({"change": lambda c: c["shafts"][0].update(x=1)}, r"shafts\[0\]\.x"),
     "a NaN": ({"text": lambda s: s.replace("0.5", "NaN")}, "NaN"),

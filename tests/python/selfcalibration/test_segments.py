@@ -72,6 +72,18 @@ def test_turns_and_readings_that_are_needed() -> None:
         assert len(cut_stretches(some)) == stretches
 
 
+@pytest.mark.parametrize("turns", [[0.8, 3.0], [1.2, 2.0, 1.0], [2.6, 0.9, 4.4]])
+def test_turns_are_counted_on_from_stretch_to_stretch(turns) -> None:
+    """Every stretch has its whole turns, one at least, and no number is left out."""
+    stretches = [
+        segment(np.linspace(0.0, 9.0, 500), np.linspace(0.3, 0.3 + TURN * n, 500)) for n in turns
+    ]
+    number = _turn_numbers(SegmentReadings(stretches))
+    whole = [max(1, round(n)) for n in turns]
+    assert sorted(set(number.tolist())) == list(range(sum(whole)))
+    assert [len(set(part)) for part in np.split(number, len(turns))] == whole
+
+
 def test_readings_of_one_time_stamp_do_not_move() -> None:
     """A recorder that begins with what its buffer held stamps all of that alike."""
     angle = np.linspace(0.0, 5.0 * TURN, 240)

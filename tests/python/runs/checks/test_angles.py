@@ -240,3 +240,9 @@ def test_what_can_and_cannot_be_known() -> None:
         assert len(fewer) == 7
         assert len(cannot) == 1
         assert lost in cannot[0]
+
+
+@pytest.mark.parametrize("teeth", range(2, 14))
+def test_ratios_of_up_to_thirteen_teeth_are_offered(teeth: int) -> None:
+    """No smaller pair of wheels comes near one more tooth on the one than on the other."""
+    assert f"a gear of ratio {2 * teeth + 1}/{teeth} between" in ratio_suggestion(2.0 + 1.0 / teeth)
