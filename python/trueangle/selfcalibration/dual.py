@@ -88,11 +88,11 @@ class _UsedRatio(NamedTuple):
 
 def dual(
     recordings: Sequence[Recording],
-    orders: str | Sequence[float] = "auto",
+    orders: str | Sequence[float],
     *,
-    gear_ratio: float | None = None,
-    fit_ratio: bool = False,
-    period: float = 360.0,
+    gear_ratio: float | None,
+    fit_ratio: bool,
+    period: float,
 ) -> SelfCalibration:
     """Sums at every order with their names; see `trueangle.selfcal`."""
     if gear_ratio is not None and not (math.isfinite(gear_ratio) and gear_ratio != 0.0):
