@@ -221,7 +221,10 @@ def estimate_dual_ratio(
     turns: float,
     beside: Sequence[int] = BESIDE_RATIO,
 ) -> RatioEstimate:
-    """The ratio jointly with orders 1 and 2 of the output, and what else stands out.
+    """The ratio jointly with orders 1 and 2 of the output, and with what else there may be.
+
+    Of ``orders="auto"`` one more than the readings ask for is held beside it: over an arc the
+    lowest orders and the slope are nearly one another, and one that is not seen would move it.
 
     Examples
     --------
