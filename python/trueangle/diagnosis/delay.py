@@ -20,7 +20,7 @@ import numpy as np
 
 from ..effects.latency import Latency
 from ..estimation.extension import Extension
-from ..estimation.factor import orthonormal_basis
+from ..estimation.factor import least_squares, orthonormal_basis
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.earlier import earlier_signals
@@ -129,7 +129,7 @@ def _newton(
     lines = lines_columns(then.theta, orders)
     known = orthonormal_basis(np.hstack([runs, then.direction[:, None], lines]))
     rest = y - known @ (known.T @ y)
-    fitted = np.linalg.lstsq(np.hstack([runs, lines]), y, rcond=None)[0][runs.shape[1] :]
+    fitted = least_squares(np.hstack([runs, lines]), y)[runs.shape[1] :]
     known_lines = sim.pattern
     pattern = Pattern(
         np.concatenate([known_lines.orders, orders]),

@@ -11,6 +11,7 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..support.arrays import Array
 from .unnamed import effect_or_unnamed, is_named
+from .unseenorders import unseen_order_columns
 
 #: Share of a cause's energy that its form may leave: one known to 3 %.
 FORM = 1e-3
@@ -82,19 +83,30 @@ def share_beside_form_errors(
 
 
 def with_form_errors(regression: Regression) -> Regression:
-    """The regression with the errors that the forms make in its coefficients.
+    """The regression with the errors that forms and unseen orders make in its coefficients.
 
     Bends B with coefficients ``ξ ~ N(0, κ²)`` shift what is fitted without
     them by ``X⁺ Bξ``. ``κ`` is the one that makes the residual most likely (0
     where it is hardly better than none), and ``ξ`` has its mean and covariance given
-    the residual.
+    the residual. Orders that over an arc are nearly those found are as large as those (κ = 1):
+    of them the residual tells nothing.
     """
-    columns = regression.whiten(form_error_columns(regression))
+    parts = [
+        _shifts(regression, form_error_columns(regression), None),
+        _shifts(regression, unseen_order_columns(regression), 1.0),
+    ]
+    found = [part for part in parts if part is not None]
+    return replace(regression, form_errors=np.sum(found, axis=0)) if found else regression
+
+
+def _shifts(regression: Regression, bends: Array, size: float | None) -> Array | None:
+    """Covariance of what bends of a size, or of the likeliest, shift; None without any."""
+    columns = regression.whiten(bends)
     known = regression.q.T @ columns
     rest = columns - regression.q @ known
     count = columns.shape[1]
     if not count:
-        return regression
+        return None
     _, s, vt = np.linalg.svd(rest, full_matrices=False)
     kept = s > DISTINCT * s[0]
     s, vt = s[kept], vt[kept]
@@ -105,9 +117,9 @@ def with_form_errors(regression: Regression) -> Regression:
         wider = 1.0 + (kappa * s) ** 2 / variance
         return float(np.sum(moment**2 / variance * (1.0 - 1.0 / wider) - np.log(wider)))
 
-    kappa = max(SIZES, key=deviance)
-    if deviance(kappa) < SHOWN:
-        return regression
+    kappa = max(SIZES, key=deviance) if size is None else size
+    if size is None and deviance(kappa) < SHOWN:
+        return None
     wider = variance + (kappa * s) ** 2
     mean = vt.T @ (kappa**2 * s * moment / wider)
     # The mean, what the residual tells of the bends, and what it does not: roots, whose products
@@ -115,4 +127,4 @@ def with_form_errors(regression: Regression) -> Regression:
     told = vt.T * (kappa * np.sqrt(variance / wider))
     untold = kappa * (np.eye(count) - vt.T @ vt)
     roots = regression.back @ known @ np.column_stack([mean, told, untold])
-    return replace(regression, form_errors=np.asarray(roots @ roots.T))
+    return np.asarray(roots @ roots.T)

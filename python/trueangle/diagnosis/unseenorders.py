@@ -1,0 +1,43 @@
+"""Low orders of the output that were not found: over an arc they are nearly those that were."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..effects.missing_order import MissingOrder
+from ..effects.scale_error import ScaleError
+from ..estimation.extension import Extension
+from ..estimation.regression import Regression
+from ..joint.pattern import lines_columns
+from ..support.arrays import Array
+
+#: Cycles over the travel up to which an order takes part of its neighbours'.
+FEW_CYCLES = 5.0
+
+
+def unseen_order_columns(regression: Regression) -> Array:
+    """Columns of the orders up to the highest found and one more, as large as what was found.
+
+    With a ramp, where none was found. Over a turn and more there are none: what was not found is
+    not there.
+    """
+    theta = regression.signals.theta
+    turns = float(np.ptp(theta)) / (2.0 * np.pi)
+    found = [(term, c) for term, c in regression.fitted() if _is_low(term, turns)]
+    orders = {float(t.shape["output_order"]) for t, _ in found if t.cause == MissingOrder.kind}
+    if turns >= 1.0 or not orders:
+        return np.zeros((regression.n, 0))
+    known = orders | {float(k) for k in regression.around.pattern.orders}
+    more = [float(k) for k in range(1, int(max(orders)) + 2) if float(k) not in known]
+    columns = lines_columns(theta, np.array(more))
+    if all(term.cause != ScaleError.kind for term, _ in found):
+        columns = np.column_stack([columns, (theta - theta.mean()) / theta.std()])
+    return np.asarray(columns * np.std(sum(term.columns @ c for term, c in found)))
+
+
+def _is_low(term: Extension, turns: float) -> bool:
+    """Whether a cause is a ramp, or a whole order of few cycles over the travel."""
+    if term.cause != MissingOrder.kind:
+        return term.cause == ScaleError.kind
+    order = float(term.shape["output_order"])
+    return order == round(order) and order * turns <= FEW_CYCLES

@@ -1,0 +1,112 @@
+"""Over less than a turn low orders and a ramp are nearly one another: errors say so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.diagnosis.unseenorders import unseen_order_columns
+from trueangle.effects.missing_order import MissingOrder
+from trueangle.effects.scale_error import ScaleError
+from trueangle.estimation.regression import Regression
+from trueangle.joint.signals import join_runs
+from trueangle.simulation import Simulation
+
+SEED = 59_300
+BELIEVED = Simulation(sigma_arcsec=5.0)
+
+
+def swept(rng: np.random.Generator, turns: float, orders: tuple[int, ...], scale: float):
+    """There and back over an arc: lines of 10 to 200 arcsec, a ramp, noise of 5; and the lines."""
+    sizes, phases = rng.uniform(10.0, 200.0, len(orders)), rng.uniform(0.0, 6.28, len(orders))
+    start = rng.uniform(0.0, 360.0)
+    way = np.linspace(0.0, 360.0 * turns, 400)
+    runs = []
+    for x in (way, way[::-1]):
+        place = np.radians(x + start)
+        error = sum(
+            a * np.sin(k * place + q) for k, a, q in zip(orders, sizes, phases, strict=True)
+        )
+        error = scale * x + (error + rng.normal(0.0, 5.0, x.size)) / 3600.0
+        time = np.arange(x.size) / 20.0
+        runs.append(ta.CalibrationRun(x + start, x + start + error, period=360.0, time=time))
+    return runs, dict(zip(orders, sizes, strict=True))
+
+
+@pytest.mark.parametrize("scale", [0.0, 300e-6])
+@pytest.mark.parametrize("orders", [(1, 2), (1, 2, 3, 5)], ids=str)
+@pytest.mark.parametrize("turns", [0.45, 0.6, 0.8, 1.2])
+def test_what_is_confirmed_is_as_uncertain_as_it_is_wrong(turns, orders, scale):
+    """It had been of the orders chosen: off by 50 standard errors over half a turn, and named."""
+    print("seed", SEED)
+    rng = np.random.default_rng([SEED, int(100 * turns), len(orders), int(scale > 0.0)])
+    pulls, wrong, confirmed = [], 0, 0
+    for _ in range(6):
+        runs, lines = swept(rng, turns, orders, scale)
+        for finding in ta.diagnose(runs, BELIEVED, within=60.0).findings:
+            given = finding.parameters
+            if not finding.confirmed:
+                continue
+            confirmed += 1
+            if finding.cause == "missing_order":
+                truth = lines.get(int(given["order"].value))
+                wrong += truth is None
+                size = given["amplitude_arcsec"]
+                pulls += [] if truth is None else [(size.value - truth) / size.std]
+            elif finding.cause == "scale_error":
+                size = given["relative_error"]
+                pulls.append((size.value - scale) / size.std)
+    print(turns, orders, scale, np.round(pulls, 2), wrong, confirmed)
+    assert np.abs(pulls).max(initial=0.0) < 6.0
+    assert wrong <= 2
+    assert confirmed >= (4 if turns > 0.7 else 2)
+
+
+def found_in(turns: float, error: dict[float, float], ramp: float = 0.0) -> Regression:
+    """What is found of lines of some sizes over some turns, and of a ramp in arcsec a radian."""
+    theta = np.linspace(0.5, 0.5 + 2.0 * np.pi * turns, 400)
+    run = ta.CalibrationRun(theta, theta)
+    signals = join_runs([run])
+    lines = sum(size * np.sin(k * theta + 0.3) for k, size in error.items())
+    noise = np.random.default_rng(SEED).normal(size=theta.size)
+    error_of_all = noise + lines + ramp * theta
+    regression = Regression.of(signals, error_of_all, BELIEVED.surroundings, rho=0.0)
+    if ramp:
+        found = ScaleError.propose(regression)
+        assert found is not None
+        regression = regression.with_terms([found])
+    for _ in error:
+        found = MissingOrder.propose(regression)
+        assert found is not None
+        regression = regression.with_terms([*regression.terms, found])
+    assert {t.shape.get("output_order") for t in regression.terms} - {None} == {*error}
+    return regression
+
+
+@pytest.mark.parametrize("turns", [0.5, 0.99, 1.0])
+@pytest.mark.parametrize("error", [{2.0: 80.0}, {3.0: 200.0}, {2.0: 80.0, 40.0: 50.0}], ids=str)
+def test_orders_that_were_not_found_are_those_up_to_one_more(error, turns):
+    """And a ramp, each as large as what the low orders make of the readings."""
+    regression = found_in(turns, error)
+    columns = unseen_order_columns(regression)
+    if turns >= 1.0:
+        assert columns.shape == (400, 0)
+        return
+    low = min(error)
+    size = float(np.std(error[low] * np.sin(low * regression.signals.theta + 0.3)))
+    theta = regression.signals.theta
+    others = [k for k in range(1, int(low) + 2) if k != low]
+    expected = [f(k * theta) for k in others for f in (np.cos, np.sin)]
+    expected.append((theta - theta.mean()) / theta.std())
+    np.testing.assert_allclose(columns, size * np.column_stack(expected), atol=0.03 * size)
+
+
+def test_a_line_of_many_cycles_stands_by_itself():
+    assert unseen_order_columns(found_in(0.6, {40.0: 50.0})).shape == (400, 0)
+
+
+def test_beside_a_ramp_that_was_found_there_is_no_other():
+    without, beside = (unseen_order_columns(found_in(0.8, {2.0: 80.0}, r)) for r in (0.0, 900.0))
+    assert without.shape[1] - beside.shape[1] == 1
+    assert beside.std() > 5.0 * without.std()  # of what both make of the readings
