@@ -110,6 +110,13 @@ def test_sizes_named_in_a_rehearsal(grows: bool) -> None:
     (ax,) = plots.detection(SimpleNamespace(causes=[cause])).axes
     dashed = sorted(float(line.get_xdata()[0]) for line in ax.lines if line.get_linestyle() == "--")
     assert len(dashed) == 2
+    ((points, _, (bars,)),) = ax.containers
+    assert bars.get_linewidth()[0] > 0.0
+    entries = cause.to_dict()["tried"]
+    ends = [segment[:, 1].tolist() for segment in bars.get_segments()]
+    assert ends == [pytest.approx(entry["interval"]) for entry in entries]
+    named = [entry["named"] / entry["trials"] for entry in entries]
+    assert points.get_ydata() == pytest.approx(named)
     said = words(ax, r"by size: 50 % at (\S+), 95 % at (\S+)\.$")
     assert [float(x) for x in said] == pytest.approx(dashed if grows else dashed[::-1], rel=THREE)
 
