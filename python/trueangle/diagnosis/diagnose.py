@@ -44,6 +44,7 @@ from .penalty import regression_without
 from .remainder import leftover_of, unexplained_remainder
 from .result import Diagnosis
 from .rounding import rounding_of
+from .unseenorders import arc_note
 from .wrongplace import misplaced_beliefs
 
 if TYPE_CHECKING:
@@ -215,7 +216,7 @@ def _diagnosis(
     )
     beliefs, findings = misplaced_beliefs(beliefs, findings, sim)
     notes = [_incomplete(at, gain)] if at.cut else []
-    notes += [text] if (text := many_causes(findings)) else []
+    notes += [text for text in (many_causes(findings), arc_note(chosen)) if text]
     residual = error - stated.predict(every)
     before = goodness_of_fit(
         leftover_of(first.signals, residual if rows is None else residual[rows], first.cache),

@@ -7,14 +7,16 @@ from dataclasses import replace
 
 from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
-from ..effects.effect import ScatterFinding
+from ..effects.effect import Effect, ScatterFinding
+from ..effects.missing_order import MissingOrder
+from ..effects.scale_error import ScaleError
 from ..estimation.quantity import Parameters, Quantity, quantity
 from ..estimation.regression import Regression
 from ..runs.checks.fault import DataFault
 from ..support.deadline import current_deadline
 from .confirmation import CONFIRMED, NOT_CONFIRMED, confirmation_status
 from .finding import Finding
-from .formerrors import with_form_errors
+from .formerrors import with_form_errors, with_unseen_orders
 from .gain import Gain, measure_gain
 from .gates import gated_findings
 from .goodness import Unexplained
@@ -63,17 +65,13 @@ def findings_of(
     gains: Sequence[Gain | None] = [None] * len(named)
     if with_gain and named:
         gains = measure_gain(regression, named) or gains
-    fitted = regression.fitted()
     widened = with_form_errors(regression)
     findings: list[Finding] = []
     exchanged: list[tuple[list[int], Ambiguity]] = []
     for group, gain in zip(named, gains, strict=True):
-        terms = [(*fitted[k], widened.robust_covariance(k)) for k in group]
-        cause = terms[0][0].cause
-        parameters, effects = EFFECTS[cause].report(widened, terms)
-        parameters |= EFFECTS[cause].form_limits(regression, terms)
-        if origins[group[0]]:
-            parameters["explanations"] = _explanations(parameters, cause, origins[group[0]])
+        terms = [regression.terms[k] for k in group]
+        cause = terms[0].cause
+        parameters, effects = _reported(regression, widened, group, origins[group[0]])
         rivals = (
             rivals_of(regression, group)
             if len(findings) < RIVALLED and not current_deadline().over
@@ -85,10 +83,10 @@ def findings_of(
             exchanged.append((group, equal))
             continue
         weight = {
-            "bic_gain": float(sum(t.bic_gain for t, _, _ in terms)),
-            "deviance": float(sum(t.deviance for t, _, _ in terms)),
-            "parameters": float(sum(t.parameters for t, _, _ in terms)),
-            "log_grid": float(sum(t.log_grid for t, _, _ in terms)),
+            "bic_gain": float(sum(t.bic_gain for t in terms)),
+            "deviance": float(sum(t.deviance for t in terms)),
+            "parameters": float(sum(t.parameters for t in terms)),
+            "log_grid": float(sum(t.log_grid for t in terms)),
         }
         status, reason = confirmation_status(cause, gain, regression, group, unexplained)
         if with_gain and gain is None and status == CONFIRMED:
@@ -113,7 +111,30 @@ def findings_of(
     findings, alike, shared = gated_findings(regression, beside)
     shared |= dependent
     doubtful = [k for f in findings if not f.confirmed for k in f.group if k not in shared]
+    # Over an arc names are those of the fewest causes, and errors are not of those alone.
+    stated = with_unseen_orders(widened)
+    if stated is not widened:
+        findings = [
+            replace(f, parameters=_reported(regression, stated, f.group, origins[f.group[0]])[0])
+            if f.cause in (MissingOrder.kind, ScaleError.kind)
+            else f
+            for f in findings
+        ]
     return findings, spots + alike, doubtful
+
+
+def _reported(
+    regression: Regression, errors: Regression, group: Sequence[int], doubts: list[Ambiguity]
+) -> tuple[Parameters, list[Effect]]:
+    """Parameters and effects of a finding, with the errors of a regression."""
+    fitted = regression.fitted()
+    terms = [(*fitted[k], errors.robust_covariance(k)) for k in group]
+    cause = terms[0][0].cause
+    parameters, effects = EFFECTS[cause].report(errors, terms)
+    parameters |= EFFECTS[cause].form_limits(regression, terms)
+    if doubts:
+        parameters["explanations"] = _explanations(parameters, cause, doubts)
+    return parameters, effects
 
 
 def _beside_doubts(

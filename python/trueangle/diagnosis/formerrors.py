@@ -83,20 +83,27 @@ def share_beside_form_errors(
 
 
 def with_form_errors(regression: Regression) -> Regression:
-    """The regression with the errors that forms and unseen orders make in its coefficients.
+    """The regression with the errors that the forms make in its coefficients.
 
     Bends B with coefficients ``ξ ~ N(0, κ²)`` shift what is fitted without
     them by ``X⁺ Bξ``. ``κ`` is the one that makes the residual most likely (0
     where it is hardly better than none), and ``ξ`` has its mean and covariance given
-    the residual. Orders that over an arc are nearly those found are as large as those (κ = 1):
-    of them the residual tells nothing.
+    the residual.
     """
-    parts = [
-        _shifts(regression, form_error_columns(regression), None),
-        _shifts(regression, unseen_order_columns(regression), 1.0),
-    ]
-    found = [part for part in parts if part is not None]
-    return replace(regression, form_errors=np.sum(found, axis=0)) if found else regression
+    shifts = _shifts(regression, form_error_columns(regression), None)
+    return regression if shifts is None else replace(regression, form_errors=shifts)
+
+
+def with_unseen_orders(regression: Regression) -> Regression:
+    """The same with what orders that were not found may do over an arc (κ = 1).
+
+    They are nearly those that were found, and the residual tells nothing of them.
+    """
+    shifts = _shifts(regression, unseen_order_columns(regression), 1.0)
+    if shifts is None:
+        return regression
+    before = 0.0 if regression.form_errors is None else regression.form_errors
+    return replace(regression, form_errors=before + shifts)
 
 
 def _shifts(regression: Regression, bends: Array, size: float | None) -> Array | None:

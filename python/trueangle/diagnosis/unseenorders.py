@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..effects.local_defect import WHOLE_TURN
 from ..effects.missing_order import MissingOrder
 from ..effects.scale_error import ScaleError
 from ..estimation.extension import Extension
@@ -18,14 +19,14 @@ FEW_CYCLES = 5.0
 def unseen_order_columns(regression: Regression) -> Array:
     """Columns of the orders up to the highest found and one more, as large as what was found.
 
-    With a ramp, where none was found. Over a turn and more there are none: what was not found is
-    not there.
+    With a ramp, where none was found. Over a whole turn there are none: what was not found is not
+    there.
     """
     theta = regression.signals.theta
     turns = float(np.ptp(theta)) / (2.0 * np.pi)
     found = [(term, c) for term, c in regression.fitted() if _is_low(term, turns)]
     orders = {float(t.shape["output_order"]) for t, _ in found if t.cause == MissingOrder.kind}
-    if turns >= 1.0 or not orders:
+    if turns >= WHOLE_TURN or not orders:
         return np.zeros((regression.n, 0))
     known = orders | {float(k) for k in regression.around.pattern.orders}
     more = [float(k) for k in range(1, int(max(orders)) + 2) if float(k) not in known]
@@ -33,6 +34,17 @@ def unseen_order_columns(regression: Regression) -> Array:
     if all(term.cause != ScaleError.kind for term, _ in found):
         columns = np.column_stack([columns, (theta - theta.mean()) / theta.std()])
     return np.asarray(columns * np.std(sum(term.columns @ c for term, c in found)))
+
+
+def arc_note(regression: Regression) -> str:
+    """What the names of orders over an arc rest on; nothing over a whole turn."""
+    if not unseen_order_columns(regression).shape[1]:
+        return ""
+    turns = float(np.ptp(regression.signals.theta)) / (2.0 * np.pi)
+    return (
+        f"over {turns:.2g} turns low orders and a ramp are nearly one another: the fewest that "
+        "explain the readings are named, and their errors hold what the others may do to them"
+    )
 
 
 def _is_low(term: Extension, turns: float) -> bool:

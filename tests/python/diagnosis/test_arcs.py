@@ -38,28 +38,30 @@ def swept(rng: np.random.Generator, turns: float, orders: tuple[int, ...], scale
 @pytest.mark.parametrize("orders", [(1, 2), (1, 2, 3, 5)], ids=str)
 @pytest.mark.parametrize("turns", [0.45, 0.6, 0.8, 1.2])
 def test_what_is_confirmed_is_as_uncertain_as_it_is_wrong(turns, orders, scale):
-    """It had been of the orders chosen: off by 50 standard errors over half a turn, and named."""
+    """It had been of the orders chosen: off by 50 standard errors over half a turn."""
     print("seed", SEED)
     rng = np.random.default_rng([SEED, int(100 * turns), len(orders), int(scale > 0.0)])
-    pulls, wrong, confirmed = [], 0, 0
+    pulls, confirmed = [], 0
     for _ in range(6):
         runs, lines = swept(rng, turns, orders, scale)
-        for finding in ta.diagnose(runs, BELIEVED, within=60.0).findings:
+        result = ta.diagnose(runs, BELIEVED, within=60.0)
+        lines_named = any(f.cause == "missing_order" for f in result.findings)
+        told = any("the fewest that explain" in note for note in result.notes)
+        assert told == (turns < 0.9 and lines_named)
+        for finding in result.findings:
             given = finding.parameters
             if not finding.confirmed:
                 continue
             confirmed += 1
             if finding.cause == "missing_order":
                 truth = lines.get(int(given["order"].value))
-                wrong += truth is None
                 size = given["amplitude_arcsec"]
-                pulls += [] if truth is None else [(size.value - truth) / size.std]
+                pulls.append((size.value - (truth or 0.0)) / size.std)
             elif finding.cause == "scale_error":
                 size = given["relative_error"]
                 pulls.append((size.value - scale) / size.std)
-    print(turns, orders, scale, np.round(pulls, 2), wrong, confirmed)
+    print(turns, orders, scale, np.round(pulls, 2), confirmed)
     assert np.abs(pulls).max(initial=0.0) < 6.0
-    assert wrong <= 2
     assert confirmed >= (4 if turns > 0.7 else 2)
 
 
@@ -84,13 +86,13 @@ def found_in(turns: float, error: dict[float, float], ramp: float = 0.0) -> Regr
     return regression
 
 
-@pytest.mark.parametrize("turns", [0.5, 0.99, 1.0])
+@pytest.mark.parametrize("turns", [0.5, 0.89, 0.9, 1.0])
 @pytest.mark.parametrize("error", [{2.0: 80.0}, {3.0: 200.0}, {2.0: 80.0, 40.0: 50.0}], ids=str)
 def test_orders_that_were_not_found_are_those_up_to_one_more(error, turns):
     """And a ramp, each as large as what the low orders make of the readings."""
     regression = found_in(turns, error)
     columns = unseen_order_columns(regression)
-    if turns >= 1.0:
+    if turns >= 0.9:
         assert columns.shape == (400, 0)
         return
     low = min(error)
