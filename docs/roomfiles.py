@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import ast
+import functools
 from pathlib import Path
 
-__all__ = ["defined_names", "first_sentence", "room_files_page", "rooms_of"]
+__all__ = ["defined_names", "first_sentence", "room_files_page", "rooms_of", "syntax"]
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "python" / "trueangle"
@@ -18,16 +19,22 @@ def rooms_of(contributing: str) -> list[str]:
     return [name.strip(" `/") for cell in cells for name in cell.split(",")]
 
 
+@functools.cache
+def syntax(file: Path) -> ast.Module:
+    """A file taken apart."""
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
 def first_sentence(file: Path) -> str:
     """What a file says it holds."""
-    told = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+    told = ast.get_docstring(syntax(file)) or ""
     return " ".join(told.split("\n\n")[0].split())
 
 
 def defined_names(file: Path) -> list[str]:
     """Functions and classes of a file that others use: what its page is searched for."""
     kinds = (ast.FunctionDef, ast.ClassDef)
-    body = ast.parse(file.read_text(encoding="utf-8")).body
+    body = syntax(file).body
     names = {node.name for node in body if isinstance(node, kinds)}  # an overload once
     return sorted(name for name in names if not name.startswith("_"))
 

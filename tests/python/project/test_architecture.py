@@ -11,7 +11,7 @@ from conftest import ROOT
 
 sys.path.insert(0, str(ROOT / "docs"))
 
-from roomfiles import first_sentence, room_files_page, rooms_of
+from roomfiles import first_sentence, room_files_page, rooms_of, syntax
 
 PACKAGE = ROOT / "python" / "trueangle"
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
@@ -57,7 +57,7 @@ def test_the_page_lists_every_file_by_its_first_sentence_and_its_names():
     listed = {file.strip(" `"): (held.strip(), names) for file, held, names in rows}
     files = [file for file in PACKAGE.rglob("*.py") if file.name != "__init__.py"]
     for file in files:
-        tree = ast.parse(file.read_text("utf-8"))
+        tree = syntax(file)
         assert ast.get_docstring(tree), file
         if file.parent != PACKAGE:
             held, names = listed.pop(str(file.relative_to(PACKAGE)))
