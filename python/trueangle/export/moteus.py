@@ -108,6 +108,8 @@ class Moteus(Target):
                 f"{seen} of {ENTRIES} lines of motor_position.sources.{source}."
                 "compensation_table are there; write them by moteus_tool --dump-config",
             )
+        if abs(scale) > float(np.finfo(np.float32).max):
+            raise table_error(path, f"a scale of {scale:g} is none of the firmware's floats")
         return sampled_model(
             -table * scale / 127.0,
             path,

@@ -319,3 +319,15 @@ def test_what_is_no_table_is_refused_in_one_line(target, text, tmp_path):
         ta.import_model(path, target)
     assert "\n" not in str(caught.value)
     assert "present" in str(caught.value)
+
+
+@pytest.mark.parametrize("scale", ["1e200", "-4e38"])
+def test_a_scale_that_no_float_holds_is_refused(scale, tmp_path):
+    shaft = ta.Shaft("output", 1, [1], [0.3], [0.4])
+    made = ta.export_model(ta.HarmonicModel([shaft], period=360.0), "moteus")
+    text = re.sub(r"(compensation_scale )\S+", rf"\g<1>{scale}", made.text)
+    assert text != made.text
+    path = tmp_path / "table.cfg"
+    path.write_text(text)
+    with pytest.raises(ta.errors.TrueAngleError, match="none of the firmware's floats"):
+        ta.import_model(path, "moteus")
