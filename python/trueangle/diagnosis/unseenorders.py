@@ -22,12 +22,11 @@ def unseen_order_columns(regression: Regression) -> Array:
     With a ramp, where none was found. Over a whole turn there are none: what was not found is not
     there.
     """
-    theta = regression.signals.theta
-    turns = float(np.ptp(theta)) / (2.0 * np.pi)
-    found = [(term, c) for term, c in regression.fitted() if _is_low(term, turns)]
-    orders = {float(t.shape["output_order"]) for t, _ in found if t.cause == MissingOrder.kind}
-    if turns >= WHOLE_TURN or not orders:
+    theta, turns = regression.signals.theta, _turns(regression)
+    orders = _low_orders(regression)
+    if not orders:
         return np.zeros((regression.n, 0))
+    found = [(term, c) for term, c in regression.fitted() if _is_low(term, turns)]
     known = orders | {float(k) for k in regression.around.pattern.orders}
     more = [float(k) for k in range(1, int(max(orders)) + 2) if float(k) not in known]
     columns = lines_columns(theta, np.array(more))
@@ -38,13 +37,27 @@ def unseen_order_columns(regression: Regression) -> Array:
 
 def arc_note(regression: Regression) -> str:
     """What the names of orders over an arc rest on; nothing over a whole turn."""
-    if not unseen_order_columns(regression).shape[1]:
+    if not _low_orders(regression):
         return ""
-    turns = float(np.ptp(regression.signals.theta)) / (2.0 * np.pi)
+    turns = _turns(regression)
     return (
         f"over {turns:.2g} turns low orders and a ramp are nearly one another: the fewest that "
         "explain the readings are named, and their errors hold what the others may do to them"
     )
+
+
+def _turns(regression: Regression) -> float:
+    """Travel of all runs together."""
+    return float(np.ptp(regression.signals.theta)) / (2.0 * np.pi)
+
+
+def _low_orders(regression: Regression) -> set[float]:
+    """Orders found over an arc that are nearly others; none over a whole turn."""
+    turns = _turns(regression)
+    if turns >= WHOLE_TURN:
+        return set()
+    lines = (term for term in regression.terms if term.cause == MissingOrder.kind)
+    return {float(term.shape["output_order"]) for term in lines if _is_low(term, turns)}
 
 
 def _is_low(term: Extension, turns: float) -> bool:

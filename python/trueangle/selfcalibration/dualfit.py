@@ -246,16 +246,20 @@ def estimate_dual_ratio(
         if not fit.projected.seen[-1]:
             return RatioEstimate(start, math.inf)
         slope, variance = float(fit.patterns[-1]), float(fit.covariance[-1, -1])
-        ratio /= 1.0 + slope
+        fitted, ratio = ratio, ratio / (1.0 + slope)
         if abs(slope) < 0.1 * math.sqrt(variance):
             break
     if isinstance(orders, str) and beside:
-        variance *= _doubt(channels, ratio, lines, beside)
+        variance *= _doubt(channels, fitted, lines, fit, beside)
     return RatioEstimate(ratio, abs(ratio) * math.sqrt(max(variance, 0.0)))
 
 
 def _doubt(
-    channels: GearedChannels, ratio: float, lines: Sequence[SharedLine], beside: Sequence[int]
+    channels: GearedChannels,
+    ratio: float,
+    lines: Sequence[SharedLine],
+    fit: DenseFit,
+    beside: Sequence[int],
 ) -> float:
     """By what the variance of a ratio grows where the highest order of the output moves it.
 
@@ -266,8 +270,8 @@ def _doubt(
         return 1.0
     fewer = [line for line in lines if line.motor or line.output != highest]
     (after, wide), (before, narrow) = (
-        (float(fit.patterns[-1]), float(fit.covariance[-1, -1]))
-        for fit in (fit_dual_lines(channels, ratio, ls, slope=True).dense for ls in (lines, fewer))
+        (float(each.patterns[-1]), float(each.covariance[-1, -1]))
+        for each in (fit, fit_dual_lines(channels, ratio, fewer, slope=True).dense)
     )
     allowed = 4.0 * max(wide - narrow, 0.0)
     return max((after - before) ** 2 / allowed, 1.0) if allowed > 0.0 else 1.0

@@ -32,6 +32,14 @@ def saved(form, comments, delimiter):
     return text.getvalue()
 
 
+@pytest.fixture(params=["fast", "slow"])
+def way(request, monkeypatch):
+    """Text cut by Arrow, and by the standard library, which reads short files anyway."""
+    monkeypatch.setattr("trueangle.formats.csvfile.SMALL", 0)
+    if request.param == "slow":
+        monkeypatch.setattr("trueangle.formats.csvfile._plain_block", lambda: None)
+
+
 NAMES = {"reference": "ref", "indicated": "enc", "time": "t"}
 COLUMNS = {"time": "column1", "reference": ("column2", "deg"), "indicated": "column3"}
 SCOPE = "\t".join(["Name", "Axis.Ref", "Name", "Axis.Enc"])
@@ -117,13 +125,9 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("way", ["fast", "slow"])
+@pytest.mark.usefixtures("way")
 @pytest.mark.parametrize("case", FILES)
-def test_columns_are_found_whatever_stands_around_them(case, way, tmp_path, monkeypatch):
-    # However short the file: the standard library would read it anyway.
-    monkeypatch.setattr("trueangle.formats.csvfile.SMALL", 0)
-    if way == "slow":
-        monkeypatch.setattr("trueangle.formats.csvfile._plain_block", lambda: None)
+def test_columns_are_found_whatever_stands_around_them(case, tmp_path):
     text, signals = FILES[case]
     path = tmp_path / "rig.csv"
     path.write_text(text)
@@ -136,14 +140,12 @@ def test_columns_are_found_whatever_stands_around_them(case, way, tmp_path, monk
     np.testing.assert_allclose(run.time, TIMES, rtol=1e-12)
 
 
-@pytest.mark.parametrize("way", ["fast", "slow"])
+@pytest.mark.usefixtures("way")
 @pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
 def test_words_of_any_number_are_no_readings_of_a_copy_either(
     delimiter, way, tmp_path, monkeypatch
 ):
     """As many as the copy has columns, one more than the log: it could not be corrected."""
-    if way == "slow":
-        monkeypatch.setattr("trueangle.formats.csvfile._plain_block", lambda: None)
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.25])], 0.5, 360.0)
     for words in (3, 4, 5):
         said = delimiter.join(["ready"] * words)
@@ -266,13 +268,9 @@ def test_a_degree_sign_of_an_old_code_page(tmp_path):
     np.testing.assert_allclose(run.reference, REFERENCE)
 
 
-@pytest.mark.parametrize("way", ["fast", "slow"])
+@pytest.mark.usefixtures("way")
 @pytest.mark.parametrize("column", [0, 2])
-def test_bytes_that_are_no_text_are_refused_wherever_they_stand(way, column, tmp_path, monkeypatch):
-    # However short the file: the standard library would read it anyway.
-    monkeypatch.setattr("trueangle.formats.csvfile.SMALL", 0)
-    if way == "slow":
-        monkeypatch.setattr("trueangle.formats.csvfile._plain_block", lambda: None)
+def test_bytes_that_are_no_text_are_refused_wherever_they_stand(column, tmp_path):
     rows = [[b"a", b"%d" % (i % 360), b"x"] for i in range(3000)]
     bad = [list(row) for row in rows]
     bad[2500] = [b"a", b"1", b"x"]
@@ -312,13 +310,10 @@ def test_words_among_readings_are_counted_and_said(tmp_path):
         ta.read_runs(path, signals=COLUMNS)
 
 
-@pytest.mark.parametrize("way", ["fast", "slow"])
+@pytest.mark.usefixtures("way")
 @pytest.mark.parametrize("rows", [5, 1500])
-def test_files_that_were_put_together_are_not_read_in_part(rows, way, tmp_path, monkeypatch):
+def test_files_that_were_put_together_are_not_read_in_part(rows, tmp_path):
     """All readings above the names that stand again were lost, and the output had them as notes."""
-    monkeypatch.setattr("trueangle.formats.csvfile.SMALL", 0)
-    if way == "slow":
-        monkeypatch.setattr("trueangle.formats.csvfile._plain_block", lambda: None)
     one = "time_s,reference_deg,indicated_deg\n" + "".join(
         f"{k},{k}.0,{k}.5\n" for k in range(rows)
     )
