@@ -37,6 +37,7 @@ lint:               ## style and lints, warnings are errors
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) .ci/arrows
+	$(PYTHON) .ci/weight
 	$(PYTHON) -m check_jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(dir $(PYTHON))zizmor --offline --quiet .github/workflows
 
@@ -104,7 +105,7 @@ pythons:            ## the wheel tried on every Python that is to be had here
 	$(PYTHON) .ci/pythons target/tried/*.whl
 
 readings:           ## time and memory up to 10^8 readings, beside the model of cost
-	$(PYTHON) -m trueangle bench --scaling --largest 1e8
+	$(PYTHON) benches/scaling.py --largest 1e8
 
 kills:              ## 40 kills of each of five commands at random moments; logs of any size
 	TRUEANGLE_KILLS=40 $(PYTHON) -m pytest -q tests/python/injection tests/python/logs
