@@ -15,9 +15,9 @@ import platform
 
 import numpy as np
 
+from harness import evaluation
+from harness.evaluation import EvaluationRow
 from latency import histogram, paced
-from trueangle.cli.benchmarks import evaluation
-from trueangle.cli.benchmarks.evaluation import EvaluationRow
 
 
 def show(title: str, rows: list[EvaluationRow], base: str, ratio: str) -> None:

@@ -15,8 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from trueangle import _core
-from trueangle.cli.benchmarks.fit import (
+from harness.fit import (
     Case,
     FitRow,
     fit_columns,
@@ -24,6 +23,7 @@ from trueangle.cli.benchmarks.fit import (
     fit_readings,
     measure_fits,
 )
+from trueangle import _core
 
 
 def show(rows: list[FitRow]) -> None:

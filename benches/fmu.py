@@ -11,8 +11,8 @@ import fmpy
 import numpy as np
 
 import trueangle as ta
+from harness.interleaved import interleave
 from trueangle import terms as T
-from trueangle.cli.benchmarks.interleaved import interleave
 
 STEPS, ROUNDS = 100, 1500
 ARCSEC = np.pi / 648_000.0

@@ -12,9 +12,9 @@ import subprocess
 from pathlib import Path
 from typing import NamedTuple
 
+from harness.compiled import FLAGS
+from harness.evaluation import evaluated_model
 from trueangle import terms
-from trueangle.cli.benchmarks.compiled import FLAGS
-from trueangle.cli.benchmarks.evaluation import evaluated_model
 
 TURN = 360.0
 SERIES = evaluated_model(range(1, 18), TURN).shafts[0]

@@ -200,8 +200,8 @@ def performance() -> str:
 
 
 def scaling(picture: Path) -> str:
-    """The text of ``trueangle bench --scaling`` of this build, and its picture."""
-    command = [sys.executable, "-m", "trueangle", "bench", "--scaling", "--plot", str(picture)]
+    """The text of ``benches/scaling.py`` of this build, and its picture."""
+    command = [sys.executable, str(ROOT / "benches" / "scaling.py"), "--plot", str(picture)]
     command += ["--largest", "1e6", "--rounds", "2"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return f"```text\n{done.stdout}```\n"

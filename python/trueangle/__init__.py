@@ -6,7 +6,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from ._core import __version__
-from .support import renamed
 
 if TYPE_CHECKING:
     from . import errors as errors
@@ -123,14 +122,12 @@ _PUBLIC = {
 #: Modules that are reached as attributes, likewise imported at first use.
 _MODULES = {"errors": "errors", "plots": "plots", "terms": "model.terms"}
 
-renamed.install_former_names()
-
 __all__ = ["__version__", *sorted([*_PUBLIC, *_MODULES])]
 
 
 def __getattr__(name: str) -> Any:
-    if name in _MODULES or name in renamed.RENAMED:
-        return importlib.import_module(f".{_MODULES.get(name, name)}", __name__)
+    if name in _MODULES:
+        return importlib.import_module(f".{_MODULES[name]}", __name__)
     module = _PUBLIC.get(name)
     if module is None:
         raise AttributeError(f"module 'trueangle' has no attribute {name!r}")

@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..support.arrays import Array
 from ..support.plainresult import ShownResult
-from ..support.renamed import renamed_attribute
 from .robust import Loss
 
 if TYPE_CHECKING:
@@ -210,8 +209,3 @@ def correct_held_out(model: HarmonicModel | None, run: CalibrationRun, label: st
 
 def _rms(parts: Sequence[Array]) -> float:
     return math.sqrt(sum(float(p @ p) for p in parts) / sum(p.size for p in parts))
-
-
-def __getattr__(name: str) -> Any:
-    # `hold_out_extended` moved to the diagnosis, which this room does not import.
-    return renamed_attribute(__name__, "trueangle.diagnosis.heldout", name)

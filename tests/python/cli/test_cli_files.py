@@ -210,7 +210,7 @@ def test_an_input_named_by_a_link_is_not_overwritten_by_its_own_name(command, de
 
 
 def test_every_command_that_writes_is_tried():
-    """Also by those that are added: `demo --report` and `bench --plot` alone read nothing."""
+    """Also by those that are added: `demo --report` alone reads nothing."""
     writing = {
         command
         for command in COMMANDS
@@ -219,7 +219,7 @@ def test_every_command_that_writes_is_tried():
         and callable(action.type)
         and getattr(action.type, "__qualname__", "").startswith("Output")
     }
-    tried = {name.split()[0].rstrip(",") for name in WRITING} | {"demo", "bench"}
+    tried = {name.split()[0].rstrip(",") for name in WRITING} | {"demo"}
     assert writing <= tried
 
 

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from trueangle import selfcalibration
 from trueangle.errors import ArgumentError, NotInvertibleError
 from trueangle.model.model import HarmonicModel
 from trueangle.selfcalibration.loop import (
@@ -353,9 +352,3 @@ def test_a_summary_tells_every_number() -> None:
     assert "not the encoder's alone" in named
     assert "both" in named
     assert result.to_dict()["blind"][0]["orders"] == [2, 3.5]
-
-
-def test_the_former_name_of_a_pattern_held_out() -> None:
-    with pytest.warns(DeprecationWarning, match="HeldOutPattern"):
-        assert selfcalibration.HeldOut is HeldOutPattern
-    assert not hasattr(selfcalibration, "HeldIn")

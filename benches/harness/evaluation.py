@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-import trueangle._core as _core
-
-from ...joint.shafts import Shaft
-from ...model.model import HarmonicModel
-from .evaluationpeers import evaluation_peers
-from .interleaved import Timing, interleave
+from harness.evaluationpeers import evaluation_peers
+from harness.interleaved import Timing, interleave
+from trueangle import _core
+from trueangle.joint.shafts import Shaft
+from trueangle.model.model import HarmonicModel
 
 #: Orders of the models timed, by name.
 ORDERS: dict[str, Sequence[int]] = {

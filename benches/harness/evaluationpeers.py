@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...estimation import reference
-from ...model.model import HarmonicModel
-from .compiled import compiled_peer, is_available
+from harness.compiled import compiled_peer, is_available
+from trueangle.estimation import reference
+from trueangle.model.model import HarmonicModel
 
 _Array = NDArray[np.float64]
 _Evaluate = Callable[[_Array], _Array]

@@ -1,8 +1,13 @@
 """What a benchmark tells of rounds: their median, the least and the most."""
 
 import itertools
+import sys
 
-from trueangle.cli.benchmarks import interleaved
+from conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "benches"))
+
+from harness import interleaved
 
 
 def test_one_slow_round_does_not_move_the_median(monkeypatch):

@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import trueangle._core as _core
-
-from ...fitting.fit import fit
-from ...runs.run import CalibrationRun
-from .interleaved import Timing, interleave
+from harness.interleaved import Timing, interleave
+from trueangle import _core
+from trueangle.fitting.fit import fit
+from trueangle.runs.run import CalibrationRun
 
 _Array = NDArray[np.float64]
 #: A fit of angles, errors and the highest order.

@@ -12,17 +12,17 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ...errors import MissingExtraError
-from ...estimation.moments import Moments
-from ...fitting.fit import fit
-from ...fleets.fleet import fleet
-from ...model.model import HarmonicModel
-from ...model.monitor import Monitor
-from ...runs.run import CalibrationRun
-from ...support.arrays import Array
-from .evaluation import evaluated_model
-from .fit import Case, fit_readings
-from .interleaved import Timing, interleave
+from harness.evaluation import evaluated_model
+from harness.fit import Case, fit_readings
+from harness.interleaved import Timing, interleave
+from trueangle.errors import MissingExtraError
+from trueangle.estimation.moments import Moments
+from trueangle.fitting.fit import fit
+from trueangle.fleets.fleet import fleet
+from trueangle.model.model import HarmonicModel
+from trueangle.model.monitor import Monitor
+from trueangle.runs.run import CalibrationRun
+from trueangle.support.arrays import Array
 
 _Ways: TypeAlias = dict[tuple[str, int], Callable[[], object]]
 
@@ -122,9 +122,9 @@ def scaling_by_workers(workers: Sequence[int], size: int, files: int = 8) -> lis
         import pyarrow.parquet as pq
     except ImportError:
         raise MissingExtraError(
-            "workers need Dask and Parquet: pip install 'trueangle[dask,parquet]'"
+            "workers need Dask and Parquet: pip install 'trueangle[logs]'"
         ) from None
-    from ...logs.fitting import fit_logs
+    from trueangle.logs.fitting import fit_logs
 
     found = []
     with tempfile.TemporaryDirectory() as folder:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
-from trueangle.cli.benchmarks import fit
-from trueangle.cli.benchmarks.fit import Case, fit_peers, measure_fits, quick_fits
+from conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "benches"))
+
+from harness import fit
+from harness.fit import Case, fit_peers, measure_fits, quick_fits
 
 # Ours relative to the largest coefficient; the error is a difference of angles of a turn.
 AGREES = 1e-11

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.model import HarmonicModel
+from trueangle.model.model import HarmonicModel
 
 _Array = NDArray[np.float64]
 
