@@ -283,7 +283,8 @@ def _structure(start: Regression) -> dict[str, float]:
         if extension is not None and extension.bic_gain > 0.0:
             after = start.with_terms([extension], 0.0).left_within_runs
             alone[cause] = 1.0 - float(np.sum(after**2) / max(float(np.sum(before**2)), 1e-300))
-    return dict(sorted(alone.items(), key=lambda item: -item[1]))
+    # Equal shares by name: their last digits differ from one processor to the next.
+    return dict(sorted(alone.items(), key=lambda item: (-round(item[1], 6), item[0])))
 
 
 def _noise(chosen: Regression, rest: Unexplained) -> float:
