@@ -10,6 +10,7 @@ __all__ = [
     "EmptyCellsWarning",
     "FileError",
     "KindError",
+    "LargeModelWarning",
     "MessageLinesWarning",
     "MissingExtraError",
     "MissingSignalError",
@@ -187,6 +188,10 @@ class NotCorrectedWarning(UserWarning):
 
 class UnlikeRunsWarning(UserWarning):
     """Runs that do not show one pattern were fitted together; the message names them."""
+
+
+class LargeModelWarning(UserWarning):
+    """A model was saved without its covariance, which no file that is read back can hold."""
 
 
 def level_of_caller() -> int:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from os import PathLike
-from typing import Any
+from typing import Any, Final
 
-from ..errors import ArgumentError
+from ..errors import LargeModelWarning, level_of_caller
 from ..support.files import MODEL, MODEL_BYTES, written_atomically
 from ..support.plainresult import pretty_json
 from .errormodel import ErrorModel
@@ -16,6 +17,9 @@ from .records import FitRecord
 FORMAT = "trueangle-model"
 ROBOT_FORMAT = "trueangle-robot"
 VERSION = 1
+
+#: Bytes of a number in a file at most: 17 digits, sign, point, exponent and separator.
+FLOAT_BYTES: Final = 26
 
 
 def model_text(model: ErrorModel) -> str:
@@ -45,15 +49,24 @@ def plain_model(model: ErrorModel) -> dict[str, Any]:
 
 def save_model(model: ErrorModel, path: str | PathLike[str]) -> None:
     """Write ``model``; see `HarmonicModel.save`."""
-    text = model_text(model)
-    if len(text) > MODEL_BYTES:
-        raise ArgumentError(
-            f"{path}: the model takes {len(text)} bytes, and at most {MODEL_BYTES} are read back; "
-            "save it without its covariance"
-        )
+    text = model_text(_readable(model, path, 1))
     hashes = [source.sha256 for source in model.provenance.inputs]
     with written_atomically(path, kind=MODEL, hashes=hashes) as file:
         file.write(text)
+
+
+def _readable(model: ErrorModel, path: str | PathLike[str], models: int) -> ErrorModel:
+    """The model, without a covariance that makes a file of ``models`` longer than is read back."""
+    covariance = model.covariance
+    if covariance is None or models * FLOAT_BYTES * covariance.size <= MODEL_BYTES:
+        return model
+    warnings.warn(
+        f"{path}: saved without the covariance of {len(covariance)} numbers, which makes the file "
+        f"longer than the {MODEL_BYTES >> 20} MiB that are read back; fit fewer orders to keep it",
+        LargeModelWarning,
+        stacklevel=level_of_caller(),
+    )
+    return replace(model, covariance=None)
 
 
 def save_robot(
@@ -71,13 +84,10 @@ def save_robot(
             joint: {role: [*column] for role, column in columns.items()}
             for joint, columns in signals.items()
         }
-    content["joints"] = {joint: plain_model(model) for joint, model in models.items()}
+    content["joints"] = {
+        joint: plain_model(_readable(model, path, len(models))) for joint, model in models.items()
+    }
     text = pretty_json(content) + "\n"
-    if len(text) > MODEL_BYTES:
-        raise ArgumentError(
-            f"{path}: the models take {len(text)} bytes, and at most {MODEL_BYTES} are read back; "
-            "save them without their covariances"
-        )
     hashes = [source.sha256 for model in models.values() for source in model.provenance.inputs]
     with written_atomically(path, kind=MODEL, hashes=hashes) as file:
         file.write(text)

@@ -438,3 +438,18 @@ def test_a_penalty_needs_no_second_look_at_the_readings():
     assert again.degrees_of_freedom == wanted.degrees_of_freedom != plain.degrees_of_freedom
     with pytest.raises(ValueError, match="ridge"):
         plain.penalised([1.0])
+
+
+@pytest.mark.parametrize(("size", "highest"), [(3000, 300), (5000, 450)])
+def test_many_orders_of_few_readings_take_moments_and_agree_with_numpy(size, highest):
+    """Two readings in a segment: QR of rows would cost size * (2 highest + 1)^2."""
+    rng = np.random.default_rng(size)
+    x = rng.uniform(0.0, 360.0, size)
+    e = np.cos(np.radians(x - 20.0)) + 0.1 * rng.normal(size=size)
+    found = _core.fit([(x, x + e, None)], 360.0, [1.0], [list(range(1, highest + 1))])
+    assert found.method == "moments"
+    phase = np.radians(np.outer(x, np.arange(1, highest + 1)))
+    columns = np.column_stack([np.ones(size), np.cos(phase), np.sin(phase)])
+    expected = np.linalg.lstsq(columns, e, rcond=None)[0]
+    got = np.concatenate([[found.constant], found.cosine[0], found.sine[0]])
+    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12 * np.abs(expected).max())

@@ -12,6 +12,8 @@ import pytest
 
 import trueangle as ta
 from trueangle.effects import EFFECTS
+from trueangle.errors import LargeModelWarning
+from trueangle.model import writing
 
 SAVED = Path(__file__).parent / "saved"
 
@@ -54,3 +56,20 @@ def test_simulations_of_before_predict_as_they_did(path):
     np.testing.assert_allclose(error, then["error_deg"], rtol=0, atol=MOVED / 3600.0)
     # Every cause of that version is in it.
     assert len({effect.kind for effect in sim.effects} & set(EFFECTS)) == 20
+
+
+def test_a_covariance_too_large_to_be_read_back_is_left_out_and_reported(tmp_path, monkeypatch):
+    x = np.linspace(0.0, 360.0, 50, endpoint=False)
+    run = ta.CalibrationRun(x, x + 0.1 * np.sin(np.radians(x)), 360.0)
+    model = ta.fit(run, orders=[1, 2]).model
+    assert model.covariance.shape == (5, 5)
+    path = tmp_path / "m.json"
+    monkeypatch.setattr(writing, "MODEL_BYTES", 25 * writing.FLOAT_BYTES)
+    model.save(path)
+    np.testing.assert_array_equal(ta.load_model(path).covariance, model.covariance)
+    monkeypatch.setattr(writing, "MODEL_BYTES", 25 * writing.FLOAT_BYTES - 1)
+    with pytest.warns(LargeModelWarning, match="without the covariance of 5 numbers"):
+        model.save(path)
+    loaded = ta.load_model(path)
+    assert loaded.covariance is None
+    assert loaded.shafts == model.shafts
