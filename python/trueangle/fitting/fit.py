@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 from ..errors import ArgumentError, NoOrderError, UnlikeRunsWarning
@@ -16,6 +17,7 @@ from ..runs.run import CalibrationRun
 from ..runs.source import ReadingOptions
 from ..runs.travel import CONDITION, travelled_span, without_drift
 from ..support.argumentkinds import told_kinds
+from ..support.arrays import Array
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument, ArgumentChoice, choose_argument
 from .problem import Problem
@@ -258,10 +260,6 @@ def fitted_to(
         if any(row.verdict == "too long" for row in selection.table):
             cycles = [k * shaft.cycles_per_turn for shaft in wanted for k in shaft.orders]
             found = [without_drift(run, cycles) for run in found]
-        if len(found) > 1:
-            from .transfer import check_new_run
-
-            check_new_run(found, wanted, choice.argument, summed)
     else:
         choice = choose_argument(found, argument, wanted)
     if summed is None:
@@ -272,6 +270,10 @@ def fitted_to(
 
         problem = SummedProblem(summed, wanted, threads)
         weighted = fit_without_outliers(problem, len(summed.outliers))
+    if selection is not None and len(found) > 1:
+        from .transfer import check_new_run
+
+        check_new_run(_weighted_runs(found, weighted.weights), wanted, choice.argument, summed)
     span = travelled_span(problem.travel, problem.period, problem.is_periodic)
     if ridge is None:
         tame = (span.full and problem.is_periodic) or weighted.fitted.solution.is_conditioned_below(
@@ -320,6 +322,15 @@ def fitted_to(
         covariance,
         taken,
     )
+
+
+def _weighted_runs(
+    runs: Sequence[CalibrationRun], weights: Sequence[Array] | None
+) -> Sequence[CalibrationRun]:
+    """The runs with the weights of the robust fit, so that every hold-out rejects its outliers."""
+    if weights is None:
+        return runs
+    return [replace(run, weights=w) for run, w in zip(runs, weights, strict=True)]
 
 
 class _Beside(NamedTuple):

@@ -30,13 +30,14 @@ from ..joint.shafts import ShaftOrders
 from ..model.model import Argument
 from ..model.validity import check_invertible
 from ..runs.follows import check_follows
+from ..runs.outliers import WILD
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, unit_name, wrap
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument
 from .problem import PlainSolution, Problem, SolvedProblem
-from .robust import WILD, Loss, RobustFit
+from .robust import Loss, RobustFit
 
 #: Rounds in which what is set aside settles, and the noise: each takes off a part of what is left.
 _ROUNDS: Final = 20

@@ -14,14 +14,12 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-import trueangle._core as _core
-
 from ..joint.lattice import sensor_lattice
+from ..runs.outliers import WILD, WILD_SHARE, robust_scale, spikes
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.display_units import brief_number
-from ..support.quantiles import median, quantile
 from ..support.suggestions import check_choice
 from .problem import Problem, SolvedProblem
 
@@ -33,18 +31,8 @@ LOSSES: tuple[Loss, ...] = ("auto", "linear", "huber", "tukey")
 HUBER = 1.345
 TUKEY = 4.685
 
-#: Median absolute deviation to standard deviation, for the normal distribution.
-MAD_TO_SIGMA = 1.4826
-
-#: Readings further off than this are wild. Of 1e12 normal readings not one is.
-WILD = 8.0
-
 #: Counts of a sensor up to which a reading differs from its neighbours by being rounded.
 WILD_COUNTS = 2.0
-
-#: With more than this share beyond `WILD` the readings are not wild: the model lacks an
-#: effect, and least squares on all of them is the honest answer.
-WILD_SHARE = 0.2
 
 #: Readings further off than this (robust standard deviations) are rare: 0.7 % of normal ones.
 FAR = 2.7
@@ -68,12 +56,6 @@ _WORK = 4e9
 #: Readings for each unknown beyond which a solution takes them in one pass.
 _BY_ROWS = 32
 
-#: Readings whose median a spike is held against.
-_NEIGHBOURS = 7
-
-#: The scale is taken from at most about so many readings.
-SAMPLE = 4096
-
 #: With this share of them a robust fit of several orders is at its end wherever they are ...
 _MOST: Final = 0.15
 #: ... and with `MANY` where neighbours in angle agree so many times better than the fit:
@@ -93,11 +75,6 @@ class RobustFit(NamedTuple):
     wild: int
     far: float = 0.0
     unsettled: int = 0
-
-
-def robust_scale(residuals: Array) -> float:
-    """Standard deviation by the median absolute deviation: half the readings may be wild."""
-    return MAD_TO_SIGMA * _core.median_magnitude(np.ascontiguousarray(residuals), SAMPLE)
 
 
 def fit_robustly(problem: Problem, loss: Loss, floor: float) -> RobustFit:
@@ -201,35 +178,17 @@ def _set_aside(problem: Problem, floor: float) -> RobustFit:
 def without_spikes(run: CalibrationRun) -> CalibrationRun:
     """The run with isolated outliers given weight 0, found without any model.
 
-    A reading is a spike when it lies more than 8 robust standard deviations off the
-    median of its neighbours in angle; an error that changes as much from neighbour to
-    neighbour widens the limit itself, and so does noise on a slope. For choosing orders;
-    `fit_robustly` looks again with the model in hand.
+    For choosing orders (`trueangle.runs.outliers`); `fit_robustly` looks again with the model.
     """
     given = _given(run.weights, len(run))
     used = slice(None) if run.weights is None else given > 0.0
     error, reference = run.centred_error[used], run.reference[used]
-    if error.size < 4 * _NEIGHBOURS:
-        return run
-    order = np.argsort(np.mod(reference, run.period), kind="stable")
-    half = _NEIGHBOURS // 2
-    around = np.concatenate([error[order[-half:]], error[order], error[order[:half]]])
-    windows = np.lib.stride_tricks.sliding_window_view(around, _NEIGHBOURS)
-    deviation = np.empty_like(error)
-    deviation[order] = error[order] - median(windows, axis=1)
-    distance = np.abs(deviation)
-    # On a slope most readings are the median of their neighbours: what they scatter by is what
-    # they are off the line between the next two, 3/2 of the variance.
-    inner = around[half - 1 : around.size - half + 1]
-    between = inner[1:-1] - 0.5 * (inner[:-2] + inner[2:])
-    # Readings in counts: most deviations may be exactly 0, the rest one count.
-    scale = max(robust_scale(deviation), float(quantile(distance, 0.8)))
-    wild = distance > WILD * max(scale, robust_scale(between) / math.sqrt(1.5))
+    wild, distance = spikes(error, reference, run.period)
     if wild.any():
         turns = run.unwrapped_reference * (2.0 * math.pi / run.period)
         count = sensor_lattice([run], turns)[0] * run.period / ARCSEC_PER_TURN
         wild &= distance > WILD_COUNTS * count
-    if not wild.any() or wild.mean() > WILD_SHARE:
+    if not wild.any():
         return run
     weights = given.copy()
     weights[used] = np.where(wild, 0.0, given[used])

@@ -18,12 +18,13 @@ from ..fitting.fit import ROUNDING, fit
 from ..fitting.orders.candidates import HIGHEST_FREE_ORDER, HIGHEST_SCANNED, SHAFT_HARMONICS
 from ..fitting.problem import SolvedProblem
 from ..fitting.result import FitResult
-from ..fitting.robust import FAR, HIDDEN, MANY, WILD, WILD_SHARE, robust_scale
+from ..fitting.robust import FAR, HIDDEN, MANY
 from ..fitting.summed import SummedReadings
 from ..joint.gear import gear_orders
 from ..joint.shafts import Shaft, ShaftOrders, shaft_cycles
 from ..model.model import Argument, HarmonicModel
 from ..runs.files import Conversion
+from ..runs.outliers import WILD, WILD_SHARE, robust_scale
 from ..runs.run import CalibrationRun
 from ..runs.source import checked_reading_options
 from ..support.angles import wrap

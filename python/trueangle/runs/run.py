@@ -119,7 +119,8 @@ class CalibrationRun:
         put(self, "period", check_period(self.period))
         reference = signal_column("reference", self.reference, None)
         put(self, "reference", reference)
-        put(self, "indicated", signal_column("indicated", self.indicated, reference.size))
+        indicated = signal_column("indicated", self.indicated, reference.size)
+        put(self, "indicated", _resolved(indicated, reference, self.period))
         for name in (*FIELDS, "weights"):
             values = getattr(self, name)
             if values is not None:
@@ -284,6 +285,20 @@ def runs_or_data(data: Any) -> tuple[list[CalibrationRun] | None, Any]:
                 "read files with trueangle.read_runs"
             )
     return list(data), data
+
+
+def _resolved(indicated: Array, reference: Array, period: float) -> Array:
+    """Readings, of which those that a double does not resolve to a period are half of one off.
+
+    Such a number (1e300) is no angle: whatever it wraps to is rounding, which could pass for a
+    good reading. Half a period off it is an outlier to every test.
+    """
+    lost = np.abs(indicated) * np.finfo(np.float64).eps > period
+    if not lost.any():
+        return indicated
+    resolved = np.where(lost, reference + 0.5 * period, indicated)
+    resolved.flags.writeable = False
+    return resolved
 
 
 def _rebuild(values: dict[str, Any]) -> CalibrationRun:

@@ -9,7 +9,9 @@ from scipy.stats import norm
 
 import trueangle as ta
 from trueangle.fitting import robust
-from trueangle.fitting.robust import RobustFit, fit_robustly, fit_without_outliers, robust_scale
+from trueangle.fitting.robust import RobustFit, fit_robustly, fit_without_outliers
+from trueangle.runs import outliers
+from trueangle.runs.outliers import robust_scale
 
 SEED = 88_127
 X = np.linspace(-9.0, 9.0, 200_001)
@@ -22,9 +24,9 @@ def test_constants_are_those_of_normal_readings():
     psi = np.where(np.abs(u) < 1.0, X * (1.0 - u**2) ** 2, 0.0)
     rise = np.where(np.abs(u) < 1.0, (1.0 - u**2) * (1.0 - 5.0 * u**2), 0.0)
     assert (DENSITY @ rise) ** 2 / (DENSITY @ psi**2) == pytest.approx(0.95, abs=1e-3)
-    assert norm.ppf(0.75) == pytest.approx(1.0 / robust.MAD_TO_SIGMA, abs=1e-5)
+    assert norm.ppf(0.75) == pytest.approx(1.0 / outliers.MAD_TO_SIGMA, abs=1e-5)
     assert f"{200.0 * norm.sf(robust.FAR):.1f} %" == "0.7 %"
-    assert 2e12 * norm.sf(robust.WILD) < 1.0 < 2e12 * norm.sf(robust.WILD - 1.0)
+    assert 2e12 * norm.sf(outliers.WILD) < 1.0 < 2e12 * norm.sf(outliers.WILD - 1.0)
 
 
 def fixed(rest, base=None, angles=None, **more):
@@ -47,8 +49,8 @@ def fixed(rest, base=None, angles=None, **more):
 def test_of_fewer_than_fifty_readings_no_share_is_told(size, share):
     print(f"seed {SEED}")
     rest = np.where(np.arange(size) % 2, 1.0, -1.0)
-    rest[:5] = 2.71 * robust.MAD_TO_SIGMA
-    rest[5:10] = -2.69 * robust.MAD_TO_SIGMA
+    rest[:5] = 2.71 * outliers.MAD_TO_SIGMA
+    rest[5:10] = -2.69 * outliers.MAD_TO_SIGMA
     assert fit_without_outliers(fixed([rest]), 0) == (
         [None], None, 0, pytest.approx(share), 0
     )  # fmt: skip

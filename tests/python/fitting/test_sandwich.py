@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fitting.robust import HUBER, MAD_TO_SIGMA, TUKEY
+from trueangle.fitting.robust import HUBER, TUKEY
+from trueangle.runs.outliers import MAD_TO_SIGMA
 
 SEED = 72_900
 

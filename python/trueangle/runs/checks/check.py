@@ -20,6 +20,7 @@ from .angles import (
     wrong_ratio,
 )
 from .fault import DataFault
+from .outliers import outliers
 from .record import Record, read_records, records_of
 from .still import stuck_readings
 
@@ -87,8 +88,9 @@ def check(data: Any, **reading: Unpack[ReadingOptions]) -> Check:
         if entry["because"] == "no time stamps":
             entry["because"] = f"column '{clocks[0]}' is not used"
             entry["measure"] = "nothing anew: give it the role time, with its unit"
+    faults = data_faults(records)
     return Check(
-        tuple(data_faults(records)),
+        (*faults, *outliers(records, faults)),
         ratio,
         ratio_suggestion(ratio),
         extent,

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...support.angles import wrap
 from ...support.arrays import Array
 from ...support.roles import offsets_of, unit_in_name
 from ..files import read_columns
+from ..outliers import spikes
 from ..readings import FileReadings
 from ..run import CalibrationRun
 from ..source import checked_reading_options
@@ -57,9 +59,29 @@ class Record:
         return int(self.reference.size)
 
     @cached_property
+    def spikes(self) -> tuple[NDArray[np.bool_], Array]:
+        """Which readings are isolated outliers, and how far each is off its neighbours, deg."""
+        wild, distance = spikes(self._run.centred_error, self.reference, 360.0)
+        if wild.any():  # a sensor that rounds differs from its neighbours by its counts
+            steps = np.diff(np.unique(self.indicated[~wild]))
+            wild &= distance > 2.0 * steps.min(initial=360.0, where=steps > 0.0)
+        return wild, distance
+
+    @cached_property
     def unwrapped(self) -> tuple[Array, Array]:
-        """Reference and indicated without jumps of a turn."""
-        return np.unwrap(self.reference, period=360.0), np.unwrap(self.indicated, period=360.0)
+        """Reference and indicated without jumps of a turn, those of single outliers included."""
+        indicated, error = self._run.indicated.copy(), self._run.error
+        if len(self) > 2:
+            # One reading off by more than a quarter of a turn, there and back, is no motion.
+            step = np.abs(wrap(np.diff(error), 360.0)) > 90.0
+            across = np.abs(wrap(error[2:] - error[:-2], 360.0)) < 90.0
+            alone = np.flatnonzero(step[:-1] & step[1:] & across) + 1
+            indicated[alone] = self.reference[alone] + error[alone - 1]
+        return np.unwrap(self.reference, period=360.0), np.unwrap(indicated, period=360.0)
+
+    @cached_property
+    def _run(self) -> CalibrationRun:
+        return CalibrationRun(self.reference, self.indicated, 360.0)
 
 
 def records_of(runs: Iterable[CalibrationRun]) -> list[Record]:

@@ -1,0 +1,64 @@
+"""One reading wrong by anything: the model is that of the others, and every door names the row."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+
+GRID = np.linspace(0.0, 2.0 * np.pi, 500, endpoint=False)
+SIZES = (0.5, 2.0, 44.0, 91.0, 178.0, 183.0, -60.0, 1e5, 1e12, 7e299)
+
+
+def joint(seed):
+    """Readings of one joint in turns of one to twenty runs, and which of them is to be wrong."""
+    rng = np.random.default_rng(seed)
+    runs, size = int(rng.choice([1, 2, 3, 5, 8, 20])), int(rng.integers(50, 200))
+    orders = rng.choice(np.arange(1, 7), 2, replace=False)
+    amplitudes = 0.06 * rng.uniform(0.3, 1.0, 2)
+    phases = rng.uniform(0.0, 2.0 * np.pi, 2)
+    tables = []
+    for _ in range(runs):
+        x = np.sort(rng.uniform(0.0, 2.0 * np.pi, size))
+        waves = amplitudes * np.cos(np.outer(x, orders) - phases)
+        tables.append((x, x + np.radians(waves.sum(axis=1) + 0.002 * rng.standard_normal(size))))
+    return tables, int(rng.integers(runs)), int(rng.integers(size))
+
+
+def runs_of(tables, run, row, off):
+    """The runs with one reading off by so many degrees, or without it."""
+    found = []
+    for k, (x, y) in enumerate(tables):
+        if k == run and off is None:
+            x, y = np.delete(x, row), np.delete(y, row)
+        elif k == run:
+            y = y.copy()
+            y[row] += np.radians(off)
+        found.append(ta.CalibrationRun(x, y, label=f"r{k}"))
+    return found
+
+
+@pytest.mark.parametrize("off", SIZES)
+def test_the_model_is_that_of_the_other_readings(off):
+    for seed in range(8):
+        tables, run, row = joint(1000 + seed)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            expected = ta.fit(runs_of(tables, run, row, None)).model.error(GRID)
+            fit = ta.fit(runs_of(tables, run, row, off))
+        left = fit.model.error(GRID) - expected
+        assert left.std() <= 0.1 * expected.std(), (seed, run, row)
+        assert (f"r{run}", row) in [(label, index) for label, index in fit.wild], seed
+
+
+@pytest.mark.parametrize("off", SIZES)
+def test_check_names_the_row_and_nothing_else(off):
+    for seed in range(8):
+        tables, run, row = joint(2000 + seed)
+        faults = ta.check(runs_of(tables, run, row, off)).data_faults
+        assert [(f.fault, f.runs, f.rows) for f in faults] == [
+            ("outliers", (f"r{run}",), (row + 1,))
+        ], seed
+        assert not faults[0].unusable
+        assert ta.check(runs_of(tables, run, row, None)).data_faults == ()
