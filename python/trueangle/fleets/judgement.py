@@ -31,12 +31,7 @@ def judged_fleet(
 ) -> Fleet:
     """Verdicts, and what the fleet is like."""
     n = len(units.last)
-    chosen = shared_pattern(units, aligned=False)
-    if n > 2:
-        shared = shared_pattern(units, aligned=True)
-        both = shared.belong & chosen.belong
-        if float((shared.scores - chosen.scores)[both].sum()) > 0.0:
-            chosen = shared
+    chosen = shared_pattern(units)
     if n < FEWEST:
         those = "One unit does" if n == 1 else f"{n} units do"
         notes.append(f"{those} not tell which of them is an outlier: {FEWEST} are needed.")

@@ -69,31 +69,51 @@ class Units:
 class SharedPattern(NamedTuple):
     """What the units that belong share, with or without a mean.
 
-    ``belong`` are the units that are no outliers; all of them where more stand out than
-    `FEW` says: these are the tails of the design, of which the next unit may be one.
+    ``belong`` are the units that are no outliers; all of them where more are outliers than
+    `FEW` allows: these are the tails of the design, of which the next unit may be one.
     """
 
     aligned: bool
     deviates: Deviates
     belong: NDArray[np.bool_]
     between: list[BetweenUnits]
-    scores: Array
 
 
-def shared_pattern(units: Units, aligned: bool) -> SharedPattern:
-    """Outliers, and mean and variance of the others."""
-    found = deviates(units.values, units.own, aligned, shares=level_by_order(units.orders))
-    if len(units.last) < FEWEST:
-        found = found._replace(outlying=np.zeros(len(units.last), dtype=bool))
-    few = found.outlying.sum() <= max(1.0, FEW * len(units.last))
-    kept = ~found.outlying if few else np.ones(len(units.last), dtype=bool)
-    scores = np.zeros(len(units.last))
-    between = []
-    for values, own in zip(units.values, units.own, strict=True):
-        one = reml(values[kept], own[kept], aligned)
-        between.append(one)
-        scores[kept] += held_out_score(values[kept], own[kept], one.variance, aligned)
-    return SharedPattern(aligned, found, kept, between, scores)
+def shared_pattern(units: Units) -> SharedPattern:
+    """Outliers, and mean and variance of the others; the mean is zero where that predicts better.
+
+    Both choices are compared on the same units: those that neither of them calls an outlier. An
+    outlier that only one of them detects would else decide for all.
+    """
+    n = len(units.last)
+    shares = level_by_order(units.orders)
+    choices = (False, True) if n > 2 else (False,)
+    found = {
+        aligned: deviates(units.values, units.own, aligned, shares=shares) for aligned in choices
+    }
+    judged = ~np.any([one.outlying for one in found.values()], axis=0)
+    if n < FEWEST:
+        judged[:] = True
+    scores = {aligned: _held_out(units, judged, aligned) for aligned in choices}
+    aligned = scores.get(True, -math.inf) > scores[False]
+    chosen = found[aligned]
+    if n < FEWEST:
+        chosen = chosen._replace(outlying=np.zeros(n, dtype=bool))
+    few = chosen.outlying.sum() <= max(1.0, FEW * n)
+    kept = ~chosen.outlying if few else np.ones(n, dtype=bool)
+    pairs = zip(units.values, units.own, strict=True)
+    between = [reml(values[kept], own[kept], aligned) for values, own in pairs]
+    return SharedPattern(aligned, chosen, kept, between)
+
+
+def _held_out(units: Units, judged: NDArray[np.bool_], aligned: bool) -> float:
+    """Logarithm of the density of every judged unit by the other judged ones, all orders."""
+    total = 0.0
+    for every, covariances in zip(units.values, units.own, strict=True):
+        values, own = every[judged], covariances[judged]
+        variance = reml(values, own, aligned).variance
+        total += float(held_out_score(values, own, variance, aligned).sum())
+    return total
 
 
 #: Level at which units are found to differ in their noise.

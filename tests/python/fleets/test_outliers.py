@@ -7,7 +7,7 @@ from scipy.stats import f
 import trueangle as ta
 from trueangle.fleets.outliers import _variance, deviates, level_by_order
 
-from .made import units
+from .made import pattern, units
 
 SEED = 52_020
 
@@ -188,3 +188,34 @@ def test_units_that_are_known_worse_are_not_named_for_it(size):
         told += bool(deviates(values, own, True).outlying.any())
     # Weights by a variance that is not there are as of its error: some more than 1 %.
     assert told <= 12
+
+
+def hiding_fleet(seed):
+    """Units in any number: one off in amplitude, one in phase, one with its own order 4, two turned
+    by half a turn."""
+    rng = np.random.default_rng(seed)
+    count, places = int(rng.integers(16, 44)), np.arange(0.0, 360.0, 6.0)
+    odd = rng.choice(count, 5, replace=False).tolist()
+    runs = []
+    for u in range(count):
+        own = np.array([[25.0, 60.0], [0.0, 30.0], [12.0, -12.0], [0.0, 0.0]])
+        own += rng.normal(0.0, 8.0, (4, 2)) * np.array([[1.0], [0.6], [0.4], [0.1]])
+        own[0] += np.array([-90.0, -60.0]) * (u == odd[0])
+        own[1] += np.array([60.0, 50.0]) * (u == odd[1])
+        own[3] += np.array([0.0, 28.0]) * (u == odd[2])
+        own *= -1.0 if u in odd[3:] else 1.0
+        error = pattern(own, places) + rng.normal(0.0, 3.0 / 3600.0, places.size)
+        runs.append(ta.CalibrationRun(places, places + error, 360.0, unit=f"u{u}"))
+    return runs, {f"u{u}" for u in odd}
+
+
+def test_outliers_do_not_decide_whether_the_others_share_a_mean():
+    """An outlier that only a common mean shows once turned the mean off, and hid by that."""
+    for seed in range(900, 940):
+        runs, odd = hiding_fleet(seed)
+        if len({run.unit for run in runs}) > 20:
+            continue
+        found = ta.fleet(runs, orders=[1, 2, 3, 4])
+        named = {unit for unit, verdict in found.verdicts().items() if verdict != "fine"}
+        assert found.aligned, seed
+        assert named == odd, seed
