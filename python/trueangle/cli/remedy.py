@@ -53,7 +53,7 @@ def _words(error: TrueAngleError, args: argparse.Namespace, build: Build) -> lis
         # The model to extend needs it; a new one holds what these readings show.
         return _again(build, args, command, (), _named_outputs(args), without=("model",))
     if command not in ("fit", "orders"):
-        return _plan(args) if isinstance(error, NoModelError) and command == "selfcal" else []
+        return _plan(error, args) if command == "selfcal" else []
     if isinstance(error, RankError):
         return _again(build, args, "orders", (), (), without=("orders",))
     if isinstance(error, NoModelError):
@@ -68,11 +68,13 @@ def _words(error: TrueAngleError, args: argparse.Namespace, build: Build) -> lis
     return []
 
 
-def _plan(args: argparse.Namespace) -> list[str]:
+def _plan(error: TrueAngleError, args: argparse.Namespace) -> list[str]:
     """How to measure for the method of a self-calibration."""
+    if not isinstance(error, NoModelError) or "plan_self" in str(error):  # the error has it
+        return []
     method = "spin-down" if args.method == "auto" else args.method
     words = ["plan", "--self", method]
-    return [*words, "--gear-ratio", f"{args.gear_ratio!r}"] if args.gear_ratio else words
+    return [*words, "--gear-ratio", f"{abs(args.gear_ratio)!r}"] if args.gear_ratio else words
 
 
 def _named_outputs(args: argparse.Namespace) -> list[str]:

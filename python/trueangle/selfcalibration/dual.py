@@ -35,6 +35,7 @@ from .dualfit import (
     fit_dual_lines,
 )
 from .gearlines import (
+    SLIP,
     GearedChannels,
     SharedLine,
     geared_channels,
@@ -98,6 +99,7 @@ def dual(
     if gear_ratio is not None and not (math.isfinite(gear_ratio) and gear_ratio != 0.0):
         raise ArgumentError(f"gear_ratio must be motor turns per output turn, got {gear_ratio!r}")
     channels = geared_channels(recordings)
+    _check_travel(recordings[0].named, channels, gear_ratio)
     start = slope_ratio(channels) if gear_ratio is None else float(gear_ratio)
     turns = sum(float(np.ptp(m)) for m in channels.motor) / abs(start) / (2.0 * math.pi)
     found = _ratio(channels, start, orders, turns, gear_ratio is not None, fit_ratio)
@@ -161,6 +163,18 @@ def dual(
         turns=turns,
         beside=_beside(fit, found, channels),
     )
+
+
+def _check_travel(named: str, channels: GearedChannels, gear_ratio: float | None) -> None:
+    """Refuse runs over less than one turn of the motor: its orders are trends there."""
+    turns = max(float(np.ptp(m)) for m in channels.motor) / (2.0 * math.pi)
+    if turns < 1.0 - SLIP:  # positions evenly over a turn do not repeat the first
+        ratio = "" if gear_ratio is None else f", gear_ratio={abs(gear_ratio):g}"
+        raise NoModelError(
+            f"{named}: the motor turned only {turns:.2g} turns in the longest run; 1 turn in one "
+            "run is needed for orders of the motor, 1 turn of the output for those of the output; "
+            f'record more: `ta.planning.plan_self("dual"{ratio})` plans the travel'
+        )
 
 
 def _ratio(

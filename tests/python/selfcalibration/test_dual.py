@@ -1,6 +1,7 @@
 """A geared joint over part of a turn: the count of teeth stays, low orders are told."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -146,3 +147,31 @@ def test_a_ratio_is_fitted_of_two_encoders_only():
     theta = np.linspace(0.0, 60.0, 4000)
     with pytest.raises(ArgumentError, match="fit_ratio"):
         ta.selfcal({"time_s": theta, "indicated_rad": theta}, fit_ratio=True)
+
+
+@pytest.mark.parametrize("turns", [0.02, 0.4, 0.85])
+def test_less_than_a_turn_of_the_motor_is_refused_with_what_to_record(turns, tmp_path, capsys):
+    """Before, orders of up to 365 arcsec were fitted to a fraction of a turn."""
+    rng = np.random.default_rng(4188)
+    motor = np.linspace(0.0, 360.0 * turns, 900)
+    motor = np.concatenate([motor, motor[::-1]])
+    error = 1.7 * np.tanh(motor / 5.0) - 0.2 * motor + 0.6 * rng.normal(size=motor.size)
+    table = np.column_stack([20.0 - motor / 63.0 + error * ARCSEC * 180.0 / np.pi, motor])
+    log, out = tmp_path / "short.csv", tmp_path / "m.json"
+    np.savetxt(log, table, "%.8f", ",", header="indicated_deg,motor_deg", comments="")
+    for extra in ([], ["--gear-ratio", "-63"], ["--orders", "1"]):
+        assert main(["selfcal", str(log), "-o", str(out), "--method", "dual", *extra]) != 0
+        told = " ".join(capsys.readouterr().err.split())
+        assert re.search(rf"short.csv: the motor turned only {turns:.2g} turns", told)
+        assert not out.exists()
+        advice = re.search(r"record more: trueangle (.+) plans the travel$", told)
+        assert main(advice[1].split()) == 0
+        assert re.search(r"turns +3\n", capsys.readouterr().out)
+
+
+def test_one_turn_of_the_motor_is_enough_for_its_eccentricity():
+    theta = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False) / 63.0
+    log = joint(theta, 63.0, [], np.random.default_rng(4189), ((300.0, 1.0),), 0.1)
+    found = ta.selfcal(log, method="dual", gear_ratio=63, orders=[1])
+    size = {round(o.order): o for o in found.orders}[63]
+    assert abs(size.amplitude - 300.0 / 63.0) < FAR * size.std
