@@ -44,9 +44,10 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json_text({"robot": args.output, "name": robot.name, "joints": joints}))
         return 0
-    for joint in joints:
-        ratio = joint["gear_ratio"]
-        print(f"{joint['name']}: " + ("no gear ratio" if ratio is None else f"ratio {ratio:g}"))
+    for joint in robot.joints:
+        ratio, column = joint.gear_ratio, joint.signals["indicated"].removesuffix(":rad")
+        called = joint.name if joint.name == column else f"{joint.name} ({column!r} in the URDF)"
+        print(f"{called}: " + ("no gear ratio" if ratio is None else f"ratio {ratio:g}"))
     print(f"\nsaved {args.output}")
     print("name the columns of every reference under [joint.signals], as")
     print('reference = "laser3:deg"')

@@ -123,7 +123,11 @@ def load_description(path: str | PathLike[str]) -> RobotDescription:
     FileError
         Names the line where the text is not TOML, or the joint and key at fault.
     """
-    text = read_text(path, SIMULATION_BYTES, FileError, "a robot file")
+    return description_of_text(path, read_text(path, SIMULATION_BYTES, FileError, "a robot file"))
+
+
+def description_of_text(path: str | PathLike[str], text: str) -> RobotDescription:
+    """The robot that a text (TOML) describes; errors name ``path``."""
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as cause:
@@ -144,7 +148,7 @@ class _DescriptionReader(Decoder):
         names = [joint.name for joint in joints]
         for i, name in enumerate(names):
             if name in names[:i]:
-                raise self.error(f"two joints are called {name!r}", f"joint[{i}].name")
+                raise self.error(f"two joints are called {name!r}: rename one", f"joint[{i}].name")
         if not joints:
             raise self.error("one [[joint]] at least is needed", "joint")
         return RobotDescription(self.text(named.get("name", ""), "robot.name"), joints)
@@ -206,7 +210,8 @@ class _DescriptionReader(Decoder):
 
 
 def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
+    # TOML refuses the one control character that JSON leaves as it is.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _key(name: str) -> str:

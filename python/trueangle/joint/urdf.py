@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from ..errors import FileError
 from ..support.decoding import read_text
 from ..support.files import SIMULATION_BYTES
-from .description import JointDescription, RobotDescription
+from .description import JointDescription, RobotDescription, description_of_text
 
 #: Joints that turn; others have no angle.
 _TURNING = ("revolute", "continuous")
@@ -22,13 +22,13 @@ def robot_of_urdf(path: str | PathLike[str]) -> RobotDescription:
 
     ``mechanicalReduction`` of the joint's ``<transmission>`` is its gear ratio (its size: the
     sign says which way the motor is mounted). The column of a JointState log is the joint's own
-    name, in radians.
+    name, in radians; the joint is called so too, with ``_`` for ``.`` and ``=``.
 
     Raises
     ------
     FileError
         No XML, an entity or document type of its own, no ``<robot>``, no joint that turns, a
-        reduction that is not a number.
+        reduction that is not a number, two joints of one name, more joints than a robot file has.
     """
     root = _root(path)
     ratios: dict[str, float | None] = {}
@@ -45,12 +45,15 @@ def robot_of_urdf(path: str | PathLike[str]) -> RobotDescription:
         if kind in _TURNING and name and element.find("mimic") is None:
             ratio = ratios.get(name)
             member = "none" if ratio is None else "circular_spline"
-            joints.append(JointDescription(name, ratio, member, {"indicated": f"{name}:rad"}))
+            # A dot divides joint and role, an equals sign role and column: `--signal a.torque=tau`.
+            own = name.replace(".", "_").replace("=", "_")
+            joints.append(JointDescription(own, ratio, member, {"indicated": f"{name}:rad"}))
     if not joints:
         raise FileError(
             path, f"names no joint that turns (type {' or '.join(_TURNING)}, without mimic)"
         )
-    return RobotDescription(root.get("name", ""), tuple(joints))
+    # What the file of it would be refused for is refused here.
+    return description_of_text(path, RobotDescription(root.get("name", ""), tuple(joints)).text)
 
 
 def _root(path: str | PathLike[str]) -> ElementTree.Element:

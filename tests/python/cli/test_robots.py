@@ -10,6 +10,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import build_parser, main
 from trueangle.cli.robots import joints_asked
+from trueangle.joint.description import load_description
 
 #: Order 1 of the error of each joint, arcsec.
 SIZES = {"shoulder": 40.0, "elbow": 90.0, "wrist": 5.0}
@@ -92,6 +93,34 @@ def test_what_is_no_urdf_is_refused_in_words(text, says, tmp_path, capsys):
     assert main(["robot", "--from-urdf", str(tmp_path / "a.urdf"), "-o", str(out)]) == 1
     assert says in capsys.readouterr().err
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("names", "says"),
+    [
+        (["left.hip", "left=knee", "del\x7f", 'q"\\', "à b"], None),
+        (["hip", "knee", "hip"], "two joints are called 'hip': rename one"),
+        (["l.hip", "l_hip"], "two joints are called 'l_hip': rename one"),
+        ([f"j{k}" for k in range(257)], "holds 257 [[joint]] tables; at most 256 are allowed"),
+    ],
+)
+def test_a_robot_file_that_is_written_can_be_read(names, says, tmp_path, capsys):
+    """Each of these was written with status 0, and refused by the next command."""
+    joints = "".join(TURNING.format(html.escape(name), 36) for name in names)
+    urdf, out = tmp_path / "a.urdf", tmp_path / "r.toml"
+    urdf.write_text(URDF.format(joints=joints), encoding="utf-8")
+    status = main(["robot", "--from-urdf", str(urdf), "-o", str(out)])
+    printed = capsys.readouterr()
+    if says is not None:
+        assert (status, out.exists()) == (1, False)
+        assert "a.urdf" in printed.err
+        assert says in printed.err
+        return
+    assert status == 0
+    assert "left_hip ('left.hip' in the URDF): ratio 36\nleft_knee ('left=knee'" in printed.out
+    read = load_description(out).joints
+    assert [joint.name for joint in read] == ["left_hip", "left_knee", *names[2:]]
+    assert [joint.signals["indicated"] for joint in read] == [f"{name}:rad" for name in names]
 
 
 @pytest.mark.parametrize("command", ["check", "diagnose"])

@@ -54,6 +54,7 @@ def test_joints_that_turn_and_their_ratios(tmp_path: Path) -> None:
         ("</robot>", "", "is not XML: (?!.*xacro)"),
         ("</robot>", "xacro", "expand xacro first"),
         ("<robot", "<!DOCTYPE robot><robot", "declares a document type"),
+        ('name="tool" type', 'name="base" type', "two joints are called 'base'"),
         ("revolute", "fixed", None),
     ],
 )
