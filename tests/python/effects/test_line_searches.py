@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.effects import NonIntegerOrder, Sidebands, WrongGearRatio
+from trueangle.effects import MissingOrder, NonIntegerOrder, Sidebands, WrongGearRatio
 from trueangle.effects.time_periodic import FREQUENCY_DRIFT, OVERSAMPLING, _drifting
 from trueangle.estimation.extension import Extension
 from trueangle.estimation.regression import Regression
@@ -125,6 +125,25 @@ def test_a_line_that_keeps_its_phase_is_the_orders_beside_it(runs: int) -> None:
         deviance = gain / (share * (0.5 + 0.5 / runs))
         found = Extension("non_integer_order", {"order": 7.4}, beside, 1, deviance=deviance)
         assert NonIntegerOrder._keeps_phase(regression, found) == (share > 1.0)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "turns", "resolved"),
+    [(31.0, 0.12, False), (46.0, 0.09, False), (31.0, 0.6, True), (46.0, 1.2, True)],
+)
+def test_orders_that_differ_by_less_than_half_a_wave_over_a_run_are_named_together(
+    ratio: float, turns: float, resolved: bool
+) -> None:
+    """The motor's own order is then proposed in place of its neighbour."""
+    sim = Simulation(Joint(ratio))
+    signals = signals_of(sim, turns, runs=1, samples=300)
+    line = line_sum(signals.theta, ((ratio - 1.0, 3.0, 70.0),))
+    found = MissingOrder.propose(regression_of(sim, signals, line))
+    assert found is not None
+    order = ratio - 1.0 if resolved else ratio
+    assert found.shape["output_order"] == order
+    assert (ratio - 1.0 in found.shape["alike"]) != resolved
+    assert (found.shape["alike"] == []) == resolved
 
 
 GEARED = Simulation(

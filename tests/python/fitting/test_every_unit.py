@@ -287,3 +287,18 @@ def test_an_amplitude_and_its_phase_have_the_errors_of_their_draws() -> None:
     about = 4.5 / np.sqrt(2.0 * 4000.0)
     np.testing.assert_allclose(100.0 * sizes.std(axis=0), fit.amplitude_std, rtol=about + 0.01)
     np.testing.assert_allclose(100.0 * phases.std(axis=0), fit.phase_std, rtol=about + 0.01)
+
+
+@pytest.mark.filterwarnings("ignore::trueangle.errors.UnlikeRunsWarning")
+def test_labels_of_runs_stay_where_one_without_a_label_holds_no_order() -> None:
+    """A run without a label is called by its place among all runs, not among those that remain."""
+    rng = np.random.default_rng(SEED)
+    sizes = {0: 0.1, 2: 0.2, 3: 0.3}
+    runs = []
+    for k, label in enumerate(("", "", "third", "")):
+        theta = np.linspace(7.0 * k, 360.0 + 7.0 * k, 3 if k == 1 else 90, endpoint=False)
+        error = sizes.get(k, 0.1) * np.sin(np.radians(theta)) + 1e-4 * rng.normal(size=theta.size)
+        runs.append(ta.CalibrationRun(theta, theta + error, 360.0, label=label))
+    (first, _) = run_phases(ta.fit(runs, [1, 2], loss="linear"))
+    assert first.labels == ("1", "third", "4")
+    np.testing.assert_allclose(first.amplitude / 3600.0, list(sizes.values()), atol=1e-3)

@@ -376,3 +376,19 @@ def test_every_column_has_its_own_unit_and_counts(reference, indicated, offset):
     )
     np.testing.assert_allclose(run.reference / run.period, true, atol=1e-12)
     np.testing.assert_allclose(run.indicated / run.period, said, atol=1e-12)
+
+
+@pytest.mark.parametrize("start", [0.0, 351.0])
+def test_uneven_facets_are_matched_within_a_hundredth_of_their_closest_two(start, tmp_path):
+    """Two facets are 5 deg apart, so a reading may be 0.05 deg off any of them."""
+    facets = np.mod(start + np.array([0.0, 5.0, 90.0, 260.0]), 360.0)
+    saved(tmp_path / "facets.csv", reference_deg=facets, deviation_arcsec=[1.0, -2.0, 3.0, -4.0])
+    off = np.array([0.04, -0.04, 0.04, -0.04])
+    path = saved(tmp_path / "near.csv", reference_deg=facets + off, indicated_deg=facets)
+    (run,) = ta.read_runs(path, facets=tmp_path / "facets.csv")
+    added = (run.reference - facets - off) * 3600.0
+    np.testing.assert_allclose(added, [1.0, -2.0, 3.0, -4.0], atol=1e-6)
+    off[3] = -0.06
+    path = saved(tmp_path / "off.csv", reference_deg=facets + off, indicated_deg=facets)
+    with pytest.raises(FileError, match=r"off.csv.*reading 4 is at .*not a facet of facets.csv"):
+        ta.read_runs(path, facets=tmp_path / "facets.csv")
