@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 
@@ -84,6 +84,13 @@ class JointCoupling(_OfOthers):
         return best_shape(cls, regression, shapes, [grid] * len(shapes))
 
     @classmethod
+    def imitate(cls, regression: Regression) -> Extension | None:
+        """The share that a ramp of the joint's own would be."""
+        ramps = [j for j, why in _hidden(regression).items() if why and ScaleError in why]
+        shapes = [{"joint": joint} for joint in ramps]
+        return best_shape(cls, regression, shapes, [float(np.log(max(len(ramps), 1)))] * len(ramps))
+
+    @classmethod
     def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         return ARCSEC_PER_DEG * signals.coupled[shape["joint"]][:, None]
 
@@ -104,19 +111,23 @@ class JointCoupling(_OfOthers):
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
-        for because in filter(None, _hidden(regression).values()):
-            yield cls.blind(because)
+        for because, *others in filter(None, _hidden(regression).values()):
+            yield cls.blind(because, *others)
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         return (JointCouplingTerm(self.joint, self.factor),)
 
 
-def _hidden(regression: Regression) -> dict[str, str | None]:
+#: Why a share is hidden, and the other effects that have the same regressor.
+_Hidden: TypeAlias = tuple[str, *tuple[type[Effect], ...]]
+
+
+def _hidden(regression: Regression) -> dict[str, _Hidden | None]:
     """Of every other joint, why the readings cannot show a share of its angle, or None."""
     joints = regression.signals.coupled
     if not joints:
         return {}
-    found: dict[str, str | None] = regression.of_pattern(
+    found: dict[str, _Hidden | None] = regression.of_pattern(
         f"hidden {JointCoupling.kind}",
         (*joints,),
         lambda: {joint: _hidden_by(regression, joint) for joint in joints},
@@ -124,26 +135,29 @@ def _hidden(regression: Regression) -> dict[str, str | None]:
     return found
 
 
-def _hidden_by(regression: Regression, joint: str) -> str | None:
+def _hidden_by(regression: Regression, joint: str) -> _Hidden | None:
     """Why the readings cannot show a share of this joint's angle, or None where they can."""
     signals = regression.signals
     own = _about_means(signals, signals.coupled[joint])
     if not own.any():
-        return f"joint {joint} stands still in every run: its share is in the zeros of the runs"
+        return (f"joint {joint} stands still in every run: its share is in the zeros of the runs",)
     angle = np.degrees(signals.theta)
     motion = np.column_stack([angle, _about_means(signals, angle)])
     if share_left(regression, own[:, None], motion) < OWN_POWER:
         return (
             f"joint {joint} moves in proportion to this joint: a share of its angle and a ramp in "
-            "this one's own are the same regressor"
+            "this one's own are the same regressor",
+            ScaleError,
         )
     others = {j: _about_means(signals, a) for j, a in signals.coupled.items() if j != joint}
     for other, angle in others.items():
         if share_left(regression, own[:, None], motion, angle[:, None]) < OWN_POWER:
-            return f"joints {joint} and {other} move in proportion: a share of either is the same"
+            return (
+                f"joints {joint} and {other} move in proportion: a share of either is the same",
+            )
     rest = np.column_stack([*others.values()]) if others else np.zeros((len(signals), 0))
     if share_left(regression, own[:, None], motion, rest) < OWN_POWER:
-        return f"the motion of joint {joint} is made up of those of {', '.join(others)}"
+        return (f"the motion of joint {joint} is made up of those of {', '.join(others)}",)
     return None
 
 

@@ -115,6 +115,33 @@ def test_where_motions_are_collinear_it_is_said_and_never_named(which):
         assert any(said in because for because in told), told
 
 
+@pytest.mark.parametrize(("factor", "scale"), [(0.015, 0.0), (0.0, -0.004)])
+def test_a_share_of_a_motion_in_proportion_and_a_ramp_are_both_named_and_neither_confirmed(
+    factor, scale
+):
+    """Whichever is there; before, the ramp was confirmed and the coupling could not be seen."""
+    rng, runs = np.random.default_rng(73), []
+    for k in range(3):
+        turn = np.linspace(0.0, 2.0 * np.pi * (1 + k % 2), 300)
+        own, other = 41.0 * np.sin(turn), -17.0 * np.sin(turn)
+        error = factor * other + scale * own + rng.normal(0.0, 2.0 / 3600.0, own.size)
+        signals = {"coupled_hip": other}
+        runs.append(
+            ta.CalibrationRun(own, own + error, 360.0, time=turn, signals=signals, label=str(k))
+        )
+    found = ta.diagnose(runs, BELIEVED)
+    assert not {"scale_error", "joint_coupling"} & {f.cause for f in found.findings}
+    (spot,) = [s for s in found.not_identifiable if "joint_coupling" in s.causes]
+    assert spot.causes == ("joint_coupling", "scale_error")
+    assert spot.supported
+    assert spot.measure == "turn one joint while the other stands still"
+    ramp = scale - factor * 17.0 / 41.0
+    share = spot.estimates["joint_coupling"]["factor"]
+    slope = spot.estimates["scale_error"]["relative_error"]
+    assert slope.value == pytest.approx(ramp, abs=4.0 * slope.std)
+    assert share.value == pytest.approx(-ramp * 41.0 / 17.0, abs=4.0 * share.std)
+
+
 def test_of_a_joint_alone_nothing_is_asked():
     runs = simulate(replace(BELIEVED, sigma_arcsec=1.0, runs=(RunDesign(reversals=(0.5,)),)), 72)
     found = ta.diagnose(runs, BELIEVED)
