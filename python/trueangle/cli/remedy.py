@@ -74,7 +74,7 @@ def _plan(error: TrueAngleError, args: argparse.Namespace) -> list[str]:
         return []
     method = "spin-down" if args.method == "auto" else args.method
     words = ["plan", "--self", method]
-    return [*words, "--gear-ratio", f"{abs(args.gear_ratio)!r}"] if args.gear_ratio else words
+    return [*words, "--gear-ratio", f"{args.gear_ratio!r}"] if args.gear_ratio else words
 
 
 def _named_outputs(args: argparse.Namespace) -> list[str]:

@@ -174,6 +174,8 @@ def _text(node: ast.expr, between: str = ",") -> str:
             return str(value)
         case ast.Name(id=name):
             return name
+        case ast.UnaryOp(op=ast.USub(), operand=value):
+            return f"-{_text(value)}"
         case ast.List(elts=several) | ast.Tuple(elts=several):
             return between.join(map(_text, several))
         case ast.Call(args=[first, ast.Constant(value=int(end))]):

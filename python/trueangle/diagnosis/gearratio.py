@@ -50,7 +50,8 @@ def find_ratio(geared: GearedLines) -> GearedLinesRatio | None:
     there = float(np.mean(geared.shares(believed)))
     if there > MISSING and geared.together(believed) > MISSING:
         return None
-    low, high, step = believed * (1.0 - REACH), believed * (1.0 + REACH), geared.step
+    low, high = sorted((believed * (1.0 - REACH), believed * (1.0 + REACH)))
+    step = geared.step
     # From beyond either end, where there may be a peak.
     trials = np.arange(low - step, high + 2.0 * step, step)
     shares = np.array([geared.share(trial) for trial in trials.tolist()])

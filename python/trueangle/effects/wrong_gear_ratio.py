@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
@@ -92,7 +93,8 @@ class WrongGearRatio(Effect):
             return None
         gains = dict(zip(regression.lines.orders.tolist(), regression.line_gains(), strict=True))
         top = int(max(gains) / max(pattern.orders[geared] / joint.shafts["motor"]))
-        ratios = [float(r) for r in range(2, top + 1) if r != joint.gear_ratio]
+        whole = (math.copysign(r, joint.gear_ratio) for r in range(2, top + 1))
+        ratios = [ratio for ratio in whole if ratio != joint.gear_ratio]
 
         def score(ratio: float) -> float:
             orders = np.array(_moved(joint, pattern, ratio))[geared]

@@ -42,7 +42,8 @@ class JointDescription:
     ----------
     name : str
     gear_ratio : float or None
-        Motor turns per output turn; None where it is not known.
+        Motor turns per output turn, negative where the motor turns the other way; None where it
+        is not known.
     fixed_member : str
     signals : mapping of role to "COLUMN" or "COLUMN:UNIT"
     shafts : mapping of str to float
@@ -161,8 +162,8 @@ class _DescriptionReader(Decoder):
         ratio = None
         if "gear_ratio" in table:
             ratio = self.number(table["gear_ratio"], f"{at}.gear_ratio")
-            if not ratio > 0.0:
-                raise self.error(f"must be positive, got {ratio!r}", f"{at}.gear_ratio")
+            if ratio == 0.0:
+                raise self.error("must not be 0", f"{at}.gear_ratio")
         member = self.text(table.get("fixed_member", "circular_spline"), f"{at}.fixed_member")
         if member not in FIXED_MEMBERS:
             raise self.error(

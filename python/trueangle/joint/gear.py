@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
-from ..errors import ArgumentError
 from ..support.argumentkinds import told_kinds
 from ..support.suggestions import check_choice
 from .members import FIXED_MEMBERS
+from .shafts import shaft_cycles
 
 #: Gear ratios of common strain wave gears, tried where none is declared.
 COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
@@ -74,12 +74,8 @@ def gear_orders(gear_ratio: float, fixed_member: str = "circular_spline") -> dic
     >>> gear_orders(100)[202]
     'tooth mesh with the circular spline'
     """
-    if not (math.isfinite(gear_ratio) and gear_ratio > 0.0):
-        raise ArgumentError(
-            f"gear_ratio must be positive (motor turns per output turn), got {gear_ratio!r}"
-        )
+    i = shaft_cycles(gear_ratio, "none")["motor"]
     check_choice("fixed_member", fixed_member, FIXED_MEMBERS)
-    i = float(gear_ratio)
     if fixed_member == "none":
         if i == 1.0:
             return {}

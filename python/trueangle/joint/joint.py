@@ -32,7 +32,8 @@ class Joint:
     Parameters
     ----------
     gear_ratio : float
-        Motor turns per output turn; need not be an integer.
+        Motor turns per output turn; need not be an integer; negative where the motor turns the
+        other way.
     fixed_member : {"circular_spline", "flexspline", "none"}
         The member of the strain wave gear held by the housing; "none" is a direct drive.
     encoder_side : {"motor", "output"}
@@ -64,10 +65,8 @@ class Joint:
             wanted = f"a {kind.__name__} of trueangle.joint.declared"
             found: tuple[object, ...] = all_of_type(name, getattr(self, name), kind, wanted)
             object.__setattr__(self, name, found)
-        if not 0.0 < self.gear_ratio < float("inf"):
-            raise ArgumentError(f"gear_ratio must be positive and finite, got {self.gear_ratio!r}")
         check_choice("fixed_member", self.fixed_member, FIXED_MEMBERS)
-        shaft_cycles(self.gear_ratio, self.fixed_member)  # refuses a generator that stands
+        shaft_cycles(self.gear_ratio, self.fixed_member)  # refuses 0, and a generator that stands
         check_choice("encoder_side", self.encoder_side, ENCODER_SIDES)
         if self.pole_pairs < 1:
             raise ArgumentError(f"pole_pairs must be at least 1, got {self.pole_pairs!r}")

@@ -91,7 +91,8 @@ def shaft_cycles(
     The output turns once, the motor ``gear_ratio`` times, the wave generator against the
     output member ``gear_ratio + 1`` times when the circular spline is fixed and
     ``gear_ratio - 1`` times when the flexspline is. ``gear_ratio`` is motor turns per
-    output turn in either case.
+    output turn in either case, negative where the motor turns the other way: cycles are counts
+    and have no sign.
 
     Examples
     --------
@@ -101,13 +102,14 @@ def shaft_cycles(
     check_choice("fixed_member", fixed_member, FIXED_MEMBERS)
     cycles = {"output": 1.0}
     if gear_ratio is not None:
-        if not 0.0 < gear_ratio < float("inf"):
+        if not 0.0 < abs(gear_ratio) < float("inf"):
             raise ArgumentError(
-                f"gear_ratio must be positive motor turns per output turn, got {gear_ratio!r}"
+                "gear_ratio must be motor turns per output turn, finite and not 0, got "
+                f"{gear_ratio!r}"
             )
-        cycles["motor"] = float(gear_ratio)
+        cycles["motor"] = abs(float(gear_ratio))
         if fixed_member != "none":
-            generator = float(gear_ratio) + _WAVE_GENERATOR[fixed_member]
+            generator = cycles["motor"] + _WAVE_GENERATOR[fixed_member]
             if generator <= 0.0:
                 raise ArgumentError(
                     "gear_ratio must be above 1 where the flexspline is fixed (the wave generator "

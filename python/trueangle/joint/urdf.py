@@ -20,8 +20,8 @@ _TURNING = ("revolute", "continuous")
 def robot_of_urdf(path: str | PathLike[str]) -> RobotDescription:
     """The robot of a URDF file: its turning joints, in the order of the file.
 
-    ``mechanicalReduction`` of the joint's ``<transmission>`` is its gear ratio (its size: the
-    sign says which way the motor is mounted). The column of a JointState log is the joint's own
+    ``mechanicalReduction`` of the joint's ``<transmission>`` is its gear ratio, negative
+    where the motor turns the other way. The column of a JointState log is the joint's own
     name, in radians; the joint is called so too, with ``_`` for ``.`` and ``=``.
 
     Raises
@@ -45,7 +45,7 @@ def robot_of_urdf(path: str | PathLike[str]) -> RobotDescription:
         if kind in _TURNING and name and element.find("mimic") is None:
             ratio = ratios.get(name)
             member = "none" if ratio is None else "circular_spline"
-            # A dot divides joint and role, an equals sign role and column: `--signal a.torque=tau`.
+            # A dot divides joint and role, an equals sign role and column, where one is typed.
             own = name.replace(".", "_").replace("=", "_")
             joints.append(JointDescription(own, ratio, member, {"indicated": f"{name}:rad"}))
     if not joints:
@@ -78,9 +78,9 @@ def _root(path: str | PathLike[str]) -> ElementTree.Element:
 
 def _ratio(path: str | PathLike[str], name: str, text: str) -> float | None:
     try:
-        ratio = abs(float(text))
+        ratio = float(text)
     except ValueError:
         ratio = math.nan
-    if not 0.0 < ratio < math.inf:
+    if not 0.0 < abs(ratio) < math.inf:
         raise FileError(path, f"joint {name!r}: mechanicalReduction must be a number, got {text!r}")
     return ratio

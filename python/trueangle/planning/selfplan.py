@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError
-from ..joint.shafts import limited_orders
+from ..joint.shafts import limited_orders, shaft_cycles
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
@@ -252,8 +252,7 @@ def _dual(
     notes = ["only sums are seen: output encoder with gear, motor encoder with gear"]
     turns = 3.0
     if ratio is not None:
-        if not (math.isfinite(ratio) and ratio > 0.0):
-            raise ArgumentError(f"gear_ratio must be positive, got {ratio!r}")
+        ratio = shaft_cycles(ratio, "none")["motor"]
         gap = min(abs(j * ratio - k) for j in range(1, 9) for k in orders)
         if abs(ratio - round(ratio)) < 1e-9:
             notes.append(

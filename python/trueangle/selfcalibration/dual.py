@@ -169,7 +169,7 @@ def _check_travel(named: str, channels: GearedChannels, gear_ratio: float | None
     """Refuse runs over less than one turn of the motor: its orders are trends there."""
     turns = max(float(np.ptp(m)) for m in channels.motor) / (2.0 * math.pi)
     if turns < 1.0 - SLIP:  # positions evenly over a turn do not repeat the first
-        ratio = "" if gear_ratio is None else f", gear_ratio={abs(gear_ratio):g}"
+        ratio = "" if gear_ratio is None else f", gear_ratio={gear_ratio:g}"
         raise NoModelError(
             f"{named}: the motor turned only {turns:.2g} turns in the longest run; 1 turn in one "
             "run is needed for orders of the motor, 1 turn of the output for those of the output; "

@@ -71,7 +71,7 @@ def test_a_urdf_names_joints_and_ratios(arm):
         f'name = "{name}"' for name in SIZES
     ]
     assert [line for line in text.splitlines() if line.startswith("gear")] == [
-        f"gear_ratio = {50.0 + i}" for i in range(3)
+        f"gear_ratio = {-50.0 - i}" for i in range(3)
     ]
     assert "finger" not in text
     assert "base" not in text
@@ -237,7 +237,7 @@ def test_wrong_options_beside_a_robot_are_named(options, says, arm, capsys):
     [
         ("[robot]", "[robots]", "key 'robots': is unknown; the keys are robot, joint"),
         ('name = "elbow"', 'name = "wrist"', "two joints are called 'wrist'"),
-        ("gear_ratio = 51.0", "gear_ratio = -1.0", "key 'joint[1].gear_ratio': must be positive"),
+        ("gear_ratio = -51.0", "gear_ratio = 0.0", "key 'joint[1].gear_ratio': must not be 0"),
         ("reference = ", "refrence = ", "no column has the role 'refrence'"),
         ("fixed_member", "fixed_part", "'joint[0].fixed_part': is unknown"),
         ('name = "arm"', "name = arm", "is not TOML"),
@@ -428,5 +428,5 @@ def test_a_ratio_of_a_urdf_is_printed_as_it_is(tmp_path, capsys):
     (tmp_path / "a.urdf").write_text(URDF.format(joints=joints))
     assert main(["robot", "--from-urdf", str(tmp_path / "a.urdf"), "-o", str(tmp_path / "r")]) == 0
     told = capsys.readouterr().out
-    for ratio in ("ratio 100.5", "ratio 50", "ratio 24.375"):
+    for ratio in ("ratio 100.5", "ratio -50", "ratio 24.375"):
         assert ratio in told

@@ -195,8 +195,8 @@ ASKED = {
         "--column a=NAME",
     ),
     "a ratio": (
-        lambda: ta.fit(RUN, gear_ratio=-3.0),
-        "fit r.csv -o x.json --gear-ratio -3",
+        lambda: ta.fit(RUN, gear_ratio=0.0),
+        "fit r.csv -o x.json --gear-ratio 0",
         "gear_ratio must",
         "--gear-ratio must",
     ),

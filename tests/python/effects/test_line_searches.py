@@ -33,11 +33,12 @@ def regression_of(sim: Simulation, signals: Signals, error: Array) -> Regression
     return Regression.of(signals, noise + error, sim.surroundings, rho=0.0)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("highest", [1.0, 2.0])
-def test_a_ratio_is_one_of_those_whose_lines_are_looked_for(highest: float) -> None:
+def test_a_ratio_is_one_of_those_whose_lines_are_looked_for(highest: float, sign: float) -> None:
     """All whole ratios but the believed one, up to that whose fastest line is the last order."""
     lines = (Harmonic("motor", 1, 20.0, 40.0), Harmonic("motor", highest + 1.0, 15.0, 80.0))
-    sim = Simulation(Joint(20.0), lines)
+    sim = Simulation(Joint(sign * 20.0), lines)
     signals = signals_of(sim, 1.3)
     hidden = WrongGearRatio(23.0)
     error = hidden.signal(signals, sim.surroundings, np.random.default_rng(0))
@@ -47,7 +48,7 @@ def test_a_ratio_is_one_of_those_whose_lines_are_looked_for(highest: float) -> N
     orders = regression.lines.orders
     ratios = [r for r in range(2, 500) if r * (highest + 1.0) <= orders.max() and r != 20]
     assert found.shape == {
-        "gear_ratio": 23.0, "orders": [23.0, 23.0 * (highest + 1.0)], "alike": [],
+        "gear_ratio": sign * 23.0, "orders": [23.0, 23.0 * (highest + 1.0)], "alike": [],
     }  # fmt: skip
     assert found.log_grid == pytest.approx(np.log(len(ratios)))
     # Two lines and the ratio.

@@ -81,7 +81,7 @@ def test_defaults_and_the_simulation_beside_the_file(tmp_path: Path) -> None:
         ('name = "base"', 'name = ""', r"joint\[0\].name': .*without '.' and '=' is needed"),
         ('name = "base"', 'name = "a.b"', r"joint\[0\].name"),
         ('name = "base"', 'name = "a=b"', r"joint\[0\].name"),
-        ("= 100", "= 0", r"joint\[0\].gear_ratio': must be positive, got 0.0"),
+        ("= 100", "= 0", r"joint\[0\].gear_ratio': must not be 0"),
         ("= 100", "= nan", r"joint\[0\].gear_ratio"),
         ('"none"', '"nome"', r"joint\[0\].fixed_member': must be one of .*none"),
         ('simulation = "base.toml"', "simulation = 3", r"joint\[0\].simulation"),

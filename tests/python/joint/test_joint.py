@@ -178,8 +178,8 @@ def test_lines_of_bearings_allow_for_slip() -> None:
 
 def test_what_no_joint_is() -> None:
     for wrong, says in (
-        ({"gear_ratio": 0.0}, "gear_ratio must be positive and finite"),
-        ({"gear_ratio": float("inf")}, "gear_ratio must be positive and finite"),
+        ({"gear_ratio": 0.0}, "gear_ratio must be motor turns .*, finite and not 0"),
+        ({"gear_ratio": float("inf")}, "gear_ratio must be motor turns .*, finite and not 0"),
         ({"gear_ratio": 1.0, "fixed_member": "flexspline"}, "above 1"),
         ({"fixed_member": "spline"}, "fixed_member"),
         ({"encoder_side": "gear"}, "encoder_side must be one of"),

@@ -28,9 +28,9 @@ def test_the_wave_generator_turns_against_the_output_member(ratio: float) -> Non
     assert shaft_cycles(None) == {"output": 1.0}
 
 
-@pytest.mark.parametrize("ratio", [0.0, -2.0, math.inf, math.nan])
+@pytest.mark.parametrize("ratio", [0.0, -math.inf, math.inf, math.nan])
 def test_no_such_ratio(ratio: float) -> None:
-    with pytest.raises(ArgumentError, match="positive motor turns per output turn"):
+    with pytest.raises(ArgumentError, match="motor turns per output turn, finite and not 0"):
         shaft_cycles(ratio)
 
 

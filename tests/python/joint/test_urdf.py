@@ -1,4 +1,4 @@
-"""Joints of a URDF: those that turn, in their order, with the size of their reductions."""
+"""Joints of a URDF: those that turn, in their order, with their reductions."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_joints_that_turn_and_their_ratios(tmp_path: Path) -> None:
     assert robot.name == "arm"
     assert robot.joints == (
         JointDescription("base", None, "none", {"indicated": "base:rad"}),
-        JointDescription("wrist", 50.5, "circular_spline", {"indicated": "wrist:rad"}),
+        JointDescription("wrist", -50.5, "circular_spline", {"indicated": "wrist:rad"}),
         JointDescription("tool", 100.0, "circular_spline", {"indicated": "tool:rad"}),
     )
     assert _load(tmp_path, FILE.replace(' name="arm"', "")).name == ""

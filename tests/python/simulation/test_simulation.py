@@ -141,7 +141,7 @@ def test_added_effects_leave_the_text_of_the_file_alone(tmp_path):
         ("[joint", "not a TOML file"),
         ("[gear]\nratio = 3", "unknown table 'gear'"),
         ("[joint]\nratio = 3", "[joint]: unknown key 'ratio'"),
-        ("[joint]\ngear_ratio = -3", "gear_ratio must be positive"),
+        ("[joint]\ngear_ratio = 0", "gear_ratio must be motor turns per output turn"),
         ('[joint]\ngear_ratio = "x"', "gear_ratio must be a finite number"),
         ('[[harmonic]]\nshaft = "motor"', "[[harmonic]] number 1: missing"),
         ('[[harmonic]]\nshaft="x"\norder=1\namplitude_arcsec=1', "shaft must be one of"),

@@ -97,7 +97,7 @@ class Candidates:
     @property
     def highest_alias(self) -> int:
         """Highest order listed as an alias: 4 motor turns' worth, at least 400."""
-        ratio = max(COMMON_RATIOS) if self.gear_ratio is None else self.gear_ratio
+        ratio = max(COMMON_RATIOS) if self.gear_ratio is None else abs(self.gear_ratio)
         return max(_LEAST_ALIAS, math.ceil(4.0 * ratio) + 4)
 
     @property

@@ -127,7 +127,7 @@ class OrderTable(PlainResult):
             if float(order).is_integer():
                 found.setdefault("output", []).append(int(order))
                 continue
-            ratio = float(self.gear_ratio or math.nan)
+            ratio = abs(float(self.gear_ratio or math.nan))
             for shaft, cycles in (
                 *self.shafts.items(),
                 ("motor", ratio),
