@@ -94,9 +94,12 @@ class FileReadings(NamedTuple):
             problem = f"seconds, or dates and times (ISO 8601, all with a zone or none), got {got}"
             raise self.error(f"needs {problem}", column.name, bad)
         if values.dtype == object:
-            row = next((i for i, value in enumerate(values) if _is_no_number(value)), 0)
-            got = repr(values[row])[:60]
-            raise self.error(f"a number is needed, got {got}", column.name, row)
+            row = next((i for i, value in enumerate(values) if _is_no_number(value)), None)
+            labels = [self.roles[role].name for role in LABELS if role in self.roles]
+            # A label was read as text; as a signal too it must hold numbers only.
+            if row is not None or column.name not in labels:
+                got = repr(values[row or 0])[:60]
+                raise self.error(f"a number is needed, got {got}", column.name, row or 0)
         numbers = np.asarray(values, dtype=np.float64)
         infinite = np.flatnonzero(np.isinf(numbers))
         if infinite.size:

@@ -21,7 +21,7 @@ from .angles import (
 )
 from .fault import DataFault
 from .outliers import outliers
-from .record import Record, read_records, records_of
+from .record import LEAST_READINGS, Record, read_records, records_of
 from .still import stuck_readings
 
 if TYPE_CHECKING:
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
 #: Faults after which the angles of a run mean nothing to further tests.
 UNSURE = ("mixed_units", "wrapped_reference", "unsorted_time")
-
-#: Readings that a run must have to be compared as a whole.
-LEAST_READINGS = 3
 
 
 @told_kinds

@@ -9,7 +9,7 @@ import numpy as np
 from ...support.arrays import Array
 from ...support.layout import counted
 from ...support.quantiles import median, quantile
-from .record import Record
+from .record import LEAST_READINGS, Record
 
 #: Levels are apart by this share of their range, and by so much at least.
 GAP = 0.1
@@ -36,7 +36,7 @@ class Extent:
     directions : tuple of int
         Of -1 and +1 those that were travelled.
     speeds, loads, temperatures, mounts : tuple of float
-        Levels (mean of a run): deg/s, Nm, Celsius, degrees; empty where not recorded.
+        Levels, also within a run: deg/s, Nm, Celsius, degrees; empty where not recorded.
     timed : bool
     """
 
@@ -79,9 +79,9 @@ def extent_of(records: list[Record]) -> Extent:
         max(travels, default=0.0),
         tuple(sorted(directions)),
         _levels(speeds, "speed"),
-        _levels(_means(records, "torque"), "load"),
-        _levels(_means(records, "temperature"), "temperature"),
-        _levels(_means(records, "mount"), "mount"),
+        _signal_levels([record.torque for record in records], "load"),
+        _signal_levels([record.temperature for record in records], "temperature"),
+        _signal_levels([record.mount for record in records], "mount"),
         all(record.time is not None for record in records),
     )
 
@@ -138,19 +138,30 @@ def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
     return can, cannot
 
 
-def _means(records: list[Record], name: str) -> list[float]:
-    values = [getattr(record, name) for record in records]
-    return [float(np.mean(v)) for v in values if v is not None]
+def _signal_levels(signals: list[Array | None], kind: str) -> tuple[float, ...]:
+    """Levels of a signal over all runs, of which one run may hold several."""
+    found: list[float] = []
+    for values in signals:
+        if values is not None:
+            groups = _groups(values, kind)
+            # Single readings apart from the others are noise, not a level.
+            held = [group for group in groups if group.size >= LEAST_READINGS]
+            found += [float(np.mean(group)) for group in held or [values]]
+    return _levels(found, kind)
 
 
 def _levels(values: list[float], kind: str) -> tuple[float, ...]:
-    """Means of groups of values that lie closer together than the gaps between groups."""
-    if not values:
-        return ()
-    ordered = np.sort(np.array(values))
+    """Means of groups of values."""
+    return tuple(float(f"{np.mean(group):.4g}") for group in _groups(np.array(values), kind))
+
+
+def _groups(values: Array, kind: str) -> list[Array]:
+    """Values that are closer together than the gaps between groups."""
+    if not values.size:
+        return []
+    ordered = np.sort(values)
     gap = max(GAP * float(np.ptp(ordered)), LEAST_GAP[kind])
-    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > gap) + 1)
-    return tuple(float(f"{np.mean(group):.4g}") for group in groups)
+    return np.split(ordered, np.flatnonzero(np.diff(ordered) > gap) + 1)
 
 
 def _span(places: Array) -> float:

@@ -20,6 +20,9 @@ from ..readings import FileReadings
 from ..run import CalibrationRun
 from ..source import checked_reading_options
 
+#: Readings that a run must have to be compared as a whole, and a level to be more than noise.
+LEAST_READINGS = 3
+
 
 @dataclass(frozen=True, eq=False)
 class Record:

@@ -10,6 +10,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
+from trueangle.errors import FileError
 
 FAULTS = (
     "duplicate_runs",
@@ -160,3 +161,43 @@ def test_measured_data(data_dir: Path) -> None:
     assert [(f.fault, f.runs) for f in found.data_faults] == [("duplicate_runs", ("10", "11"))]
     for name in ("rm44_misalignment", "arm_joint_protractor", "resolver_stepper", "gear_pair_fit"):
         assert ta.check(data_dir / f"{name}.csv").data_faults == (), name
+
+
+@pytest.mark.parametrize("mounts", [(0.0, 105.0), (-30.0, 17.5, 80.0)])
+def test_levels_within_one_run_are_reported(mounts: tuple[float, ...]) -> None:
+    """A mean of two levels is no level; a drift and noise are one level."""
+    rng = np.random.default_rng(41)
+    place = np.arange(0.0, 360.0, 12.0)
+    rows = [(x, m, 20.0 + 11.0 * i) for i, m in enumerate(mounts) for x in place]
+    reference, mount, temperature = np.array(rows).T
+    run = ta.CalibrationRun(
+        reference,
+        reference + 0.05 * np.cos(np.radians(reference - mount)),
+        period=360.0,
+        temperature=temperature + rng.normal(0.0, 0.2, mount.size),
+        torque=np.linspace(1.0, 2.0, mount.size),
+        mount=mount,
+    )
+    found = ta.check(run)
+    assert found.extent.mounts == mounts
+    expected = 20.0 + 11.0 * np.arange(len(mounts))
+    assert found.extent.temperatures == pytest.approx(expected, abs=0.2)
+    assert found.extent.loads == (1.5,)
+    assert {"thermal drift", "the reference's own error apart from the joint's"} <= {*found.can}
+
+
+def test_one_column_is_label_and_mount(tmp_path: Path) -> None:
+    path = tmp_path / "polygon.csv"
+    rows = [(x, x + 0.001 * (m + x % 7), m) for m in (0, 72, 144) for x in range(0, 360, 15)]
+    path.write_text(
+        "reference_deg,indicated_deg,turned\n" + "".join(f"{a},{b},{c}\n" for a, b, c in rows)
+    )
+    runs = ta.read_runs(path, signals={"run": "turned", "mount": ("turned", "deg")})
+    assert [run.label for run in runs] == ["0", "72", "144"]
+    assert [run.mount[0] for run in runs] == [0.0, 72.0, 144.0]
+    assert main(["check", str(path), "--signal", "run=turned", "--signal", "mount=turned:deg"]) == 0
+    path.write_text(path.read_text().replace(",144\n", ",third\n", 1))
+    with pytest.raises(
+        FileError, match="line 50, column 'turned': a number is needed, got 'third'"
+    ):
+        ta.read_runs(path, signals={"run": "turned", "mount": ("turned", "deg")})
