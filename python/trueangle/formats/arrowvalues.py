@@ -9,7 +9,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .format import Labels
+from .format import Labels, decoded_text
 
 #: Times count from 2000: a later start keeps more digits of a second.
 _STAMP, _EPOCH = pa.timestamp("us"), 946684800.0
@@ -78,9 +78,11 @@ def label_codes(column: pa.Array | pa.ChunkedArray) -> Labels:
     """A column of texts by their place among the different ones; nulls are the last."""
     if isinstance(column, pa.ChunkedArray):
         column = column.combine_chunks()
+    if pa.types.is_string_view(column.type) or pa.types.is_binary_view(column.type):
+        column = column.cast(pa.large_binary())
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
-    names = column.dictionary.to_pylist()
+    names = [decoded_text(name) for name in column.dictionary.to_pylist()]
     codes = arrow_values(column.indices)
     if column.indices.null_count:
         codes = np.where(np.isnan(codes), len(names), codes)
@@ -99,8 +101,9 @@ def is_number(kind: pa.DataType) -> bool:
 
 
 def is_label(kind: pa.DataType) -> bool:
-    """Whether `label_codes` takes it."""
-    return is_string(kind.value_type if pa.types.is_dictionary(kind) else kind)
+    """Whether `label_codes` takes it: text, or the bytes of one."""
+    kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+    return is_text(kind) or bool(pa.types.is_fixed_size_binary(kind))
 
 
 def is_string(kind: pa.DataType) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -239,8 +239,13 @@ class Format:
         return row + 2 if find is None else int(find(path, row))
 
 
-def row_labels(texts: Sequence[Any]) -> Labels:
-    """Texts, or None, as labels."""
+def decoded_text(text: Any) -> Any:
+    """Bytes as the text they encode, without the zeros that pad it; all else as it is."""
+    return text.decode("utf-8", "replace").rstrip("\0") if isinstance(text, bytes) else text
+
+
+def row_labels(texts: Iterable[Any]) -> Labels:
+    """Texts, their bytes, or None, as labels."""
     codes: dict[Any, int] = {}
-    found = [codes.setdefault(text, len(codes)) for text in texts]
+    found = [codes.setdefault(decoded_text(text), len(codes)) for text in texts]
     return Labels(np.array(found, dtype=np.intp), list(codes))

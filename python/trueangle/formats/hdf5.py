@@ -19,7 +19,7 @@ from .checksum import Checksum
 from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, note
 from .hdf5places import Hdf5Places
-from .hdf5sets import cached, data_sets, is_elsewhere, part, put
+from .hdf5sets import cached, data_sets, is_elsewhere, is_number_or_text, part, put
 from .stored import ROWS
 
 #: Readings taken together: what is read of them stays in the cache of the processor.
@@ -48,7 +48,7 @@ class RowRange(NamedTuple):
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
-    """Paths of all data sets of numbers, without the leading slash."""
+    """Paths of all data sets of numbers and texts, without the leading slash."""
     with _opened(path) as file:
         return _names(file)
 
@@ -186,7 +186,7 @@ def _names(file: h5py.File) -> list[str]:
     def visit(name: str | bytes, item: Any) -> None:
         if isinstance(name, bytes):  # it is no text, and nobody can ask for it
             return
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and item.ndim:
+        if isinstance(item, h5py.Dataset) and item.ndim and is_number_or_text(item):
             found.append(name)
 
     file.visititems(visit)

@@ -38,6 +38,7 @@ class Hdf5Places(NamedTuple):
         properties = data.id.get_create_plist()
         if (
             data.ndim != 1
+            or data.dtype.kind not in "fiu"
             or data.file.userblock_size
             or data.is_virtual
             or data.external

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from . import budget
-from .format import check_lengths
+from .format import check_lengths, row_labels
 from .hdf5filters import check_filters
 
 #: Places of HDF5's table of chunks in memory; a prime.
@@ -107,9 +107,16 @@ def _place(data: h5py.Dataset, start: int, stop: int) -> tuple[slice, ...]:
     return tuple(slice(start, stop) if i == along else slice(None) for i in range(data.ndim))
 
 
-def part(data: h5py.Dataset, start: int, stop: int) -> NDArray[Any]:
-    """A stretch of a vector, in the order of bytes of this machine."""
+def is_number_or_text(data: h5py.Dataset) -> bool:
+    """Whether `part` reads it: numbers, or texts of a fixed or any length."""
+    return data.dtype.kind in "fiu" or h5py.check_string_dtype(data.dtype) is not None
+
+
+def part(data: h5py.Dataset, start: int, stop: int) -> Any:
+    """A segment of a vector: numbers in the byte order of this machine, or labels."""
     values: NDArray[Any] = data[_place(data, start, stop)].reshape(-1)
+    if values.dtype.kind not in "fiu":
+        return row_labels(values.tolist())
     return values.astype(values.dtype.newbyteorder("="), copy=False)
 
 

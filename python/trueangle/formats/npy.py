@@ -141,8 +141,7 @@ def _values(part: NDArray[Any], array: NDArray[Any], name: str) -> Any:
     if array.dtype.names is not None:
         values = np.asarray(part[name])
         if values.dtype.kind in "SU":
-            texts = [v.decode("utf-8", "replace") if isinstance(v, bytes) else v for v in values]
-            return row_labels([str(text) for text in texts])
+            return row_labels(values.tolist())
     else:
         values = np.asarray(part.reshape(len(part), -1)[:, _names(array).index(name)])
     return np.ascontiguousarray(values.astype(values.dtype.newbyteorder("="), copy=False))

@@ -177,8 +177,7 @@ def _part(path: Path, name: str, given: IO[bytes], column: _ArrayHeader, count: 
     values: NDArray[Any] = np.frombuffer(data, column.kind)
     if column.kind.kind in "fiu":
         return values.astype(column.kind.newbyteorder("="), copy=False)
-    decoded = [v.decode("utf-8", "replace") if isinstance(v, bytes) else v for v in values.tolist()]
-    return row_labels(decoded)
+    return row_labels(values.tolist())
 
 
 def _kind_of_copy(column: _ArrayHeader) -> np.dtype[Any]:

@@ -40,8 +40,9 @@ def spikes(error: Array, angle: Array, period: float) -> tuple[NDArray[np.bool_]
     """Which readings are isolated outliers, and how far each is off its neighbours.
 
     A reading is a spike where it lies more than 8 robust standard deviations off the median of
-    its neighbours in angle, and off the line between the next two; an error that changes as much from neighbour to neighbour widens the
-    limit itself, and so does noise on a slope. None of fewer than 28 readings is one.
+    its neighbours in angle, and off the line between the next two; an error that changes as much
+    from neighbour to neighbour widens the limit itself, and so does noise on a slope. None of
+    fewer than 28 readings is one.
     """
     none = np.zeros(error.size, dtype=np.bool_)
     if error.size < 4 * _NEIGHBOURS:

@@ -1,0 +1,64 @@
+"""Labels are text however a format stores text: every file gives the runs that CSV gives."""
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+
+h5py = pytest.importorskip("h5py")
+pa = pytest.importorskip("pyarrow")
+pq = pytest.importorskip("pyarrow.parquet")
+
+NAMES = ["cold", "warm", "hot Ä"]
+ZEROS = np.array([0.0, 7.0, -4.0])
+
+
+def readings():
+    rng = np.random.default_rng(17)
+    x = np.sort(rng.uniform(0.0, 360.0, 150))
+    run = rng.integers(0, 3, x.size)
+    return x, x + ZEROS[run] + 0.08 * np.cos(np.radians(2.0 * x)), [NAMES[k] for k in run]
+
+
+def hdf5(path, kind, chunked):
+    x, y, run = readings()
+    more = {"chunks": (32,), "compression": "gzip"} if chunked else {}
+    with h5py.File(path, "w") as file:
+        file.create_dataset("reference_deg", data=x, **more)
+        file.create_dataset("indicated_deg", data=y, **more)
+        texts = [name.encode() for name in run] if kind == "S9" else run
+        file.create_dataset("run", data=np.array(texts, dtype=kind), **more)
+
+
+def parquet(path, kind):
+    x, y, run = readings()
+    if kind == "fixed":
+        column = pa.array([name.encode().ljust(9, b"\0") for name in run], pa.binary(9))
+    elif kind == "dictionary":
+        column = pa.array([name.encode() for name in run]).dictionary_encode()
+    else:
+        column = pa.array([name.encode() for name in run]).cast(kind)
+    pq.write_table(pa.table({"reference_deg": x, "indicated_deg": y, "run": column}), path)
+
+
+CASES = [
+    *(("h5", kind, chunked) for kind in ("S9", "vlen") for chunked in (False, True)),
+    *(("parquet", k, None) for k in (pa.string(), pa.binary(), pa.large_binary(), "fixed")),
+    ("parquet", "dictionary", None),
+]
+
+
+@pytest.mark.parametrize(("ending", "kind", "chunked"), CASES, ids=str)
+def test_texts_are_labels(ending, kind, chunked, tmp_path):
+    path = tmp_path / f"runs.{ending}"
+    if ending == "h5":
+        hdf5(path, h5py.string_dtype() if kind == "vlen" else kind, chunked)
+    else:
+        parquet(path, kind)
+    runs = ta.read_runs(path)
+    assert sorted(run.label for run in runs) == sorted(NAMES)
+    _, y, run = readings()
+    first = next(r for r in runs if r.label == NAMES[2])
+    np.testing.assert_array_equal(first.indicated, y[np.array(run) == NAMES[2]])
+    fit = ta.fit(path, orders=[1, 2])
+    np.testing.assert_allclose(fit.amplitudes, [0.0, 0.08], atol=1e-12)
