@@ -244,7 +244,9 @@ class Target(ABC):
 
 def _checked(name: str, option: Option, value: Any) -> Any:
     if isinstance(option.values, tuple):
-        return check_choice(name, value, option.values)
+        # A word of digits may be given as the number that it is.
+        number = isinstance(value, int) and not isinstance(value, bool)
+        return check_choice(name, str(value) if number else value, option.values)
     try:
         if option.values is int and float(value) != int(value):
             raise ValueError

@@ -331,3 +331,20 @@ def test_a_scale_that_no_float_holds_is_refused(scale, tmp_path):
     path.write_text(text)
     with pytest.raises(ta.errors.TrueAngleError, match="none of the firmware's floats"):
         ta.import_model(path, "moteus")
+
+
+def test_a_choice_of_digits_is_taken_as_a_number_too():
+    """`fmi=2` and `fmi="2"` are one; other numbers are refused by the words allowed."""
+    tried = [
+        (target, name, word)
+        for target in TARGETS.values()
+        for name, option in target.options.items()
+        if isinstance(option.values, tuple)
+        for word in option.values
+        if word.isdigit()
+    ]
+    assert len(tried) >= 6
+    for target, name, word in tried:
+        assert target.checked({name: int(word)}) == target.checked({name: word})
+        with pytest.raises(ta.errors.ArgumentError, match=f"{name} must be one of"):
+            target.checked({name: 7})
