@@ -27,6 +27,9 @@ settings.load_profile("trueangle")
 
 # What a shell runs in the background is deaf to Ctrl-C, and so is all that it starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# Likewise what nohup starts to a hang-up; tests that send one to a child need the default there.
+if hasattr(signal, "SIGHUP"):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -348,3 +348,16 @@ def test_a_choice_of_digits_is_taken_as_a_number_too():
         assert target.checked({name: int(word)}) == target.checked({name: word})
         with pytest.raises(ta.errors.ArgumentError, match=f"{name} must be one of"):
             target.checked({name: 7})
+
+
+@pytest.mark.parametrize("target", ["c", "rust", "csv", "moteus", "simplefoc", "tinymovr"])
+def test_a_table_with_a_byte_order_mark_is_read_as_without(target, tmp_path):
+    """Editors of Windows write one: the table is not refused, and no order is lost."""
+    plain, marked = (tmp_path / f"{name}{ENDINGS[target]}" for name in ("plain", "marked"))
+    more = {"bits": 14} if "bits" in TARGETS[target].options else {}
+    ta.export_model(golden_model(), target, plain, **more)
+    marked.write_bytes(b"\xef\xbb\xbf" + plain.read_bytes())
+    expected, found = (ta.import_model(path, target) for path in (plain, marked))
+    assert expected.shafts
+    assert found.shafts == expected.shafts
+    assert found.constant == expected.constant
