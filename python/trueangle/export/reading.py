@@ -70,7 +70,13 @@ def table_error(path: str, problem: str, line: int | None = None) -> FileError:
 
 
 def sampled_model(
-    values: Array, path: str, target: Target, device: Correction, *, step: float
+    values: Array,
+    path: str,
+    target: Target,
+    device: Correction,
+    *,
+    step: float,
+    note: str = "",
 ) -> HarmonicModel:
     """Model of equidistant corrections (turns) between which a target interpolates."""
     closed = np.append(values, values[0])
@@ -80,7 +86,7 @@ def sampled_model(
         return np.asarray(np.interp(x % 1.0, places, closed))
 
     table = ReadTable("output", 1.0, function, len(values), step)
-    return function_model([table], path, target, device)
+    return function_model([table], path, target, device, note=note)
 
 
 def function_model(

@@ -122,8 +122,25 @@ def test_a_lookup_of_a_mechaduino_is_known_to_its_last_digit_of_a_degree(decimal
     np.testing.assert_allclose(np.sqrt(np.diag(model.covariance)[1:]), std)
     assert {1, 3} <= set(model.orders)
     assert min(model.amplitudes) > 3.0 * std
-    np.testing.assert_allclose(
-        np.asarray(model.correct(read)) - table + 123.0
-        - 360.0 * np.rint((np.asarray(model.correct(read)) - table + 123.0) / 360.0),
-        0.0, atol=0.51 * step + 1e-3 * step * 16.0,
-    )  # fmt: skip
+    assert model.constant == pytest.approx(-123.0, abs=step)
+    off = np.mod(np.asarray(model.correct(read)) - table + 180.0, 360.0) - 180.0
+    np.testing.assert_allclose(off, 0.0, atol=0.51 * step + 1e-3 * step * 16.0)
+
+
+@pytest.mark.parametrize(("zero", "noise"), [(41.5, 0.006), (-163.0, 0.013), (179.8, 0.02)])
+def test_a_measured_lookup_keeps_its_zero_and_its_noise_is_smoothed(zero, noise, tmp_path):
+    """Noise of about an entry makes angles go backward: they are smoothed, and it is reported."""
+    rng = np.random.default_rng(8)
+    read = np.arange(16384) * (360.0 / 16384)
+    true = read - zero - 0.9 * np.sin(np.radians(read + 10.0)) - 0.1 * np.sin(np.radians(50 * read))
+    table = np.mod(true + noise * rng.normal(size=read.size), 360.0)
+    path = tmp_path / "Parameters.cpp"
+    body = ", ".join(f"{value:.2f}" for value in table)
+    path.write_text(f"const PROGMEM float lookup[] = {{\n{body}\n}};\n")
+    model = ta.import_model(path, "mechaduino")
+    off = np.mod(np.asarray(model.correct(read)) - true + 180.0, 360.0) - 180.0
+    assert np.abs(off).max() < 2.0 * noise
+    assert "go backward" in model.fit.note
+    path.write_text(f"const PROGMEM float lookup[] = {{\n{', '.join(map(str, table[::-1]))}\n}};\n")
+    with pytest.raises(ta.TrueAngleError, match="do not go once around"):
+        ta.import_model(path, "mechaduino")
