@@ -15,11 +15,13 @@ use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 /// Rows reduced at a time: enough to hide the triangle above them, few enough for the cache.
 const BLOCK_ROWS: usize = 512;
 
-/// Readings of a run from which on moments cost less than QR of its rows. The rows cost
-/// `readings * unknowns^2`, the spectrum of the moments and its normal equations grow with the
-/// unknowns no slower than that, so the number does not depend on the orders: measured from 5
-/// to 200 of them, the two are equal at 190 to 250 readings.
-const READINGS_PER_RUN: usize = 256;
+/// Moments pay when there are this many readings per segment of the circle.
+const READINGS_PER_SEGMENT: usize = 8;
+
+/// With this many harmonics they pay at any number of readings: QR of the rows costs
+/// `readings * harmonics^2`, the moments' spectrum and normal equations less. With fewer, QR stays:
+/// what it says of partial travel is relied on where a run is held out in parts.
+const MANY_HARMONICS: usize = 128;
 
 /// Factors of segments want some readings more than their twelve unknowns.
 pub const READINGS_PER_FACTOR: usize = 32;
@@ -116,7 +118,8 @@ pub fn reduce(
         let readings: usize = runs.iter().map(|run| run.angle.len()).sum();
         let per_segment = readings / (segments * runs.len());
         let fits = segments <= MOST_SEGMENTS;
-        if fits && (readings >= READINGS_PER_RUN * runs.len() || asked.is_some()) {
+        let pays = per_segment >= READINGS_PER_SEGMENT || orders.len() >= MANY_HARMONICS;
+        if fits && (pays || asked.is_some()) {
             let preview = || Preview::of_runs(design, (cycles, &orders), runs, centres);
             let preview = options.watch.then(preview).flatten();
             let mut farthest = 0.0f64;

@@ -228,7 +228,7 @@ def test_a_ratio_near_that_of_two_units_is_told_as_a_ratio(ratio):
         ({"orders": {"motor": [1]}}, "gear_ratio"),
         ({"orders": "all"}, "auto"),
         ({"orders": [1], "loss": "cauchy"}, "loss"),
-        ({"orders": {"motor": [1]}, "gear_ratio": -5.0}, "gear_ratio"),
+        ({"orders": {"motor": [1]}, "gear_ratio": 0.0}, "gear_ratio"),
         ({"orders": [1], "argument": "true"}, "argument"),
         ({"orders": [1], "fixed_member": "housing"}, "fixed_member"),
     ],

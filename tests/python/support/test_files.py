@@ -281,15 +281,6 @@ def test_files_have_a_size_limit_that_the_message_names(tmp_path, monkeypatch):
             read(path)
 
 
-def test_what_is_written_is_small_enough_to_be_read(tmp_path, model, monkeypatch):
-    from trueangle.model import writing as modeltext
-
-    monkeypatch.setattr(modeltext, "MODEL_BYTES", 100)
-    with pytest.raises(ta.errors.ArgumentError, match="covariance"):
-        model.save(tmp_path / "m.json")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_folder_that_takes_no_files_ends_the_attempt(model, tmp_path, monkeypatch):
     """As /proc: a folder, in which nothing can be made."""
     opened = os.open

@@ -68,7 +68,8 @@ class Record:
         if wild.any():  # a sensor that rounds differs from its neighbours by its counts
             steps = np.diff(np.unique(self.indicated[~wild]))
             wild &= distance > 2.0 * steps.min(initial=360.0, where=steps > 0.0)
-        return wild, distance
+        # What several readings in a row show is an effect, not an outlier.
+        return wild & (np.convolve(wild, np.ones(7), "same") < 1.5), distance
 
     @cached_property
     def unwrapped(self) -> tuple[Array, Array]:
