@@ -56,6 +56,24 @@ pub enum Error {
         wanted: usize,
     },
 
+    /// A run without a reading.
+    #[error("a run must have at least 1 reading, got none")]
+    NoReadings,
+
+    /// Times of a run decrease, or all are the same.
+    #[error(
+        "time[{index}] must not be smaller than the one before, and the times of a run must \
+         differ: got {got} after {previous}; pass no time for equally spaced readings"
+    )]
+    Time {
+        /// The reading at fault.
+        index: usize,
+        /// Its time.
+        got: f64,
+        /// The time before.
+        previous: f64,
+    },
+
     /// Shaft speeds are positive finite cycles per output turn.
     #[error(
         "cycles_per_turn of shaft {shaft} must be positive and finite (1e-9 to 1e9), got {got}"

@@ -28,6 +28,7 @@ pub mod terms;
 pub mod band;
 pub mod banded;
 pub mod design;
+pub mod evidence;
 pub mod fit;
 pub mod linear;
 pub mod lstsq;

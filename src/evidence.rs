@@ -1,0 +1,29 @@
+//! One linear model of all readings: noise, orders and effects of runs by their evidence.
+//!
+//! For every run `r`, with `X` the columns of all groups (an order is its cosine and its sine):
+//!
+//! ```text
+//! y_r  = z_r + X_r (b + d_r) + n_r
+//! b_g  ~ 0 or N(0, tau_g I)            which groups are in (spike and slab)
+//! d_rg ~ N(0, omega_g I)               what differs from run to run
+//! n_r  ~ N(0, C),  C = w I + sum_j a_j exp(-|dt| / T_j)
+//! z_r  flat                            the zero of the run
+//! ```
+//!
+//! The correlation times `T_j` are fixed ([`CORRELATION_TIMES`]), in median steps of the run's time.
+//! White noise, autoregressive noise, drift, 1/f noise and random walks are all in their span.
+//!
+//! One pass over the readings gives the Gram matrices of each run ([`Gram`]).
+
+// Loops over small arrays read as the equations do.
+#![allow(clippy::needless_range_loop)]
+
+mod gram;
+mod readings;
+mod rows;
+mod whitening;
+
+pub use gram::{Gram, Sums};
+pub use readings::{Readings, Run};
+pub use rows::Rows;
+pub use whitening::{CORRELATION_TIMES, Factor, Noise, State, TERMS, decays};

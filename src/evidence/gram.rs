@@ -1,0 +1,126 @@
+//! Sums of products of whitened columns: all that the evidence needs of a run.
+//!
+//! With `X` the columns, `Y` the right-hand sides (the error) and `1` the zero of the run:
+//!
+//! ```text
+//! G = X' C^-1 X - c c' / n,   c = X' C^-1 1,   n = 1' C^-1 1
+//! g = X' C^-1 Y - c (1' C^-1 Y) / n,    s = Y' C^-1 Y - (Y' C^-1 1) (1' C^-1 Y) / n
+//! log scale = -log|L| - 1/2 log n - (N - 1)/2 log 2 pi
+//! ```
+//!
+//! so that a run's likelihood, its zero integrated over a flat prior, is
+//! `log scale - 1/2 (s - 2 b' g + b' G b)`.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::readings::{Readings, Run};
+use super::rows::Rows;
+use super::whitening::{Factor, Noise, State};
+use crate::{interrupt, threads};
+
+/// Readings below which one thread is faster than several.
+const THREADED: usize = 400;
+
+/// Sums without the zero of the run; those of several runs add up.
+#[derive(Clone, Debug)]
+pub struct Sums {
+    /// `G`.
+    pub products: DMatrix<f64>,
+    /// `g`, a column for each right-hand side.
+    pub moments: DMatrix<f64>,
+    /// `s`.
+    pub squares: DMatrix<f64>,
+    /// Logarithm of what does not depend on coefficients.
+    pub log_scale: f64,
+}
+
+impl Sums {
+    /// Of no readings.
+    pub fn zeros(columns: usize, targets: usize) -> Self {
+        Self {
+            products: DMatrix::zeros(columns, columns),
+            moments: DMatrix::zeros(columns, targets),
+            squares: DMatrix::zeros(targets, targets),
+            log_scale: 0.0,
+        }
+    }
+
+    /// Adds those of other readings.
+    pub fn merge(&mut self, other: &Self) {
+        self.products += &other.products;
+        self.moments += &other.moments;
+        self.squares += &other.squares;
+        self.log_scale += other.log_scale;
+    }
+}
+
+/// Sums of one run, and what its zero took of them.
+#[derive(Clone, Debug)]
+pub struct Gram {
+    /// Without the zero.
+    pub sums: Sums,
+    /// `n`: the information of the run about its zero.
+    pub information: f64,
+    /// `c / n`: weighted means of the columns.
+    pub means: DVector<f64>,
+    /// Weighted mean of the error, less its plain mean.
+    pub level: f64,
+}
+
+impl Gram {
+    /// From the upper triangle of products of whitened rows: zero, columns, error.
+    fn of(products: &[f64], stride: usize, columns: usize, (factor, count): (f64, usize)) -> Self {
+        let m = columns - 2;
+        let at = |i: usize, j: usize| products[i.min(j) * stride + i.max(j)];
+        let n = at(0, 0);
+        let left = |i: usize, j: usize| at(i, j) - at(0, i) * (at(0, j) / n);
+        let last = columns - 1;
+        let constant = 0.5 * (count as f64 - 1.0) * TAU.ln();
+        let sums = Sums {
+            products: DMatrix::from_fn(m, m, |i, j| left(i + 1, j + 1)),
+            moments: DMatrix::from_fn(m, 1, |i, _| left(i + 1, last)),
+            squares: DMatrix::from_element(1, 1, left(last, last).max(0.0)),
+            log_scale: -factor - 0.5 * n.ln() - constant,
+        };
+        Self {
+            sums,
+            information: n,
+            means: DVector::from_fn(m, |i, _| at(0, i + 1) / n),
+            level: at(0, last) / n,
+        }
+    }
+}
+
+impl Readings {
+    /// The Gram matrices of each run under a noise, in one pass.
+    pub fn grams(&self, noise: Noise) -> Vec<Gram> {
+        let work = |r: usize| self.gram(&self.runs()[r], noise);
+        threads::map_parts(self.runs().len(), self.threads(), work).collect()
+    }
+
+    /// Threads that a pass is worth.
+    pub(super) fn threads(&self) -> usize {
+        if self.len() < THREADED {
+            1
+        } else {
+            threads::available()
+        }
+    }
+
+    fn gram(&self, run: &Run, noise: Noise) -> Gram {
+        let factor = Factor::new(noise, run.decays());
+        let columns = self.columns();
+        let stride = Rows::width(columns);
+        let mut state = State::new(columns);
+        let mut products = vec![0.0; columns * stride];
+        for (start, count) in run.chunks() {
+            interrupt::point();
+            let mut rows = self.rows(run, start, count);
+            factor.whiten(start, &mut rows, &mut state);
+            rows.add_products(&rows, &mut products);
+        }
+        Gram::of(&products, stride, columns, (factor.log_root, run.len()))
+    }
+}

@@ -1,0 +1,176 @@
+//! Readings of runs, and the rows of their columns: zero, cosines and sines of orders, error.
+
+use super::rows::Rows;
+use super::whitening::{Terms, decays};
+use crate::check::{finite, same_length};
+use crate::error::Error;
+use crate::spectrum::median;
+use crate::waves;
+
+/// Readings whose columns are made at once: they stay in the second cache.
+pub const CHUNK: usize = 256;
+
+/// Readings of one run, in the order in which they were read.
+#[derive(Clone, Debug)]
+pub struct Run {
+    theta: Vec<f64>,
+    error: Vec<f64>,
+    mean: f64,
+    decays: Vec<Terms>,
+}
+
+impl Run {
+    /// Of angles in radians, errors in any unit, and times that do not decrease; without times,
+    /// readings are equally spaced.
+    pub fn new(theta: &[f64], error: &[f64], time: Option<&[f64]>) -> Result<Self, Error> {
+        if theta.is_empty() {
+            return Err(Error::NoReadings);
+        }
+        same_length("error", error.len(), "theta", theta.len())?;
+        finite("theta", theta)?;
+        finite("error", error)?;
+        let decays = match time {
+            Some(time) => {
+                same_length("time", time.len(), "theta", theta.len())?;
+                finite("time", time)?;
+                decays(&in_steps(time)?)
+            }
+            None => decays(&(0..theta.len()).map(|i| i as f64).collect::<Vec<_>>()),
+        };
+        let mean = error.iter().sum::<f64>() / error.len() as f64;
+        Ok(Self {
+            theta: theta.to_vec(),
+            error: error.iter().map(|e| e - mean).collect(),
+            mean,
+            decays,
+        })
+    }
+
+    /// Readings.
+    pub fn len(&self) -> usize {
+        self.theta.len()
+    }
+
+    /// True without a reading.
+    pub fn is_empty(&self) -> bool {
+        self.theta.is_empty()
+    }
+
+    /// Decays of the noise between readings.
+    pub fn decays(&self) -> &[Terms] {
+        &self.decays
+    }
+
+    /// Errors less their mean.
+    pub fn error(&self) -> &[f64] {
+        &self.error
+    }
+
+    /// Mean of the errors.
+    pub fn mean(&self) -> f64 {
+        self.mean
+    }
+
+    /// First reading and length of each chunk.
+    pub fn chunks(&self) -> impl DoubleEndedIterator<Item = (usize, usize)> + ExactSizeIterator {
+        let n = self.len();
+        (0..n.div_ceil(CHUNK)).map(move |k| (k * CHUNK, CHUNK.min(n - k * CHUNK)))
+    }
+}
+
+/// Times in units of the median step.
+fn in_steps(time: &[f64]) -> Result<Vec<f64>, Error> {
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if let Some(at) = steps.iter().position(|step| *step < 0.0) {
+        return Err(Error::Time {
+            index: at + 1,
+            got: time[at + 1],
+            previous: time[at],
+        });
+    }
+    if steps.is_empty() {
+        return Ok(vec![0.0; time.len()]);
+    }
+    let mut step = median(&mut steps);
+    if step == 0.0 {
+        // Most readings share their time with another: the mean step is what is left.
+        step = (time[time.len() - 1] - time[0]) / steps.len() as f64;
+    }
+    if step == 0.0 {
+        return Err(Error::Time {
+            index: 1,
+            got: time[1],
+            previous: time[0],
+        });
+    }
+    Ok(time.iter().map(|t| (t - time[0]) / step).collect())
+}
+
+/// Runs, and the orders that are looked at.
+#[derive(Clone, Debug)]
+pub struct Readings {
+    runs: Vec<Run>,
+    orders: Vec<u32>,
+}
+
+impl Readings {
+    /// Of orders from 1 in increasing order.
+    pub fn new(runs: Vec<Run>, orders: Vec<u32>) -> Result<Self, Error> {
+        let mut previous = 0;
+        for &got in &orders {
+            if got <= previous {
+                return Err(Error::Orders {
+                    shaft: 0,
+                    previous,
+                    got,
+                });
+            }
+            previous = got;
+        }
+        Ok(Self { runs, orders })
+    }
+
+    /// The runs.
+    pub fn runs(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// The orders.
+    pub fn orders(&self) -> &[u32] {
+        &self.orders
+    }
+
+    /// Readings of all runs.
+    pub fn len(&self) -> usize {
+        self.runs.iter().map(Run::len).sum()
+    }
+
+    /// True without a reading.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Columns of a row: the zero, a cosine and a sine of every order, the error.
+    pub fn columns(&self) -> usize {
+        2 * self.orders.len() + 2
+    }
+
+    /// Rows of a chunk of a run.
+    pub(super) fn rows(&self, run: &Run, start: usize, count: usize) -> Rows {
+        let columns = self.columns();
+        let mut rows = Rows::zeros(count, columns);
+        let mut waves = vec![0.0; 2 * self.orders.len() * count];
+        let theta = &run.theta[start..start + count];
+        let answer = waves::Answer::default();
+        waves::rows(theta, &self.orders, answer, &mut waves).expect("lengths are right");
+        for i in 0..count {
+            let row = rows.row_mut(i);
+            row[0] = 1.0;
+            for c in 0..2 * self.orders.len() {
+                row[c + 1] = waves[c * count + i];
+            }
+            row[columns - 1] = run.error[start + i];
+        }
+        rows
+    }
+}

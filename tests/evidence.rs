@@ -1,0 +1,246 @@
+//! The evidence of models of all readings against dense covariances.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use trueangle::Error;
+use trueangle::evidence::{
+    CORRELATION_TIMES, Factor, Noise, Readings, Rows, Run, State, TERMS, decays,
+};
+
+/// Of some hundred products of order 1 times the condition of the covariance.
+const SAME: f64 = 1e-10;
+
+/// Numbers from 0 to 1 without a generator: the golden rotation.
+fn even(i: usize, seed: usize) -> f64 {
+    (0.618_033_988_749_895 * i as f64 + 0.414_213_562_373_095 * seed as f64 + 0.1).fract()
+}
+
+/// About normal: the sum of twelve scattered numbers.
+fn normal(i: usize, seed: usize) -> f64 {
+    let hash = |k: usize| {
+        let mut x = (i * 1_000_003 + k * 7919 + seed * 104_729 + 17) as u64;
+        for _ in 0..3 {
+            x ^= x >> 33;
+            x = x.wrapping_mul(0xff51_afd7_ed55_8ccd);
+        }
+        (x >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..12).map(hash).sum::<f64>() - 6.0
+}
+
+/// Irregular times with gaps and readings that share a time.
+fn times(n: usize, seed: usize) -> Vec<f64> {
+    let mut t = 3.0;
+    (0..n)
+        .map(|i| {
+            t += match i % 17 {
+                5 => 0.0,
+                9 => 150.0,
+                _ => 0.2 + 1.6 * even(i, seed),
+            };
+            t
+        })
+        .collect()
+}
+
+fn dense(noise: &Noise, time: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(time.len(), time.len(), |i, k| {
+        let apart = (time[i] - time[k]).abs();
+        let white = if i == k { noise.white } else { 0.0 };
+        let terms = noise.terms.iter().zip(CORRELATION_TIMES);
+        white
+            + terms
+                .map(|(a, length)| a * (-apart / length).exp())
+                .sum::<f64>()
+    })
+}
+
+fn noises() -> [Noise; 4] {
+    [
+        Noise::of([0.7, 0.2, 0.5, 0.1, 0.9, 2.0]),
+        Noise::of([1.3, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        Noise::of([0.05, 0.0, 4.0, 0.0, 0.0, 0.3]),
+        Noise::of([0.02, 1.0, 0.0, 0.0, 0.0, 30.0]),
+    ]
+}
+
+fn rows_of(x: &DMatrix<f64>) -> Rows {
+    let mut rows = Rows::zeros(x.nrows(), x.ncols());
+    for i in 0..x.nrows() {
+        for c in 0..x.ncols() {
+            rows.row_mut(i)[c] = x[(i, c)];
+        }
+    }
+    rows
+}
+
+fn matrix(rows: &Rows) -> DMatrix<f64> {
+    DMatrix::from_fn(rows.len(), rows.columns(), |i, c| rows.row(i)[c])
+}
+
+#[test]
+fn whitened_columns_are_those_of_the_dense_factor() {
+    for (n, width) in [(1, 3), (2, 1), (150, 9)] {
+        let time = times(n, n);
+        let x = DMatrix::from_fn(n, width, |i, c| normal(i, c));
+        for noise in noises() {
+            let found = Cholesky::new(dense(&noise, &time)).unwrap();
+            let decays = decays(&time);
+            let factor = Factor::new(noise, &decays);
+            let log_root = found.l().diagonal().map(f64::ln).sum();
+            assert!((factor.log_root - log_root).abs() < SAME * n as f64);
+            let mut rows = rows_of(&x);
+            factor.whiten(0, &mut rows, &mut State::new(x.ncols()));
+            let white = found.l().solve_lower_triangular(&x).unwrap();
+            assert!((matrix(&rows) - &white).amax() < SAME * white.amax().max(1.0));
+            factor.back(0, &mut rows, &mut State::new(x.ncols()));
+            let solved = found.solve(&x);
+            assert!((matrix(&rows) - &solved).amax() < SAME * solved.amax().max(1.0));
+        }
+    }
+}
+
+/// Nothing overflows, and what is singular is held at the rounding of the total.
+#[test]
+fn extreme_noises_stay_finite() {
+    let time: Vec<f64> = (0..400)
+        .map(|i| 1e6 * f64::from(i % 2) + f64::from(i))
+        .scan(0.0, |t, step| {
+            *t += step;
+            Some(*t)
+        })
+        .collect();
+    let same = vec![5.0; 400];
+    for time in [time, same] {
+        let decays = decays(&time);
+        for scale in [1e-200, 1.0, 1e200] {
+            for white in [0.0, 1e-30, 1.0] {
+                let noise = Noise {
+                    white: scale * white,
+                    terms: [scale; TERMS],
+                };
+                let factor = Factor::new(noise, &decays);
+                let mut rows = rows_of(&DMatrix::from_element(400, 2, scale.sqrt()));
+                factor.whiten(0, &mut rows, &mut State::new(2));
+                assert!(factor.log_root.is_finite());
+                assert!(matrix(&rows).iter().all(|x| x.is_finite()));
+            }
+        }
+    }
+}
+
+#[derive(Clone)]
+struct Case {
+    theta: Vec<f64>,
+    error: Vec<f64>,
+    time: Vec<f64>,
+}
+
+/// Runs of different lengths, one of a single reading and one longer than a chunk.
+fn cases(lengths: &[usize]) -> Vec<Case> {
+    lengths
+        .iter()
+        .enumerate()
+        .map(|(r, &n)| {
+            let theta: Vec<f64> = (0..n).map(|i| 6.0 * even(i, r)).collect();
+            let wave = |(i, x): (usize, &f64)| {
+                5.0 * (x + 0.3).cos() + 2.0 * (3.0 * x).sin() + normal(i, r) + 40.0 * r as f64
+            };
+            let error = theta.iter().enumerate().map(wave).collect();
+            Case {
+                theta,
+                error,
+                time: times(n, r),
+            }
+        })
+        .collect()
+}
+
+fn readings(cases: &[Case], orders: &[u32]) -> Readings {
+    let run = |case: &Case| Run::new(&case.theta, &case.error, Some(&case.time)).unwrap();
+    Readings::new(cases.iter().map(run).collect(), orders.to_vec()).unwrap()
+}
+
+fn in_steps(time: &[f64]) -> Vec<f64> {
+    let mut steps: Vec<f64> = time.windows(2).map(|p| p[1] - p[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let n = steps.len();
+    let step = if n == 0 {
+        1.0
+    } else {
+        0.5 * (steps[n / 2] + steps[(n - 1) / 2])
+    };
+    time.iter().map(|t| t / step).collect()
+}
+
+fn harmonics(theta: &[f64], orders: &[u32]) -> DMatrix<f64> {
+    DMatrix::from_fn(theta.len(), 2 * orders.len(), |i, c| {
+        let angle = f64::from(orders[c / 2]) * theta[i];
+        if c % 2 == 0 { angle.cos() } else { angle.sin() }
+    })
+}
+
+const LENGTHS: [usize; 4] = [90, 1, 300, 40];
+const ORDERS: [u32; 4] = [1, 2, 3, 17];
+
+#[test]
+fn grams_are_those_of_the_dense_inverse() {
+    let cases = cases(&LENGTHS);
+    let readings = readings(&cases, &ORDERS);
+    for noise in noises() {
+        for (case, gram) in cases.iter().zip(readings.grams(noise)) {
+            let n = case.theta.len();
+            let covariance = Cholesky::new(dense(&noise, &in_steps(&case.time))).unwrap();
+            let x = harmonics(&case.theta, &ORDERS);
+            let y = DVector::from_column_slice(&case.error);
+            let ones = DVector::from_element(n, 1.0);
+            let own = covariance.solve(&ones);
+            let information = ones.dot(&own);
+            let projected =
+                |c: &DMatrix<f64>| covariance.solve(c) - &own * (own.transpose() * c) / information;
+            let y = DMatrix::from_column_slice(n, 1, y.as_slice());
+            let expected = [
+                (&gram.sums.products, x.tr_mul(&projected(&x))),
+                (&gram.sums.moments, x.tr_mul(&projected(&y))),
+                (&gram.sums.squares, y.tr_mul(&projected(&y))),
+            ];
+            for (found, wanted) in expected {
+                assert!((found - &wanted).amax() <= SAME * (1.0 + wanted.amax()) * 10.0);
+            }
+            assert!((gram.information / information - 1.0).abs() < SAME);
+            let log_root: f64 = covariance.l().diagonal().map(f64::ln).sum();
+            let constant = 0.5 * (n as f64 - 1.0) * std::f64::consts::TAU.ln();
+            let scale = -log_root - 0.5 * information.ln() - constant;
+            assert!((gram.sums.log_scale - scale).abs() < SAME * n as f64);
+        }
+    }
+}
+
+#[test]
+fn readings_that_cannot_be_used_are_refused() {
+    let new =
+        |theta: &[f64], error: &[f64], time: Option<&[f64]>| Run::new(theta, error, time).err();
+    assert_eq!(new(&[], &[], None), Some(Error::NoReadings));
+    assert!(matches!(
+        new(&[1.0], &[1.0, 2.0], None),
+        Some(Error::Length { .. })
+    ));
+    assert!(matches!(
+        new(&[f64::NAN], &[1.0], None),
+        Some(Error::NotFinite { .. })
+    ));
+    let time = |time: &[f64]| new(&[1.0; 3], &[1.0; 3], Some(time));
+    let wrong = |index, got, previous| {
+        Some(Error::Time {
+            index,
+            got,
+            previous,
+        })
+    };
+    assert_eq!(time(&[1.0, 3.0, 2.0]), wrong(2, 2.0, 3.0));
+    assert_eq!(time(&[4.0; 3]), wrong(1, 4.0, 4.0));
+    assert_eq!(time(&[4.0, 4.0, 5.0]), None);
+    let orders = |orders: &[u32]| Readings::new(Vec::new(), orders.to_vec()).err();
+    assert!(matches!(orders(&[0]), Some(Error::Orders { .. })));
+    assert!(matches!(orders(&[2, 2]), Some(Error::Orders { .. })));
+    assert_eq!(orders(&[1, 7]), None);
+}
