@@ -13,17 +13,22 @@
 //! The correlation times `T_j` are fixed ([`CORRELATION_TIMES`]), in median steps of the run's time.
 //! White noise, autoregressive noise, drift, 1/f noise and random walks are all in their span.
 //!
-//! One pass over the readings gives the Gram matrices of each run ([`Gram`]).
+//! One pass over the readings gives the Gram matrices of each run ([`Gram`]); from them come the
+//! evidence and the posterior of a model ([`Model::posterior`]) without another look at the readings.
 
 // Loops over small arrays read as the equations do.
 #![allow(clippy::needless_range_loop)]
 
 mod gram;
+mod model;
+mod posterior;
 mod readings;
 mod rows;
 mod whitening;
 
 pub use gram::{Gram, Sums};
+pub use model::Model;
+pub use posterior::Posterior;
 pub use readings::{Readings, Run};
 pub use rows::Rows;
 pub use whitening::{CORRELATION_TIMES, Factor, Noise, State, TERMS, decays};

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use trueangle::Error;
 use trueangle::evidence::{
-    CORRELATION_TIMES, Factor, Noise, Readings, Rows, Run, State, TERMS, decays,
+    CORRELATION_TIMES, Factor, Model, Noise, Readings, Rows, Run, State, TERMS, decays,
 };
 
 /// Of some hundred products of order 1 times the condition of the covariance.
@@ -243,4 +243,129 @@ fn readings_that_cannot_be_used_are_refused() {
     assert!(matches!(orders(&[0]), Some(Error::Orders { .. })));
     assert!(matches!(orders(&[2, 2]), Some(Error::Orders { .. })));
     assert_eq!(orders(&[1, 7]), None);
+}
+
+/// All readings in one: their covariance without coefficients that all runs share, and the columns
+/// of the zeros.
+fn joined(
+    cases: &[Case],
+    noise: &Noise,
+    orders: &[u32],
+    omega: &[f64],
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let n = cases.iter().map(|case| case.theta.len()).sum();
+    let (mut covariance, mut zeros) = (DMatrix::zeros(n, n), DMatrix::zeros(n, cases.len()));
+    let mut start = 0;
+    for (r, case) in cases.iter().enumerate() {
+        let own = case.theta.len();
+        let x = harmonics(&case.theta, orders);
+        let each = DVector::from_fn(x.ncols(), |i, _| omega[i / 2]);
+        let effects = DMatrix::from_diagonal(&each);
+        let part = dense(noise, &in_steps(&case.time)) + &x * effects * x.transpose();
+        covariance
+            .view_mut((start, start), (own, own))
+            .copy_from(&part);
+        zeros.view_mut((start, r), (own, 1)).fill(1.0);
+        start += own;
+    }
+    (covariance, zeros)
+}
+
+/// Log density of the readings with flat priors of their zeros, and `V^-1 y` without these.
+fn density(
+    covariance: DMatrix<f64>,
+    zeros: &DMatrix<f64>,
+    y: &DMatrix<f64>,
+) -> (f64, DMatrix<f64>) {
+    let found = Cholesky::new(covariance).unwrap();
+    let own = found.solve(zeros);
+    let inner = Cholesky::new(zeros.tr_mul(&own)).unwrap();
+    let solved = found.solve(y) - &own * inner.solve(&own.tr_mul(y));
+    let log = |found: &Cholesky<f64, nalgebra::Dyn>| found.l().diagonal().map(f64::ln).sum();
+    let free = (y.nrows() - zeros.ncols()) as f64;
+    let square = y.column(0).dot(&solved.column(0));
+    let constant = free * std::f64::consts::TAU.ln();
+    (
+        -log(&found) - log(&inner) - 0.5 * (square + constant),
+        solved,
+    )
+}
+
+fn models() -> [Model; 4] {
+    let of = |tau: [f64; 4], omega: [f64; 4]| Model {
+        widths: vec![2; 4],
+        tau: tau.to_vec(),
+        omega: omega.to_vec(),
+    };
+    [
+        of([30.0, 0.0, 2.0, 0.0], [0.0; 4]),
+        of([30.0, 0.0, 2.0, 0.1], [0.5, 0.0, 0.0, 0.2]),
+        // A line bound to time: it differs from run to run, and runs share nothing of it.
+        of([50.0, 0.0, 0.0, 0.0], [0.0, 3.0, 0.0, 0.0]),
+        of([0.0; 4], [0.0; 4]),
+    ]
+}
+
+/// Errors of all runs, and the columns of all readings.
+fn whole(cases: &[Case]) -> (DMatrix<f64>, DMatrix<f64>) {
+    let error: Vec<f64> = cases.iter().flat_map(|case| case.error.clone()).collect();
+    let theta: Vec<f64> = cases.iter().flat_map(|case| case.theta.clone()).collect();
+    let y = DMatrix::from_column_slice(error.len(), 1, &error);
+    (y, harmonics(&theta, &ORDERS))
+}
+
+#[test]
+fn evidence_and_posterior_are_those_of_the_dense_covariance() {
+    let cases = cases(&LENGTHS);
+    let readings = readings(&cases, &ORDERS);
+    let (y, x) = whole(&cases);
+    for noise in noises() {
+        let grams = readings.grams(noise);
+        for model in models() {
+            let (own, zeros) = joined(&cases, &noise, &ORDERS, &model.omega);
+            let prior = DMatrix::from_diagonal(&DVector::from_fn(8, |i, _| model.tau[i / 2]));
+            let all = own + &x * &prior * x.transpose();
+            let (wanted, solved) = density(all.clone(), &zeros, &y);
+            let found = model.posterior(&grams).unwrap();
+            let near = SAME * wanted.abs();
+            assert!(
+                (found.log_evidence - wanted).abs() < near,
+                "{}",
+                found.log_evidence - wanted
+            );
+            let mean = &prior * x.tr_mul(&solved);
+            // `T - T X' V^-1 X T`.
+            let (_, solved) = density(all, &zeros, &(&x * &prior));
+            let covariance = &prior - &prior * x.tr_mul(&solved);
+            for (i, &c) in found.columns.iter().enumerate() {
+                let apart = found.mean[(i, 0)] - mean[c];
+                assert!(apart.abs() < 10.0 * SAME, "{apart:e}");
+                for (k, &d) in found.columns.iter().enumerate() {
+                    let apart = found.covariance()[(k, i)] - covariance[(d, c)];
+                    assert!(apart.abs() < SAME * prior[(c, c)], "{apart:e}");
+                }
+            }
+            let active = model
+                .active()
+                .iter()
+                .map(|&k| model.widths[k])
+                .sum::<usize>();
+            assert_eq!(found.columns.len(), active);
+        }
+    }
+}
+
+#[test]
+fn sums_of_runs_add_up() {
+    let readings = readings(&cases(&LENGTHS), &ORDERS);
+    let grams = readings.grams(noises()[0]);
+    let mut total = grams[0].sums.clone();
+    for gram in &grams[1..] {
+        total.merge(&gram.sums);
+    }
+    let all = models()[0].sums(&grams);
+    assert!((all.products - total.products).amax() < SAME);
+    assert!((all.moments - total.moments).amax() < SAME);
+    assert!((all.squares - total.squares).amax() < SAME * 1e2);
+    assert!((all.log_scale - total.log_scale).abs() < SAME);
 }
