@@ -20,6 +20,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod gram;
+mod information;
 mod model;
 mod posterior;
 mod readings;
@@ -27,6 +28,7 @@ mod rows;
 mod whitening;
 
 pub use gram::{Gram, Sums};
+pub use information::{Information, VARIANCES};
 pub use model::Model;
 pub use posterior::Posterior;
 pub use readings::{Readings, Run};

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use trueangle::Error;
 use trueangle::evidence::{
-    CORRELATION_TIMES, Factor, Model, Noise, Readings, Rows, Run, State, TERMS, decays,
+    CORRELATION_TIMES, Factor, Model, Noise, Readings, Rows, Run, State, TERMS, VARIANCES, decays,
 };
 
 /// Of some hundred products of order 1 times the condition of the covariance.
@@ -368,4 +368,59 @@ fn sums_of_runs_add_up() {
     assert!((all.moments - total.moments).amax() < SAME);
     assert!((all.squares - total.squares).amax() < SAME * 1e2);
     assert!((all.log_scale - total.log_scale).abs() < SAME);
+}
+
+/// Gradient by differences of the evidence, information from dense covariances.
+#[test]
+fn gradient_and_information_are_those_of_the_dense_covariance() {
+    let cases = cases(&LENGTHS);
+    let readings = readings(&cases, &ORDERS);
+    let (y, x) = whole(&cases);
+    for noise in [noises()[0], noises()[2]] {
+        for model in models() {
+            let grams = readings.grams(noise);
+            let posterior = model.posterior(&grams).unwrap();
+            let found = readings
+                .information(noise, &model, &grams, &posterior)
+                .unwrap();
+            let evidence = |variances: [f64; VARIANCES]| {
+                let grams = readings.grams(Noise::of(variances));
+                model.posterior(&grams).unwrap().log_evidence
+            };
+            // Richardson's differences: their error is of the fourth power of the step.
+            for j in 0..VARIANCES {
+                let moved = |step: f64| {
+                    let mut variances = noise.variances();
+                    variances[j] *= step.exp();
+                    evidence(variances)
+                };
+                let slope = |step: f64| (moved(step) - moved(-step)) / (2.0 * step);
+                let wanted = (4.0 * slope(1e-3) - slope(2e-3)) / 3.0;
+                let near = 1e-7 * (1.0 + wanted.abs());
+                assert!(
+                    (found.gradient[j] - wanted).abs() < near,
+                    "{j}: {} {wanted}",
+                    found.gradient[j]
+                );
+            }
+            let (own, zeros) = joined(&cases, &noise, &ORDERS, &model.omega);
+            let prior = DMatrix::from_diagonal(&DVector::from_fn(8, |i, _| model.tau[i / 2]));
+            let all = own + &x * &prior * x.transpose();
+            let (_, solved) = density(all.clone(), &zeros, &y);
+            let unit = |j: usize| {
+                let mut variances = [0.0; VARIANCES];
+                variances[j] = noise.variances()[j];
+                let (own, _) = joined(&cases, &Noise::of(variances), &ORDERS, &[0.0; 4]);
+                own * &solved
+            };
+            let v = DMatrix::from_columns(
+                &(0..VARIANCES)
+                    .map(|j| unit(j).column(0).into_owned())
+                    .collect::<Vec<_>>(),
+            );
+            let (_, left) = density(all, &zeros, &v);
+            let wanted = 0.5 * v.tr_mul(&left);
+            assert!((&found.average - &wanted).amax() < 1e-8 * (1.0 + wanted.amax()));
+        }
+    }
 }

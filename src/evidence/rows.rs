@@ -53,9 +53,14 @@ impl Rows {
         self.len() == 0
     }
 
-    /// The first `rows` of them are kept.
-    pub fn truncate(&mut self, rows: usize) {
-        self.values.truncate(rows * self.stride + Self::SLACK);
+    /// A copy of some rows.
+    pub(super) fn part(&self, start: usize, count: usize) -> Self {
+        let (from, to) = (start * self.stride, (start + count) * self.stride);
+        Self {
+            values: self.values[from..to + Self::SLACK].to_vec(),
+            stride: self.stride,
+            columns: self.columns,
+        }
     }
 
     /// One row and what a vector may read beyond it.

@@ -98,6 +98,12 @@ impl State {
             last: vec![0.0; stride + Rows::SLACK],
         }
     }
+
+    /// A row for each term.
+    #[inline(always)]
+    pub(super) fn terms(&self) -> &[f64] {
+        &self.terms
+    }
 }
 
 impl<'a> Factor<'a> {
