@@ -19,18 +19,29 @@
 // Loops over small arrays read as the equations do.
 #![allow(clippy::needless_range_loop)]
 
+mod estimate;
+mod gains;
 mod gram;
 mod information;
 mod model;
+mod noise;
 mod posterior;
+mod prior;
 mod readings;
 mod rows;
+mod search;
+mod slopes;
 mod whitening;
 
+pub use estimate::Estimate;
+pub use gains::{Candidate, Solved, Without};
 pub use gram::{Gram, Sums};
-pub use information::{Information, VARIANCES};
+pub use information::Information;
 pub use model::Model;
+pub use noise::NoiseFit;
 pub use posterior::Posterior;
+pub use prior::{NoisePrior, Prior};
 pub use readings::{Readings, Run};
 pub use rows::Rows;
-pub use whitening::{CORRELATION_TIMES, Factor, Noise, State, TERMS, decays};
+pub use search::{Found, Search};
+pub use whitening::{CORRELATION_TIMES, Factor, Noise, State, TERMS, VARIANCES, decays};

@@ -10,6 +10,7 @@ mod beside;
 mod circle;
 mod corrector;
 mod door;
+mod evidence;
 mod factor;
 mod failure;
 mod fit;
@@ -60,6 +61,9 @@ mod _core {
 
     #[pymodule_export]
     use super::corrector::PyCorrector;
+
+    #[pymodule_export]
+    use super::evidence::PyEvidence;
 
     #[pymodule_export]
     use super::factor::{PyFactor, settled, short_stretches};

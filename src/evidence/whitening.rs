@@ -17,6 +17,9 @@ use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 /// Exponential terms of the noise.
 pub const TERMS: usize = 5;
 
+/// Variances of the noise: its white part and its terms.
+pub const VARIANCES: usize = TERMS + 1;
+
 /// Correlation times of the terms in median steps of time; the last is a walk for any run.
 pub const CORRELATION_TIMES: [f64; TERMS] = [3.0, 15.0, 80.0, 400.0, 4000.0];
 
@@ -37,13 +40,13 @@ pub struct Noise {
 
 impl Noise {
     /// From the white variance and those of the terms in turn.
-    pub fn of(variances: [f64; TERMS + 1]) -> Self {
+    pub fn of(variances: [f64; VARIANCES]) -> Self {
         let [white, terms @ ..] = variances;
         Self { white, terms }
     }
 
     /// The white variance, then those of the terms.
-    pub fn variances(&self) -> [f64; TERMS + 1] {
+    pub fn variances(&self) -> [f64; VARIANCES] {
         std::array::from_fn(|i| {
             if i == 0 {
                 self.white

@@ -1,0 +1,188 @@
+//! Changes of the evidence by closed forms (Tipping and Faul 2003): no candidate is factorised.
+//!
+//! For a group with columns `X` that is not in, with `V` the covariance of the readings without it,
+//! `s = X' V^-1 X` and `q = X' V^-1 y`, a variance `tau` changes the log evidence by
+//!
+//! ```text
+//! -1/2 log|I + tau s| + 1/2 tau q' (I + tau s)^-1 q
+//! ```
+//!
+//! With `S` the posterior covariance and `P = S G`: `s_j = G_jj - G_j' P_j` of a group that is out;
+//! without a group `k` that is in, `s_k = S_kk^-1 - I / tau` of itself, and of another
+//! `s_j + P_kj' S_kk^-1 P_kj`.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::gram::Sums;
+use super::model::Model;
+use super::posterior::Posterior;
+
+/// `s` and `q` of a group without which the readings have covariance `V`.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    s: DMatrix<f64>,
+    q: DVector<f64>,
+}
+
+impl Candidate {
+    /// Change of the log evidence by letting the group in with this variance.
+    pub fn gain(&self, tau: f64) -> f64 {
+        let m = self.q.len();
+        let (mut lower, mut z) = (self.s.clone(), self.q.clone());
+        lower *= tau;
+        // Cholesky and solution at once: groups have a few columns.
+        let (mut log_root, mut square) = (0.0, 0.0);
+        for i in 0..m {
+            for k in 0..=i {
+                let known: f64 = (0..k).map(|l| lower[(i, l)] * lower[(k, l)]).sum();
+                if i > k {
+                    lower[(i, k)] = (lower[(i, k)] - known) / lower[(k, k)];
+                } else {
+                    // At least 1 but for rounding.
+                    lower[(i, i)] = (1.0 + lower[(i, i)] - known).max(f64::EPSILON).sqrt();
+                }
+            }
+            let known: f64 = (0..i).map(|l| lower[(i, l)] * z[l]).sum();
+            z[i] = (z[i] - known) / lower[(i, i)];
+            log_root += lower[(i, i)].ln();
+            square += z[i] * z[i];
+        }
+        0.5 * tau * square - log_root
+    }
+
+    /// The variance of these that gains most, and what it gains.
+    pub fn best(&self, sizes: &[f64]) -> (f64, f64) {
+        let gains = sizes.iter().map(|&tau| (tau, self.gain(tau)));
+        gains.fold((0.0, f64::NEG_INFINITY), |best, own| {
+            if own.1 > best.1 { own } else { best }
+        })
+    }
+}
+
+/// A model under one noise with all that gains need.
+#[derive(Clone, Debug)]
+pub struct Solved {
+    /// The model.
+    pub model: Model,
+    /// Log evidence.
+    pub log_evidence: f64,
+    bounds: Vec<(usize, usize)>,
+    mean: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Place of the columns of each group that is in among those that are.
+    places: Vec<usize>,
+    /// `P` at all columns.
+    reach: DMatrix<f64>,
+    /// `s` and `q` at all columns; of use where groups are out.
+    outside: DMatrix<f64>,
+    moments: DVector<f64>,
+}
+
+impl Solved {
+    /// From sums of all columns without the effects of runs.
+    pub fn of(model: Model, sums: &Sums) -> Option<Self> {
+        let tau = model.by_column(&model.tau);
+        let active: Vec<usize> = (0..tau.len()).filter(|&c| tau[c] > 0.0).collect();
+        let cross = sums.products.select_rows(&active);
+        let own = Sums {
+            products: cross.select_columns(&active),
+            moments: sums.moments.select_rows(&active),
+            squares: sums.squares.clone(),
+            log_scale: sums.log_scale,
+        };
+        let sizes: Vec<f64> = active.iter().map(|&c| tau[c]).collect();
+        let found = Posterior::of(&own, &sizes, active)?;
+        let (covariance, mean) = (found.covariance(), found.mean.column(0).into_owned());
+        let reach = &covariance * &cross;
+        let bounds = model.bounds();
+        let mut place = 0;
+        let places = (0..bounds.len()).map(|k| {
+            let own = place;
+            place += if model.tau[k] > 0.0 {
+                model.widths[k]
+            } else {
+                0
+            };
+            own
+        });
+        Some(Self {
+            log_evidence: found.log_evidence,
+            places: places.collect(),
+            outside: &sums.products - cross.tr_mul(&reach),
+            moments: sums.moments.column(0) - cross.tr_mul(&mean),
+            bounds,
+            mean,
+            covariance,
+            reach,
+            model,
+        })
+    }
+
+    /// Of a group that is out.
+    pub fn outside(&self, j: usize) -> Candidate {
+        let (from, to) = self.bounds[j];
+        Candidate {
+            s: self
+                .outside
+                .view((from, from), (to - from, to - from))
+                .into_owned(),
+            q: self.moments.rows(from, to - from).into_owned(),
+        }
+    }
+
+    /// Without a group that is in.
+    pub fn without(&self, k: usize) -> Option<Without<'_>> {
+        let (place, width) = (self.places[k], self.model.widths[k]);
+        let own = self
+            .covariance
+            .view((place, place), (width, width))
+            .into_owned();
+        let precision = Cholesky::new(own)?.inverse();
+        let q = &precision * self.mean.rows(place, width);
+        let mut s = precision.clone();
+        for i in 0..width {
+            s[(i, i)] -= 1.0 / self.model.tau[k];
+        }
+        let own = Candidate { s, q };
+        let loss = own.gain(self.model.tau[k]);
+        Some(Without {
+            solved: self,
+            k,
+            precision,
+            own,
+            loss,
+        })
+    }
+}
+
+/// What a model would be without one of its groups; effects of runs stay as they are.
+pub struct Without<'a> {
+    solved: &'a Solved,
+    k: usize,
+    precision: DMatrix<f64>,
+    /// The group itself, as if it were out.
+    pub own: Candidate,
+    /// What its leaving takes from the log evidence.
+    pub loss: f64,
+}
+
+impl Without<'_> {
+    /// Another group that is out, in a model without this one.
+    pub fn other(&self, j: usize) -> Candidate {
+        let Self {
+            solved,
+            k,
+            precision,
+            own,
+            ..
+        } = self;
+        let mut candidate = solved.outside(j);
+        let ((from, to), place) = (solved.bounds[j], solved.places[*k]);
+        let reach = solved
+            .reach
+            .view((place, from), (precision.nrows(), to - from));
+        candidate.s += reach.tr_mul(&(precision * reach));
+        candidate.q += reach.tr_mul(&own.q);
+        candidate
+    }
+}

@@ -1,0 +1,163 @@
+//! The noise at the maximum of the evidence, and a few points of its posterior.
+//!
+//! Newton steps in the logarithms of the variances, with the average information as curvature,
+//! damped until the evidence increases. Nothing is random.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::gram::Gram;
+use super::model::Model;
+use super::prior::NoisePrior;
+use super::readings::Readings;
+use super::whitening::{Noise, VARIANCES};
+use crate::interrupt;
+
+/// Steps at most; a dozen are usual.
+const STEPS: usize = 50;
+
+/// Greatest change of a logarithm in one step.
+const LONGEST: f64 = 2.0;
+
+/// Increase of the log evidence below which another step is not worth a pass over the readings.
+const CLOSE: f64 = 1e-5;
+
+/// Dampings tried before a step is given up.
+const TRIES: usize = 12;
+
+/// Where the points of the posterior are, in its standard deviations along each axis.
+const APART: f64 = 1.5;
+
+/// The noise of most evidence under a model.
+#[derive(Clone, Debug)]
+pub struct NoiseFit {
+    /// Logarithms of the variances.
+    pub position: [f64; VARIANCES],
+    /// The noise there.
+    pub noise: Noise,
+    /// Gram matrices under it.
+    pub grams: Vec<Gram>,
+    /// Log evidence and log prior of the noise.
+    pub value: f64,
+    /// Curvature of that, with the other sign.
+    pub precision: DMatrix<f64>,
+}
+
+impl Readings {
+    /// The noise of most evidence under a model, from logarithms of variances to start from.
+    ///
+    /// None where no evidence can be computed: a covariance is not positive by rounding.
+    pub fn noise(
+        &self,
+        model: &Model,
+        prior: NoisePrior,
+        start: [f64; VARIANCES],
+    ) -> Option<NoiseFit> {
+        let (low, high) = prior.bounds();
+        let mut position = start.map(|x| x.clamp(low, high));
+        let mut noise = prior.noise(&position);
+        let mut grams = self.grams(noise);
+        let mut posterior = model.posterior(&grams)?;
+        let mut value = posterior.log_evidence + prior.log_density(&position);
+        let mut damping = 0.0;
+        for step in 0.. {
+            interrupt::point();
+            let found = self.information(noise, model, &grams, &posterior)?;
+            let mut precision = found.average;
+            for j in 0..VARIANCES {
+                precision[(j, j)] += prior.precision();
+            }
+            let slopes = prior.slopes(&position);
+            let gradient: [f64; VARIANCES] = std::array::from_fn(|j| found.gradient[j] + slopes[j]);
+            let mut moved = false;
+            for _ in 0..TRIES {
+                let (next, gain) = newton(&position, &gradient, &precision, damping, (low, high))?;
+                if gain < CLOSE || step == STEPS {
+                    break;
+                }
+                let next_noise = prior.noise(&next);
+                let next_grams = self.grams(next_noise);
+                let next_posterior = model.posterior(&next_grams);
+                let next_value = next_posterior
+                    .as_ref()
+                    .map(|found| found.log_evidence + prior.log_density(&next));
+                match (next_posterior, next_value) {
+                    (Some(found), Some(better)) if better > value => {
+                        // Full steps again where the prediction was about right.
+                        damping = if better - value > 0.25 * gain {
+                            damping / 8.0
+                        } else {
+                            damping
+                        };
+                        (position, noise, grams, posterior, value) =
+                            (next, next_noise, next_grams, found, better);
+                        moved = true;
+                        break;
+                    }
+                    _ => damping = f64::max(4.0 * damping, 0.5),
+                }
+            }
+            if !moved {
+                return Some(NoiseFit {
+                    position,
+                    noise,
+                    grams,
+                    value,
+                    precision,
+                });
+            }
+        }
+        None
+    }
+}
+
+/// A damped Newton step within bounds, and the increase that it predicts.
+fn newton(
+    position: &[f64; VARIANCES],
+    gradient: &[f64; VARIANCES],
+    precision: &DMatrix<f64>,
+    damping: f64,
+    (low, high): (f64, f64),
+) -> Option<([f64; VARIANCES], f64)> {
+    // At a bound that the gradient points beyond, a variance stays.
+    let is_free = |j: &usize| {
+        let (x, slope) = (position[*j], gradient[*j]);
+        !(x <= low && slope < 0.0 || x >= high && slope > 0.0)
+    };
+    let free: Vec<usize> = (0..VARIANCES).filter(is_free).collect();
+    let mut own = precision.select_rows(&free).select_columns(&free);
+    for i in 0..free.len() {
+        own[(i, i)] *= 1.0 + damping;
+    }
+    let slopes = DVector::from_iterator(free.len(), free.iter().map(|&j| gradient[j]));
+    let mut step = Cholesky::new(own)?.solve(&slopes);
+    let longest = step.amax();
+    if longest > LONGEST {
+        step *= LONGEST / longest;
+    }
+    let mut next = *position;
+    for (i, &j) in free.iter().enumerate() {
+        next[j] = (position[j] + step[i]).clamp(low, high);
+    }
+    let gain = 0.5
+        * (0..VARIANCES)
+            .map(|j| gradient[j] * (next[j] - position[j]))
+            .sum::<f64>();
+    Some((next, gain))
+}
+
+impl NoiseFit {
+    /// The maximum, and a point on both sides of it along each principal axis of the curvature.
+    pub fn points(&self) -> Vec<[f64; VARIANCES]> {
+        let axes = self.precision.clone().symmetric_eigen();
+        let mut out = vec![self.position];
+        for (axis, power) in axes.eigenvectors.column_iter().zip(&axes.eigenvalues) {
+            let apart = APART / power.sqrt();
+            for side in [1.0, -1.0] {
+                out.push(std::array::from_fn(|j| {
+                    self.position[j] + side * apart * axis[j]
+                }));
+            }
+        }
+        out
+    }
+}

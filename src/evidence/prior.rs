@@ -1,0 +1,115 @@
+//! What is assumed before any reading: sizes of groups, which are in, and the noise.
+
+use super::model::Model;
+use super::whitening::{Noise, VARIANCES};
+
+/// Standard deviation of the logarithm of each variance of the noise.
+const SPREAD: f64 = 3.0;
+
+/// Share of the variance of residuals at which the white variance and each of the terms are centred.
+const SHARES: [f64; VARIANCES] = [0.5, 0.03, 0.03, 0.03, 0.03, 0.03];
+
+/// Logarithms of the smallest and greatest variance over that of residuals.
+const RANGE: (f64, f64) = (-12.0, 4.0);
+
+/// Prior of which groups are in, and of their sizes.
+#[derive(Clone, Debug)]
+pub struct Prior {
+    /// Probability that each group is in; more than 0 and less than 1.
+    pub probabilities: Vec<f64>,
+    /// Variances of shared coefficients that a group may have, equally probable.
+    pub sizes: Vec<f64>,
+    /// Variances of what differs from run to run, besides none, which has half of the probability;
+    /// empty where there is one run.
+    pub effects: Vec<f64>,
+}
+
+impl Prior {
+    /// Of groups in readings of variance `total`: sizes from 1e-4 to 4 times that, effects of runs
+    /// from 1e-5 to 0.1 times.
+    pub fn of(probabilities: Vec<f64>, total: f64, runs: usize) -> Self {
+        let powers = |first: f64, step: f64, count: usize| {
+            let power = move |k| total * 10.0_f64.powf(first + step * k as f64);
+            (0..count).map(power).collect()
+        };
+        Self {
+            probabilities,
+            sizes: powers(-4.0, 0.8, 7),
+            effects: if runs > 1 {
+                powers(-5.0, 1.0, 5)
+            } else {
+                Vec::new()
+            },
+        }
+    }
+
+    /// Logarithm of the probability that group `k` is in with one of the sizes, over that it is not.
+    pub fn log_in(&self, k: usize) -> f64 {
+        let p = self.probabilities[k];
+        (p / (1.0 - p) / self.sizes.len() as f64).ln() + self.log_effect(0.0)
+    }
+
+    /// Logarithm of the probability of a variance from run to run of a group that is in.
+    pub fn log_effect(&self, omega: f64) -> f64 {
+        match self.effects.len() {
+            0 => 0.0,
+            _ if omega == 0.0 => 0.5_f64.ln(),
+            count => (0.5 / count as f64).ln(),
+        }
+    }
+
+    /// Logarithm of the probability of a model.
+    pub fn log_probability(&self, model: &Model) -> f64 {
+        let group = |k: usize| {
+            let out = (1.0 - self.probabilities[k]).ln();
+            if model.tau[k] == 0.0 {
+                return out;
+            }
+            out + self.log_in(k) - self.log_effect(0.0) + self.log_effect(model.omega[k])
+        };
+        (0..model.tau.len()).map(group).sum()
+    }
+}
+
+/// Prior of the logarithms of the noise's variances: independent normal ones.
+#[derive(Clone, Copy, Debug)]
+pub struct NoisePrior {
+    /// Variance of residuals, which they are relative to.
+    pub scale: f64,
+}
+
+impl NoisePrior {
+    /// Where it is greatest.
+    pub fn centre(&self) -> [f64; VARIANCES] {
+        SHARES.map(|share| (self.scale * share).ln())
+    }
+
+    /// Logarithm of the density, but for a constant.
+    pub fn log_density(&self, position: &[f64; VARIANCES]) -> f64 {
+        let own = position.iter().zip(self.centre());
+        own.map(|(x, centre)| -0.5 * ((x - centre) / SPREAD).powi(2))
+            .sum()
+    }
+
+    /// Slopes of the logarithm of the density.
+    pub fn slopes(&self, position: &[f64; VARIANCES]) -> [f64; VARIANCES] {
+        let centre = self.centre();
+        std::array::from_fn(|j| (centre[j] - position[j]) / (SPREAD * SPREAD))
+    }
+
+    /// Curvature of the logarithm of the density, with the other sign.
+    pub fn precision(&self) -> f64 {
+        1.0 / (SPREAD * SPREAD)
+    }
+
+    /// The smallest and greatest logarithm of a variance.
+    pub fn bounds(&self) -> (f64, f64) {
+        (self.scale.ln() + RANGE.0, self.scale.ln() + RANGE.1)
+    }
+
+    /// The noise at a position within the bounds.
+    pub fn noise(&self, position: &[f64; VARIANCES]) -> Noise {
+        let (low, high) = self.bounds();
+        Noise::of(position.map(|x| x.clamp(low, high).exp()))
+    }
+}

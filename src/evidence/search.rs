@@ -1,0 +1,253 @@
+//! The search for groups and their sizes: in, out, exchange, size, effect of runs.
+//!
+//! One move at a time, the one that gains most, until none gains. Gains in, out, of sizes and of
+//! exchanges are closed forms ([`Solved`]): with `m` columns in, a round over `K` groups costs
+//! `O(K m^2)`. A variance from run to run changes every run's sums: of groups that are in, each of
+//! them is computed from the columns that are in. What is met within the window of the best is kept.
+
+use std::collections::BTreeMap;
+
+use super::gains::Solved;
+use super::gram::{Gram, Sums};
+use super::model::Model;
+use super::prior::Prior;
+use crate::interrupt;
+
+/// Moves at most.
+const MOVES: usize = 200;
+
+/// Gain below which a move is rounding.
+const GAIN: f64 = 1e-7;
+
+/// A model and the logarithm of its evidence times its prior.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The model.
+    pub model: Model,
+    /// Of evidence and prior.
+    pub score: f64,
+}
+
+/// Models met within a window of the best, under one noise.
+#[derive(Debug)]
+pub struct Search<'a> {
+    grams: &'a [Gram],
+    prior: &'a Prior,
+    window: f64,
+    best: f64,
+    /// The best sizes met for each set of groups.
+    met: BTreeMap<Vec<usize>, Found>,
+    /// Sums without the effects of runs, of the variances met last.
+    sums: Option<(Vec<f64>, Sums)>,
+}
+
+impl<'a> Search<'a> {
+    /// Under the noise of these Gram matrices.
+    pub fn new(grams: &'a [Gram], prior: &'a Prior, window: f64) -> Self {
+        Self {
+            grams,
+            prior,
+            window,
+            best: f64::NEG_INFINITY,
+            met: BTreeMap::new(),
+            sums: None,
+        }
+    }
+
+    /// The best model within reach of `start` by moves that gain; None where its evidence cannot be
+    /// computed.
+    pub fn from(&mut self, start: Model) -> Option<Found> {
+        let mut now = self.solved(start)?;
+        let mut score = self.score(&now);
+        self.meet(&now.model, score);
+        for _ in 0..MOVES {
+            interrupt::point();
+            let Some(next) = self.best_move(&now, score) else {
+                break;
+            };
+            if next.score <= score + GAIN {
+                break;
+            }
+            // Closed forms and factorisations differ by rounding: no move counts that loses.
+            let solved = self.solved(next.model)?;
+            let reached = self.score(&solved);
+            if reached <= score {
+                break;
+            }
+            (now, score) = (solved, reached);
+            self.meet(&now.model, score);
+        }
+        Some(Found {
+            model: now.model,
+            score,
+        })
+    }
+
+    /// Models within the window of the best, best first.
+    pub fn models(self) -> Vec<Found> {
+        let least = self.best - self.window;
+        let mut kept: Vec<Found> = self.met.into_values().filter(|f| f.score > least).collect();
+        kept.sort_by(|a, b| b.score.total_cmp(&a.score));
+        kept
+    }
+
+    fn score(&self, solved: &Solved) -> f64 {
+        solved.log_evidence + self.prior.log_probability(&solved.model)
+    }
+
+    fn solved(&mut self, model: Model) -> Option<Solved> {
+        if self
+            .sums
+            .as_ref()
+            .is_none_or(|(omega, _)| *omega != model.omega)
+        {
+            self.sums = Some((model.omega.clone(), model.sums(self.grams)));
+        }
+        let (_, sums) = self.sums.as_ref()?;
+        Solved::of(model, sums)
+    }
+
+    fn meet(&mut self, model: &Model, score: f64) {
+        self.best = self.best.max(score);
+        if score <= self.best - self.window {
+            return;
+        }
+        let found = || Found {
+            model: model.clone(),
+            score,
+        };
+        let own = self.met.entry(model.active()).or_insert_with(found);
+        if score > own.score {
+            *own = found();
+        }
+    }
+
+    /// Meets every neighbour of a model; the best of them.
+    fn best_move(&mut self, now: &Solved, score: f64) -> Option<Found> {
+        let mut best: Option<Found> = None;
+        let groups = now.model.tau.len();
+        let (inside, outside): (Vec<usize>, Vec<usize>) =
+            (0..groups).partition(|&k| now.model.tau[k] > 0.0);
+        for &j in &outside {
+            self.enter(now, j, score, &mut best);
+        }
+        for &k in &inside {
+            self.resize(now, k, score, &mut best)?;
+            if now.model.omega[k] == 0.0 {
+                self.leave(now, k, &outside, score, &mut best)?;
+            } else {
+                self.leave_with_effect(now, k, &outside, &mut best)?;
+            }
+            for omega in self.prior.effects.iter().chain(&[0.0]) {
+                if *omega != now.model.omega[k] {
+                    let mut model = now.model.clone();
+                    model.omega[k] = *omega;
+                    self.factorised(model, &mut best)?;
+                }
+            }
+        }
+        best
+    }
+
+    fn offer(&mut self, model: impl Fn() -> Model, score: f64, best: &mut Option<Found>) {
+        if score > self.best - self.window {
+            self.meet(&model(), score);
+        }
+        if best.as_ref().is_none_or(|best| score > best.score) {
+            *best = Some(Found {
+                model: model(),
+                score,
+            });
+        }
+    }
+
+    /// A group in.
+    fn enter(&mut self, now: &Solved, j: usize, score: f64, best: &mut Option<Found>) {
+        let (tau, gain) = now.outside(j).best(&self.prior.sizes);
+        let model = || with(&now.model, &[(j, tau, 0.0)]);
+        self.offer(model, score + gain + self.prior.log_in(j), best);
+    }
+
+    /// Another size of a group.
+    fn resize(
+        &mut self,
+        now: &Solved,
+        k: usize,
+        score: f64,
+        best: &mut Option<Found>,
+    ) -> Option<()> {
+        let without = now.without(k)?;
+        let (tau, gain) = without.own.best(&self.prior.sizes);
+        if tau != now.model.tau[k] {
+            let model = || with(&now.model, &[(k, tau, now.model.omega[k])]);
+            self.offer(model, score + gain - without.loss, best);
+        }
+        Some(())
+    }
+
+    /// A group out, alone or for another one.
+    fn leave(
+        &mut self,
+        now: &Solved,
+        k: usize,
+        outside: &[usize],
+        score: f64,
+        best: &mut Option<Found>,
+    ) -> Option<()> {
+        let without = now.without(k)?;
+        let left = score - without.loss - self.prior.log_in(k);
+        self.offer(|| with(&now.model, &[(k, 0.0, 0.0)]), left, best);
+        for &j in outside {
+            let (tau, gain) = without.other(j).best(&self.prior.sizes);
+            let model = || with(&now.model, &[(k, 0.0, 0.0), (j, tau, 0.0)]);
+            self.offer(model, left + gain + self.prior.log_in(j), best);
+        }
+        Some(())
+    }
+
+    /// The same for a group with an effect of runs, which leaves with it; the best one that comes for
+    /// it is tried with that effect, too.
+    fn leave_with_effect(
+        &mut self,
+        now: &Solved,
+        k: usize,
+        outside: &[usize],
+        best: &mut Option<Found>,
+    ) -> Option<()> {
+        let model = with(&now.model, &[(k, 0.0, 0.0)]);
+        let sums = model.sums(self.grams);
+        let without = Solved::of(model, &sums)?;
+        let left = self.score(&without);
+        self.offer(|| without.model.clone(), left, best);
+        let mut other: Option<Found> = None;
+        for &j in outside {
+            self.enter(&without, j, left, &mut other);
+        }
+        let Some(found) = other else { return Some(()) };
+        self.offer(|| found.model.clone(), found.score, best);
+        let mut model = found.model;
+        for &j in outside {
+            if model.tau[j] > 0.0 {
+                model.omega[j] = now.model.omega[k];
+            }
+        }
+        self.factorised(model, best)
+    }
+
+    /// A model by its factorisation.
+    fn factorised(&mut self, model: Model, best: &mut Option<Found>) -> Option<()> {
+        let evidence = model.posterior(self.grams)?.log_evidence;
+        let score = evidence + self.prior.log_probability(&model);
+        self.offer(|| model.clone(), score, best);
+        Some(())
+    }
+}
+
+/// A model with other variances of some groups.
+fn with(model: &Model, changes: &[(usize, f64, f64)]) -> Model {
+    let mut changed = model.clone();
+    for &(k, tau, omega) in changes {
+        (changed.tau[k], changed.omega[k]) = (tau, omega);
+    }
+    changed
+}

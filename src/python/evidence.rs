@@ -1,0 +1,149 @@
+//! `_core.Evidence`: orders, coefficients and noise of readings by their evidence.
+
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use pyo3::prelude::*;
+
+use super::array::{columns, values, vector};
+use super::failure::argument_error;
+use super::release::detached;
+use crate::check::{not_negative, same_length};
+use crate::evidence::{Model, Noise, NoisePrior, Readings, Run, VARIANCES};
+
+type Vector<'py> = Bound<'py, PyArray1<f64>>;
+type Matrix<'py> = Bound<'py, PyArray2<f64>>;
+type Column<'py> = PyReadonlyArray1<'py, f64>;
+
+/// Log evidence, mean and covariance of all coefficients.
+type Solution<'py> = (f64, Vector<'py>, Matrix<'py>);
+
+/// Probabilities, mean, covariance, variances of the noise; weight, tau and omega of each model.
+type Estimated<'py> = (
+    Vector<'py>,
+    Vector<'py>,
+    Matrix<'py>,
+    Vector<'py>,
+    Vec<(f64, Vec<f64>, Vec<f64>)>,
+);
+
+const LOST: &str = "no evidence can be computed: a covariance is not positive by rounding";
+
+/// Readings of runs, and the orders that are looked at.
+#[pyclass(name = "Evidence", module = "trueangle._core", frozen)]
+pub struct PyEvidence(Readings);
+
+#[pymethods]
+impl PyEvidence {
+    /// Of angles in radians, errors and times (None: equally spaced) of each run.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        runs: Vec<(Column<'_>, Column<'_>, Option<Column<'_>>)>,
+        orders: Vec<u32>,
+    ) -> PyResult<Self> {
+        let given: Vec<_> = runs
+            .iter()
+            .map(|(theta, error, time)| (values(theta), values(error), time.as_ref().map(values)))
+            .collect();
+        let made = detached(py, || {
+            let runs = given
+                .iter()
+                .map(|(theta, error, time)| Run::new(theta, error, time.as_deref()))
+                .collect::<Result<_, _>>()?;
+            Readings::new(runs, orders)
+        })?;
+        Ok(Self(made?))
+    }
+
+    /// Log evidence, mean and covariance of the coefficients under a noise and a model.
+    fn posterior<'py>(
+        &self,
+        py: Python<'py>,
+        noise: [f64; VARIANCES],
+        tau: Vec<f64>,
+        omega: Vec<f64>,
+    ) -> PyResult<Solution<'py>> {
+        not_negative("noise", &noise)?;
+        if noise[0] == 0.0 {
+            return Err(argument_error(
+                py,
+                "noise[0], the white variance, must be above 0".into(),
+            ));
+        }
+        let model = self.model(tau, omega)?;
+        let found = detached(py, || {
+            let posterior = model.posterior(&self.0.grams(Noise::of(noise)))?;
+            let covariance = posterior.covariance();
+            Some((posterior, covariance))
+        })?;
+        let (posterior, own) = found.ok_or_else(|| argument_error(py, LOST.into()))?;
+        let n = 2 * self.0.orders().len();
+        let (mut mean, mut covariance) = (vec![0.0; n], vec![0.0; n * n]);
+        for (i, &c) in posterior.columns.iter().enumerate() {
+            mean[c] = posterior.mean[(i, 0)];
+            for (k, &d) in posterior.columns.iter().enumerate() {
+                covariance[c * n + d] = own[(i, k)];
+            }
+        }
+        let covariance = columns(py, &covariance, &[n, n])?;
+        Ok((posterior.log_evidence, vector(py, &mean)?, covariance))
+    }
+
+    /// Variances of the noise at the maximum of evidence and weak prior, whose scale is a variance.
+    fn noise<'py>(
+        &self,
+        py: Python<'py>,
+        tau: Vec<f64>,
+        omega: Vec<f64>,
+        scale: f64,
+    ) -> PyResult<Vector<'py>> {
+        if !(scale > 0.0 && scale.is_finite()) {
+            return Err(argument_error(
+                py,
+                format!("scale must be above 0 and finite, got {scale}"),
+            ));
+        }
+        let (model, prior) = (self.model(tau, omega)?, NoisePrior { scale });
+        let found = detached(py, || self.0.noise(&model, prior, prior.centre()))?;
+        let found = found.ok_or_else(|| argument_error(py, LOST.into()))?;
+        vector(py, &found.noise.variances())
+    }
+
+    /// The mixture over models and noises, from prior probabilities of the orders.
+    fn estimate<'py>(&self, py: Python<'py>, probabilities: Vec<f64>) -> PyResult<Estimated<'py>> {
+        same_length(
+            "probabilities",
+            probabilities.len(),
+            "orders",
+            self.0.orders().len(),
+        )?;
+        if let Some(wrong) = probabilities.iter().find(|p| !(**p > 0.0 && **p < 1.0)) {
+            let problem = format!("probabilities must be above 0 and below 1, got {wrong}");
+            return Err(argument_error(py, problem));
+        }
+        let found = detached(py, || self.0.estimate(&probabilities))?;
+        let found = found.ok_or_else(|| argument_error(py, LOST.into()))?;
+        let n = found.mean.len();
+        let models = found.models.into_iter();
+        Ok((
+            vector(py, &found.probabilities)?,
+            vector(py, found.mean.as_slice())?,
+            columns(py, found.covariance.as_slice(), &[n, n])?,
+            vector(py, &found.noise.variances())?,
+            models
+                .map(|(weight, model)| (weight, model.tau, model.omega))
+                .collect(),
+        ))
+    }
+}
+
+impl PyEvidence {
+    fn model(&self, tau: Vec<f64>, omega: Vec<f64>) -> PyResult<Model> {
+        let orders = self.0.orders().len();
+        for (name, variances) in [("tau", &tau), ("omega", &omega)] {
+            same_length(name, variances.len(), "orders", orders)?;
+            not_negative(name, variances)?;
+        }
+        let widths = vec![2; orders];
+        Ok(Model { widths, tau, omega })
+    }
+}
