@@ -56,8 +56,8 @@ pub enum Error {
         wanted: usize,
     },
 
-    /// A run without a reading.
-    #[error("a run must have at least 1 reading, got none")]
+    /// No run, or one without a reading.
+    #[error("at least 1 run is required, and each must have at least 1 reading")]
     NoReadings,
 
     /// Times of a run decrease, or all are the same.

@@ -7,6 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::gram::Gram;
 use super::model::Model;
+use super::posterior::Posterior;
 use super::prior::NoisePrior;
 use super::readings::Readings;
 use super::whitening::{Noise, VARIANCES};
@@ -23,6 +24,9 @@ const CLOSE: f64 = 1e-5;
 
 /// Dampings tried before a step is given up.
 const TRIES: usize = 12;
+
+/// Part of the predicted increase from which on the damping is lowered.
+const TRUSTED: f64 = 0.25;
 
 /// Where the points of the posterior are, in its standard deviations along each axis.
 const APART: f64 = 1.5;
@@ -42,7 +46,30 @@ pub struct NoiseFit {
     pub precision: DMatrix<f64>,
 }
 
+/// A noise, and the evidence of a model under it.
+struct At {
+    position: [f64; VARIANCES],
+    noise: Noise,
+    grams: Vec<Gram>,
+    posterior: Posterior,
+    value: f64,
+}
+
 impl Readings {
+    fn at(&self, model: &Model, prior: NoisePrior, position: [f64; VARIANCES]) -> Option<At> {
+        let noise = prior.noise(&position);
+        let grams = self.grams(noise);
+        let posterior = model.posterior(&grams)?;
+        let value = posterior.log_evidence + prior.log_density(&position);
+        Some(At {
+            position,
+            noise,
+            grams,
+            posterior,
+            value,
+        })
+    }
+
     /// The noise of most evidence under a model, from logarithms of variances to start from.
     ///
     /// None where no evidence can be computed: a covariance is not positive by rounding.
@@ -53,57 +80,46 @@ impl Readings {
         start: [f64; VARIANCES],
     ) -> Option<NoiseFit> {
         let (low, high) = prior.bounds();
-        let mut position = start.map(|x| x.clamp(low, high));
-        let mut noise = prior.noise(&position);
-        let mut grams = self.grams(noise);
-        let mut posterior = model.posterior(&grams)?;
-        let mut value = posterior.log_evidence + prior.log_density(&position);
+        let mut now = self.at(model, prior, start.map(|x| x.clamp(low, high)))?;
         let mut damping = 0.0;
         for step in 0.. {
-            interrupt::point();
-            let found = self.information(noise, model, &grams, &posterior)?;
-            let mut precision = found.average;
+            let found = self.information(now.noise, model, &now.grams, &now.posterior)?;
+            let (mut gradient, mut precision) = (found.gradient, found.average);
+            let slopes = prior.slopes(&now.position);
             for j in 0..VARIANCES {
-                precision[(j, j)] += prior.precision();
+                // A slope is curvature in the logarithm, too: its part is added where it is positive.
+                precision[(j, j)] += prior.precision() + f64::max(-gradient[j], 0.0);
+                gradient[j] += slopes[j];
             }
-            let slopes = prior.slopes(&position);
-            let gradient: [f64; VARIANCES] = std::array::from_fn(|j| found.gradient[j] + slopes[j]);
-            let mut moved = false;
+            let mut better = None;
             for _ in 0..TRIES {
-                let (next, gain) = newton(&position, &gradient, &precision, damping, (low, high))?;
+                interrupt::point();
+                let own = (&gradient, &precision, damping);
+                let (next, gain) = newton(&now.position, own, (low, high))?;
                 if gain < CLOSE || step == STEPS {
                     break;
                 }
-                let next_noise = prior.noise(&next);
-                let next_grams = self.grams(next_noise);
-                let next_posterior = model.posterior(&next_grams);
-                let next_value = next_posterior
-                    .as_ref()
-                    .map(|found| found.log_evidence + prior.log_density(&next));
-                match (next_posterior, next_value) {
-                    (Some(found), Some(better)) if better > value => {
-                        // Full steps again where the prediction was about right.
-                        damping = if better - value > 0.25 * gain {
-                            damping / 8.0
-                        } else {
-                            damping
-                        };
-                        (position, noise, grams, posterior, value) =
-                            (next, next_noise, next_grams, found, better);
-                        moved = true;
-                        break;
+                let next = self.at(model, prior, next);
+                if let Some(next) = next.filter(|next| next.value > now.value) {
+                    if next.value - now.value > TRUSTED * gain {
+                        damping /= 8.0;
                     }
-                    _ => damping = f64::max(4.0 * damping, 0.5),
+                    better = Some(next);
+                    break;
                 }
+                damping = f64::max(4.0 * damping, 0.5);
             }
-            if !moved {
-                return Some(NoiseFit {
-                    position,
-                    noise,
-                    grams,
-                    value,
-                    precision,
-                });
+            match better {
+                Some(next) => now = next,
+                None => {
+                    return Some(NoiseFit {
+                        position: now.position,
+                        noise: now.noise,
+                        grams: now.grams,
+                        value: now.value,
+                        precision,
+                    });
+                }
             }
         }
         None
@@ -113,9 +129,7 @@ impl Readings {
 /// A damped Newton step within bounds, and the increase that it predicts.
 fn newton(
     position: &[f64; VARIANCES],
-    gradient: &[f64; VARIANCES],
-    precision: &DMatrix<f64>,
-    damping: f64,
+    (gradient, precision, damping): (&DVector<f64>, &DMatrix<f64>, f64),
     (low, high): (f64, f64),
 ) -> Option<([f64; VARIANCES], f64)> {
     // At a bound that the gradient points beyond, a variance stays.

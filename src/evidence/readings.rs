@@ -127,6 +127,9 @@ impl Readings {
             }
             previous = got;
         }
+        if runs.is_empty() {
+            return Err(Error::NoReadings);
+        }
         Ok(Self { runs, orders })
     }
 

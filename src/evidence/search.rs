@@ -2,8 +2,9 @@
 //!
 //! One move at a time, the one that gains most, until none gains. Gains in, out, of sizes and of
 //! exchanges are closed forms ([`Solved`]): with `m` columns in, a round over `K` groups costs
-//! `O(K m^2)`. A variance from run to run changes every run's sums: of groups that are in, each of
-//! them is computed from the columns that are in. What is met within the window of the best is kept.
+//! `O(K m^2)`. A variance from run to run changes the sums of every run: such a move is factorised,
+//! from the columns that are in, and tried only where no other move gains. Every model met within
+//! the window of the best is kept.
 
 use std::collections::BTreeMap;
 
@@ -62,9 +63,10 @@ impl<'a> Search<'a> {
         self.meet(&now.model, score);
         for _ in 0..MOVES {
             interrupt::point();
-            let Some(next) = self.best_move(&now, score) else {
-                break;
-            };
+            let mut next = self.best_move(&now, score)?;
+            if next.score <= score + GAIN {
+                next = self.best_effect(&now, next)?;
+            }
             if next.score <= score + GAIN {
                 break;
             }
@@ -122,9 +124,12 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Meets every neighbour of a model; the best of them.
+    /// Meets the neighbours of a model by closed forms; the best of it and them.
     fn best_move(&mut self, now: &Solved, score: f64) -> Option<Found> {
-        let mut best: Option<Found> = None;
+        let mut best = Some(Found {
+            model: now.model.clone(),
+            score,
+        });
         let groups = now.model.tau.len();
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (0..groups).partition(|&k| now.model.tau[k] > 0.0);
@@ -138,11 +143,23 @@ impl<'a> Search<'a> {
             } else {
                 self.leave_with_effect(now, k, &outside, &mut best)?;
             }
-            for omega in self.prior.effects.iter().chain(&[0.0]) {
-                if *omega != now.model.omega[k] {
-                    let mut model = now.model.clone();
-                    model.omega[k] = *omega;
-                    self.factorised(model, &mut best)?;
+        }
+        best
+    }
+
+    /// Meets the models with another variance from run to run of one group, which comes in with it
+    /// where it is out; the best of them and of one more.
+    fn best_effect(&mut self, now: &Solved, other: Found) -> Option<Found> {
+        let prior = self.prior;
+        let mut best = Some(other);
+        for k in 0..now.model.tau.len() {
+            let (mut tau, own) = (now.model.tau[k], now.model.omega[k]);
+            if tau == 0.0 {
+                (tau, _) = now.outside(k).best(&prior.sizes);
+            }
+            for &omega in prior.effects.iter().chain(&[0.0]) {
+                if omega != own {
+                    self.factorised(with(&now.model, &[(k, tau, omega)]), &mut best)?;
                 }
             }
         }
