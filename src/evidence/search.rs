@@ -36,8 +36,8 @@ pub struct Search<'a> {
     prior: &'a Prior,
     window: f64,
     best: f64,
-    /// The best sizes met for each set of groups.
-    met: BTreeMap<Vec<usize>, Found>,
+    /// The best sizes met for each set of groups and of their effects of runs, by their bits.
+    met: BTreeMap<Vec<(usize, u64)>, Found>,
     /// Sums without the effects of runs, of the variances met last.
     sums: Option<(Vec<f64>, Sums)>,
 }
@@ -118,7 +118,9 @@ impl<'a> Search<'a> {
             model: model.clone(),
             score,
         };
-        let own = self.met.entry(model.active()).or_insert_with(found);
+        let key = model.active().into_iter();
+        let key = key.map(|k| (k, model.omega[k].to_bits())).collect();
+        let own = self.met.entry(key).or_insert_with(found);
         if score > own.score {
             *own = found();
         }
