@@ -60,6 +60,15 @@ pub enum Error {
     #[error("at least 1 run is required, and each must have at least 1 reading")]
     NoReadings,
 
+    /// What is wrong with one of several runs.
+    #[error("runs[{run}]: {cause}")]
+    InRun {
+        /// Its place.
+        run: usize,
+        /// What is wrong.
+        cause: Box<Error>,
+    },
+
     /// Times of a run decrease, or all are the same.
     #[error(
         "time[{index}] must not be smaller than the one before, and the times of a run must \

@@ -1,5 +1,5 @@
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, Unpack, final, overload
+from typing import Any, ClassVar, Literal, Unpack, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -191,6 +191,32 @@ class Banded:
     @property
     def log_determinant(self) -> float: ...
     def solve(self, right: NDArray[np.float64]) -> None: ...
+
+@final
+class Evidence:
+    """Readings of runs, and the orders that are tested."""
+
+    CORRELATION_TIMES: ClassVar[list[float]]
+    def __new__(
+        cls,
+        runs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]],
+        orders: Sequence[int],
+    ) -> Evidence: ...
+    def posterior(
+        self, noise: Sequence[float], tau: Sequence[float], omega: Sequence[float]
+    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]: ...
+    def noise(
+        self, tau: Sequence[float], omega: Sequence[float], scale: float
+    ) -> NDArray[np.float64]: ...
+    def estimate(
+        self, probabilities: Sequence[float]
+    ) -> tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        list[tuple[float, list[float], list[float]]],
+    ]: ...
 
 @final
 class LinearModel:

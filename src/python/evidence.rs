@@ -7,7 +7,10 @@ use super::array::{columns, values, vector};
 use super::failure::argument_error;
 use super::release::detached;
 use crate::check::{not_negative, same_length};
-use crate::evidence::{Model, Noise, NoisePrior, Readings, Run, VARIANCES};
+use crate::error::Error;
+use crate::evidence::{
+    CORRELATION_TIMES, Model, Noise, NoisePrior, Readings, Run, TERMS, VARIANCES,
+};
 
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 type Matrix<'py> = Bound<'py, PyArray2<f64>>;
@@ -27,12 +30,15 @@ type Estimated<'py> = (
 
 const LOST: &str = "no evidence can be computed: a covariance is not positive by rounding";
 
-/// Readings of runs, and the orders that are looked at.
+/// Readings of runs, and the orders that are tested.
 #[pyclass(name = "Evidence", module = "trueangle._core", frozen)]
 pub struct PyEvidence(Readings);
 
 #[pymethods]
 impl PyEvidence {
+    #[classattr]
+    const CORRELATION_TIMES: [f64; TERMS] = CORRELATION_TIMES;
+
     /// Of angles in radians, errors and times (None: equally spaced) of each run.
     #[new]
     fn new(
@@ -45,10 +51,14 @@ impl PyEvidence {
             .map(|(theta, error, time)| (values(theta), values(error), time.as_ref().map(values)))
             .collect();
         let made = detached(py, || {
-            let runs = given
-                .iter()
-                .map(|(theta, error, time)| Run::new(theta, error, time.as_deref()))
-                .collect::<Result<_, _>>()?;
+            let mut runs = Vec::with_capacity(given.len());
+            for (run, (theta, error, time)) in given.iter().enumerate() {
+                let made = Run::new(theta, error, time.as_deref());
+                runs.push(made.map_err(|cause| Error::InRun {
+                    run,
+                    cause: Box::new(cause),
+                })?);
+            }
             Readings::new(runs, orders)
         })?;
         Ok(Self(made?))
