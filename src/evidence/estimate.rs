@@ -1,9 +1,9 @@
 //! Orders, coefficients and noise of readings: the mixture over models and noises.
 //!
 //! The noise of most evidence with all orders in, so that no strong order is mistaken for slow
-//! noise; the search under it; then both again until the set of orders stays. What is not known of
-//! the noise is integrated on a few points of its posterior, what is not known of the orders over
-//! the models within Occam's window (Madigan and Raftery 1994).
+//! noise; the search under it; then both again until the set of orders stays. The mixture integrates
+//! over the noise on a few points of its posterior, and over the models within Occam's window
+//! (Madigan and Raftery 1994).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -32,10 +32,10 @@ const LIGHT: f64 = 1e-4;
 /// Smallest variance of residuals over that of errors: sums of squares hold no less.
 const EXACT: f64 = 1e-12;
 
-/// Smallest variance of errors that is told from zero.
+/// Smallest variance of errors that is distinguished from zero.
 const NOTHING: f64 = 1e-200;
 
-/// What readings tell of orders, coefficients and noise.
+/// Posterior of orders, coefficients and noise.
 #[derive(Clone, Debug)]
 pub struct Estimate {
     /// Probability that each order is in.
@@ -99,7 +99,7 @@ impl Readings {
             .map(|own| 1.0 - own / wide)
             .sum();
         let free = (self.len() - self.runs().len()) as f64 - unknowns;
-        let left = total * found.left[(0, 0)] / free.max(1.0);
+        let left = total * found.residual[(0, 0)] / free.max(1.0);
         Some((total, left.max(EXACT * total)))
     }
 

@@ -100,7 +100,7 @@ impl Readings {
         threads::map_parts(self.runs().len(), self.threads(), work).collect()
     }
 
-    /// Threads that a pass is worth.
+    /// Threads of a pass over the readings.
     pub(super) fn threads(&self) -> usize {
         if self.len() < THREADED {
             1

@@ -69,7 +69,7 @@ impl Readings {
                 ..gram.clone()
             })
             .collect();
-        let left = model.posterior(&grams)?.left;
+        let left = model.posterior(&grams)?.residual;
         let sizes = noise.variances();
         let average = DMatrix::from_fn(VARIANCES, VARIANCES, |i, j| {
             0.5 * sizes[i] * sizes[j] * left[(i, j)]

@@ -68,7 +68,7 @@ impl Model {
 
     /// Posterior of the shared coefficients; None where a covariance is not positive by rounding.
     ///
-    /// Only the columns of groups that are in are looked at.
+    /// It is computed from the columns of groups that are in.
     pub fn posterior(&self, grams: &[Gram]) -> Option<Posterior> {
         let tau = self.by_column(&self.tau);
         let active: Vec<usize> = (0..tau.len()).filter(|&c| tau[c] > 0.0).collect();

@@ -19,7 +19,7 @@ const STEPS: usize = 50;
 /// Greatest change of a logarithm in one step.
 const LONGEST: f64 = 2.0;
 
-/// Increase of the log evidence below which another step is not worth a pass over the readings.
+/// Predicted increase of the log evidence below which the maximum is reached.
 const CLOSE: f64 = 1e-5;
 
 /// Dampings tried before a step is given up.

@@ -21,7 +21,7 @@ pub struct Posterior {
     /// Means, a column for each right-hand side.
     pub mean: DMatrix<f64>,
     /// `s - g' S g`.
-    pub left: DMatrix<f64>,
+    pub residual: DMatrix<f64>,
     /// `L^-1 T`, whose square is the covariance.
     root: DMatrix<f64>,
 }
@@ -42,14 +42,14 @@ impl Posterior {
         }
         lower.solve_lower_triangular_unchecked_mut(&mut root);
         let q = &root * &sums.moments;
-        let left = &sums.squares - q.tr_mul(&q);
+        let residual = &sums.squares - q.tr_mul(&q);
         let log_root: f64 = lower.diagonal().map(f64::ln).sum();
-        let log_evidence = sums.log_scale - log_root - 0.5 * left[(0, 0)];
+        let log_evidence = sums.log_scale - log_root - 0.5 * residual[(0, 0)];
         log_evidence.is_finite().then(|| Self {
             log_evidence,
             columns,
             mean: root.tr_mul(&q),
-            left,
+            residual,
             root,
         })
     }

@@ -19,7 +19,7 @@ pub struct Prior {
     pub probabilities: Vec<f64>,
     /// Variances of shared coefficients that a group may have, equally probable.
     pub sizes: Vec<f64>,
-    /// Variances of what differs from run to run, besides none, which has half of the probability;
+    /// Variances of what differs from run to run; a variance of 0 has half of the probability;
     /// empty where there is one run.
     pub effects: Vec<f64>,
 }

@@ -4,11 +4,15 @@ use super::rows::Rows;
 use super::whitening::{Terms, decays};
 use crate::check::{finite, same_length};
 use crate::error::Error;
+use crate::memory::room;
 use crate::spectrum::median;
 use crate::waves;
 
 /// Readings whose columns are made at once: they stay in the second cache.
 pub const CHUNK: usize = 256;
+
+/// Bytes that a reading takes at most: its own numbers, factor, residual and products of terms.
+const BYTES: usize = 40 * size_of::<f64>();
 
 /// Readings of one run, in the order in which they were read.
 #[derive(Clone, Debug)]
@@ -27,6 +31,7 @@ impl Run {
             return Err(Error::NoReadings);
         }
         same_length("error", error.len(), "theta", theta.len())?;
+        room(theta.len() * BYTES)?;
         finite("theta", theta)?;
         finite("error", error)?;
         let decays = match time {
@@ -93,7 +98,7 @@ fn in_steps(time: &[f64]) -> Result<Vec<f64>, Error> {
     }
     let mut step = median(&mut steps);
     if step == 0.0 {
-        // Most readings share their time with another: the mean step is what is left.
+        // Most readings share their time with another: the mean step is not zero.
         step = (time[time.len() - 1] - time[0]) / steps.len() as f64;
     }
     if step == 0.0 {
@@ -106,7 +111,7 @@ fn in_steps(time: &[f64]) -> Result<Vec<f64>, Error> {
     Ok(time.iter().map(|t| (t - time[0]) / step).collect())
 }
 
-/// Runs, and the orders that are looked at.
+/// Runs, and the orders that are tested.
 #[derive(Clone, Debug)]
 pub struct Readings {
     runs: Vec<Run>,

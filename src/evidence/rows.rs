@@ -5,7 +5,7 @@ use crate::simd::{InstructionSet, Kernel, Lanes, MOST_LANES, dispatch};
 /// Columns that a product holds in registers at once.
 const TILE: usize = 4;
 
-/// Rows of so many columns, each filled up with zeros to whole vectors.
+/// Rows of columns, each padded with zeros to whole vectors.
 #[derive(Clone, Debug)]
 pub struct Rows {
     values: Vec<f64>,
@@ -28,7 +28,7 @@ impl Rows {
         }
     }
 
-    /// Distance of rows of so many columns.
+    /// Distance of rows with this number of columns.
     pub(super) fn width(columns: usize) -> usize {
         columns.next_multiple_of(MOST_LANES)
     }

@@ -3,8 +3,8 @@
 //! One move at a time, the one that gains most, until none gains. Gains in, out, of sizes and of
 //! exchanges are closed forms ([`Solved`]): with `m` columns in, a round over `K` groups costs
 //! `O(K m^2)`. A variance from run to run changes the sums of every run: such a move is factorised,
-//! from the columns that are in, and tried only where no other move gains. Every model met within
-//! the window of the best is kept.
+//! from the columns that are in, and tried only where no other move gains. Every model evaluated
+//! within the window of the best is kept.
 
 use std::collections::BTreeMap;
 
@@ -29,16 +29,16 @@ pub struct Found {
     pub score: f64,
 }
 
-/// Models met within a window of the best, under one noise.
+/// Models within a window of the best, under one noise.
 #[derive(Debug)]
 pub struct Search<'a> {
     grams: &'a [Gram],
     prior: &'a Prior,
     window: f64,
     best: f64,
-    /// The best sizes met for each set of groups and of their effects of runs, by their bits.
+    /// The best sizes of each set of groups with their effects of runs (bits of `omega`).
     met: BTreeMap<Vec<(usize, u64)>, Found>,
-    /// Sums without the effects of runs, of the variances met last.
+    /// Sums without the effects of runs, for the variances used last.
     sums: Option<(Vec<f64>, Sums)>,
 }
 
@@ -126,7 +126,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Meets the neighbours of a model by closed forms; the best of it and them.
+    /// Evaluates the neighbours of a model by closed forms; returns the best of it and them.
     fn best_move(&mut self, now: &Solved, score: f64) -> Option<Found> {
         let mut best = Some(Found {
             model: now.model.clone(),
@@ -149,8 +149,8 @@ impl<'a> Search<'a> {
         best
     }
 
-    /// Meets the models with another variance from run to run of one group, which comes in with it
-    /// where it is out; the best of them and of one more.
+    /// Evaluates another variance from run to run of each group, also of those that are out; returns
+    /// the best of these models and `other`.
     fn best_effect(&mut self, now: &Solved, other: Found) -> Option<Found> {
         let prior = self.prior;
         let mut best = Some(other);

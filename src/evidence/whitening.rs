@@ -93,7 +93,7 @@ pub struct State {
 }
 
 impl State {
-    /// Of so many columns, before the first reading (after the last one for [`Factor::back`]).
+    /// With this number of columns, before the first reading (after the last one for [`Factor::back`]).
     pub fn new(columns: usize) -> Self {
         let stride = Rows::width(columns);
         Self {

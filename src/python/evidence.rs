@@ -44,8 +44,13 @@ impl PyEvidence {
     fn new(
         py: Python<'_>,
         runs: Vec<(Column<'_>, Column<'_>, Option<Column<'_>>)>,
-        orders: Vec<u32>,
+        orders: Vec<i64>,
     ) -> PyResult<Self> {
+        let whole = |k: &i64| u32::try_from(*k).map_err(|_| *k);
+        let orders: Result<Vec<u32>, i64> = orders.iter().map(whole).collect();
+        let orders = orders.map_err(|k| {
+            argument_error(py, format!("orders must be from 1 to 4294967295, got {k}"))
+        })?;
         let given: Vec<_> = runs
             .iter()
             .map(|(theta, error, time)| (values(theta), values(error), time.as_ref().map(values)))

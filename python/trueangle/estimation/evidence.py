@@ -33,7 +33,7 @@ class WeightedModel(NamedTuple):
 
 @dataclass(frozen=True)
 class EvidenceEstimate:
-    """What readings tell of orders, coefficients and noise.
+    """Posterior of orders, coefficients and noise.
 
     Attributes
     ----------

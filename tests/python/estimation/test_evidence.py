@@ -114,7 +114,7 @@ def test_effects_of_runs_are_those_of_statsmodels() -> None:
         assert at(w * white, o * omega)[0] < best
 
 
-def memory(kind: str, n: int) -> np.ndarray:
+def correlations(kind: str, n: int) -> np.ndarray:
     """Correlations of a noise of variance 1, or 1 on average over a run."""
     i = np.arange(n)
     if kind == "half walk, half white":
@@ -137,7 +137,7 @@ def noisy_runs(
     """Runs of orders 1, 2 and 4 in a noise of 5."""
     runs = []
     for own in theta:
-        root = np.linalg.cholesky(memory(kind, own.size) + 1e-12 * np.eye(own.size))
+        root = np.linalg.cholesky(correlations(kind, own.size) + 1e-12 * np.eye(own.size))
         error = harmonics(own, [1, 2, 4]) @ sizes + 5.0 * root @ rng.normal(size=own.size)
         runs.append(RunReadings(own, error - 70.0, 3.0 + 0.02 * np.arange(own.size)))
     return runs
@@ -147,7 +147,7 @@ def best_known(kind: str, runs: list[RunReadings]) -> np.ndarray:
     """Generalized least squares with the true orders and the true noise."""
     gram, moment = np.zeros((6, 6)), np.zeros(6)
     for run in runs:
-        known = cho_factor(memory(kind, run.theta.size))
+        known = cho_factor(correlations(kind, run.theta.size))
         whole = cho_solve(known, np.ones(run.theta.size))
         x = harmonics(run.theta, [1, 2, 4])
         x -= np.outer(np.ones(run.theta.size), whole @ x) / whole.sum()
@@ -288,6 +288,8 @@ def test_what_cannot_be_used_is_refused_with_the_run_and_the_reading() -> None:
         estimate_by_evidence([], [1])
     with pytest.raises(ArgumentError, match="increasing order, got 2 before 2"):
         estimate_by_evidence([good], [2, 2])
+    with pytest.raises(ArgumentError, match="orders must be from 1 to 4294967295, got -2"):
+        estimate_by_evidence([good], [-2])
     with pytest.raises(ArgumentError, match="above 0 and below 1, got 1"):
         estimate_by_evidence([good], [2], [1.0])
     with pytest.raises(ArgumentError, match="probabilities has 2 elements, orders has 1"):
