@@ -62,3 +62,10 @@ def test_check_names_the_row_and_nothing_else(off):
         ], seed
         assert not faults[0].unusable
         assert ta.check(runs_of(tables, run, row, None)).data_faults == ()
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 6, 7, 27])
+def test_check_names_no_row_of_a_run_too_short_to_tell(size):
+    x = np.linspace(0.5, 5.0, size)
+    y = x + np.where(np.arange(size) == size // 2, 0.3, 0.0)
+    assert [f for f in ta.check(ta.CalibrationRun(x, y)).data_faults if f.fault == "outliers"] == []

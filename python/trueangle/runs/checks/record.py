@@ -65,11 +65,13 @@ class Record:
     def spikes(self) -> tuple[NDArray[np.bool_], Array]:
         """Which readings are isolated outliers, and how far each is off its neighbours, deg."""
         wild, distance = spikes(self._run.centred_error, self.reference, 360.0)
-        if wild.any():  # a sensor that rounds differs from its neighbours by its counts
+        if wild.any():
+            # A sensor that rounds differs from its neighbours by its counts.
             steps = np.diff(np.unique(self.indicated[~wild]))
             wild &= distance > 2.0 * steps.min(initial=360.0, where=steps > 0.0)
-        # What several readings in a row show is an effect, not an outlier.
-        return wild & (np.convolve(wild, np.ones(7), "same") < 1.5), distance
+            # What several readings in a row show is an effect, not an outlier.
+            wild &= np.convolve(wild, np.ones(7), "same") < 1.5
+        return wild, distance
 
     @cached_property
     def unwrapped(self) -> tuple[Array, Array]:
