@@ -19,8 +19,8 @@ const BLOCK_ROWS: usize = 512;
 const READINGS_PER_SEGMENT: usize = 8;
 
 /// With this many harmonics they pay at any number of readings: QR of the rows costs
-/// `readings * harmonics^2`, the moments' spectrum and normal equations less. With fewer, QR stays:
-/// what it says of partial travel is relied on where a run is held out in parts.
+/// `readings * harmonics^2`, the moments' spectrum and normal equations less. With fewer the rule
+/// above stands in for the costs, which are microseconds there, and fits keep their last digits.
 const MANY_HARMONICS: usize = 128;
 
 /// Factors of segments want some readings more than their twelve unknowns.
