@@ -6,7 +6,7 @@ import errno
 import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from .checksum import Checksum
 from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, note
 from .hdf5places import Hdf5Places
-from .hdf5sets import cached, data_sets, is_elsewhere, is_number_or_text, part, put
+from .hdf5sets import cached, data_sets, is_elsewhere, is_number, is_number_or_text, part, put
 from .stored import ROWS
 
 #: Readings taken together: what is read of them stays in the cache of the processor.
@@ -95,7 +95,7 @@ def read(path: Path, wanted: Selection) -> Iterator[Batch]:
 def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected data sets; see `format.FormatModule`."""
     with _opened(task.source) as file:  # refuse what cannot be corrected before it is copied
-        channels = task.choose(_names(file))
+        channels = task.choose(_names(file, is_number))
         for channel in channels:
             data_sets(task.source, file, [channel.column, *channel.signals.values()])
         total = max(sum(file[channel.column].size for channel in channels), 1)
@@ -180,13 +180,15 @@ def _first_line(error: Exception) -> str:
     return str(error).partition("\n")[0]
 
 
-def _names(file: h5py.File) -> list[str]:
+def _names(
+    file: h5py.File, is_wanted: Callable[[h5py.Dataset], bool] = is_number_or_text
+) -> list[str]:
     found: list[str] = []
 
     def visit(name: str | bytes, item: Any) -> None:
         if isinstance(name, bytes):  # it is no text, and nobody can ask for it
             return
-        if isinstance(item, h5py.Dataset) and item.ndim and is_number_or_text(item):
+        if isinstance(item, h5py.Dataset) and item.ndim and is_wanted(item):
             found.append(name)
 
     file.visititems(visit)

@@ -107,15 +107,20 @@ def _place(data: h5py.Dataset, start: int, stop: int) -> tuple[slice, ...]:
     return tuple(slice(start, stop) if i == along else slice(None) for i in range(data.ndim))
 
 
+def is_number(data: h5py.Dataset) -> bool:
+    """Whether it holds numbers."""
+    return data.dtype.kind in "fiu"
+
+
 def is_number_or_text(data: h5py.Dataset) -> bool:
     """Whether `part` reads it: numbers, or texts of a fixed or any length."""
-    return data.dtype.kind in "fiu" or h5py.check_string_dtype(data.dtype) is not None
+    return is_number(data) or h5py.check_string_dtype(data.dtype) is not None
 
 
 def part(data: h5py.Dataset, start: int, stop: int) -> Any:
     """A segment of a vector: numbers in the byte order of this machine, or labels."""
     values: NDArray[Any] = data[_place(data, start, stop)].reshape(-1)
-    if values.dtype.kind not in "fiu":
+    if not is_number(data):
         return row_labels(values.tolist())
     return values.astype(values.dtype.newbyteorder("="), copy=False)
 

@@ -61,8 +61,8 @@ def spikes(error: Array, angle: Array, period: float) -> tuple[NDArray[np.bool_]
     # Readings in counts: most deviations may be exactly 0, the rest one count.
     scale = max(robust_scale(deviation), float(quantile(distance, 0.8)))
     limit = WILD * max(scale, robust_scale(between) / math.sqrt(1.5))
-    wild = distance > limit
-    if wild.any():
+    far = distance > limit
+    if far.any():
         # Across a gap a steep error is far off its neighbours, but not off the line between them.
         place = np.mod(angle, period)[order]
         before, after = np.roll(error[order], 1), np.roll(error[order], -1)
@@ -71,5 +71,5 @@ def spikes(error: Array, angle: Array, period: float) -> tuple[NDArray[np.bool_]
         share = np.divide(back, gap, out=np.full_like(gap, 0.5), where=gap > 0.0)
         line = before + share * (after - before)
         distance[order] = np.minimum(distance[order], np.abs(error[order] - line))
-        wild &= distance > limit
-    return (none if wild.mean() > WILD_SHARE else wild), distance
+        far &= distance > limit
+    return (none if far.mean() > WILD_SHARE else far), distance

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
@@ -293,10 +294,10 @@ def _resolved(indicated: Array, reference: Array, period: float) -> Array:
     Such a number (1e300) is no angle: whatever it wraps to is rounding, which could pass for a
     good reading. Half a period off it is an outlier to every test.
     """
-    lost = np.abs(indicated) * np.finfo(np.float64).eps > period
-    if not lost.any():
+    size, most = np.abs(indicated), period / sys.float_info.epsilon
+    if size.max() <= most:
         return indicated
-    resolved = np.where(lost, reference + 0.5 * period, indicated)
+    resolved = np.where(size > most, reference + 0.5 * period, indicated)
     resolved.flags.writeable = False
     return resolved
 

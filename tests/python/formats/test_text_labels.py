@@ -62,3 +62,12 @@ def test_texts_are_labels(ending, kind, chunked, tmp_path):
     np.testing.assert_array_equal(first.indicated, y[np.array(run) == NAMES[2]])
     fit = ta.fit(path, orders=[1, 2])
     np.testing.assert_allclose(fit.amplitudes, [0.0, 0.08], atol=1e-12)
+
+
+def test_a_text_is_no_angle_to_correct(tmp_path):
+    path = tmp_path / "log.h5"
+    hdf5(path, "S9", False)
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.1])], 0.0, 360.0)
+    report = ta.correct_logs(path, model, tmp_path / "out.h5", column="run", unit="deg")
+    assert "no such column; its columns are" in str(report.logs[0].error)
+    assert not (tmp_path / "out.h5").exists()

@@ -15,7 +15,6 @@ from ...support.angles import wrap
 from ...support.arrays import Array
 from ...support.roles import offsets_of, unit_in_name
 from ..files import read_columns
-from ..outliers import spikes
 from ..readings import FileReadings
 from ..run import CalibrationRun
 from ..source import checked_reading_options
@@ -62,21 +61,9 @@ class Record:
         return int(self.reference.size)
 
     @cached_property
-    def spikes(self) -> tuple[NDArray[np.bool_], Array]:
-        """Which readings are isolated outliers, and how far each is off its neighbours, deg."""
-        wild, distance = spikes(self._run.centred_error, self.reference, 360.0)
-        if wild.any():
-            # A sensor that rounds differs from its neighbours by its counts.
-            steps = np.diff(np.unique(self.indicated[~wild]))
-            wild &= distance > 2.0 * steps.min(initial=360.0, where=steps > 0.0)
-            # What several readings in a row show is an effect, not an outlier.
-            wild &= np.convolve(wild, np.ones(7), "same") < 1.5
-        return wild, distance
-
-    @cached_property
     def unwrapped(self) -> tuple[Array, Array]:
         """Reference and indicated without jumps of a turn, those of single outliers included."""
-        indicated, error = self._run.indicated.copy(), self._run.error
+        indicated, error = self.run.indicated.copy(), self.run.error
         if len(self) > 2:
             # One reading off by more than a quarter of a turn, there and back, is no motion.
             step = np.abs(wrap(np.diff(error), 360.0)) > 90.0
@@ -86,7 +73,8 @@ class Record:
         return np.unwrap(self.reference, period=360.0), np.unwrap(indicated, period=360.0)
 
     @cached_property
-    def _run(self) -> CalibrationRun:
+    def run(self) -> CalibrationRun:
+        """Its angles as a run."""
         return CalibrationRun(self.reference, self.indicated, 360.0)
 
 
