@@ -113,7 +113,7 @@ def conformity(
     -------
     dict
         ``limit_arcsec, decision_rule, statement, conforms`` (by the binary rule: every value
-        within its acceptance limit), ``worst`` position with its acceptance limit,
+        within its acceptance limit), ``worst`` position with its acceptance limit and its excess,
         ``counts`` of positions by statement, and the least ``conformance_probability``.
     """
     limit, rule = specification.limit_arcsec, specification.decision_rule
@@ -144,6 +144,7 @@ def conformity(
             "error_arcsec": row["error_arcsec"],
             "expanded_arcsec": row["expanded_arcsec"],
             "acceptance_limit_arcsec": limit - bands[worst],
+            "beyond_limit_arcsec": max(abs(row["error_arcsec"]) - limit, 0.0),
         },
         "counts": {name: stated.count(name) for name in _STATEMENTS},
         "conformance_probability": min(chances),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..fitting.summary import fit_error_unit
+from ..runs.checks import check
 from ..runs.provenance import provenance
 from ..runs.run import CalibrationRun, as_runs
 from ..support.angles import ARCSEC_PER_TURN
@@ -52,7 +53,8 @@ class Certificate:
         Errors are in arcsec; ``errors_in`` says which unit the pages show.
         ``positions`` holds ``angle_deg, error_arcsec, standard_arcsec,
         degrees_of_freedom, coverage_factor, expanded_arcsec`` of every position;
-        ``as_left`` the same as a model leaves it, ``conformity`` what `conformity` states.
+        ``as_left`` the same as a model leaves it, ``conformity`` what `conformity` states;
+        ``data_faults`` and ``coverage`` what `trueangle.check` reports of the readings.
     logo : path or None
         The picture in the head of the first page.
     """
@@ -163,6 +165,7 @@ def certify(
             "same_readings": is_of_these(by, found),
             **_valued(_fitted(corrected_runs(by, found), same, gear), angles, who),
         }
+    checked = check(found).to_dict()
     unit = fit_error_unit(fit, errors_in)
     source = None if isinstance(identity, Identity) else str(Path(identity))
     content: dict[str, Any] = {
@@ -182,6 +185,8 @@ def certify(
         "as_left": left,
         "harmonics": _harmonics(fit, _degrees_of_freedom(fit)),
         "readings": _readings(fit),
+        "data_faults": checked["data_faults"],
+        "coverage": {name: checked[name] for name in ("directions", "span_deg", "cannot")},
         "notes": list(fit.notes),
         "aliases": _aliases(fit),
         "provenance": provenance(found, source),

@@ -41,25 +41,25 @@ def note_in(language: str, note: str) -> str:
     >>> note_in("de", "3 outliers set aside.")
     '3 Ausreißer ausgeschlossen.'
     """
-    if language == _WRITTEN:
-        return note
-    found = _translated(note.removesuffix("."), language)
+    found = translated(note.removesuffix("."), language)
     return f"{found[:1].upper()}{found[1:]}{'.' if note.endswith('.') else ''}"
 
 
-def _translated(note: str, language: str) -> str:
+def translated(note: str, language: str) -> str:
     """A sentence or a part of one; of lists every entry."""
+    if language == _WRITTEN:
+        return note
     known = _notes(language)
     for pattern, text in known:
         match = pattern.fullmatch(note)
         if match is not None:
-            values = {name: _translated(part, language) for name, part in match.groupdict().items()}
+            values = {name: translated(part, language) for name, part in match.groupdict().items()}
             return "".join(
                 values.get(part, part) if i % 2 else part
                 for i, part in enumerate(_PLACE.split(text))
             )
     if ", " in note:
-        return ", ".join(_translated(part, language) for part in note.split(", "))
+        return ", ".join(translated(part, language) for part in note.split(", "))
     return _DECIMAL.sub(rf"\1{certificate_texts(language)['decimal_mark']}\2", note)
 
 

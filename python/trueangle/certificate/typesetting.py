@@ -19,7 +19,7 @@ from ..plots.canvas import described, new_axes, new_figure, turn_axis
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.display_units import ErrorsIn, error_unit, significant_digits, sine_of_rms
 from ..support.files import CERTIFICATE, check_output, external_output, read_whole
-from .language import certificate_texts, note_in
+from .language import certificate_texts, note_in, translated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,7 +55,8 @@ def certificate_pictures(content: dict[str, Any], dots_per_inch: float = 110.0) 
 
 def lay_out(content: dict[str, Any], folder: Path, logo: str | None = None) -> Path:
     """Write what is typeset into ``folder``; the file that the typesetter takes."""
-    said = certificate_texts(content["language"])
+    language = content["language"]
+    said = certificate_texts(language)
     rows = content["positions"]
     span = max(r["error_arcsec"] for r in rows) - min(r["error_arcsec"] for r in rows)
     small = max(r["expanded_arcsec"] for r in rows) < _SMALL * span
@@ -63,7 +64,13 @@ def lay_out(content: dict[str, Any], folder: Path, logo: str | None = None) -> P
     if logo is not None and picture is not None:
         (folder / picture).write_bytes(read_whole(logo, _MOST_BYTES, "a logo"))
     shown = content | {"small_u": small, "logo": None if picture is None else str(picture)}
-    shown["notes"] = [note_in(content["language"], note) for note in content["notes"]]
+    shown["notes"] = [note_in(language, note) for note in content["notes"]]
+    shown["data_faults"] = [note_in(language, f"{f['says']}.") for f in content["data_faults"]]
+    cannot = [
+        f"{translated(entry['what'], language)} ({translated(entry['because'], language)})"
+        for entry in content["coverage"]["cannot"]
+    ]
+    shown["coverage"] = content["coverage"] | {"cannot": cannot}
     (folder / "certificate.typ").write_bytes(_TEMPLATE.read_bytes())
     (folder / "content.json").write_text(json.dumps(shown, allow_nan=False), "utf-8")
     (folder / "texts.json").write_text(json.dumps(said), "utf-8")

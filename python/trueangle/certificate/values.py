@@ -16,7 +16,7 @@ from ..estimation.reference import design_matrix
 from ..model.file import load_model
 from ..model.model import HarmonicModel
 from ..plots.curves import fitted_degrees
-from ..runs.aliasing import distinct_positions
+from ..runs.aliasing import POSITION_TOLERANCE, distinct_positions
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
@@ -82,7 +82,7 @@ def nominal_positions(fit: FitResult, count: int | None = None) -> Array:
     if count is None:
         read = distinct_positions(fit.runs)
         if 2 <= len(read) <= POSITIONS:
-            return read.turns * 360.0
+            return _rounded(read.turns * 360.0)
     low, high = fitted_degrees(fit.model)
     pitch = 360.0 / (count or POSITIONS)
     first = int(np.ceil(low / pitch - 1e-9))
@@ -96,6 +96,14 @@ def nominal_positions(fit: FitResult, count: int | None = None) -> Array:
             f"{count or POSITIONS} positions to a turn: ask for more"
         )
     return np.asarray(angles, dtype=np.float64)
+
+
+def _rounded(read_deg: Array) -> Array:
+    """Positions as they were meant: with the fewest decimals that keep each the place it is."""
+    tolerance = 360.0 * POSITION_TOLERANCE
+    decimals = (np.round(read_deg, n) for n in range(3))
+    meant = next(deg for deg in decimals if np.abs(deg - read_deg).max() < tolerance)
+    return np.unique(np.mod(meant, 360.0))
 
 
 def values_at(fit: FitResult, angles_deg: Array) -> Values:

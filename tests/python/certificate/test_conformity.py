@@ -101,13 +101,18 @@ def test_statements_are_those_of_ilac_g8(error, simple, guarded):
         assert found["statement"] == statement
         assert found["conforms"] is (statement == "pass")
         assert sum(found["counts"].values()) == 2
+    assert found["worst"]["beyond_limit_arcsec"] == pytest.approx(max(abs(error) - 10.0, 0.0))
     assert found["worst"]["acceptance_limit_arcsec"] == 8.0
 
 
 def test_the_worst_position_is_the_one_nearest_to_its_own_acceptance_limit():
     found = conformity(Specification(10.0, "guard_band"), rows((7.0, 0.5), (-6.0, 3.5)))
     worst = {"angle_deg": 10.0, "error_arcsec": -6.0, "expanded_arcsec": 3.5}
-    assert found["worst"] == {**worst, "acceptance_limit_arcsec": 6.5}
+    assert found["worst"] == {
+        **worst,
+        "acceptance_limit_arcsec": 6.5,
+        "beyond_limit_arcsec": 0.0,
+    }
     assert found["statement"] == "pass"
     wide = conformity(Specification(10.0, "guard_band"), rows((0.0, 11.0)))
     assert wide["statement"] == "conditional_pass"  # a U beyond the limit accepts nothing
@@ -382,6 +387,44 @@ def test_the_pdf_says_it_in_its_language(name, tmp_path):
     assert abs(k * u - total) <= 0.5 * last * (1.0 + k) + 0.005 * u
 
 
+#: What the first page says of readings that a check finds fault with, and of their verdict.
+FAULTY = {
+    "en": ("Fail . Greatest error: ", "which exceeds the limit by", "Runs 0 and 2 hold the same",
+           "in one direction of travel", "noise and repeatability"),
+    "de": ("Nicht bestanden . Größte Abweichung: ", "außerhalb der Grenze um",
+           "Die Messreihen 0 und 2 enthalten dieselben", "in einer Fahrtrichtung", "Rauschen"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAULTY)
+def test_the_first_page_states_the_verdict_and_the_faults_of_the_readings(name):
+    """A copied run, one direction, 24 places met to 0.001 deg, an error of 34 for a limit of 21."""
+    pytest.importorskip("typst")
+    rng = np.random.default_rng(8)
+    given = []
+    for _ in range(2):
+        theta = 15.0 * np.arange(25) + rng.uniform(-1e-3, 1e-3, 25)
+        error = 34.0 * np.sin(np.radians(theta)) + rng.normal(0.0, 0.5, 25)
+        given.append(ta.CalibrationRun(theta, theta + error / 3600.0, 360.0, label=str(len(given))))
+    given.append(replace(given[0], label="2"))
+    who = replace(WHO, language=name, specification=Specification(21.0, "simple"))
+    content = certify(given, who, orders=[1]).content
+    assert [row["angle_deg"] for row in content["positions"]] == list(range(0, 360, 15))
+    assert [fault["fault"] for fault in content["data_faults"]] == ["duplicate_runs"]
+    assert content["coverage"]["directions"] == [1]
+    text = re.sub(r"\s+", " ", pdf_text(typesetting.typeset_certificate(content)))
+    first, rest = text.split({"en": "page 1 of", "de": "Seite 1 von"}[name])
+    for words in FAULTY[name]:
+        assert words in first, words
+    stated = first.split(FAULTY[name][0])[1].replace(",", ".")
+    size, excess = map(float, re.findall(r"(\d+\.\d+)″", stated)[:2])
+    assert size - 21.0 == pytest.approx(excess) == pytest.approx(13.0, abs=1.0)
+    unknown = {"en": "reversal error (one direction of travel); delay, drift and lines in time",
+               "de": "Umkehrspanne (eine Fahrtrichtung); Verzögerung, Drift"}  # fmt: skip
+    assert unknown[name] in rest
+    assert not re.search(r"\d[.,]000\b", text)
+
+
 def constants(folder):
     """Literal parts of all strings below a folder, those within f-strings too, as one text."""
     found = []
@@ -404,7 +447,8 @@ def test_notes_are_found_by_words_that_fits_write():
     for name, text in language.certificate_texts("en")["notes"].items():
         # Plurals and numbers are put in where the sentence is made.
         for part in re.split(
-            r"#\w+|\b1\b|\b(?:rows?|outliers?|runs?|intervals?|positions?)\b|[.,;:()]", text
+            r"#\w+|\b1\b|\b(?:rows?|outliers?|runs?|intervals?|positions?|readings?|is|are|one|no)\b|[.,;:()]",
+            text,
         ):
             words = part.strip()
             assert len(words) < 4 or words.lower() in written, (name, words)
