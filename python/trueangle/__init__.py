@@ -54,8 +54,8 @@ if TYPE_CHECKING:
     from .runs.joining import join as join
     from .runs.run import CalibrationRun as CalibrationRun
     from .runs.writing import write_runs as write_runs
-    from .selfcalibration import SelfCalibration as SelfCalibration
-    from .selfcalibration import selfcal as selfcal
+    from .selfcalibration.calibrate import selfcal as selfcal
+    from .selfcalibration.result import SelfCalibration as SelfCalibration
     from .simulation import Simulation as Simulation
     from .simulation import load_simulation as load_simulation
     from .simulation import simulate as simulate
@@ -67,14 +67,14 @@ _PUBLIC = {
     "wrap": "support.angles",
     "CalibrationRun": "runs.run",
     "Diagnosis": "diagnosis",
-    "OrderSelection": "fitting.orders",
+    "OrderSelection": "fitting.orders.result",
     "plan_after": "rehearsal",
     "plan_arc": "planning",
     "plan_mounts": "planning",
-    "select_orders": "fitting.orders",
+    "select_orders": "fitting.orders.select",
     "FitResult": "fitting.result",
     "HarmonicModel": "model.model",
-    "SelfCalibration": "selfcalibration",
+    "SelfCalibration": "selfcalibration.result",
     "Shaft": "joint.shafts",
     "check": "runs.checks.check",
     "correct": "logs.frames",
@@ -97,7 +97,7 @@ _PUBLIC = {
     "rehearse": "rehearsal",
     "Robot": "model.robot",
     "report": "reports",
-    "selfcal": "selfcalibration",
+    "selfcal": "selfcalibration.calibrate",
     "Simulation": "simulation",
     "diagnose": "diagnosis",
     "load_simulation": "simulation",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import statistics
 import time
 from collections.abc import Callable
 from typing import Any, Final
@@ -32,6 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print."""
+    import statistics
+
     if args.samples < _POLYGON or args.rounds < 1:
         raise ArgumentError(
             f"--samples must be {_POLYGON} or more and --rounds 1 or more, "

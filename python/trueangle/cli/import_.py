@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-from ..support.angles import zero_text
 from ..support.display_units import error_unit
 from ..support.layout import counted
 from ..support.plainresult import json_text
@@ -40,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     import math
 
     from ..export import import_model
-    from ..support.angles import ARCSEC_PER_TURN
+    from ..support.angles import ARCSEC_PER_TURN, zero_text
 
     model = import_model(args.file, args.source, args.output, **target_options(args))
     unit = ARCSEC_PER_TURN / model.period

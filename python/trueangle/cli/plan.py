@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
+from ..selfcalibration.methods import METHODS
 from .nextplan import add_after_arguments, refuse_without_after, run_after
 from .options import refuse_given
 from .paths import Input
@@ -92,15 +93,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_self_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of ``--self``."""
-    from ..planning.selfplan import SELF_METHODS
-
     add = parser.add_argument_group("without a reference").add_argument
     add(
         "--self",
         dest="self_method",
-        choices=SELF_METHODS,
+        choices=METHODS,
         metavar="METHOD",
-        help=f"plan a calibration without a reference: {', '.join(SELF_METHODS)}",
+        help=f"plan a calibration without a reference: {', '.join(METHODS)}",
     )
     add(
         "--simulation",

@@ -7,6 +7,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
+from ..selfcalibration.methods import LOOPS, METHODS
 from ..support.plainresult import json_text
 from .options import add_errors_in, add_model_output, errors_in
 from .paths import Input
@@ -15,7 +16,7 @@ from .signal_options import add_signals, reading_options
 from .values import parse_orders
 
 if TYPE_CHECKING:
-    from ..selfcalibration import SelfCalibration
+    from ..selfcalibration.result import SelfCalibration
     from .robots import JointAsked
 
 HELP = "calibrate without a reference: from time stamps, heads, shifts or the motor"
@@ -24,15 +25,12 @@ EXAMPLE = "trueangle selfcal coast.csv -o joint.json --loop open"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    from ..selfcalibration.calibrate import METHODS
-    from ..selfcalibration.loop import LOOPS
-
     add = parser.add_argument
     add("logs", nargs="+", type=Input, metavar="LOGS", help="CSV or Parquet logs of the joint")
     add_model_output(parser)
     add(
         "--method",
-        choices=METHODS,
+        choices=("auto", *METHODS),
         default="auto",
         help="auto (default) looks at the columns: time_s, head1_deg, shift_deg, motor_deg",
     )
@@ -107,7 +105,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
 
 
 def _calibrated(args: argparse.Namespace) -> SelfCalibration:
-    from ..selfcalibration import selfcal
+    from ..selfcalibration.calibrate import selfcal
 
     ripple = args.ripple
     return selfcal(

@@ -27,7 +27,6 @@ from .correlation import (
     white_variance_share,
 )
 from .problem import Problem, SolvedProblem
-from .ridge import bias_covariance, pattern_variances
 from .sandwich import Sandwich, sandwich
 
 if TYPE_CHECKING:
@@ -226,7 +225,7 @@ def _bias(
     problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], penalty: float
 ) -> Array:
     """What a penalty may have taken from the coefficients, as a covariance (see `penalty`)."""
-    from .ridge import REACH, error_range
+    from .ridge import REACH, bias_covariance, error_range, pattern_variances
 
     used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
     parts = [problem.products(weights, i, 1)[0] for i in used]

@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError
 from ..joint.shafts import limited_orders, shaft_cycles
+from ..selfcalibration.methods import METHODS
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
 from .plan import readings_needed
 from .referencefree import SelfPlan
-
-SELF_METHODS: Final = ("spin-down", "heads", "shifts", "dual")
 
 #: Ratios of start to end speed whose costs are told.
 _RATIOS: Final = (1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0)
@@ -159,7 +158,7 @@ def plan_self(
     >>> plan.angles_deg, round(plan.worst_noise_factor, 2), plan.readings
     ((0.0, 40.0), 2.92, 1710)
     """
-    check_choice("method", method, SELF_METHODS)
+    check_choice("method", method, METHODS)
     wanted = tuple(
         sorted({float(k) for k in limited_orders(range(1, 9) if orders is None else orders)})
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final, Unpack
+from typing import Any, Unpack
 
 from ..errors import ArgumentError, NoModelError
 from ..joint.shafts import MOST_ORDERS, limited_orders
@@ -15,12 +15,11 @@ from ..support.suggestions import check_choice
 from .dual import dual
 from .heads import head_patterns
 from .loop import check_loop
+from .methods import METHODS
 from .recording import Recording, as_recordings
 from .result import SelfCalibration
 from .shifts import shift_patterns
 from .spindown import spin_down
-
-METHODS: Final = ("auto", "spin-down", "heads", "shifts", "dual")
 
 
 @told_kinds
@@ -111,7 +110,7 @@ def selfcal(
     """
     turn = 360.0 if period is None else check_period(period)
     check_loop(loop, loop_bandwidth)
-    check_choice("method", method, METHODS)
+    check_choice("method", method, ("auto", *METHODS))
     wanted = _orders(orders)
     recordings = as_recordings(logs, {**reading, "period": period})
     chosen = _method(recordings) if method == "auto" else method

@@ -9,9 +9,8 @@ from typing import Final
 
 from ..errors import ArgumentError
 from ..support.suggestions import check_choice
+from .methods import LOOPS
 from .result import Blind, OrderEstimate
-
-LOOPS: Final = ("open", "closed", "unknown")
 
 #: Below so many bandwidths a velocity loop follows more than a tenth of what it sees.
 FOLLOWS_BELOW: Final = 2.0

@@ -14,7 +14,7 @@ import trueangle as ta
 from trueangle.cli import COMMANDS, build_parser, main
 from trueangle.cli.wording import _COMMANDS, _OPTIONS, Wording
 from trueangle.errors import ArgumentError, TrueAngleError
-from trueangle.selfcalibration import selfcal
+from trueangle.selfcalibration.calibrate import selfcal
 from trueangle.support.suggestions import check_choice, did_you_mean
 
 PACKAGE = Path(ta.__file__).parent

@@ -296,7 +296,7 @@ def selection(runs: list[ta.CalibrationRun]) -> ta.OrderSelection:
 
 
 def test_threshold_parts_significant_orders_from_the_others(selection) -> None:
-    from trueangle.fitting.orders import FALSE_ALARM
+    from trueangle.fitting.orders.search import FALSE_ALARM
 
     limit = np.array([row.needed for row in selection.table])
     assert np.isfinite(limit).all()

@@ -29,7 +29,7 @@ DOORS = (
     "planning.plan.plan_encoder", "planning.arc.plan_arc", "planning.selfplan.plan_self",
     "fleets.plan_unit", "rehearsal.after.plan_after", "simulation.simulate", "diagnosis.diagnose",
     "rehearsal.rehearse", "reports.report", "fleets.fleet.fleet", "export.export_model",
-    "export.import_model", "selfcalibration.selfcal", "model.monitor.Monitor",
+    "export.import_model", "selfcalibration.calibrate.selfcal", "model.monitor.Monitor",
     "model.batches.read_batches", "plots.kinds.fit_plot",
     "plots.modelerror.model_error",
 )  # fmt: skip

@@ -17,10 +17,8 @@ from ..fit import fitted_to
 from ..uncertainty import CovarianceKind
 from .choice import Method, selected_orders
 from .result import OrderSelection
-from .selection import FALSE_ALARM
-from .table import OrderRow
 
-__all__ = ["FALSE_ALARM", "OrderRow", "OrderSelection", "select_orders"]
+__all__ = ["OrderSelection", "select_orders"]
 
 
 @told_kinds

@@ -20,7 +20,6 @@ from .noise import pure_error
 from .ordernoise import OrderNoise
 from .phases import circular_range_deg, unit_phases
 from .result import OrderSelection
-from .rounding import orders_beyond_rounding
 from .search import FALSE_ALARM, EvidenceSearch
 from .table import OrderRow
 from .verdicts import row_with_verdict, selection_notes, verdict_reason
@@ -99,6 +98,8 @@ class EvidenceSelection(EvidenceSearch):
         mine = [i for i in chosen if i not in self.forced]
         if not (self.step and mine):
             return chosen, dropped
+        from .rounding import orders_beyond_rounding  # most readings are fine enough
+
         test = self.examined(chosen, mine)
         strongest = np.argsort(-np.hypot(test.cosine, test.sine), kind="stable")
         places = [*self.forced, *(mine[k] for k in strongest)]

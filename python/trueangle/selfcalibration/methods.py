@@ -1,0 +1,8 @@
+"""Words that a calibration without a reference takes: its methods, and loops of the speed."""
+
+from __future__ import annotations
+
+from typing import Final
+
+METHODS: Final = ("spin-down", "heads", "shifts", "dual")
+LOOPS: Final = ("open", "closed", "unknown")
