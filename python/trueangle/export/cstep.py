@@ -42,7 +42,17 @@ def c_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -> s
     late = ""
     if terms.delay:
         late = f"\n        + @n@_angle(signals->velocity * {FIXED.number(terms.delay)})"
-    parts.append(FIXED.part("step unwrapped", start=start, late=late))
+    held = [
+        f"state->good.{name} = @n@_good("
+        f"signals->{name}, {FIXED.number(limit)}, state->good.{name});"
+        for name, limit in terms.limits.items()
+    ]
+    if held:
+        parts.append(FIXED.part("good"))
+        if "direction" in terms.signals:
+            held.append("state->good.direction = signals->direction;")
+        held.append("signals = &state->good;")
+    parts.append(FIXED.part("step unwrapped", held="\n".join(held), start=start, late=late))
     if whole:
         parts.append(FIXED.part("step"))
     return filled_code("\n".join(parts), angle=FIXED.angle, real=FIXED.real)
@@ -50,18 +60,23 @@ def c_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -> s
 
 def c_state(terms: RunTimeTerms, arithmetic: CArithmetic) -> str:
     """Types of the state and of the signals."""
-    fields = ["uint8_t none;"]
+    fields = []
     if terms.travels:
         held = "@n@_stretch stretch;" if terms.springs else "int8_t direction;"
         fields = ["@angle@ farthest;", held, "uint8_t known;"]
-    signals = [f"@real@ {name}; /* {_UNITS[name]} */" for name in terms.signals if name in _UNITS]
+    if arithmetic is FIXED and terms.limits:
+        fields.append("@n@_signals good;")
+    signals = []
+    for name, limit in terms.limits.items():
+        most = f", up to {limit:.4g}" if arithmetic is FIXED else ""
+        signals.append(f"@real@ {name}; /* {_UNITS[name]}{most} */")
     if "direction" in terms.signals:
         signals.append("int8_t direction; /* of travel: 1, -1, 0 as before */")
     stretch = [arithmetic.part("stretch", count=len(terms.springs))] if terms.springs else []
     parts = [
         *stretch,
-        arithmetic.part("state", fields="\n".join(fields)),
         arithmetic.part("signals", fields="\n".join(signals or ["uint8_t none;"])),
+        arithmetic.part("state", fields="\n".join(fields or ["uint8_t none;"])),
     ]
     return filled_code("\n".join(parts), angle=arithmetic.angle, real=arithmetic.real)
 

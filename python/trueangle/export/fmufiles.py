@@ -82,7 +82,7 @@ def fmu_source(
     by_name = {variable.name: variable.reference for variable in variables}
     scale = {"velocity": " / turn", "temperature": " - 273.15"}
     signals = [
-        f"signals.{name} = me->value[{by_name[name]}]{scale.get(name, '')};"
+        f"known += signals.{name} = me->value[{by_name[name]}]{scale.get(name, '')};"
         for name in terms.signals
     ]
     instance = _part(
@@ -92,7 +92,7 @@ def fmu_source(
         noise=by_name.get("noise_std", 0),
         seed=by_name.get("seed", 0),
         start=", ".join(DOUBLE.number(v.start) for v in variables),
-        signals="\n".join(signals) or "\n",
+        signals="\n".join(signals),
     )
     text = "\n".join([*core, instance, ""])
     return f"{head}\n{_part('includes')}\n" + filled_code(text, n="m")

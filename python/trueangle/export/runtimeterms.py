@@ -33,6 +33,9 @@ DIRECTIONS = ("auto", "angle", "velocity", "signal")
 _UNITS = 4.0
 _OF_THE_SUM = 2.0**-20
 
+#: Power of two up to which signals are numbers: products of a few of them are finite floats.
+_LARGEST = 40
+
 
 class RunTimeWaves(NamedTuple):
     """Lines ``C sin(2 pi (m x + phase))`` of output orders m, all in turns."""
@@ -78,6 +81,9 @@ class RunTimeTerms:
         What they are, by name.
     signals : tuple of str
         Those they need, and the direction where it is asked for.
+    limits : dict of str to float
+        Of the numbers among them, either way: a power of two at which the terms are below half a
+        turn, or the range on record where that is larger. Signals beyond it are faults.
     way : str
         What tells the direction of travel: "angle", "velocity" or "direction"; empty where no
         term follows it.
@@ -96,6 +102,7 @@ class RunTimeTerms:
 
     kinds: tuple[str, ...]
     signals: tuple[str, ...]
+    limits: Mapping[str, float]
     way: str
     delay: float
     play: float
@@ -148,9 +155,18 @@ class RunTimeTerms:
             *["direction"] * (way == "direction"),
         ]
         kinds = tuple(term.kind for term in terms if not isinstance(term, LocalDefect))
+        recorded = {s: max(-low, high) for s, low, high in (model.fit.signals if model.fit else ())}
+        limits = {
+            name: max(
+                _limit(name, delay, smooth, waves),
+                recorded.get(name, 0.0) / (period if name == "velocity" else 1.0),
+            )
+            for name in signals
+            if name != "direction"
+        }
         return cls(
-            kinds, tuple(signals), way, delay, play, RunTimeWaves.of(places), tuple(springs),
-            tuple(smooth), tuple(waves), RunTimeWaves.of(lines),
+            kinds, tuple(signals), limits, way, delay, play, RunTimeWaves.of(places),
+            tuple(springs), tuple(smooth), tuple(waves), RunTimeWaves.of(lines),
         )  # fmt: skip
 
     @property
@@ -184,7 +200,8 @@ class RunTimeTerms:
             f"With {', '.join(self.kinds)}: {function}({state}, raw, &signals), or "
             f"{function}_unwrapped({state}, turns, raw, &signals), of every reading in the order "
             f"they are taken; the state is {fresh} before the first. {way} In float: 2^-20 of "
-            "their sum and 4 units of 2^-32 turns at most."
+            "their sum and 4 units of 2^-32 turns at most. A signal that is no number or beyond "
+            "its limit counts as its last good value, 0 before the first."
         )
 
     def steepness(self, ranges: Mapping[str, tuple[float, float]]) -> float:
@@ -228,6 +245,26 @@ def _way(direction: str, needs: set[str], travels: bool) -> str:
             '`direction="velocity"` or "signal"'
         )
     return "direction" if direction == "signal" else direction
+
+
+def _limit(
+    signal: str, delay: float, smooth: Sequence[Form], waves: Sequence[RunTimeWaves]
+) -> float:
+    """Power of two at which the terms of a signal are below half a turn."""
+
+    def size(value: float) -> float:
+        total = abs(delay) * value if signal == "velocity" else 0.0
+        for form, lines in zip(smooth, waves, strict=True):
+            match form:
+                case forms.Scaled() if form.signal == signal:
+                    slope = abs(form.level) + sum(lines.amplitudes)
+                    total += slope * (value + abs(form.origin))
+                case forms.Spring() if form.signal == signal:
+                    linear = abs(form.linear) + abs(form.beyond)
+                    total += linear * value + abs(form.cubic) * value**3
+        return total
+
+    return next((2.0**k for k in range(_LARGEST, -_LARGEST, -1) if size(2.0**k) < 0.5), 0.0)
 
 
 def _is_shaped(form: Form) -> bool:

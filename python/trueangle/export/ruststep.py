@@ -9,10 +9,10 @@ from .runtimeterms import RunTimeTerms, RunTimeWaves
 from .table import TURN, ratio_of_cycles
 
 _DOCS = {
-    "velocity": "Turns of the output per second.",
-    "temperature": "Degrees Celsius.",
-    "torque": "Nm at the output.",
-    "current": "A of the motor.",
+    "velocity": "Turns of the output per second",
+    "temperature": "Degrees Celsius",
+    "torque": "Nm at the output",
+    "current": "A of the motor",
 }
 
 
@@ -61,7 +61,17 @@ def rust_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -
         parts.append(_function("bumps", ["x: i64"], sums))
         start += " + to_angle(bumps(pattern(reading)))"
     late = f" + to_angle(signals.velocity * {_number(terms.delay)})" if terms.delay else ""
-    parts.append(_part("step unwrapped", start=start, late=late))
+    good = [
+        f"{name}: good(signals.{name}, {_number(limit)}, state.good.{name}),"
+        for name, limit in terms.limits.items()
+    ]
+    held = ""
+    if good:
+        parts.append(_part("good"))
+        if "direction" in terms.signals:
+            good.append("direction: signals.direction,")
+        held = _part("held", fields="\n".join(good))
+    parts.append(_part("step unwrapped", held=held, start=start, late=late))
     if whole:
         parts.append(_part("step"))
     return "\n".join(parts)
@@ -81,7 +91,12 @@ def _state(terms: RunTimeTerms) -> list[str]:
     """Types of the state and of the signals."""
     held = "stretch: Stretch" if terms.springs else "direction: i8"
     fields = ["farthest: i64", held, "known: bool"] if terms.travels else []
-    signals = [f"/// {_DOCS[name]}\n    pub {name}: f32" for name in terms.signals if name in _DOCS]
+    if terms.limits:
+        fields.append("good: Signals")
+    signals = [
+        f"/// {_DOCS[name]}, up to {limit:.4g}.\n    pub {name}: f32"
+        for name, limit in terms.limits.items()
+    ]
     if "direction" in terms.signals:
         signals.append("/// Of travel: 1, -1, 0 as before.\n    pub direction: i8")
     return [

@@ -136,6 +136,33 @@ def test_what_is_not_told_is_at_rest_at_the_temperature_that_terms_count_from(se
     assert kelvin - 273.15 == pytest.approx(RunDesign().temperature_C)
 
 
+def stepped(path, moved):
+    """Outputs of a unit that is given inputs one by one."""
+    description = fmpy.read_model_description(str(path))
+    unit = fmpy.instantiate_fmu(fmpy.extract(str(path)), description, "CoSimulation")
+    inputs = [v for v in description.modelVariables if v.causality == "input"]
+    (out,) = (v.valueReference for v in description.modelVariables if v.causality == "output")
+    columns = [moved[v.name if v.name in moved else "angle"].astype(np.float64) for v in inputs]
+    references = [v.valueReference for v in inputs]
+    unit.enterInitializationMode()
+    unit.exitInitializationMode()
+    found = np.empty(len(moved["angle"]))
+    for i, row in enumerate(np.column_stack(columns).tolist()):
+        unit.setFloat64(references, row)
+        unit.doStep(i * STEP, STEP)
+        (found[i],) = unit.getFloat64([out])
+    unit.terminate()
+    unit.freeInstance()
+    return found
+
+
+def wanted(model, variant, moved):
+    angle, signals = moved["angle"], signals_of(model, moved)
+    if variant == "correction":
+        return model.corrector()(angle, **signals)
+    return angle + model.error(angle, **signals)
+
+
 @pytest.mark.parametrize("variant", ["correction", "sensor"])
 @pytest.mark.parametrize("name", list(TERMS))
 def test_random_inputs(name, variant, tmp_path):
@@ -144,30 +171,27 @@ def test_random_inputs(name, variant, tmp_path):
     model = ta.HarmonicModel((OUTPUT, MOTOR), 0.01, terms=TERMS[name])
     path = tmp_path / "joint.fmu"
     ta.export_model(model, "fmu", path, variant=variant)
-    description = fmpy.read_model_description(str(path))
-    unit = fmpy.instantiate_fmu(fmpy.extract(str(path)), description, "CoSimulation")
-    inputs = [v for v in description.modelVariables if v.causality == "input"]
-    (out,) = (v.valueReference for v in description.modelVariables if v.causality == "output")
     moved = motion(seed, INPUTS)
-    columns = [moved[v.name if v.name in moved else "angle"].astype(np.float64) for v in inputs]
-    references = [v.valueReference for v in inputs]
-    unit.enterInitializationMode()
-    unit.exitInitializationMode()
-    found = np.empty(INPUTS)
-    for i, row in enumerate(np.column_stack(columns).tolist()):
-        unit.setFloat64(references, row)
-        unit.doStep(i * STEP, STEP)
-        (found[i],) = unit.getFloat64([out])
-    unit.terminate()
-    unit.freeInstance()
-    angle, signals = moved["angle"], signals_of(model, moved)
-    if variant == "correction":
-        want = model.corrector()(angle, **signals)
-    else:
-        want = angle + model.error(angle, **signals)
-    worst = np.max(np.abs(found - want))
+    worst = np.max(np.abs(stepped(path, moved) - wanted(model, variant, moved)))
     print(f"{worst} of {INPUTS} inputs")
     assert worst <= WITHIN
+
+
+@pytest.mark.parametrize("variant", ["correction", "sensor"])
+def test_inputs_that_are_no_numbers_give_none_and_leave_no_trace(variant, tmp_path):
+    """As of the corrector: the readings after them are those of the last good ones."""
+    model = ta.HarmonicModel((OUTPUT, MOTOR), 0.01, terms=TERMS["all"])
+    path = tmp_path / "joint.fmu"
+    ta.export_model(model, "fmu", path, variant=variant)
+    moved = motion(29, 600)
+    for i, name in enumerate(["angle", "velocity", "torque", "temperature", "current"]):
+        for j, fault in enumerate([np.nan, np.inf, -np.inf]):
+            moved[name][[3 * i + j, 17 * (i + 1) + j, 200 + 31 * i + 7 * j]] = fault
+    found, want = stepped(path, moved), wanted(model, variant, moved)
+    known = np.isfinite(want)
+    assert 500 < np.sum(known) < 560
+    assert np.max(np.abs(found - want)[known]) <= WITHIN
+    assert np.all(np.isnan(found[~known]))
 
 
 def test_a_sensor_at_the_indicated_angle_is_what_is_corrected(tmp_path):

@@ -1,6 +1,7 @@
 """Terms at run time in exported C and Rust: against the corrector, over random trajectories."""
 
 import os
+import re
 import subprocess
 
 import numpy as np
@@ -17,6 +18,8 @@ from .test_machines import ARM, HERE, STRICT, figures, run, tool
 from .trajectories import UNIT, trajectories, trajectory
 
 A = 1.0 / 3600.0
+#: What C leaves undefined ends the program.
+UNDEFINED = ("-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 #: Readings of a random trajectory against the corrector.
 SAMPLES = 10_000_000 if os.environ.get("TRUEANGLE_NIGHTLY") else 20_000
 LINES = {"orders": (1.0, 3.0), "cosine": (2 * A, 0.0), "sine": (A, 3 * A)}
@@ -94,7 +97,7 @@ def walked_in_c(model, rows, folder, flags=()):
     return made, np.frombuffer(done.stdout, "<i8") * UNIT
 
 
-def walked_in_rust(model, rows, folder):
+def walked_in_rust(model, rows, folder, flags=()):
     tool("rustc")
     made = exported(model, "rust", folder / "j.rs")
     places = {"velocity": 8, "temperature": 12, "torque": 16, "current": 20}
@@ -112,7 +115,7 @@ def walked_in_rust(model, rows, folder):
         "        out.extend(found.to_le_bytes());\n    }\n"
         "    std::io::stdout().write_all(&out).unwrap();\n}\n"
     )
-    run(["rustc", "--edition", "2021", "-O", "-D", "warnings", folder / "walk.rs", "-o",
+    run(["rustc", "--edition", "2021", "-O", *flags, "-D", "warnings", folder / "walk.rs", "-o",
          folder / "walk"])  # fmt: skip
     (folder / "lib.rs").write_text("#![no_std]\npub mod j;\n")
     run(["rustc", "--edition", "2021", "--crate-type", "rlib", folder / "lib.rs", "-o",
@@ -159,6 +162,51 @@ def test_rust_makes_the_same_as_c(case, tmp_path):
     _, found = walked_in_rust(model, rows, tmp_path / "rust")
     _, same = walked_in_c(model, rows, tmp_path, ("-ffp-contract=off",))
     assert np.max(np.abs(found - same)) <= 2.0 * UNIT
+
+
+#: Values that no sensor measures, one of them in each signal that a model needs.
+FAULTS = np.array([np.nan, np.inf, -np.inf, 1e38, 3e9, -3e9, -1e38], np.float32)
+
+
+def with_faults(model, count):
+    """A trajectory with a fault in every seventh row, and the same with the last good values."""
+    rows = trajectory(13, count)
+    good = rows.copy()
+    for i in range(7, count, 7):
+        for name in fields_of(model):
+            rows[name][i], good[name][i] = FAULTS[i // 7 % len(FAULTS)], good[name][i - 1]
+    return rows, good
+
+
+@pytest.mark.parametrize("walked", ["c", "rust"])
+@pytest.mark.parametrize("case", ["play by velocity", "heat", "loads", "gravity", "all"])
+def test_a_signal_that_is_no_measurement_holds_its_last_good_value(case, walked, tmp_path):
+    model = model_of(case)
+    rows, good = with_faults(model, 2_000)
+    if walked == "c":
+        made, found = walked_in_c(model, rows, tmp_path, UNDEFINED)
+    else:
+        made, found = walked_in_rust(model, rows, tmp_path, ("-C", "overflow-checks=on"))
+    off = np.abs(found - wanted(model.corrector(), good, fields_of(model))) * 3600.0
+    assert np.max(off) <= made.max_difference_total_arcsec
+    comment = re.sub(r"[\s/!*]+", " ", made.text)
+    assert "counts as its last good value, 0 before the first" in comment
+
+
+@pytest.mark.parametrize("walked", ["c", "rust"])
+@pytest.mark.parametrize("case", ["springs by velocity", "a place and a ratio", "all"])
+def test_no_count_of_turns_overflows(case, walked, tmp_path):
+    """Of readings at either end; from 2^29 turns on they are held."""
+    model = model_of(case).replace(constant=-200.0)
+    rows = trajectory(17, 600)
+    ends = np.array([-(2**31), 2**31 - 1, -(2**29), 2**29, 0])[np.arange(600) // 40 % 5]
+    rows["place"] = ends * 2**32 + rows["place"] % 2**32
+    if walked == "c":
+        _, found = walked_in_c(model, rows, tmp_path, UNDEFINED)
+    else:
+        _, found = walked_in_rust(model, rows, tmp_path, ("-C", "overflow-checks=on"))
+    turns = np.clip(ends, -(2**29), 2**29)
+    assert np.max(np.abs(np.round(found / 360.0) - turns)) <= 2.0
 
 
 def test_a_state_without_advance_is_found(tmp_path):

@@ -157,10 +157,17 @@ static double normal(Instance *me)
 static void step(Instance *me)
 {
     const double turn = 6.283185307179586;
+    const m_state before = me->state;
+    double known = 0.0;
     m_signals signals;
     memset(&signals, 0, sizeof signals);
     @signals@
     me->value[OUTPUT] = turn * m_output(&me->state, me->value[1] / turn, &signals);
+    if (!isfinite(known + me->value[OUTPUT])) {
+        /* As the corrector does: no number, and the next reading follows the last good one. */
+        me->state = before;
+        me->value[OUTPUT] = NAN;
+    }
     if (NOISE && me->value[NOISE] > 0.0) {
         me->value[OUTPUT] += me->value[NOISE] * normal(me);
     }

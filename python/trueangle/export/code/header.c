@@ -127,10 +127,18 @@ static inline uint32_t @name@_place(int64_t output)
 }
 
 //@ correct unwrapped
+/* A reading with its whole turns, which end at 2^29 either way: no difference overflows. */
+static inline int64_t @name@_reading(int32_t turns, uint32_t angle)
+{
+    const int32_t most = INT32_C(536870912);
+    const int32_t held = turns > most ? most : turns < -most ? -most : turns;
+    return held * INT64_C(4294967296) + angle;
+}
+
 /* The same with the whole turns of the output, before and after; 2^-32 turns. */
 static inline int64_t @name@_correct_unwrapped(int32_t turns, uint32_t angle)
 {
-    const int64_t start = turns * INT64_C(4294967296) + angle - @zero@;
+    const int64_t start = @name@_reading(turns, angle) - @zero@;
     int64_t corrected = start;
     @steps@
     return corrected;

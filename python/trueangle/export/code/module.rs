@@ -29,10 +29,15 @@ pub fn @name@_place(output: i64) -> u32 {
 }
 
 //@ correct unwrapped
+/// A reading with its whole turns, which end at 2^29 either way: no difference overflows.
+fn reading(turns: i32, indicated: u32) -> i64 {
+    (i64::from(turns.clamp(-(1 << 29), 1 << 29)) << 32) + i64::from(indicated)
+}
+
 /// The true angle with its whole turns, in 2^-32 turns, behind an indicated one.
 #[inline]
 pub fn correct_unwrapped(turns: i32, indicated: u32) -> i64 {
-    let start = (i64::from(turns) << 32) + i64::from(indicated) - (@zero@);
+    let start = reading(turns, indicated) - (@zero@);
     let left = start;
     @steps@
     left

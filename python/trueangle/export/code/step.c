@@ -7,11 +7,10 @@ static inline float @n@_turns(int64_t angle)
     return (float)angle * 2.32830644e-10f;
 }
 
-/* Turns as an angle; what is no number or beyond a million turns is held there. */
+/* Turns as an angle. */
 static inline int64_t @n@_angle(float turns)
 {
-    const float held = turns > -1e6f ? (turns < 1e6f ? turns : 1e6f) : -1e6f;
-    const float units = held * 4294967296.0f;
+    const float units = turns * 4294967296.0f;
     return (int64_t)(units < 0.0f ? units - 0.5f : units + 0.5f);
 }
 
@@ -176,13 +175,22 @@ static inline @angle@ @n@_find(@angle@ goal, const @n@_signals *signals, int8_t 
     return @inverse@(goal - @n@_angle(@n@_error(goal, signals, direction@given@)));
 }
 
+//@ good
+/* A signal within its limit, or the last one that was. */
+static inline float @n@_good(float value, float limit, float last)
+{
+    return value >= -limit && value <= limit ? value : last;
+}
+
 //@ step unwrapped
 /* The true angle behind the next reading, with the whole turns of both, in 2^-32 turns. */
 static inline int64_t @n@_step_unwrapped(@n@_state *state, int32_t turns, uint32_t raw,
     const @n@_signals *signals)
 {
-    const int64_t reading = turns * INT64_C(4294967296) + raw;
-    const int64_t goal = @start@ - @n@_angle(@n@_level(signals));
+    const int64_t reading = @n@_reading(turns, raw);
+    int64_t goal;
+    @held@
+    goal = @start@ - @n@_angle(@n@_level(signals));
     return @n@_seen(state, reading, goal, signals)@late@;
 }
 
@@ -208,7 +216,7 @@ typedef struct {
 } @n@_stretch;
 
 //@ signals
-/* What is known at a reading; finite numbers. */
+/* What is known at a reading. */
 typedef struct {
     @fields@
 } @n@_signals;

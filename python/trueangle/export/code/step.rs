@@ -10,10 +10,9 @@ fn to_turns(angle: i64) -> f32 {
     angle as f32 * 2.328_306_4e-10
 }
 
-/// Turns as an angle; what is no number or beyond a million turns is held there.
+/// Turns as an angle.
 fn to_angle(turns: f32) -> i64 {
-    let held = if turns > -1e6 { if turns < 1e6 { turns } else { 1e6 } } else { -1e6 };
-    let units = held * 4_294_967_296.0;
+    let units = turns * 4_294_967_296.0;
     (if units < 0.0 { units - 0.5 } else { units + 0.5 }) as i64
 }
 
@@ -103,10 +102,23 @@ fn find(goal: i64, signals: &Signals, direction: i8@more@) -> i64 {
     @solved@
 }
 
+//@ good
+/// A signal within its limit, or the last one that was.
+fn good(value: f32, limit: f32, last: f32) -> f32 {
+    if value >= -limit && value <= limit { value } else { last }
+}
+
+//@ held
+state.good = Signals {
+    @fields@
+};
+let signals = &{ state.good };
+
 //@ step unwrapped
 /// The true angle behind the next reading, with the whole turns of both, in 2^-32 turns.
 pub fn step_unwrapped(state: &mut State, turns: i32, raw: u32, signals: &Signals) -> i64 {
-    let reading = (i64::from(turns) << 32) + i64::from(raw);
+    let reading = reading(turns, raw);
+    @held@
     let goal = @start@ - to_angle(level(signals));
     seen(state, reading, goal, signals)@late@
 }
@@ -133,7 +145,7 @@ pub struct Stretch {
 }
 
 //@ signals
-/// What is known at a reading; finite numbers.
+/// What is known at a reading.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Signals @fields@
 
