@@ -18,7 +18,20 @@ _WRITTEN: Final = "en"
 
 #: Values of notes that are words of their own or lists; others are one word, such as a number.
 _WORDS: Final = frozenset(
-    ("list", "names", "pairs", "rest", "runs", "shifts", "span", "what", "where", "which", "why")
+    (
+        "jump",
+        "list",
+        "names",
+        "pairs",
+        "rest",
+        "runs",
+        "shifts",
+        "span",
+        "what",
+        "where",
+        "which",
+        "why",
+    )
 )
 
 _ONE: Final = r"[^\s,;()]+"

@@ -14,6 +14,8 @@ from ..errors import ArgumentError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
+from ..runs.checks.jumps import missed_counts
+from ..runs.checks.record import records_of
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import student_quantile
@@ -56,6 +58,8 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         rows = "row" if fit.missing == 1 else "rows"
         yield f"{fit.missing} {rows} with an empty cell left out."
     yield from (_sentence(remark) for remark in fit.remarks)
+    for fault in () if fit.moments is not None else missed_counts(records_of(fit.runs)):
+        yield _sentence(f"{fault.says}; {fault.mend}")
     if fit.ridge > 0.0:
         where = "arc" if fit.problem.is_periodic else "travel"
         yield (

@@ -193,7 +193,7 @@ def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:
         at_ends = (ends - low < near) & (high - tops < near)
         if not at_ends.all() or not _stays(record, jumps, slip[jumps]):
             continue
-        period = float(median(tops - ends)) + typical
+        period = float(median(np.abs(reference - ahead)[jumps]))
         yield DataFault.of(
             "wrapped_reference",
             [record.label],

@@ -20,6 +20,7 @@ from .angles import (
     wrong_ratio,
 )
 from .fault import DataFault
+from .jumps import missed_counts
 from .outliers import outliers
 from .record import LEAST_READINGS, Record, read_records, records_of
 from .still import stuck_readings
@@ -180,6 +181,7 @@ TESTS = (
     duplicate_runs,
     duplicate_rows,
     stuck_readings,
+    missed_counts,
 )
 
 
@@ -188,6 +190,6 @@ def data_faults(records: list[Record]) -> list[DataFault]:
     found: list[DataFault] = []
     for test in TESTS:
         mixed = {label for fault in found if fault.fault in UNSURE for label in fault.runs}
-        angles = test in (wrapped_reference, wrong_ratio, swapped_channels, stuck_readings)
+        angles = test not in (duplicate_runs, duplicate_rows, unsorted_time, mixed_units)
         found += test([r for r in records if not (angles and r.label in mixed)])
     return found

@@ -30,7 +30,7 @@ class DataFault(NamedTuple):
     fault : str
         Of the fixed vocabulary: duplicate_runs, duplicate_rows, stale_samples,
         unsorted_time, mixed_units, wrong_sign, swapped_channels, wrong_gear_ratio,
-        saturated_travel, wrapped_reference, outliers.
+        saturated_travel, wrapped_reference, missed_counts, outliers.
     runs : tuple of str
         Labels of the runs that have it.
     rows : tuple of int

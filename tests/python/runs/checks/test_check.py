@@ -23,6 +23,7 @@ FAULTS = (
     "wrong_gear_ratio",
     "saturated_travel",
     "wrapped_reference",
+    "missed_counts",
 )
 
 UNUSABLE = {"unsorted_time", "mixed_units", "wrong_sign", "wrong_gear_ratio", "wrapped_reference"}
@@ -84,6 +85,8 @@ def faulty(fault: str, rng: np.random.Generator) -> tuple[list[dict[str, np.ndar
     elif fault == "wrapped_reference":
         for run in runs:
             run["reference_deg"] = run["reference_deg"] % 180.0
+    elif fault == "missed_counts":
+        one["indicated_deg"][140:] -= 7.2
     return runs, labels
 
 
@@ -114,6 +117,10 @@ def test_rows_are_named(tmp_path: Path) -> None:
     fault = ta.check(written(tmp_path, runs, labels)).data_faults[0]
     assert fault.rows == (300 + 101 + 1,)
     assert fault.runs == ("b",)
+    runs, labels = faulty("missed_counts", np.random.default_rng(4))
+    fault = ta.check(written(tmp_path, runs, labels)).data_faults[0]
+    assert fault.rows == (300 + 140 + 1,)
+    assert fault.says.startswith("the error of run b jumps by -7.2 deg at row 441 and stays there")
 
 
 @pytest.mark.parametrize(("places", "span"), [(36, 360.0), (27, 260.0)])

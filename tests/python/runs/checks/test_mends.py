@@ -78,6 +78,11 @@ def exchanged(record):
     return replace(record, reference=record.indicated + 0.1 * rough, indicated=record.reference)
 
 
+def slipped(record):
+    after = np.arange(len(record)) >= len(record) // 3
+    return replace(record, indicated=record.indicated + 3.6 * after)
+
+
 def standing(record):
     ends = record.indicated.copy()
     ends[-60:] = ends[-61]
@@ -107,6 +112,12 @@ def dropped(record, fault):
     return without(record, fault)
 
 
+def parted(record, fault):
+    """The rows from there: those before are none of this test, which wants one record."""
+    assert fault.mend.startswith("give the rows from there another run label")
+    return renumbered(chosen(record, record.rows >= fault.rows[0]))
+
+
 def sorted_by_time(record, fault):
     assert fault.mend.startswith("sort the rows by time")
     return renumbered(chosen(record, np.argsort(record.time)))
@@ -131,6 +142,7 @@ CASES = {
     "unsorted_time": (out_of_order, sorted_by_time),
     "wrapped_reference": (wrapped, unwrapped),
     "saturated_travel": (standing, dropped),
+    "missed_counts": (slipped, parted),
 }
 
 

@@ -1,0 +1,139 @@
+"""Steps of the error that stay to the end of a run: counts or motor steps that were lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from ...support.angles import wrap
+from ...support.arrays import Array
+from ...support.display_units import brief_number
+from ...support.quantiles import median, quantile
+from ..outliers import WILD, robust_scale
+from .fault import DataFault
+from .record import Record
+
+#: Readings on either side of a step that show whether it stays.
+_BESIDE: Final = 7
+
+#: Jumps of a run that are events; more are a property of it.
+_FEW: Final = 4
+
+#: Steps of the reference, in usual ones, up to which a change of the error is no gap.
+_USUAL: Final = 3.0
+
+#: Of more readings every second, third ... is looked at.
+_LOOKED_AT: Final = 8192
+
+
+def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
+    """Jumps of the error that stay, and are of no place of the joint.
+
+    Of places read before and after, the error is off by all jumps between. Where they are few, an
+    error of the place is no steeper than the angle itself, but at a sensor's own wrap.
+    """
+    for record in records:
+        apart = 1 + len(record) // _LOOKED_AT
+        names = ("reference", "indicated", "rows")
+        some = replace(record, **{name: getattr(record, name)[::apart] for name in names})
+        reference, indicated = some.unwrapped
+        error = some.run.centred_error
+        # By their rows, with their sizes and what a pattern may change by meanwhile.
+        found: dict[int, tuple[float, float]] = {}
+        stride = 1
+        # What takes several readings is a jump between every second, fourth ... of them.
+        while len(some) >= 4 * _BESIDE * stride:
+            for step, size, travel in _jumps(*(x[::stride] for x in (reference, indicated, error))):
+                rows = slice(step * stride, (step + 1) * stride + 1)
+                row = rows.start + _largest(error[rows], size)
+                if all(abs(row - other) > _BESIDE * stride for other in found):
+                    found[row] = size, travel
+            stride *= 2
+        for row in sorted(found):
+            lost = _lost(reference, error, found, row)
+            if lost is None:
+                continue
+            rows = slice((row - 1) * apart, row * apart + 1)
+            k = rows.start + _largest((record.indicated - record.reference)[rows], lost)
+            yield DataFault.of(
+                "missed_counts",
+                [record.label],
+                [int(record.rows[k])],
+                f"the error of run {record.label} jumps by {brief_number(lost)} deg at row "
+                f"{record.rows[k]} and stays there: steps or counts were lost",
+                "give the rows from there another run label, or measure anew",
+            )
+
+
+def _largest(error: Array, size: float) -> int:
+    """First reading after the largest change of an error in the sense of ``size``."""
+    return 1 + int(np.argmax(wrap(np.diff(error), 360.0) * np.sign(size)))
+
+
+def _jumps(reference: Array, indicated: Array, error: Array) -> Iterator[tuple[int, float, float]]:
+    """Reading before each jump, its size in degrees, and what the pattern may change by there.
+
+    A change of the error from one reading to the next is a jump where it is more than 8 robust
+    standard deviations off the median of the changes around it, and twice as far as all but a few
+    others, in one motion in one direction. It stays where the 7 readings after it are off those
+    before it by as much.
+    """
+    steps, changes = np.diff(reference), wrap(np.diff(error), 360.0)
+    around = np.pad(changes, _BESIDE // 2, mode="reflect")
+    usual = median(np.lib.stride_tricks.sliding_window_view(around, _BESIDE), axis=1)
+    off = changes - usual
+    size = np.abs(off)
+    limit = WILD * max(robust_scale(off), float(quantile(size, 0.8)))
+    # What rounds jumps from count to count: a few jumps are larger than all others.
+    limit = max(limit, 2.0 * float(np.partition(size, -_FEW - 1)[-_FEW - 1]))
+    far = np.flatnonzero(size > limit)
+    pace = _pace(steps)
+    for k in far[(far >= _BESIDE) & (far < size.size - _BESIDE)].tolist():
+        before, after = slice(k - _BESIDE, k), slice(k + 1, k + 1 + _BESIDE)
+        way = steps[before.start : after.stop] * np.sign(steps[before].sum())
+        onward = way.min() >= 0.0 and way[-_BESIDE:].any() and way[_BESIDE] <= _USUAL * pace
+        ends = np.stack([reference[k : k + 2], indicated[k : k + 2]])
+        over = np.ptp(np.floor(ends / 360.0), axis=1) > 0.0
+        at_turn = np.abs(wrap(ends, 360.0)).min(axis=1) <= max(_USUAL * way[_BESIDE], limit)
+        alone = max(size[before].max(), size[after].max()) <= 0.5 * size[k]
+        rise = float(median(error[after]) - median(error[k - _BESIDE + 1 : k + 1]))
+        stays = 0.5 < wrap(rise - _BESIDE * usual[k], 360.0) / off[k] < 1.5
+        if onward and alone and stays:
+            yield k, float(off[k]), np.inf if (over & at_turn).any() else float(way[_BESIDE])
+
+
+def _pace(steps: Array) -> float:
+    """Usual step of a reference that moves."""
+    moved = np.abs(steps[steps != 0.0])
+    return float(median(moved)) if moved.size else 0.0
+
+
+def _lost(
+    reference: Array, error: Array, jumps: dict[int, tuple[float, float]], row: int
+) -> float | None:
+    """By how much the error changes there for good; None where it changes with the place."""
+    place = np.mod(reference, 360.0)
+    old, new = np.arange(row - _BESIDE), np.arange(row + _BESIDE, place.size)
+    order = old[np.argsort(place[old], kind="stable")]
+    ring = np.concatenate([place[order[-1:]] - 360.0, place[order], place[order[:1]] + 360.0])
+    ends = np.concatenate([order[-1:], order, order[:1]])
+    right = np.clip(np.searchsorted(ring, place[new]), 1, ring.size - 1)
+    nearest = np.where(place[new] - ring[right - 1] < ring[right] - place[new], right - 1, right)
+    lost = np.zeros_like(error)
+    for other, (amount, _) in jumps.items():
+        lost[other:] += amount
+    size, travel = jumps[row]
+    then = ends[nearest]
+    gone = lost[new] - lost[then]
+    near = np.abs(ring[nearest] - place[new]) <= _USUAL * _pace(np.diff(reference))
+    # Jumps that are made up for at the same place tell nothing.
+    again = near & (np.abs(gone) > 0.5 * abs(size))
+    if again.sum() < _BESIDE and abs(size) <= travel:
+        return None
+    if not again.any():
+        return size
+    apart = wrap((error[new] - error[then] - gone)[again], 360.0)
+    return size + float(median(apart)) if median(np.abs(apart)) <= 0.5 * abs(size) else None
