@@ -19,6 +19,7 @@ __all__ = [
     "NoOrderError",
     "NotCorrectedWarning",
     "NotInvertibleError",
+    "OtherSheetsWarning",
     "OutsideSpanWarning",
     "RankError",
     "TrueAngleError",
@@ -172,6 +173,10 @@ class EmptyCellsWarning(UserWarning):
 
 class MessageLinesWarning(UserWarning):
     """Lines of a text file that hold no readings were left out."""
+
+
+class OtherSheetsWarning(UserWarning):
+    """Sheets of an Excel file were left out: the first that holds cells is read."""
 
 
 class OutsideSpanWarning(UserWarning):

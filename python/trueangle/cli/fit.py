@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Input,
         metavar="RUNS",
-        help="files of readings: CSV, Parquet, HDF5, MATLAB, numpy, ROS bags and others",
+        help="files of readings: CSV, Excel, Parquet, HDF5, MATLAB, numpy, ROS bags and others",
     )
     add_model_output(parser)
     add(

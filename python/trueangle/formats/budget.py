@@ -15,22 +15,11 @@ from ..errors import FileError
 DECODED_BYTES: Final = 1 << 30
 
 
-#: Bytes of a text that tell how long its lines are.
-_HEAD: Final = 1 << 16
-
-
 class FileExtent(NamedTuple):
     """What a file holds: its rows, about, and the bytes of columns in memory (0: not known)."""
 
     rows: int
     size: int
-
-
-def text_extent(path: Path) -> FileExtent:
-    """Rows of a text, as its first lines tell; their numbers are counted while it is read."""
-    with path.open("rb") as file:
-        head = file.read(_HEAD)
-    return FileExtent(path.stat().st_size * (head.count(b"\n") + 1) // max(len(head), 1), 0)
 
 
 class DecodedSizeError(FileError):

@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import FileError
 from .csvcells import cell_number as read_number
 from .format import Batch, Contents, CopyTask, Selection
+from .textfile import open_text
 
 #: Name, date, time, value; what follows (alarms) is of no concern.
 LINE = re.compile(rb"(\S+)\s+(\d{4}-\d\d-\d\d)\s(\d\d:\d\d:\d\d(?:\.\d{1,9})?)\s+(\S+)")
@@ -70,7 +71,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
 
 def _lines(path: Path) -> Iterator[tuple[str, str, float | str, int]]:
     """Variable, time stamp, value and number of every line; blank and lost ones pass."""
-    with path.open("rb") as file:
+    with open_text(path) as file:
         number = 0
         while line := file.readline(_LONGEST):
             number += 1

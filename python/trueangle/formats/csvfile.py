@@ -24,6 +24,7 @@ from .csvlines import LONGEST_LINE
 from .csvrows import BLOCK, QuotedBlock, line_too_long, quoted_blocks
 from .format import Addition, Batch, Contents, CopyTask, Selection, refuse_corrected
 from .messages import warn_of_messages
+from .textfile import create_text, open_text
 
 if TYPE_CHECKING:
     from .csvblocks import PlainBlock
@@ -36,7 +37,7 @@ SMALL = 1 << 18
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
     """Names in the header line."""
-    with path.open("rb") as file:
+    with open_text(path) as file:
         return Header(path, file).names
 
 
@@ -47,10 +48,9 @@ def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """
     labels = [name for name in wanted.names if name in wanted.texts]
     numbers = [name for name in wanted.names if name not in wanted.texts]
-    with path.open("rb") as file:
+    with open_text(path) as file:
         header = Header(path, file)
-        # The length of a pipe is told as 0.
-        small = 0 < path.stat().st_size <= SMALL
+        small = file.size <= SMALL
         messages: list[tuple[int, str]] = []
 
         def values(block: _Block) -> Batch:
@@ -66,19 +66,20 @@ def read(path: Path, wanted: Selection) -> Iterator[Batch]:
             from .ahead import side_by_side  # and the threads of the standard library
 
             yield from side_by_side(values, blocks, thread_count())
+        file.warn_of_sheets(path)
     warn_of_messages(path, messages)
 
 
 def header_line(path: Path) -> int:
     """The line of the names; 1 where there is none."""
-    with path.open("rb") as file, contextlib.suppress(FileError):
+    with open_text(path) as file, contextlib.suppress(FileError):
         return max(Header(path, file).place, 0) + 1
     return 1
 
 
 def line_of(path: Path, row: int) -> int:
     """The line of the file that a row came from."""
-    with path.open("rb") as file:
+    with open_text(path) as file:
         for block in _blocks(file, Header(path, file)):
             if row < block.rows:
                 return block.lines[row]
@@ -88,9 +89,8 @@ def line_of(path: Path, row: int) -> int:
 
 def copy(task: CopyTask) -> Contents:
     """Write ``target`` with the corrected columns last; see `format.FormatModule`."""
-    size = max(task.source.stat().st_size, 1)
     rows, check = 0, 0
-    with task.source.open("rb") as file, task.target.open("wb") as output:
+    with open_text(task.source) as file, create_text(task.target) as output:
         header = Header(task.source, file)
         channels = task.choose(header.names)
         used = _used(channels)
@@ -112,14 +112,15 @@ def copy(task: CopyTask) -> Contents:
             output.write(data)
             check = zlib.crc32(data, check)
             rows += block.rows
-            task.watch(block.rows, file.tell() / size)
+            task.watch(block.rows, file.part)
+        file.warn_of_sheets(task.source)
     return Contents(rows, {"bytes": f"{check:08x}"})
 
 
 def contents(path: Path, topic: str | None = None) -> Contents:
     """Rows and checksum of the bytes as they read back."""
     rows, check = 0, 0
-    with path.open("rb") as file:
+    with open_text(path) as file:
         header = Header(path, file)
         check = zlib.crc32(b"".join(header.head), check)
         for block in _blocks(file, header):

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from .._core import __version__
 from ..errors import FileError, MissingExtraError
-from .budget import FileExtent, text_extent
+from .budget import FileExtent
+from .textfile import text_extent
 
 #: Columns that are texts whatever they look like, in formats that do not say.
 TEXTS = ("run", "unit")

@@ -6,8 +6,9 @@ import re
 from pathlib import Path
 
 from ..errors import FileError
-from ..support.files import declare_endings, promised_format
+from ..support.files import declare_endings, ending_of, promised_format
 from .format import Format
+from .textfile import head_of_text
 
 #: A process variable and a date, as camonitor begins a line.
 _CAMONITOR = rb"\A\S+[ \t]+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
@@ -23,6 +24,12 @@ _GUIDING = rb"\A[^\n]*PHD2 (?:log )?version|^(?:Guiding|Calibration) Begins at \
 #: A name and a number, and the same name again some lines later.
 _NAMED = rb"(?:[\d:.]+ *-> *)?[ \t]*%s[ \t]*[:=][ \t]*[-+]?\.?\d"
 _SERIAL = b"^%s[^\n]*\n(?:[^\n]*\n){0,5}?%s" % (_NAMED % rb"([A-Za-z_]\w*)", _NAMED % rb"\1")
+
+
+def _packed(*endings: str) -> tuple[str, ...]:
+    """Endings of text, and those of what gzip and zstd make of it."""
+    return tuple(ending + packed for packed in ("", ".gz", ".zst") for ending in endings)
+
 
 FORMATS = (
     Format("parquet", {"Parquet": (".parquet", ".pq")}, "arrow", magics=(b"PAR1",)),
@@ -55,7 +62,14 @@ FORMATS = (
     Format("camonitor", {"EPICS": (".camonitor",)}, pattern=_CAMONITOR),
     Format("guidelog", {"a guide log": ()}, pattern=_GUIDING),
     Format("seriallog", {"a serial log": ()}, pattern=_SERIAL),
-    Format("csvfile", {"CSV": (".csv",), "tab-separated text": (".tsv", ".tab"), "": (".txt",)}),
+    Format(
+        "csvfile",
+        {
+            "CSV": _packed(".csv"),
+            "tab-separated text": _packed(".tsv", ".tab"),
+            "": (*_packed(".txt"), ".xlsx", ".xlsm"),
+        },
+    ),
 )
 for _format in FORMATS:
     declare_endings(_format.promises)
@@ -75,8 +89,10 @@ def find_format(path: Path) -> Format:
         A folder that is no log, or the ending of something that is none.
     """
     found = format_of_content(path)
-    ending = path.suffix.lower()
-    if known_format(path) is None and (path.is_dir() or (found is _TEXT and promised_format(path))):
+    ending = ending_of(path)
+    named = path.with_suffix("") if ending in (".gz", ".zst") else path
+    is_other = found is _TEXT and promised_format(named) is not None
+    if known_format(path) is None and (path.is_dir() or is_other):
         endings = ", ".join(ending for entry in FORMATS for ending in entry.endings)
         what = f"the ending {ending}" if ending else "a folder"
         raise FileError(path, f"no log format has {what}; known are {endings}")
@@ -85,12 +101,12 @@ def find_format(path: Path) -> Format:
 
 def known_format(path: Path) -> Format | None:
     """Format of ``path`` by its ending, or None for other files and for plain folders."""
-    ending = path.suffix.lower()
+    ending = ending_of(path)
     if path.is_dir():
         ending = ".db3" if (path / "metadata.yaml").is_file() else "/"
     found = [entry for entry in FORMATS if ending in entry.endings]
     if len(found) > 1 and path.is_file():  # MATLAB's ending stands for several formats
-        head = _head(path)
+        head = head_of_text(path, _HEAD)
         found.sort(key=lambda entry: not _begins(entry, head))
     return found[0] if found else None
 
@@ -98,16 +114,11 @@ def known_format(path: Path) -> Format | None:
 def format_of_content(path: Path) -> Format:
     """Format of ``path`` by its first bytes, else by its ending, else text."""
     if not path.is_dir():
-        head = _head(path)
+        head = head_of_text(path, _HEAD)
         for entry in FORMATS:
             if _begins(entry, head):
                 return entry
     return known_format(path) or _TEXT
-
-
-def _head(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(_HEAD)
 
 
 def _begins(entry: Format, head: bytes) -> bool:

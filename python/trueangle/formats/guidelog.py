@@ -14,6 +14,7 @@ left out. Format: https://github.com/OpenPHDGuiding/phd2/wiki/PHD2GuideLog
 
 from __future__ import annotations
 
+import io
 import math
 import re
 import warnings
@@ -28,6 +29,7 @@ import numpy as np
 from ..errors import FileError, MessageLinesWarning
 from .csvcells import cell_number
 from .format import Batch, Contents, CopyTask, Selection, row_labels
+from .textfile import open_text
 
 #: Degrees a second by which the sky turns.
 SIDEREAL: Final = 360.0 / 86164.0905
@@ -124,7 +126,7 @@ def _frames(path: Path) -> tuple[list[_Frame], int, int]:
     lost = settling = sections = 0
     first: datetime | None = None
     section: _Section | None = None
-    with path.open(encoding="utf-8", errors="replace") as file:
+    with io.TextIOWrapper(open_text(path), encoding="utf-8", errors="replace") as file:
         place = 0
         while text := file.readline(_LONGEST):
             place += 1

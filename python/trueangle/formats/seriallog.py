@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import FileError
 from .format import Batch, Contents, CopyTask, Selection
 from .messages import warn_of_messages
+from .textfile import TextFile, create_text, open_text
 
 # Each has one way to match, and a name begins where a word does: a long line of rubbish costs its
 # length, not the square of it.
@@ -82,9 +83,9 @@ def copy(task: CopyTask) -> Contents:
     additions = task.choose(columns(task.source))
     used = [name for a in additions for name in (a.column, *a.signals.values())]
     values = _clocked(used)
-    size, done, rows, check = max(task.source.stat().st_size, 1), 0, 0, 0
-    with task.target.open("wb") as output:
-        for lines in _blocks(task.source):
+    rows, check = 0, 0
+    with open_text(task.source) as file, create_text(task.target) as output:
+        for lines in _blocks(task.source, file):
             found = [row for _raw, row in lines if row is not None]
             styles = [_style(raw) for raw, row in lines if row is not None]
             batch = values(found)
@@ -105,9 +106,8 @@ def copy(task: CopyTask) -> Contents:
             data = b"".join(parts)
             output.write(data)
             check = zlib.crc32(data, check)
-            done += sum(len(raw) for raw, _row in lines)
             rows += len(found)
-            task.watch(len(found), done / size)
+            task.watch(len(found), file.part)
     return Contents(rows, {"bytes": f"{check:08x}"})
 
 
@@ -115,7 +115,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     """Rows and checksum of the bytes as they read back."""
     rows = sum(row is not None for _raw, row in _lines(path))
     check = 0
-    with path.open("rb") as file:
+    with open_text(path) as file:
         while data := file.read(1 << 20):
             check = zlib.crc32(data, check)
     return Contents(rows, {"bytes": f"{check:08x}"})
@@ -152,9 +152,9 @@ def _style(raw: bytes) -> tuple[bytes, bytes]:
     return between, raw[pairs[0].end(1) : pairs[0].start(2)]
 
 
-def _blocks(path: Path) -> Iterator[list[tuple[bytes, _Row | None]]]:
+def _blocks(path: Path, opened: TextFile) -> Iterator[list[tuple[bytes, _Row | None]]]:
     block: list[tuple[bytes, _Row | None]] = []
-    for entry in _lines(path):
+    for entry in _lines(path, opened):
         block.append(entry)
         if len(block) == _BLOCK:
             yield block
@@ -163,8 +163,8 @@ def _blocks(path: Path) -> Iterator[list[tuple[bytes, _Row | None]]]:
         yield block
 
 
-def _lines(path: Path) -> Iterator[tuple[bytes, _Row | None]]:
-    """Every line with its row; None for words.
+def _lines(path: Path, opened: TextFile | None = None) -> Iterator[tuple[bytes, _Row | None]]:
+    """Every line with its row, None for words, of a file that may be open already.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def _lines(path: Path) -> Iterator[tuple[bytes, _Row | None]]:
         A line begins with the name that rows begin with and is none.
     """
     first: bytes | None = None
-    with path.open("rb") as file:
+    with opened or open_text(path) as file:
         number = 0
         while raw := file.readline(_LONGEST):
             number += 1

@@ -80,7 +80,9 @@ def output_places(
                 f"{len(logs)} logs go into a folder, and this is the name of a file; "
                 "name a folder (with / at its end)",
             )
-        found = [LogTarget(log, folder / name, folder) for log, name in logs]
+        found = [
+            LogTarget(log, folder / kind_of_log(log).fitting(name), folder) for log, name in logs
+        ]
     else:
         found = [LogTarget(logs[0][0], Path(output), None)]
     _check(found, in_place, list(models))

@@ -47,10 +47,11 @@ def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationR
     path : path, table, or iterable of them
         Files, folders (and all below), patterns (``"logs/*.csv"``): CSV (comma, semicolon or
         tab, decimal points or commas, lines before the names, notes that begin with #, a line
-        of units), Parquet, Arrow, HDF5, MATLAB, numpy, ROS bags, MCAP, MDF4. Tables in memory:
-        a mapping of names to arrays, a structured array, or one of pandas, polars (also lazy),
-        pyarrow, DuckDB, xarray, Dask. Columns: ``reference_deg`` and ``indicated_deg`` (or
-        ``_rad``, ``_turn``, ``_count``, or a unit in brackets), and optionally ``run``,
+        of units; also packed by gzip or zstd), Excel, Parquet, Arrow, HDF5, MATLAB, numpy, ROS
+        bags, MCAP, MDF4. Tables in memory: a mapping of names to arrays, a structured array, or
+        one of pandas, polars (also lazy), pyarrow, DuckDB, xarray, Dask. Columns:
+        ``reference_deg`` and ``indicated_deg`` (or ``_rad``, ``_turn``, ``_count``, or a unit in
+        brackets), and optionally ``run``,
         ``unit``, ``when`` (ISO 8601) and those of `trueangle.support.signals.SIGNALS`; an
         ``error_arcsec`` (or another unit) may stand beside one of the two angles. Others are
         kept in `CalibrationRun.columns`.

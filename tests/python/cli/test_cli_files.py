@@ -439,7 +439,7 @@ def test_a_folder_of_logs_that_links_to_itself_ends(desk, capsys):
         (["fit", "r.csv", "-o", "x.pdf"], "x.json"),
         (["fit", "r.csv", "--one-pass", "-o", "x.toml"], "x.json"),
         (["correct", "r.csv", "-m", "m.json", "-o", "x.parquet"], "x.csv"),
-        (["correct", "r.csv", "-m", "m.json", "-o", "x.csv.gz"], "x.csv"),
+        (["correct", "r.csv", "-m", "m.json", "-o", "x.zip"], "x.csv"),
         (["correct", "r.csv", "-m", "m.json", "-o", "x.tsv"], "x.csv"),
         (["correct", "r.csv", "t.csv", "-m", "m.json", "-o", "x.csv"], "a folder"),
         (["simulate", "b.toml", "-o", "x.parquet"], "x.csv"),

@@ -12,6 +12,7 @@ import pytest
 import trueangle as ta
 from trueangle.formats.format import CopyTask, Selection
 from trueangle.formats.formats import FORMATS, find_format, known_format
+from trueangle.formats.textfile import create_text
 
 from .test_wpilog import record, started
 
@@ -45,6 +46,19 @@ def write_text(between):
         path.write_text("\n".join([between.join(columns), *rows_of(columns, between)]) + "\n")
 
     return write
+
+
+def write_packed(write):
+    """As ``write`` does, packed as the ending says."""
+
+    def packed(path, columns):
+        plain = path.with_suffix("")
+        write(plain, columns)
+        with create_text(path) as file:
+            file.write(plain.read_bytes())
+        plain.unlink()
+
+    return packed
 
 
 def write_serial(path, columns):
@@ -126,6 +140,9 @@ FILES = {
     "a.wpilog": ("wpilog", write_wpilog, True), "a.mf4": ("mdf", write_mdf, True),
     "a.csv": ("csvfile", write_text(","), False), "a.tsv": ("csvfile", write_text("\t"), False),
     "a.txt": ("seriallog", write_serial, False),
+    "a.csv.gz": ("csvfile", write_packed(write_text(",")), False),
+    "a.tsv.zst": ("csvfile", write_packed(write_text("\t")), False),
+    "a.txt.gz": ("seriallog", write_packed(write_serial), False),
 }  # fmt: skip
 
 #: Formats that hold the time apart from the columns that are listed.
@@ -322,7 +339,7 @@ def test_every_ending_is_that_of_one_format_and_said():
         "parquet": ".parquet .pq", "arrow": ".arrow .feather .ipc .arrows",
         "hdf5": ".h5 .hdf5 .hdf .he5 .mat .nc", "rosbag": ".bag .db3 .mcap", "mdf": ".mf4 .mdf",
         "wpilog": ".wpilog", "npy": ".npy", "npz": ".npz", "camonitor": ".camonitor",
-        "csvfile": ".csv .tsv .tab .txt",
+        "csvfile": ".csv .tsv .tab .txt .csv.gz .tsv.gz .tab.gz .txt.zst .xlsx .xlsm",
     }  # fmt: skip
     for name, endings in wanted.items():
         for ending in endings.split():

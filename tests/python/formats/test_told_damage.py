@@ -139,7 +139,7 @@ def test_a_folder_that_is_no_log(tmp_path):
         find_format(tmp_path)
     told = str(caught.value)
     assert told.startswith(f"{tmp_path}: no log format has a folder; known are .parquet, .pq, .arr")
-    assert told.endswith(".csv, .tsv, .tab, .txt")
+    assert told.endswith(".txt, .txt.gz, .txt.zst, .xlsx, .xlsm")
     (tmp_path / "a.html").write_text("text")
     with pytest.raises(FileError, match=r"a\.html: no log format has the ending \.html; known are"):
         find_format(tmp_path / "a.html")

@@ -24,6 +24,7 @@ from .kinds import (
     SIMULATION,
     FileKind,
     declare_endings,
+    ending_of,
     kind_of_log,
     promised_format,
 )
@@ -50,6 +51,7 @@ __all__ = [
     "check_input",
     "check_output",
     "declare_endings",
+    "ending_of",
     "external_output",
     "kind_of_log",
     "partition_keys",

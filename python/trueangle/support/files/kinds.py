@@ -54,6 +54,19 @@ def log_endings() -> tuple[str, ...]:
     return tuple(ending for endings in _LOGS.values() for ending in endings)
 
 
+def ending_of(path: str | PathLike[str]) -> str:
+    """The ending of a name in small letters, of both parts where it is that of a packed log.
+
+    Examples
+    --------
+    >>> ending_of("a.b.CSV"), ending_of("joint.json.gz")
+    ('.csv', '.gz')
+    """
+    named = Path(path)
+    both = "".join(named.suffixes[-2:]).lower()
+    return both if both in log_endings() else named.suffix.lower()
+
+
 class FileKind(NamedTuple):
     """A kind of file: what it is called, and the endings it may bear.
 
@@ -80,18 +93,20 @@ a model (JSON); name it joint.json
         ------
         FileError
         """
-        named = Path(path)
-        ending = named.suffix.lower()
-        if ending in self.endings:
-            return
-        promised = promised_format(path)
-        if promised is not None:
-            better = named.with_suffix(self.endings[0])
+        better = self.fitting(path)
+        if better != Path(path):
             raise FileError(
                 path,
-                f"the ending {ending} means {promised}, but what is written is {self.what}; "
-                f"name it {better}",
+                f"the ending {ending_of(path)} means {promised_format(path)}, but what is written "
+                f"is {self.what}; name it {better}",
             )
+
+    def fitting(self, path: str | PathLike[str]) -> Path:
+        """The name, with an ending of this kind in place of one that promises another format."""
+        named, ending = Path(path), ending_of(path)
+        if ending in self.endings or promised_format(path) is None:
+            return named
+        return named.with_name(named.name[: -len(ending)] + self.endings[0])
 
 
 def kind_of_log(path: str | PathLike[str]) -> FileKind:
@@ -102,16 +117,17 @@ def kind_of_log(path: str | PathLike[str]) -> FileKind:
     >>> kind_of_log("a.hdf5").what
     'HDF5, as the log is'
     """
-    ending = Path(path).suffix.lower()
+    ending = ending_of(path)
     for name, endings in _LOGS.items():
         if ending in endings and name:
             return FileKind(f"{name}, as the log is", (ending, *endings))
-    return FileKind("text, as the log is", (".txt", ".csv", ".tsv", ".tab"))
+    texts = [entry for entry in log_endings() if entry.startswith((".csv", ".tsv", ".tab", ".txt"))]
+    return FileKind("text, as the log is", tuple(texts))
 
 
 def promised_format(path: str | PathLike[str]) -> str | None:
     """Name of the format that the ending of ``path`` promises, if it does."""
-    ending = Path(path).suffix.lower()
+    ending = ending_of(path)
     known = {**_LOGS, **_FORMATS}.items()
     return next((name for name, endings in known if name and ending in endings), None)
 
