@@ -166,11 +166,11 @@ def _refit(fit: FitResult, train: Sequence[CalibrationRun]) -> HarmonicModel:
     from .fit import fit as fit_runs
 
     loss = cast(Loss, fit.loss)
-    argument = fit.model.argument
+    argument = fit.problem.argument
     shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.problem.shafts}
     if fit.evidence is None:
         orders = {shaft.name: shaft.orders for shaft in fit.problem.shafts}
-        return fit_runs(train, orders, shafts=shafts, argument=argument, loss=loss).model
+        return fit_runs(train, orders, shafts=shafts, argument=argument, loss=loss).bare_model
     ratio, member = fit.joint
     return fit_runs(
         train,
@@ -179,7 +179,7 @@ def _refit(fit: FitResult, train: Sequence[CalibrationRun]) -> HarmonicModel:
         shafts=fit.evidence.shafts,
         argument=argument,
         loss=loss,
-    ).model
+    ).bare_model
 
 
 def correct_held_out(model: HarmonicModel | None, run: CalibrationRun, label: str) -> HeldOutRun:

@@ -28,17 +28,10 @@ if TYPE_CHECKING:
 
 def _build_model(fit: FittedCoefficients) -> HarmonicModel:
     """The fitted series with its covariance, record and provenance."""
-    problem, solution = fit.problem, fit.fitted.solution
-    covariance, condition = fit.uncertainty.covariance, solution.condition_number
-    sources = dict.fromkeys(run.source for run in problem.runs if run.source is not None)
-    return HarmonicModel(
-        shafts=tuple(
-            Shaft(shaft.name, shaft.cycles_per_turn, shaft.orders, tuple(a), tuple(b))
-            for shaft, a, b in zip(problem.shafts, solution.cosine, solution.sine, strict=True)
-        ),
-        constant=solution.constant,
-        period=problem.period,
-        argument=problem.argument,
+    covariance = fit.uncertainty.covariance
+    condition = fit.fitted.solution.condition_number
+    sources = dict.fromkeys(run.source for run in fit.problem.runs if run.source is not None)
+    return fit.bare_model.replace(
         covariance=covariance if np.isfinite(covariance).all() else None,
         condition_number=condition if np.isfinite(condition) else None,
         fit=_record(fit),
@@ -136,6 +129,17 @@ class FittedCoefficients(FitData):
     """The model of a fit, and its coefficients with their uncertainty."""
 
     @cached_property
+    def bare_model(self) -> HarmonicModel:
+        """The fitted coefficients alone, which are all that a correction takes."""
+        problem, solution = self.problem, self.fitted.solution
+        parts = zip(problem.shafts, solution.cosine, solution.sine, strict=True)
+        shafts = [
+            Shaft(shaft.name, shaft.cycles_per_turn, shaft.orders, tuple(a), tuple(b))
+            for shaft, a, b in parts
+        ]
+        return HarmonicModel(tuple(shafts), solution.constant, problem.period, problem.argument)
+
+    @cached_property
     def model(self) -> HarmonicModel:
         """The fitted model, with its covariance and the record of this fit."""
         return _build_model(self)
@@ -231,17 +235,17 @@ class FittedCoefficients(FitData):
     @property
     def orders(self) -> tuple[float, ...]:
         """Output orders of all harmonics, shaft by shaft."""
-        return self.model.orders
+        return self.bare_model.orders
 
     @property
     def amplitudes(self) -> Array:
         """``C_k`` of all harmonics."""
-        return self.model.amplitudes
+        return self.bare_model.amplitudes
 
     @property
     def phases(self) -> Array:
         """``phi_k`` in radians of all harmonics."""
-        return self.model.phases
+        return self.bare_model.phases
 
     @cached_property
     def amplitude_std(self) -> Array:

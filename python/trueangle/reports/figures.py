@@ -64,14 +64,11 @@ def figures_of_runs(
 
 def _before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: ErrorScale) -> Figure:
     """Error of every held-out run before and after correction."""
-    pairs = []
+    pairs, span = [], curves.travelled_degrees(runs)
     for run in held.runs:
-        low = 0.0 if run.model is None else curves.fitted_degrees(run.model)[0]
-        x = curves.reference_degrees(run.run, low)
+        x = curves.reference_degrees(run.run, span[0])
         number = next(i for i, known in enumerate(runs) if known is run.run)
         pairs.append((number, Points(run.label, x, run.before), Points(run.label, x, run.after)))
-    model = next((run.model for run in held.runs if run.model is not None), None)
-    span = (0.0, 360.0) if model is None else curves.fitted_degrees(model)
     return panel_figure(before_after_picture(pairs, span, scale.unit), scale)
 
 

@@ -1,5 +1,7 @@
 """Sums of a selection against the plain design matrix, and the core's one pass."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -131,6 +133,23 @@ def test_forward_choice_takes_the_lowest_of_aliases():
     unit = ZeroGroupReadings(turns, np.sin(2 * np.pi * 202 * turns), np.ones(36), "")
     sums = harmonic_sums([unit], (14, 202, 22))
     assert choose_forward(sums, np.full(3, -3.0), 35, NoiseSpectrum.flat(0.01, 100.0, 3)) == [0]
+
+
+def test_a_choice_among_many_orders_changes_no_matrix_of_all_of_them():
+    rng = np.random.default_rng(52)
+    turns = rng.uniform(0.0, 1.0, 3000)
+    error = sum(np.sin(2 * np.pi * k * turns + k) for k in (1, 7, 90, 91, 212))
+    unit = ZeroGroupReadings(turns, error + rng.normal(0, 0.1, 3000), np.ones(3000), "")
+    sums = harmonic_sums([unit], range(1, 301))
+    matrix, _, _ = sums.total()
+    before = matrix.copy()
+    tracemalloc.start()
+    chosen = choose_forward(sums, np.full(300, np.log(1e-6)), 2999, None)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert sorted(sums.orders[chosen]) == [1, 7, 90, 91, 212]
+    assert peak < 0.2 * matrix.nbytes
+    np.testing.assert_array_equal(matrix, before)
 
 
 def test_tail_of_the_f_distribution():

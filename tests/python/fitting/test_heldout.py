@@ -7,7 +7,9 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis import heldout as extended
+from trueangle.fitting import fitdata
 from trueangle.fitting.heldout import folds, hold_out
+from trueangle.fitting.phases import run_phases
 
 #: Arcsec in a degree, and rounding of errors of some degrees.
 ARCSEC, ROUNDING = 3600.0, 1e-6
@@ -71,6 +73,18 @@ def test_zeros_of_the_runs_are_no_error():
     # 0.2 deg of order 1 and the noise.
     assert near.rms_before == pytest.approx(ARCSEC * np.hypot(0.2 / np.sqrt(2), 0.01), rel=0.05)
     assert near.rms_after == pytest.approx(ARCSEC * 0.01, rel=0.1)
+
+
+@pytest.mark.parametrize("orders", [None, [1]])
+def test_fits_that_only_correct_estimate_no_uncertainty(orders, monkeypatch):
+    fit = ta.fit(some_runs(), orders)
+    wanted, phases = fit.model.amplitudes, fit.model.phases
+    monkeypatch.setattr(fitdata, "coefficient_uncertainty", None)
+    assert hold_out(fit).reduction > 0.5
+    found = run_phases(fit)
+    for line, amplitude, phase in zip(found, wanted, phases, strict=True):
+        assert line.amplitude.mean() == pytest.approx(3600.0 * amplitude, rel=0.1)
+        assert line.phase.mean() == pytest.approx(phase, abs=0.1)
 
 
 @pytest.mark.parametrize(("seed", "amplitude"), [(0, 0.0035), (1, 0.005)])

@@ -62,9 +62,11 @@ def choose_forward(
     taken.
     """
     gram, rhs, rest = sums.total()
-    gram, rhs = gram.copy(), rhs.copy()
-    n = sums.orders.size
-    aa, ab, bb = _pairs(gram, n)
+    rhs, n = rhs.copy(), sums.orders.size
+    # Rows and factors of the chosen orders: of what these leave of the matrix only each order's own
+    # block and the rows of the next one are asked for.
+    rows = factors = np.empty((0, 2 * n))
+    aa, ab, bb = (part.copy() for part in _pairs(gram, n))
     # Scale free: energy of both columns, the smaller direction counts.
     energy = 0.5 * (aa + bb)
     alive = energy > 0.0
@@ -75,7 +77,6 @@ def choose_forward(
         dof = readings - 2 * len(chosen) - 2
         if dof < _LEAST_DOF:
             break
-        aa, ab, bb = _pairs(gram, n)
         det = aa * bb - ab * ab
         alive &= det > (COLLINEAR * energy) ** 2
         alive &= np.minimum(aa, bb) > COLLINEAR * energy
@@ -102,10 +103,14 @@ def choose_forward(
             best = int(same[np.lexsort((sums.orders[same], -log_limits[same]))[0]])
         chosen.append(best)
         pivot = sums.columns([best])
-        factor = np.linalg.solve(gram[np.ix_(pivot, pivot)], gram[pivot])
+        row = gram[pivot] - rows[:, pivot].T @ factors
+        factor = np.linalg.solve(row[:, pivot], row)
+        rows, factors = np.vstack([rows, row]), np.vstack([factors, factor])
+        aa -= (row[:, :n] * factor[:, :n]).sum(axis=0)
+        ab -= (row[:, :n] * factor[:, n:]).sum(axis=0)
+        bb -= (row[:, n:] * factor[:, n:]).sum(axis=0)
         rest -= float(gain[best])
         rhs -= factor.T @ rhs[pivot]
-        gram -= gram[:, pivot] @ factor
         alive[best] = False
     return chosen
 

@@ -110,16 +110,15 @@ class HarmonicSums:
     @staticmethod
     def whole(spectrum: NDArray[np.complex128], mine: Array, theirs: Array) -> Array:
         """``X' W X`` of whole orders about no mean, by the spectrum of the positions."""
-        rows, columns = mine.astype(np.int64)[:, None], theirs.astype(np.int64)
-        down = rows - columns
-        minus, plus = spectrum[np.abs(down)], spectrum[rows + columns]
-        sine = np.sign(down) * minus.imag
-        return 0.5 * np.block(
-            [
-                [plus.real + minus.real, plus.imag - sine],
-                [plus.imag + sine, minus.real - plus.real],
-            ]
-        )
+        rows, columns = mine.astype(np.intp)[:, None], theirs.astype(np.intp)
+        size, highest = rows.size, spectrum.size - 1
+        both = 0.5 * np.concatenate([spectrum[:0:-1].conj(), spectrum])
+        plus, minus = both.take(rows + (highest + columns)), both.take(rows + (highest - columns))
+        gram = np.empty((2 * size, 2 * columns.size))
+        cosine, sine = plus + minus, plus - minus
+        gram[:size, : columns.size], gram[size:, : columns.size] = cosine.real, cosine.imag
+        gram[:size, columns.size :], gram[size:, columns.size :] = sine.imag, -sine.real
+        return gram
 
     def blocks(self) -> Array:
         """``X' W X`` of every unit for each order by itself, shape (units, orders, 2, 2)."""

@@ -114,23 +114,21 @@ def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
     if sums.units < 2 or index.size == 0:
         return np.full(index.size, math.inf)
     coefficients, _, _ = fit_chosen_orders(sums, chosen)
-    n = index.size
-    parts = []
     # What one order has in common with itself does not depend on those chosen.
     own = sums.blocks()[:, index]
     # At one unit's places an order may vanish, up to rounding: it says nothing there.
     most = np.trace(own, axis1=2, axis2=3).max(axis=1)
-    own = own + np.maximum(1e-9 * most, 1e-200)[:, None, None, None] * np.eye(2)
-    for unit, blocks in enumerate(own):
-        score = sums.rhs(unit, index) - sums.gram(unit, index, chosen) @ coefficients
-        parts.append((blocks, np.stack([score[:n], score[n:]], axis=1)))
-    together = np.sum([blocks for blocks, _ in parts], axis=0)
-    common = np.linalg.solve(together, np.sum([s for _, s in parts], axis=0)[..., None])
-    quadratic = np.zeros(n)
-    for blocks, score in parts:
-        own = score - (blocks @ common)[..., 0]
-        quadratic += np.einsum("ki,ki->k", own, np.linalg.solve(blocks, own[..., None])[..., 0])
-    return np.asarray(quadratic / (2.0 * (sums.units - 1)))
+    own = own + np.maximum(1e-9 * most, 1e-150)[:, None, None, None] * np.eye(2)
+    scores = [
+        sums.rhs(unit, index) - sums.gram(unit, index, chosen) @ coefficients
+        for unit in range(sums.units)
+    ]
+    score = np.reshape(scores, (sums.units, 2, -1)).transpose(0, 2, 1)
+    common = np.linalg.solve(own.sum(axis=0), score.sum(axis=0)[..., None])
+    a, b = (score - (own @ common)[..., 0]).transpose(2, 0, 1)
+    aa, ab, bb = own[..., 0, 0], own[..., 0, 1], own[..., 1, 1]
+    quadratic = (bb * a * a - 2.0 * ab * a * b + aa * b * b) / (aa * bb - ab * ab)
+    return np.asarray(quadratic.sum(axis=0) / (2.0 * (sums.units - 1)))
 
 
 def remaining_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array:

@@ -32,17 +32,37 @@ _SETTLED: Final = 1e-4
 
 
 class Shapes(NamedTuple):
-    """Shapes of as many coefficients: terms of their logarithms, what is beside them, priors."""
+    """Shapes of as many coefficients.
+
+    Attributes
+    ----------
+    basis, known : ndarray
+        Terms of their logarithms at every order, and what is added to them.
+    prior : ndarray
+    scoring : ndarray
+        Coefficients by what the orders that tell the noise do.
+    share : ndarray
+        Part of each order's logarithm that it tells itself, as one of these.
+    """
 
     basis: Array
     known: Array
     prior: Array
+    scoring: Array
+    share: Array
+
+    @classmethod
+    def of(cls, basis: Array, known: Array, prior: Array, seen: Array) -> Shapes:
+        """With what follows of them and of the orders that tell the noise."""
+        scoring = np.linalg.pinv(basis[:, seen])
+        covariance = scoring @ scoring.transpose(0, 2, 1)
+        return cls(basis, known, prior, scoring, ((basis @ covariance) * basis).sum(axis=2))
 
 
 @lru_cache(maxsize=16)
-def shapes(whole: bytes, flat_below: float, most: int) -> list[Shapes]:
+def shapes(whole: bytes, told: bytes, flat_below: float, most: int) -> list[Shapes]:
     """White noise, noise that forgets exponentially, and what so many coefficients can follow."""
-    orders = np.frombuffer(whole)
+    orders, seen = np.frombuffer(whole), np.frombuffer(told, dtype=bool)
     highest = float(orders.max())
     corners = np.geomspace(max(flat_below, _LOWEST), max(highest, 2.0 * flat_below), _CORNERS)
     corners = corners if flat_below else np.append(0.0, corners)
@@ -52,13 +72,15 @@ def shapes(whole: bytes, flat_below: float, most: int) -> list[Shapes]:
     known = [-np.log(step**2 + (scale * corner) ** 2) for step in steps for corner in corners]
     prior = [_PRIORS[0], *[_PRIORS[1] / len(known)] * len(known)]
     level = np.ones((len(prior), orders.size, 1))
-    found = [Shapes(level, np.array([np.zeros(orders.size), *known]), np.array(prior))]
+    zero = np.zeros(orders.size)
+    found = [Shapes.of(level, np.array([zero, *known]), np.array(prior), seen)]
     clipped = np.maximum(orders, flat_below)
     free = _free(clipped / float(clipped.max()), most)
     each = _PRIORS[2] / max(1, sum(map(len, free.values())))
     for bases in free.values():
         shape = len(bases), orders.size
-        found.append(Shapes(np.array(bases), np.zeros(shape), np.full(len(bases), each)))
+        same = np.full(len(bases), each)
+        found.append(Shapes.of(np.array(bases), np.zeros(shape), same, seen))
     return found
 
 
@@ -93,14 +115,26 @@ def bend_of(freedom: int) -> Bend:
     return Bend(at, mean, variance / (low[0] / mean) ** 2 * freedom / 2.0)
 
 
-def fit_shapes(basis: Array, values: Array, bend: Bend) -> tuple[Array, Array]:
+def _levels(values: Array, bend: Bend) -> Array:
+    """The level c of each row at which the mean of ``min(v / c, a)`` is that of noise."""
+    ordered = np.sort(values, axis=1)
+    sums, count = np.cumsum(ordered, axis=1), values.shape[1]
+    # A value v is bent where the mean at c = v / a is below that of noise.
+    below = np.divide(sums, ordered, out=np.full_like(sums, np.inf), where=ordered > 0.0)
+    is_free = below + np.arange(count)[::-1] >= count * bend.mean / bend.at
+    free = np.count_nonzero(is_free, axis=1)
+    total = np.take_along_axis(sums, free[:, None] - 1, axis=1)[:, 0]
+    return np.maximum(total / (count * bend.mean - (count - free) * bend.at), 1e-300)
+
+
+def fit_shapes(basis: Array, scoring: Array, values: Array, bend: Bend) -> tuple[Array, Array]:
     """Coefficients of the logarithm of each shape, and the loss: half the deviance, and a constant.
 
-    ``basis`` has shape (shapes, orders, coefficients), ``values`` (shapes, orders).
+    ``basis`` has shape (shapes, orders, coefficients) and the pseudo-inverse ``scoring``,
+    ``values`` has shape (shapes, orders).
     """
-    scoring = np.linalg.pinv(basis)
     found = np.zeros((basis.shape[0], basis.shape[2]))
-    found[:, 0] = np.log(np.sort(values, axis=1)[:, values.shape[1] // 2])
+    found[:, 0] = np.log(_levels(values, bend))
     for _ in range(_STEPS):
         ratio = values * np.exp(-np.einsum("mkp,mp->mk", basis, found))
         step = np.einsum("mpk,mk->mp", scoring, np.minimum(ratio, bend.at) / bend.mean - 1.0)

@@ -121,7 +121,7 @@ def noise_spectrum(
     -----
     Of noise that remembers 0.6 or 0.9 of the reading before, the logarithm of s² is off by as
     much as its freedom says (0.7 to 1.2 of its standard error) but at the ends, where 7 and more
-    degrees of freedom of each order resolve that no shape is quite true. 2 to 8 ms.
+    degrees of freedom of each order resolve that no shape is quite true.
 
     References
     ----------
@@ -140,16 +140,15 @@ def noise_spectrum(
     # Where lines may be among those that tell it, each coefficient needs twice as many.
     most = int(count // (2 * _ORDERS_EACH if flat_below else _ORDERS_EACH))
     parts = []
-    for basis, known, prior in shapes(orders.tobytes(), flat_below, most):
+    for shape in shapes(orders.tobytes(), seen.tobytes(), flat_below, most):
+        basis, known, prior, scoring, share = shape
         scaled = values * np.exp(-known[:, seen])
-        found, loss = fit_shapes(basis[:, seen], scaled, bend)
+        found, loss = fit_shapes(basis[:, seen], scoring, scaled, bend)
         loss = loss + known[:, seen].sum(axis=1)
         size = basis.shape[2]
         score = independent * freedom * loss - 2.0 * np.log(prior)
         score += size * math.log(0.5 * freedom * count)
         variance = np.exp(known + np.einsum("mkp,mp->mk", basis, found))
-        inverse = np.linalg.pinv(np.einsum("mkp,mkq->mpq", basis[:, seen], basis[:, seen]))
-        share = np.einsum("mkp,mpq,mkq->mk", basis, inverse, basis)
         parts.append((score, variance, independent * freedom / (bend.widening * share)))
     scores, variances, freedoms = (np.concatenate(part) for part in zip(*parts, strict=True))
     beliefs = np.exp(-0.5 * (scores - scores.min()))

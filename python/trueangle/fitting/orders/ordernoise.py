@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -81,6 +81,9 @@ class OrderNoise:
         self.lines: list[int] = []
         #: Orders that may be real and are not chosen: the residual of the chosen ones holds them.
         self.barred: list[int] = []
+        #: What `near` was asked last, and told: the orders that a search ends with are asked twice.
+        self._asked: Any = None
+        self._told: tuple[NoiseSpectrum, Array | None]
 
     @property
     def by_orders(self) -> bool:
@@ -125,6 +128,12 @@ class OrderNoise:
 
     def near(self, chosen: Sequence[int]) -> tuple[NoiseSpectrum, Array | None]:
         """Noise near each order, and each order's own scatter between runs."""
+        asked = (self.kind, *chosen), tuple(self.lines), tuple(self.barred)
+        if asked != self._asked:
+            self._asked, self._told = asked, self._near(chosen)
+        return self._told
+
+    def _near(self, chosen: Sequence[int]) -> tuple[NoiseSpectrum, Array | None]:
         if self.kind == "hac":
             return self.beside({*self.lines, *chosen}) or self.white(self.of_reading(chosen)), None
         if self.repeated is None or self.kind == "white":

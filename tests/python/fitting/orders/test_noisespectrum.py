@@ -199,9 +199,21 @@ def test_coefficients_have_the_least_loss() -> None:
         return float((log + bent).sum())
 
     least = optimize.minimize(loss, np.zeros(2), method="Nelder-Mead", tol=1e-10)
-    found, told = fit_shapes(np.array([basis]), values[None], bend)
+    found, told = fit_shapes(basis[None], np.linalg.pinv(basis)[None], values[None], bend)
     np.testing.assert_allclose(found[0], least.x, atol=1e-3)
     assert told == pytest.approx([least.fun], abs=1e-5)
+
+
+@pytest.mark.parametrize("freedom", [2, 22])
+def test_a_level_is_found_exactly_whatever_lines_are_among_the_orders(freedom: int) -> None:
+    rng = np.random.default_rng(SEED)
+    values = rng.chisquare(freedom, (5, 60)) / freedom * np.geomspace(1e-3, 1e4, 5)[:, None]
+    values[1, 20:] *= np.geomspace(1.0, 1e9, 40)
+    values[2, :20] = 0.0
+    basis, bend = np.ones((5, 60, 1)), bend_of(freedom)
+    found, _ = fit_shapes(basis, np.linalg.pinv(basis), values, bend)
+    bent = np.minimum(values * np.exp(-found), bend.at)
+    np.testing.assert_allclose(bent.mean(axis=1), bend.mean, rtol=1e-12)
 
 
 def test_the_chance_is_that_of_every_shape_by_its_belief() -> None:

@@ -5,6 +5,8 @@ Half of the false orders that are promised are asked for: 1 % of the choices.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,8 +16,10 @@ from estimation.test_covariance import correlated
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
 from trueangle.fitting.orders.noise import run_scatter
 from trueangle.fitting.orders.noiseshapes import bend_of
+from trueangle.fitting.orders.noisespectrum import noise_spectrum
 from trueangle.fitting.orders.ordernoise import OrderNoise
 from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
+from trueangle.support.arrays import Array
 
 SEED = 20_931
 SIGMA = 5.0 / 3600.0
@@ -146,3 +150,19 @@ def test_the_noise_near_an_order_makes_its_error() -> None:
         w = 2.0 * np.pi * order / 200.0
         spectrum = np.sqrt((1.0 - 0.81) / abs(1.0 - 0.9 * np.exp(1j * w)) ** 2)
         assert told[order] / white == pytest.approx(spectrum, rel=0.25)
+
+
+@pytest.mark.parametrize("count", [3, 8])
+def test_noise_near_the_same_orders_is_estimated_once(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[bytes] = []
+
+    def counted(orders: Array, told: Array, *rest: Any) -> object:
+        asked.append(told.tobytes())
+        return noise_spectrum(orders, told, *rest)
+
+    monkeypatch.setattr("trueangle.fitting.orders.ordernoise.noise_spectrum", counted)
+    runs = runs_of(np.random.default_rng(SEED), count, 200, 0.6, lines=True)
+    assert 1 in ta.select_orders(runs).orders
+    assert 0 < len(asked) == len(set(asked))
