@@ -161,8 +161,8 @@ ARRAYS = {"numpy", "statistics", "trueangle.export"}
         ("plan --help", HEAVY | ARRAYS, 32),
         ("selfcal --help", HEAVY | ARRAYS, 32),
         ("completion zsh", HEAVY, 130),
-        ("fit runs.csv -o model.json", HEAVY | {"trueangle.export"}, 130),
-        ("fit runs.csv --orders 1-4 -o model.json", HEAVY | {"trueangle.export"}, 122),
+        ("fit runs.csv -o model.json", HEAVY | {"trueangle.export"}, 134),
+        ("fit runs.csv --orders 1-4 -o model.json", HEAVY | {"trueangle.export"}, 125),
     ],
 )
 def test_small_work_starts_without_what_it_does_not_need(command, heavy, most, tmp_path):
