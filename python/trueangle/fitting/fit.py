@@ -12,7 +12,7 @@ from ..joint.shafts import limited_orders, resolve_orders
 from ..model.model import Argument
 from ..model.validity import check_invertible
 from ..runs.files import runs_of
-from ..runs.follows import check_follows
+from ..runs.follows import check_usable
 from ..runs.run import CalibrationRun
 from ..runs.source import ReadingOptions
 from ..runs.travel import CONDITION, travelled_span, without_drift
@@ -222,8 +222,7 @@ def fitted_to(
     """
     check_choice("argument", argument, ARGUMENTS)
     check_covariance(covariance, len(found))
-    for run in found:
-        check_follows(run)
+    check_usable(found)
     selection = evidence
     beside = _beside(nuisance, reference_orders)
     given = found
@@ -313,7 +312,7 @@ def fitted_to(
         remarks.append(unsettled_weights_sentence(weighted))
     if summed is not None:
         remarks.append(summed.note)
-    return FitResult(
+    result = FitResult(
         problem,
         fitted,
         weighted,
@@ -326,6 +325,11 @@ def fitted_to(
         covariance,
         taken,
     )
+    if selection is not None:
+        from .worth import check_worth
+
+        check_worth(result)
+    return result
 
 
 def _weighted_runs(

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..joint.shafts import ShaftOrders
-from ..runs.follows import check_follows
+from ..runs.follows import check_usable
 from ..runs.run import CalibrationRun
 from ..support.times import local_day
 from .calibration import Calibration, CalibrationSums, output_orders
@@ -68,7 +68,7 @@ class FleetSums:
                     f"run {run.label or ''} has period {run.period:g} and those before "
                     f"{self.period:g}: convert one of them"
                 )
-            check_follows(run)
+            check_usable([run])
             unit = self._unit(run)
             if self.shafts is not None:
                 self._take(unit, run)

@@ -29,7 +29,7 @@ from ..formats.formats import find_format
 from ..model.model import Argument, HarmonicModel
 from ..runs.angles import RunAngles, find_run_angles
 from ..runs.facets import Facets
-from ..runs.follows import check_follows
+from ..runs.follows import check_usable
 from ..runs.paths import unit_of_path
 from ..runs.run import CalibrationRun
 from ..support.angles import wrap
@@ -254,7 +254,7 @@ def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -
     for batch in stretch.kind.module.read(path, wanted):
         true, said = stretch.angles.values(batch.__getitem__)
         if is_first and found.rows == 0:
-            _check_follows(path, true, said, period)
+            _check_usable(path, true, said, period)
         columns = [
             _days(batch[name]) if role == "when" else batch[name]
             for role, name in stretch.labels.items()
@@ -366,10 +366,10 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _check_follows(path: Path, true: NDArray[Any], said: NDArray[Any], period: float) -> None:
+def _check_usable(path: Path, true: NDArray[Any], said: NDArray[Any], period: float) -> None:
     known = np.flatnonzero(np.isfinite(true) & np.isfinite(said))[:_LOOKED_AT]
     if known.size:
         try:
-            check_follows(CalibrationRun(true[known], said[known], period))
+            check_usable([CalibrationRun(true[known], said[known], period)])
         except ValueError as cause:
             raise FileError(path, str(cause)) from None

@@ -18,7 +18,7 @@ from ..fitting.summed import SummedReadings
 from ..fitting.uncertainty import CovarianceKind, check_covariance
 from ..joint.shafts import resolve_orders
 from ..runs.files import read_runs
-from ..runs.follows import check_follows
+from ..runs.follows import check_usable
 from ..runs.paths import find_logs
 from ..runs.run import CalibrationRun
 from ..support.argumentkinds import told_kinds
@@ -206,7 +206,7 @@ def _runs_of(
         runs = read_on_cluster(scheduler, paths, files)
     for run in runs:
         try:
-            check_follows(run)
+            check_usable([run])
         except ValueError as cause:
             raise FileError("" if run.source is None else run.source.file, str(cause)) from None
     return runs

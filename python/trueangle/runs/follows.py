@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,12 +14,15 @@ from ..errors import ArgumentError, UnitWarning
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.quantiles import quantile
-from .checks.angles import AGREES, angle_ratio, ratio_suggestion
+from .checks.angles import AGREES, UNUSABLE_ANGLES, angle_ratio, ratio_suggestion
 from .checks.record import records_of
 from .run import CalibrationRun
 
 #: Readings looked at; a mistake of unit shows in any few.
 _SAMPLE = 1000
+
+#: Readings of a run that are tested for faults.
+_LOOKED_AT = 4096
 
 #: Resultant length (1 = all differences equal, 0 = spread over the turn). Errors of a
 #: whole 60 deg standard deviation still give 0.58.
@@ -85,6 +89,34 @@ def check_follows(run: CalibrationRun) -> None:
     )
 
 
+def check_usable(runs: Sequence[CalibrationRun]) -> None:
+    """Raise where the angles of runs must not be used, by the tests of `trueangle.check`.
+
+    Raises
+    ------
+    ArgumentError
+        As `check_follows`; a fault that makes the angles unusable, with its remedy.
+
+    Warns
+    -----
+    UnitWarning
+        As `check_follows`.
+    """
+    for run in runs:
+        check_follows(run)
+    records = records_of(map(_thinned, runs))
+    for test in UNUSABLE_ANGLES:
+        for fault in test(records):
+            raise ArgumentError(f"the data must not be used as they are: {fault}")
+
+
+def _thinned(run: CalibrationRun) -> CalibrationRun:
+    stride = 1 + len(run) // _LOOKED_AT
+    return CalibrationRun(
+        run.reference[::stride], run.indicated[::stride], run.period, label=run.label
+    )
+
+
 def _of(run: CalibrationRun) -> str:
     return f" of run {run.label}" if run.label else ""
 
@@ -108,7 +140,7 @@ def _warn_of_degrees(run: CalibrationRun, reference: Array, indicated: Array) ->
             f"the reference{_of(run)} goes to {float(reference.max()):.6g}, and its error repeats "
             "with 360: if these are degrees, give `period=360` (the default is 2*pi, radians)",
             UnitWarning,
-            stacklevel=6,
+            stacklevel=7,
         )
 
 

@@ -12,12 +12,12 @@ from ...support.argumentkinds import told_kinds
 from ..run import runs_or_data
 from ..source import ReadingOptions
 from .angles import (
+    AGREES,
+    UNUSABLE_ANGLES,
     angle_ratio,
     mixed_units,
     ratio_suggestion,
     swapped_channels,
-    wrapped_reference,
-    wrong_ratio,
 )
 from .fault import DataFault
 from .jumps import missed_counts
@@ -87,10 +87,14 @@ def check(data: Any, **reading: Unpack[ReadingOptions]) -> Check:
             entry["because"] = f"column '{clocks[0]}' is not used"
             entry["measure"] = "nothing anew: give it the role time, with its unit"
     faults = data_faults(records)
+    wrong = any(fault.fault in ("wrong_sign", "wrong_gear_ratio") for fault in faults)
+    bent = ratio is not None and abs(ratio - 1.0) >= AGREES and not wrong
     return Check(
         (*faults, *outliers(records, faults)),
         ratio,
-        ratio_suggestion(ratio),
+        "no straight line: an error of the joint over this travel"
+        if bent
+        else ratio_suggestion(ratio),
         extent,
         tuple(can),
         tuple(cannot),
@@ -174,9 +178,7 @@ def _listed(labels: list[str]) -> str:
 #: Every test of the data, in the order in which they are told.
 TESTS = (
     unsorted_time,
-    mixed_units,
-    wrapped_reference,
-    wrong_ratio,
+    *UNUSABLE_ANGLES,
     swapped_channels,
     duplicate_runs,
     duplicate_rows,

@@ -1,0 +1,54 @@
+"""Whether the fitted error is larger than its own standard error."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from ..errors import NoModelError
+from ..estimation.reference import design_matrix
+from ..support.angles import ARCSEC_PER_TURN
+from ..support.display_units import error_unit, sine_of_rms
+
+if TYPE_CHECKING:
+    from .result import FitResult
+
+#: Readings at whose places the two are compared.
+_LOOKED_AT: Final = 512
+
+
+def check_worth(fit: FitResult) -> None:
+    """Refuse a correction that is expected to add more error than it takes.
+
+    ::
+
+        Σ_i g_iᵀ b bᵀ g_i < Σ_i g_iᵀ V g_i
+
+    over the places read, with rows ``g_i`` of the series less their mean, coefficients b and
+    their covariance V. Single coefficients may be below their errors where orders nearly cancel.
+
+    Raises
+    ------
+    NoModelError
+        The fitted error is below its standard error.
+    """
+    model = fit.model
+    if model.covariance is None:
+        return
+    places = np.concatenate(fit.problem.angles)
+    places = places[:: 1 + places.size // _LOOKED_AT]
+    shafts = [(shaft.cycles_per_turn, shaft.orders) for shaft in model.shafts]
+    rows = design_matrix(places, shafts, model.period)
+    rows = (rows - rows.mean(axis=0))[:, 1:]
+    pairs = [(a, b) for s in model.shafts for a, b in zip(s.cosine, s.sine, strict=True)]
+    size = float(np.mean((rows @ np.ravel(pairs)) ** 2))
+    error = float(np.mean(np.einsum("ij,jk,ik->i", rows, model.covariance[1:, 1:], rows)))
+    if size < error:
+        size, error = (ARCSEC_PER_TURN / model.period * math.sqrt(x) for x in (size, error))
+        unit = error_unit("auto", sine_of_rms(error))
+        raise NoModelError(
+            f"no correction can be given: the error fitted is {unit.text(size)} rms, below its own "
+            f"standard error of {unit.text(error)}; measure more runs, or declare the --orders"
+        )
