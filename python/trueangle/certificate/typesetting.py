@@ -37,9 +37,8 @@ def write_pdf(content: dict[str, Any], path: str | PathLike[str], logo: str | No
     """Typeset ``content`` and write it; see `Certificate.save`."""
     hashes = [entry["sha256"] for entry in content["provenance"]["inputs"]]
     target = check_output(path, CERTIFICATE, hashes=hashes)
-    pdf = typeset_certificate(content, logo)
     with external_output(target) as printed:
-        printed.write_bytes(pdf)
+        printed.write_bytes(typeset_certificate(content, logo))
 
 
 def typeset_certificate(content: dict[str, Any], logo: str | None = None) -> bytes:

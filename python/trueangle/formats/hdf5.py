@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import errno
+import io
 import json
-import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -103,7 +102,7 @@ def copy(task: CopyTask) -> Contents:
     before = contents(task.source)  # an earlier correction, of another joint
     rows, done = before.rows, 0
     sums: dict[str, Checksum] = {}
-    with _opened(task.target, "r+") as file:
+    with _Output(task.target, "r+b") as output, _opened(task.target, output) as file:
         for channel in channels:
             indicated = cached(file, channel.column)
             used = {signal: cached(file, name) for signal, name in channel.signals.items()}
@@ -117,11 +116,13 @@ def copy(task: CopyTask) -> Contents:
                 # Numbers of 16 bits are corrected to 32, and kept in 64.
                 after = channel.correct(given, signals).astype(corrected.dtype, copy=False)
                 put(corrected, start, stop, after)
+                output.check()
                 for check, values in zip(checks, (given, after), strict=True):
                     check.update(values)
                 done += stop - start
                 task.watch(stop - start, done / total)
             rows = max(rows, indicated.size)
+    output.check()
     texts = {name: found.text() for name, found in sums.items()}
     return Contents(rows, {**before.checksums, **texts})
 
@@ -157,27 +158,43 @@ def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[s
 
 
 @contextmanager
-def _opened(path: Path, mode: str = "r") -> Iterator[h5py.File]:
-    """The file, its errors told with its name."""
+def _opened(path: Path, output: _Output | None = None) -> Iterator[h5py.File]:
+    """The file, to be read or written, its errors told with its name."""
     hint = "; MATLAB saves HDF5 with -v7.3 only" if path.suffix == ".mat" else ""
     with damage_told(path, "HDF5", hint):
         try:
-            with h5py.File(path, mode) as file:
+            with h5py.File(output or path, "r+" if output else "r") as file:
                 yield file
-        except (OSError, RuntimeError) as cause:  # the library tells of a full disk in words
-            if "errno = 28" in str(cause) or getattr(cause, "errno", None) == errno.ENOSPC:
-                raise _disk_full(path) from None
-            if isinstance(cause, OSError) and path.is_file():
-                raise OSError(_first_line(cause)) from None
+        except OSError as cause:
+            if path.is_file() and output is None:
+                raise OSError(str(cause).partition("\n")[0]) from None
             raise
 
 
-def _disk_full(path: Path) -> OSError:
-    return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+class _Output(io.FileIO):
+    """A file that HDF5 can always close: over one that it cannot it ends the process.
 
+    The first failure to write is kept, and what comes after it goes nowhere.
+    """
 
-def _first_line(error: Exception) -> str:
-    return str(error).partition("\n")[0]
+    failure: OSError | None = None
+
+    def __repr__(self) -> str:
+        return str(self.name)
+
+    def write(self, data: Any) -> int:
+        rest = memoryview(data)
+        try:
+            while rest and self.failure is None:
+                rest = rest[super().write(rest) :]
+        except OSError as error:
+            self.failure = error
+        return len(data)
+
+    def check(self) -> None:
+        """Raise the failure, if there was one."""
+        if self.failure is not None:
+            raise self.failure
 
 
 def _names(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +128,7 @@ def _close_half_built(error: Exception) -> None:
     while place is not None:
         half_built = place.tb_frame.f_locals.get("self")
         if isinstance(half_built, MDF4) and not hasattr(half_built, "_file"):
-            half_built._tempfile.close()
             half_built._closed = True
+            with suppress(AttributeError, OSError):  # not made, or on a full disk
+                half_built._tempfile.close()
         place = place.tb_next

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -78,8 +78,13 @@ class BagWriter:
 def opened_writer(bag: OpenBag, target: Path, note: str) -> Iterator[BagWriter]:
     """A writer of the kind of ``bag``; ``note`` says where the corrected topic is from."""
     if bag.is_ros1:
-        with _ros1(bag, target) as writer:
-            yield BagWriter(bag, writer, note)
+        made = _ros1(bag, target)
+        try:
+            with made:
+                yield BagWriter(bag, made, note)
+        finally:
+            with suppress(OSError):  # a full disk leaves it open
+                made.abort()
         return
     single = not bag.path.is_dir()
     folder = target.with_name(f"{target.name}.bag") if single else target
@@ -99,8 +104,8 @@ def opened_writer(bag: OpenBag, target: Path, note: str) -> Iterator[BagWriter]:
     with writer:
         yield BagWriter(bag, writer, note)
     if single:
-        (made,) = (path for path in folder.iterdir() if path.name != "metadata.yaml")
-        os.replace(made, target)
+        (file,) = (path for path in folder.iterdir() if path.name != "metadata.yaml")
+        os.replace(file, target)
 
 
 def _ros1(bag: OpenBag, target: Path) -> Any:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import errno
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,14 +14,11 @@ import numpy as np
 from ..errors import FileError
 from ..formats.format import CopyTask, Selection, Watch
 from ..formats.formats import find_format
-from ..support.files import publish
-from ..support.files.workplace import PARTIAL, workplace
+from ..support.files import named_output, publish
+from ..support.files.workplace import workplace
 from .joints import JointChannel, JointState, LogSettings
 from .manifest import Manifest, stamp
 from .turns import TurnCounter, TurnSpan
-
-#: What the system says of writing only.
-_OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @dataclass(frozen=True)
@@ -68,7 +64,7 @@ def correct_log(task: CorrectionTask, watch: Watch = lambda rows, part: None) ->
         channels.extend(settings.channels(source, header, task.before, kind.unit))
         return channels
 
-    with kind.at_header(source), _named(target), workplace(target) as aside:
+    with kind.at_header(source), named_output(target, workplace(target), source) as aside:
         written = module.copy(
             CopyTask(source, aside, choose, watch, settings.topic, settings.output_topic)
         )
@@ -110,18 +106,6 @@ def correct_log(task: CorrectionTask, watch: Watch = lambda rows, part: None) ->
             )
         publish(aside, target)
     return result
-
-
-@contextmanager
-def _named(target: Path) -> Iterator[None]:
-    """Tell errors of the system by the output's own name, not by that of the place aside."""
-    try:
-        yield
-    except OSError as error:
-        unnamed = error.filename is None and error.errno in _OF_WRITING
-        if error.errno and (unnamed or PARTIAL in str(error.filename)):
-            raise OSError(error.errno, error.strerror, str(target)) from None
-        raise
 
 
 def states_after(result: Mapping[str, Any]) -> dict[str, JointState]:

@@ -273,6 +273,9 @@ def test_another_broken_pipe_is_told(desk, capsys, monkeypatch):
 
 # -- no room, no permission
 
+#: Commands that need a library to draw.
+DRAWN = {"report": "bokeh", "plot": "matplotlib"}
+
 #: Commands and the files they write. The limit on the size of files is below each.
 WRITES = {
     "fit": (["fit", "r.csv", "--orders", "1", "-o", "x.json"], "x.json"),
@@ -280,14 +283,18 @@ WRITES = {
     "simulate": (["simulate", "b.toml", "-o", "x.csv"], "x.csv"),
     "diagnose": (["diagnose", "r.csv", "--simulation", "b.toml", "--extend", "x.toml"], "x.toml"),
     "report": (["report", "r.csv", "--orders", "1", "-o", "x.html"], "x.html"),
+    "plot": (["plot", "r.csv", "--orders", "1", "-o", "x.png"], "x.png"),
+    "unit": (["export", "m.json", "--to", "fmu", "-o", "x.fmu"], "x.fmu"),
 }
 
 
+@pytest.mark.parametrize("room", [0, 50])
 @pytest.mark.parametrize("there", [False, True], ids=["new", "there before"])
 @pytest.mark.parametrize("command", WRITES)
-def test_a_full_disk_leaves_what_was_there(command, there, desk):
-    if command == "report":
-        pytest.importorskip("bokeh")
+def test_a_full_disk_leaves_what_was_there(command, there, room, desk):
+    """Without any room no folder for temporary files is found either."""
+    if command in DRAWN:
+        pytest.importorskip(DRAWN[command])
     arguments, output = WRITES[command]
     if there:
         (desk / output).write_text("old")
@@ -295,7 +302,7 @@ def test_a_full_disk_leaves_what_was_there(command, there, desk):
 
     def limit():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (50, 50))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
 
     done = run(arguments, preexec_fn=limit)
     assert done.returncode == 1

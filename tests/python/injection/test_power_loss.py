@@ -1,6 +1,7 @@
 """The power fails at every moment: what has its name is whole, and the work is taken up again."""
 
 import os
+import shutil
 import sys
 
 import pytest
@@ -9,6 +10,7 @@ from trueangle.cli import main
 
 from .conftest import COMMANDS, commands, tree
 from .disk import Disk, laid_out
+from .logfiles import FORMATS, made_log
 
 pytestmark = pytest.mark.skipif(
     not os.path.isdir("/proc/self/fd") or sys.platform == "win32",
@@ -102,5 +104,71 @@ def test_a_sync_that_fails_is_told(command, desk, monkeypatch, capsys):
     monkeypatch.chdir(desk)
     furnished = tree(desk)
     assert main(COMMANDS[command][0]) == 1
-    assert "Input/output error" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "Input/output error" in told
+    assert COMMANDS[command][1] in told
     assert not [name for name in tree(desk).keys() - furnished.keys() if MANIFEST not in name]
+
+
+@pytest.fixture(params=FORMATS)
+def correcting(request, desk, monkeypatch):
+    """The command that corrects a log of a format, its output, and what it had made of it."""
+    for module in FORMATS[request.param].modules:
+        pytest.importorskip(module)
+    monkeypatch.chdir(desk)
+    log = FORMATS[request.param].file
+    output = f"x{log.removeprefix('a')}"
+    arguments = ["correct", log, "-m", "m.json", *made_log(request.param, desk)]
+    before = tree(desk)
+    assert main([*arguments, "-o", output]) == 0
+    made = {name: data for name, data in tree(desk).items() if name not in before}
+    shutil.rmtree(output) if os.path.isdir(output) else os.unlink(output)
+    return arguments, log, output, made
+
+
+@pytest.mark.parametrize("room", [0, 2000, 5000])
+def test_no_room_for_a_log_is_told_of_the_output(room, correcting, desk, capsys):
+    """Whatever the library says of it: of the file that it reads, of its own, or nothing."""
+    import resource
+
+    arguments, _, output, made = correcting
+    before, limit = tree(desk), resource.getrlimit(resource.RLIMIT_FSIZE)
+    capsys.readouterr()
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, limit[1]))
+    try:
+        status = main([*arguments, "-o", output])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+    if status:
+        assert capsys.readouterr().err == f"trueangle: error: {output}: File too large\n"
+        assert tree(desk) == before
+        assert main([*arguments, "-o", output]) == 0
+    else:
+        assert max(map(len, made.values())) <= room
+    assert tree(desk).keys() == before.keys() | made.keys()
+
+
+@pytest.mark.parametrize("there", [False, True], ids=["new", "in place"])
+def test_a_name_that_the_disk_does_not_take_is_taken_back(
+    there, correcting, desk, monkeypatch, capsys
+):
+    """The last sync, of the folder, fails: the command can be given again."""
+    import errno
+
+    arguments, log, output, _ = correcting
+    name, way = (log, ["--in-place"]) if there else (output, ["-o", output])
+    before, real = tree(desk), os.fsync
+
+    def failing(handle):
+        if os.readlink(f"/proc/self/fd/{handle}") == str(desk):
+            raise OSError(errno.EIO, "Input/output error")
+        real(handle)
+
+    capsys.readouterr()
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", failing)
+        assert main([*arguments, *way]) == 1
+    assert capsys.readouterr().err == f"trueangle: error: {name}: Input/output error\n"
+    assert tree(desk) == before
+    assert main([*arguments, *way]) == 0
+    assert tree(desk) != before

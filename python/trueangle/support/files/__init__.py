@@ -28,6 +28,7 @@ from .kinds import (
     kind_of_log,
     promised_format,
 )
+from .named import named_output
 from .outputs import check_output, external_output, publish, written_atomically
 from .samefile import same_file
 from .workplace import remove_leftovers, restore
@@ -54,6 +55,7 @@ __all__ = [
     "ending_of",
     "external_output",
     "kind_of_log",
+    "named_output",
     "partition_keys",
     "partition_name",
     "promised_format",

@@ -14,13 +14,14 @@ from typing import IO
 from ...errors import FileError, KindError
 from .inputs import is_null_device, sha256_of
 from .kinds import FileKind, log_endings
+from .named import named_by, named_output
 from .samefile import irregular_file_kind, named_again
 from .workplace import (
     PARTIAL,
     hidden_name,
     made_beside,
     remove_leftovers,
-    replace_folder,
+    renamed,
     workplace,
 )
 
@@ -140,16 +141,10 @@ def written_atomically(
             yield nowhere
         return
     remove_leftovers([target])
-    try:
-        with _file_beside(target) as beside:
-            with open(beside, "r+", encoding="utf-8", newline="\n") as file:
-                yield file
-            publish(beside, target)
-    except OSError as error:
-        if error.errno and (error.filename is None or PARTIAL in os.fsdecode(error.filename)):
-            # Of writing: it says no name, or the hidden one.
-            raise OSError(error.errno, os.strerror(error.errno), os.fspath(path)) from None
-        raise
+    with named_output(path, _file_beside(target)) as beside:
+        with open(beside, "r+", encoding="utf-8", newline="\n") as file:
+            yield file
+        publish(beside, target)
 
 
 @contextlib.contextmanager
@@ -165,7 +160,7 @@ def external_output(target: Path) -> Iterator[Path]:
             yield Path(folder, target.name)
         return
     remove_leftovers([target])
-    with workplace(target) as aside:
+    with named_output(target, workplace(target)) as aside:
         yield aside
         publish(aside, target)
 
@@ -186,8 +181,9 @@ def _file_beside(target: Path) -> contextlib.AbstractContextManager[Path]:
 def publish(aside: str | PathLike[str], target: str | PathLike[str]) -> None:
     """Sync the finished file or folder ``aside`` to the disk and rename it ``target``.
 
-    A symbolic link stays; what it leads to is replaced, a folder as `replace_folder` says. A
+    A symbolic link stays; what it leads to is replaced, a folder as `renamed` says. A
     file that is replaced hands on its permissions; the null device takes the file and stays.
+    Where the disk does not take the new name, the old state comes back.
     """
     target = os.path.realpath(target)
     try:
@@ -200,14 +196,12 @@ def publish(aside: str | PathLike[str], target: str | PathLike[str]) -> None:
             return
         if stat.S_ISREG(found.st_mode):
             os.chmod(aside, stat.S_IMODE(found.st_mode) & 0o777)
-    for inside in Path(aside).rglob("*"):
-        sync_to_disk(inside)
-    sync_to_disk(aside)
-    if found is not None and stat.S_ISDIR(found.st_mode):
-        replace_folder(Path(aside), Path(target))
-    else:
-        os.replace(aside, target)
-    sync_to_disk(Path(target).parent)
+    with named_by(aside):
+        for inside in Path(aside).rglob("*"):
+            sync_to_disk(inside)
+        sync_to_disk(aside)
+        with renamed(Path(aside), Path(target)):
+            sync_to_disk(Path(target).parent)
 
 
 def sync_to_disk(path: str | PathLike[str]) -> None:

@@ -129,15 +129,34 @@ def lock_path(path: Path) -> Iterator[bool]:
         os.close(handle)
 
 
-def replace_folder(aside: Path, target: Path) -> None:
-    """Let the folder ``aside`` of a `workplace` have the name of the folder ``target``.
+@contextmanager
+def renamed(aside: Path, target: Path) -> Iterator[None]:
+    """Let ``aside`` have the name ``target``; an error of the system in the block undoes it.
 
-    In one step where the system can let both change names. Else there is a moment in which
-    ``target`` is not there: `restore` and `remove_leftovers` undo it.
+    A folder is replaced in one step where the system can let both change names. Else there is a
+    moment in which ``target`` is not there: `restore` and `remove_leftovers` undo it. A file is
+    kept by a second name meanwhile, where the file system gives one.
     """
-    if not exchange_names(aside, target):
-        os.replace(target, aside.with_name(aside.name + _REPLACED))
-        os.replace(aside, target)
+    is_new, kept = not target.exists(), hidden_beside(target)
+    try:
+        if target.is_dir():
+            if not exchange_names(aside, target):
+                os.replace(target, aside.with_name(aside.name + _REPLACED))
+                os.replace(aside, target)
+        else:
+            with contextlib.suppress(OSError):
+                os.link(target, kept)
+            os.replace(aside, target)
+        try:
+            yield
+        except OSError:
+            if kept.exists():
+                os.replace(kept, target)
+            elif is_new or (target.is_dir() and not exchange_names(aside, target)):
+                os.replace(target, aside)
+            raise
+    finally:
+        kept.unlink(missing_ok=True)
 
 
 def exchange_names(first: Path, second: Path) -> bool:
