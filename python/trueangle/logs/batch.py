@@ -147,6 +147,20 @@ def _warn_of_units(logs: Sequence[LogReport]) -> None:
         warnings.warn(f"{notes[0]}{more}", UnitWarning, stacklevel=3)
 
 
+def _without_locals(error: Exception) -> Exception:
+    """``error``, to be kept: what the frames of its traceback held (arrays, open files) is freed.
+
+    HDF5 ends the process with a fault where a virtual data set is open to its end.
+    """
+    import traceback  # brings the tokenizer with it
+
+    cause: BaseException | None = error
+    while cause is not None:
+        traceback.clear_frames(cause.__traceback__)
+        cause = cause.__context__
+    return error
+
+
 def _files_of(model: Any) -> list[str | PathLike[str]]:
     """The model files among what was given as model."""
     given = model.values() if isinstance(model, Mapping) else [model]
@@ -170,7 +184,7 @@ def _one_by_one(
                 log.result = correct_log(task, shown.advance)
                 log.status = "done"
             except (TrueAngleError, OSError) as error:
-                log.status, log.error = "failed", error
+                log.status, log.error = "failed", _without_locals(error)
         finished(log)
         # Without the turns of this log, those of the logs after it cannot be told.
         if log.error is not None and (is_disk_full(log.error) or settings.counts_turns):

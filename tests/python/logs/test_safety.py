@@ -9,12 +9,15 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 
 import numpy as np
 import pytest
 
 import trueangle as ta
 from trueangle.cli import main
+from trueangle.errors import TrueAngleError
+from trueangle.logs import batch
 from trueangle.logs.manifest import MANIFEST
 from trueangle.support.files import publish, workplace
 from trueangle.support.files.workplace import PARTIAL, hidden_name
@@ -172,6 +175,29 @@ def test_damaged_logs_are_listed_and_the_others_done(logs, model_file, tmp_path,
     assert "log2.parquet" in told
     assert "run the same command again" in told
     assert len(tree(out)) == FILES - 2
+
+
+def test_a_failed_log_keeps_nothing_that_was_read_of_it(logs, model, tmp_path, monkeypatch):
+    read = []
+
+    def taken():
+        values = np.zeros(7)
+        read.append(weakref.ref(values))
+        raise OSError("lost")
+
+    def failing(*_):
+        values = np.zeros(3)
+        read.append(weakref.ref(values))
+        try:
+            taken()
+        except OSError as cause:
+            raise TrueAngleError("damaged") from cause
+
+    monkeypatch.setattr(batch, "correct_log", failing)
+    (log,) = ta.correct_logs(logs / "log0.parquet", model, tmp_path / "o.parquet").logs
+    assert [values() for values in read] == [None, None]
+    assert (str(log.error), str(log.error.__cause__)) == ("damaged", "lost")
+    assert log.error.__traceback__ is not None  # which --debug shows
 
 
 def test_a_full_disk_ends_the_run_and_it_resumes(logs, model_file, tmp_path, capsys):
