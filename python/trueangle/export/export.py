@@ -118,10 +118,10 @@ def export_model(
     if computed is not None:
         steep, rounding = run_time_bound(pattern, computed, at_run_time)
     if max_arcsec is None:
-        made = found.make(pattern, given)
+        made, proof = _made(found, pattern, given)
     else:
-        made = _smallest(found, pattern, given, _share(max_arcsec, beside, rows, steep, rounding))
-    proof = _proven(made, given.get("bits", 24))
+        left = _share(max_arcsec, beside, rows, steep, rounding)
+        made, proof = _smallest(found, pattern, given, left)
     largest = rounded_up(proof.max_arcsec)
     total = rounded_up(steep * largest + rounding + beside) if rows or at_run_time else largest
     if max_arcsec is not None and total > max_arcsec:
@@ -274,6 +274,12 @@ def _share(
     return left
 
 
+def _made(target: Target, pattern: TurnPattern, options: dict[str, Any]) -> tuple[Made, Proof]:
+    """A table and its proof."""
+    made = target.make(pattern, options)
+    return made, _proven(made, options.get("bits", 24))
+
+
 def _proven(made: Made, bits: int) -> Proof:
     bits = made.bits or bits
     if not 1 <= bits <= 32:
@@ -286,11 +292,11 @@ def _proven(made: Made, bits: int) -> Proof:
 
 def _smallest(
     target: Target, pattern: TurnPattern, options: dict[str, Any], max_arcsec: float
-) -> Made:
+) -> tuple[Made, Proof]:
     """The first size that keeps ``max_arcsec`` on a rough grid and then on every input."""
     sizes = target.sizes(options)
     if not sizes:
-        return target.make(pattern, options)
+        return _made(target, pattern, options)
     finer = target.finer(options)
     if finer is not None:
         try:
@@ -306,7 +312,7 @@ def _first(
     options: dict[str, Any],
     max_arcsec: float,
     sizes: Sequence[int],
-) -> Made:
+) -> tuple[Made, Proof]:
     best, refused = math.inf, None
     bits = options.get("bits", 24)
     for size in sizes:
@@ -322,10 +328,10 @@ def _first(
         rough = looked.max_arcsec - looked.margin_arcsec
         best = min(best, rough)
         if rough <= max_arcsec:
-            exact = _proven(made, bits).max_arcsec
-            if exact <= max_arcsec:
-                return made
-            best = min(best, exact)
+            proof = _proven(made, bits)
+            if proof.max_arcsec <= max_arcsec:
+                return made, proof
+            best = min(best, proof.max_arcsec)
     if not math.isfinite(best) and refused is not None:
         raise refused
     raise ArgumentError(

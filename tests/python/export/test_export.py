@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.export.proof import prove_export
 from trueangle.model.records import FitRecord
 
 PERIODS = {"rad": 2.0 * math.pi, "turn": 1.0, "count": 4096.0}
@@ -103,3 +104,28 @@ def test_tables_of_several_shafts_add_up_and_name_the_outputs_orders() -> None:
     assert made.entries == sum(row["entries"] for row in made.tables) == 32
     assert made.bytes == sum(row["bytes"] for row in made.tables) == 2 * 17 * 4
     assert [row["cycles_per_turn"] for row in made.tables] == [1.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("target", "options"),
+    [
+        ("c", {"max_arcsec": 1.0}),
+        ("rust", {"max_arcsec": 2.0, "number": "f32"}),
+        ("simplefoc", {"max_arcsec": 90.0}),
+        ("moteus", {"max_arcsec": 90.0}),
+        ("c", {}),
+    ],
+)
+def test_every_input_is_evaluated_once_for_the_table_that_is_written(
+    target: str, options: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    proven: list[int] = []
+
+    def counted(corrections: object, exact: object, bits: int, *rest: object) -> object:
+        proven.append(bits)
+        return prove_export(corrections, exact, bits, *rest)
+
+    monkeypatch.setattr("trueangle.export.export.prove_export", counted)
+    made = ta.export_model(described(terms=()), target, bits=17, **options)
+    assert proven.count(17) == 1
+    assert "every one of 131072 inputs" in made.proof
