@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="S",
         help="longest pause of the reference that is interpolated over "
-        "(default: five times its typical step)",
+        "(default: five times its typical step, and longer where it moves on a line)",
     )
     add_signals(parser, runs=False)
     add_errors_in(parser)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -159,6 +160,63 @@ def test_nothing_is_made_up_over_a_gap(tmp_path):
     there = found.runs[0].time + OFFSET
     assert not ((there > gap.start_s + 0.01) & (there < gap.end_s - 0.01)).any()
     assert not ta.join(joint, laser, max_gap_s=2.0).gaps
+
+
+def test_what_was_discarded_leads_and_a_longer_gap_keeps_it(tmp_path, capsys):
+    paths = [*map(str, logs(tmp_path, 1)), "-o", str(tmp_path / "runs.csv")]
+    assert main(["join", *paths]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert re.match(r"15\d of 6000 readings discarded: at their time the reference pauses", told)
+    assert "give --max-gap or --offset where more is known 58" in told
+    assert main(["join", *paths, "--max-gap", "2"]) == 0
+    assert capsys.readouterr().out.startswith("6000 readings joined in 1 run\n")
+
+
+@pytest.mark.parametrize(("burst", "pause"), [(4, 0.0125), (6, 0.03), (2, 0.008)])
+def test_a_log_written_in_bursts_has_no_gaps_between_them(burst, pause, tmp_path):
+    """Several rows within 2 ms and a pause: by hand over 140 deg, in steps of 0.6 deg."""
+    rng = np.random.default_rng(burst)
+    ends = np.cumsum(rng.uniform(2.0, 7.0, 30))
+    places = rng.uniform(0.0, 140.0, 30)
+    t = np.arange(0.3, 99.0, 0.13)
+    s = np.sort((np.arange(0.0, 100.0, pause)[:, None] + np.linspace(0.0, 2e-3, burst)).ravel())
+    # A pause of 9 s in which the shaft goes on: of that nothing is known.
+    s = s[(s < 50.0) | (s > 59.0)]
+    theta = np.interp(t, ends, places)
+    heading = theta + 15.0 * np.sin(np.radians(theta + 200.0)) + rng.normal(0.0, 0.5, t.size)
+    shaft = 0.6 * np.round(np.interp(s, ends, places) / 0.6)
+    found = ta.join(
+        log(tmp_path / "a.csv", "indicated", t, heading),
+        log(tmp_path / "b.csv", "reference", s, shaft),
+    )
+    (gap,) = found.gaps
+    assert (gap.start_s, gap.end_s) == pytest.approx((50.0, 59.0), abs=0.05)
+    assert found.left_out == gap.left_out == pytest.approx(9.0 / 0.13, abs=2)
+    assert found.offset_s == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", [0, 37, 49, 60, 61])
+def test_rests_that_agree_at_any_offset_do_not_decide_it(seed):
+    """Few motions between long rests: at 87 to 108 s of offset hardly anything moved in both."""
+    rng = np.random.default_rng(seed)
+    length, times, places = rng.uniform(100.0, 250.0), [0.0], []
+    count = int(rng.integers(4, 25))
+    starts = np.sort(rng.uniform(0.0, length, count))
+    places.append(rng.uniform(0.0, 140.0))
+    for start in starts:
+        times += [start, start + rng.uniform(1.0, 4.0)]
+        places += [places[-1], rng.uniform(0.0, 140.0)]
+    order = np.argsort(times, kind="stable")
+    knots, places = np.array(times)[order], np.array(places)[order]
+    s = np.arange(0.0, length, 0.0125)
+    shaft = 0.6 * np.round(np.interp(s, knots, places) / 0.6)
+    t = np.arange(rng.uniform(0.0, 0.3 * length), length - 1.0, 0.13)
+    t = t + rng.uniform(-0.02, 0.02, t.size)
+    theta = np.interp(t, knots, places)
+    heading = theta + 20.0 * np.sin(np.radians(theta + 200.0)) + 3.0 * np.sin(np.radians(2 * theta))
+    said = Stream.of(t, heading + rng.normal(0.0, 0.5, t.size))
+    found = estimated_clocks(said, Stream.of(s, shaft), None, 0.0)
+    assert found.offset == pytest.approx(0.0, abs=0.5)
 
 
 def test_declared_clocks_and_the_other_order(tmp_path):

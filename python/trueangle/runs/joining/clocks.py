@@ -16,8 +16,7 @@ from .stream import Stream
 _GRID = 1 << 20
 #: Share of the shorter stream that must overlap.
 _OVERLAP = 0.25
-#: Mean square differences of velocities that are alike: times the least, and as a share of
-#: the mean square of the velocity.
+#: Parts of the motion that differ and are alike: times the least, and more by so much.
 _AS_WELL = 1.5
 _TIE = 1e-3
 #: Variation of the velocity, as a share of its root mean square, below which one speed is seen.
@@ -127,7 +126,7 @@ def _coarse(indicated: Stream, reference: Stream) -> tuple[float, list[float] | 
                 "the offset of their clocks; declare it (`offset_s=`)"
             )
         return 0.0, None
-    # Mean square difference at every lag, over what overlaps.
+    # Part of the motion in what overlaps that differs, at every lag: rests agree at any.
     n = 1 << (a.size + b.size - 1).bit_length()
     transform = [np.fft.rfft(x, n) for x in (a, b, a**2, b**2, np.ones_like(a), np.ones_like(b))]
     fa, fb, faa, fbb, one_a, one_b = transform
@@ -136,12 +135,13 @@ def _coarse(indicated: Stream, reference: Stream) -> tuple[float, list[float] | 
         return np.asarray(np.fft.irfft(np.conj(first) * second, n))
 
     count = correlation(one_a, one_b)
-    total = correlation(faa, one_b) + correlation(one_a, fbb) - 2.0 * correlation(fa, fb)
-    enough = count > _OVERLAP * min(a.size, b.size)
-    cost = np.where(enough, total / np.maximum(count, 1.0), np.inf)
+    power = correlation(faa, one_b) + correlation(one_a, fbb)
+    total = power - 2.0 * correlation(fa, fb)
+    enough = (count > _OVERLAP * min(a.size, b.size)) & (power > _ONE_SPEED * float(power.max()))
+    cost = np.where(enough, total / np.where(enough, power, 1.0), np.inf)
     shift = np.roll(cost, n // 2)
     least = np.flatnonzero((shift < np.roll(shift, 1)) & (shift <= np.roll(shift, -1)))
-    limit = _AS_WELL * float(shift.min()) + _TIE * size**2
+    limit = _AS_WELL * float(shift.min()) + _TIE
     alike = least[shift[least] <= limit]
     best = int(alike[np.argmax(np.roll(count, n // 2)[alike])])
     # Sample i of A stands at sample i + lag of B.

@@ -61,7 +61,7 @@ def join(
         known is taken for one of two quartzes, 0 +- 100 ppm beforehand.
     max_gap_s : float, optional
         Longest pause of the reference that is interpolated over (default: five times its
-        typical step).
+        typical step, and longer where the motion in as long a time is a line).
     counts_per_turn, counts_per_turn_reference, signals, topic
         As in `trueangle.read_runs`; ``signals={"a": {...}, "b": {...}}`` names columns of
         one log only, ``topic="/joints,/laser"`` the topics of A and of B.
@@ -238,7 +238,7 @@ def _joined(
             )
         )
     speed = math.sqrt(float(np.mean(velocity[inside] ** 2)))
-    step = _resolution(true) if true.is_on_change else 0.0
+    step = true.resolution if true.is_on_change else 0.0
     std = math.hypot(true.interpolation_std, clocks.timing_std * speed, step)
     on_change = [name for name, s in (("indicated", said), ("reference", true)) if s.is_on_change]
     return Joined(
@@ -253,12 +253,6 @@ def _joined(
         tuple(on_change),
         clocks.notes,
     )
-
-
-def _resolution(stream: Stream) -> float:
-    """Standard deviation of an angle that is known to one step only, degrees."""
-    steps = np.abs(np.diff(stream.angle))
-    return float(np.min(steps[steps > 0.0], initial=math.inf)) / math.sqrt(12.0)
 
 
 def _groups(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,9 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...support.arrays import Array
+from ...support.quantiles import quantile
 
 #: Times the typical step in time from which on a pause is a gap.
 GAP = 5.0
+#: Readings off a line, in their own roughness, up to which a line is as good; times that are
+#: looked at for it, of so many windows at least.
+_ROUGH, _LOOKED_AT, _WINDOWS = 3.0, 4096, 16
 #: Part of a step by which a time may lie outside.
 EDGE = 1e-3
 #: Share of neighbours that may be equal in a log on change (time stamps collide).
@@ -77,11 +82,50 @@ class Stream:
         time = np.insert(self.time, long + 1, self.time[long + 1] - self.step)
         return Stream(time, np.insert(self.angle, long + 1, self.angle[long]))
 
+    @cached_property
+    def resolution(self) -> float:
+        """Standard deviation of an angle that is known to its smallest step only, degrees."""
+        steps = np.abs(np.diff(self.angle))
+        return float(np.min(steps[steps > 0.0], initial=np.inf)) / math.sqrt(12.0)
+
+    @cached_property
+    def bridged(self) -> float:
+        """Longest pause that is interpolated over.
+
+        Five typical steps; more where the readings over as long a time stray from the line
+        between its ends by three times their own roughness at most, so that a log written in
+        bursts has no gaps between them.
+        """
+        longest = length = GAP * self.step
+        rough = max(self._off_line(2.0 * self.step) or 0.0, self.resolution)
+        while 2.0 * _WINDOWS * length <= np.ptp(self.time):
+            length *= 2.0
+            off = self._off_line(length)
+            if off is not None and off > _ROUGH * rough:
+                break
+            longest = longest if off is None else length
+        return longest
+
+    def _off_line(self, length: float) -> float | None:
+        """How far readings are off the line between two so many seconds apart; None without any."""
+        t = self.time
+        first = np.arange(0, t.size, 1 + t.size // _LOOKED_AT)
+        last = np.searchsorted(t, t[first] + length)
+        first, last = first[last < t.size], last[last < t.size]
+        whole = t[last] - t[first]
+        middle = np.searchsorted(t, t[first] + 0.5 * whole)
+        share = (t[middle] - t[first]) / whole
+        used = (whole <= 2.0 * length) & (np.abs(share - 0.5) < 0.3)
+        if np.count_nonzero(used) < _WINDOWS:
+            return None
+        line = self.angle[first] + share * (self.angle[last] - self.angle[first])
+        return float(quantile(np.abs(self.angle[middle] - line)[used], 0.9))
+
     def gaps(self, longest: float | None) -> Array:
         """Start and end of every pause of which nothing is known, shape (n, 2)."""
         if self.is_on_change and longest is None:
             return np.empty((0, 2))
-        limit = GAP * self.step if longest is None else longest
+        limit = self.bridged if longest is None else longest
         places = np.flatnonzero(np.diff(self.time) > limit)
         return np.column_stack([self.time[places], self.time[places + 1]])
 
@@ -117,7 +161,7 @@ class Stream:
         held = self.held
         inner = np.arange(3, held.time.size - 3, 2)
         kept = Stream(held.time[::2], held.angle[::2])
-        limit = GAP * self.step
+        limit = self.bridged
         wide = held.time[inner + 1] - held.time[inner - 1] > limit
         inner = inner[~wide]
         if not inner.size:
