@@ -87,7 +87,8 @@ class Wording:
         return text if not found or not option else option + text[found.end() :]
 
     def _told(self, found: re.Match[str]) -> str:
-        code = found[1].replace('\\"', '"')  # as JSON has it
+        code = found[1].replace('\\"', '"')
+        is_json = code != found[1]  # which has a backslash before every quote
         if _ARGUMENT.fullmatch(code):
             return self._option(code[:-1]) or found[0]
         if not (_ARGUMENT.match(code) or _CALL.fullmatch(code)):
@@ -101,7 +102,9 @@ class Wording:
         except (SyntaxError, ValueError):
             return found[0]
         told = " ".join(words)
-        return found[0] if '"' in told or "\\" in told else told
+        if "\\" in told:
+            return found[0]
+        return told.replace('"', '\\"') if is_json else told
 
     def _command(self, call: ast.Call) -> Iterator[str]:
         import ast

@@ -47,15 +47,12 @@ def first_lines(path: Path, file: IO[bytes]) -> tuple[list[TextLine], str]:
         parts = parts[:-1] if len(parts) > 1 else parts
     for i, raw in enumerate(parts[:_LINES]):
         body = raw.removeprefix(codecs.BOM_UTF8) if i == 0 else raw
-        try:
-            text = body.decode(encoding)
-        except UnicodeDecodeError:
-            if encoding != "utf-8" or not _is_western(data):
-                raise FileError(
-                    path, "is not UTF-8 text; save it as CSV in UTF-8", line=i + 1
-                ) from None
+        text = body.decode(errors="surrogateescape")
+        if not _is_utf8(text):
+            text = western_text(text)
+            if not _is_utf8(text):
+                raise FileError(path, "is not UTF-8 text; save it as CSV in UTF-8", line=i + 1)
             encoding = "cp1252"
-            text = body.decode("cp1252", "replace")
         found.append(TextLine(raw, text.rstrip("\r\n"), i + 1))
     return found, encoding
 
@@ -65,9 +62,18 @@ def _split(data: bytes) -> list[bytes]:
     return [*(part + b"\n" for part in parts[:-1]), *([parts[-1]] if parts[-1] else [])]
 
 
-def _is_western(data: bytes) -> bool:
-    """True where every byte beyond ASCII is a letter or sign of Western Europe's code page.
+def western_text(text: str) -> str:
+    """Text whose bytes that are no UTF-8 stand in it as surrogates, of Western Europe's code page.
 
-    Then it is °, µ, ± or a letter with an accent, in a preamble or a unit.
+    It is that where every byte beyond ASCII is a letter or sign: °, µ, ± or a letter with an
+    accent, in a preamble, a unit or a label. Other text stays as it is.
     """
-    return all(byte < 0x80 or byte >= 0xA0 for byte in data) and data.count(b"\xff") == 0
+    if _is_utf8(text):
+        return text
+    data = text.encode(errors="surrogateescape")
+    is_western = all(byte < 0x80 or 0xA0 <= byte < 0xFF for byte in data)
+    return data.decode("cp1252") if is_western else text
+
+
+def _is_utf8(text: str) -> bool:
+    return text.isascii() or not any("\udc80" <= sign <= "\udcff" for sign in text)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from .csvcells import cell_number, cut_rows, is_comment, not_cut
 from .csvheader import Header
-from .csvlines import LONGEST_LINE
+from .csvlines import LONGEST_LINE, western_text
 from .format import Labels, row_labels
 
 #: Numbers in lines, all without an exponent.
@@ -92,7 +92,7 @@ class QuotedBlock:
     def labels(self, name: str) -> Labels:
         """A column of texts, empty ones as None."""
         place = self.header.names.index(name)
-        return row_labels([row[place].strip() or None for row in self.cells if row])
+        return row_labels([western_text(row[place].strip()) or None for row in self.cells if row])
 
     def with_columns(self, columns: Sequence[tuple[str, NDArray[Any]]]) -> bytes:
         """The text with a value added to every row; empty where the angle's cell is."""

@@ -11,7 +11,7 @@ SCOPE = "Name"
 _UNIT = r"[\[(].*[\])]|[^\d\s]{0,8}(?:/[^\d\s]{1,4}\d?)?|-"
 # Compiled where a line asks for it: that takes longer than to read a small file.
 _KNOWN_UNITS = (
-    r"[\[(]?(deg(rees?)?|rad(ians?)?|turns?|rev(olutions?)?|counts?|arcsec|arcmin|°|"
+    r"[\[(]?(deg(rees?)?|rad(ians?)?|turns?|rev(olutions?)?|counts?|arcsec|arcmin|[°\u2032\u2033\"']|"
     r"m?s|us|µs|ns|sec(onds?)?|volts?|m?v|m?a|[mc]?nm|n·?m|°?c|k|rpm|(deg|rad|turn|°)/s)[\])]?"
 )
 _BRACKETED = r"[\[(][^\])]*[\])]\s*$"

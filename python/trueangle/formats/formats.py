@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from ..errors import FileError
-from ..support.files import declare_endings, ending_of, promised_format
+from ..support.files import declare_endings, ending_of, promised_format, refuse_own
 from .format import Format
 from .textfile import head_of_text
 
@@ -112,9 +112,16 @@ def known_format(path: Path) -> Format | None:
 
 
 def format_of_content(path: Path) -> Format:
-    """Format of ``path`` by its first bytes, else by its ending, else text."""
+    """Format of ``path`` by its first bytes, else by its ending, else text.
+
+    Raises
+    ------
+    FileError
+        A model or a fleet; a packed file that holds no text.
+    """
     if not path.is_dir():
         head = head_of_text(path, _HEAD)
+        refuse_own(path, head, "readings")
         for entry in FORMATS:
             if _begins(entry, head):
                 return entry

@@ -14,7 +14,7 @@ from ..errors import ArgumentError, UnitWarning
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.quantiles import quantile
-from .checks.angles import AGREES, UNUSABLE_ANGLES, angle_ratio, ratio_suggestion
+from .checks.angles import UNUSABLE_ANGLES, angle_ratio, ratio_suggestion
 from .checks.record import records_of
 from .run import CalibrationRun
 
@@ -170,10 +170,10 @@ def _ratio(run: CalibrationRun) -> float | None:
 
 
 def _moves(ratio: float | None) -> str:
-    if ratio is None or abs(ratio - 1.0) < AGREES:
+    if ratio is None:
         return "check units, sign, gear ratio and that the rows belong together"
     return (
         f"it moves {ratio:.6g} times as far as the reference, which looks like "
-        f"{ratio_suggestion(ratio)}; unwrap it and divide it by {ratio:.6g}, so that it is reduced "
-        "to the output"
+        f"{ratio_suggestion(ratio, 0.0)}; unwrap it and divide it by {ratio:.6g}, so that it is "
+        "reduced to the output"
     )

@@ -13,7 +13,7 @@ from ..joint.declared import Bearing, DeclaredShaft, Head
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic
 from ..support.decoding import finite_float, read_text, shown_value
-from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
+from ..support.files import SIMULATION, SIMULATION_BYTES, refuse_own, written_atomically
 from ..support.suggestions import did_you_mean
 from .designs import MAX_SAMPLES, RunDesign
 
@@ -56,6 +56,7 @@ def _document(path: str | Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as cause:
+        refuse_own(path, text.encode(), "a simulation")
         raise FileError(path, f"not a TOML file: {cause}") from None
     except RecursionError:
         raise FileError(path, "not a simulation: nested too deeply") from None

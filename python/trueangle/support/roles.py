@@ -34,6 +34,8 @@ _SPELLINGS = {
     **dict.fromkeys(("degree", "degrees", "°", "degs"), "deg"),
     **dict.fromkeys(("radian", "radians", "rads"), "rad"),
     **dict.fromkeys(("turns", "rev", "revs", "revolution", "revolutions"), "turn"),
+    **dict.fromkeys(('"', "\u2033", "''", "arcsecs", "arcseconds", "arc sec"), "arcsec"),
+    **dict.fromkeys(("'", "\u2032", "arcmins", "arcminutes", "arc min"), "arcmin"),
     **dict.fromkeys(("counts", "cnt", "cts", "inc", "ticks", "lsb"), "count"),
     **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
     **dict.fromkeys(("msec", "milliseconds"), "ms"),

@@ -266,6 +266,51 @@ REFUSALS: dict[str, tuple[Callable[[], list[ta.CalibrationRun]], list[str], str,
 }
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["fit", "{}", "-o", "o.json"], ["check", "{}"], ["watch", "{}", "-m", "m.json"],
+        ["correct", "{}", "-m", "m.json", "-o", "o.csv"], ["simulate", "{}", "-o", "o.csv"],
+        ["diagnose", "runs.csv", "--simulation", "{}"],
+    ],
+    ids=lambda words: words[0],
+)  # fmt: skip
+def test_a_model_or_fleet_in_place_of_another_file_is_named_with_its_use(
+    words: list[str], desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fit", "runs.csv", "-o", "m.json", "--orders", "1-2"]) == 0
+    assert main(["fleet", "runs.csv", "--by", "run", "-o", "f.json", "--orders", "1-2"]) == 0
+    is_simulation = words[0] in ("simulate", "diagnose")
+    wanted = "a simulation" if is_simulation else "readings"
+    for name, what, use in (
+        ("m.json", "a correction model", "correct LOG --model m.json --output OUT"),
+        ("f.json", "a fleet", "fit RUNS --prior f.json"),
+    ):
+        capsys.readouterr()
+        assert main([name if word == "{}" else word for word in words]) == 1
+        said = f"{name}: is {what}, not {wanted}; it is used by trueangle {use}"
+        assert capsys.readouterr().err == f"trueangle: error: {said}\n"
+        typed = use.replace("LOG", "runs.csv").replace("OUT", "o.csv").replace("RUNS", "runs.csv")
+        assert main([*typed.split(), *(["-o", "n.json"] if what == "a fleet" else [])]) == 0
+
+
+@pytest.mark.parametrize("name", ['my "ref" []', "it's [x]", "pos act", 'ref "'])
+def test_a_unit_that_is_missing_is_told_as_an_option_that_works(
+    name: str, desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = ta.read_runs("runs.csv")
+    quoted = name.replace('"', '""')
+    rows = [f"{x},{y}" for x, y in zip(runs[0].reference, runs[0].indicated, strict=True)]
+    Path("r.csv").write_text("\n".join([f'"{quoted}",indicated_deg', *rows]) + "\n")
+    words = ["fit", "r.csv", "-o", "m.json", "--orders", "1", "--signal"]
+    assert main([*words, f"reference={name}"]) == 1
+    said = capsys.readouterr().err
+    assert "its unit is not known; give it: --signal " in said
+    option = shlex.split(said.split("give it: ")[1])
+    assert option == ["--signal", f"reference={name}:deg"]
+    assert main([*words, option[1]]) == 0
+
+
 @pytest.mark.parametrize("what", REFUSALS)
 def test_the_command_that_is_named_works(
     what: str, desk: Path, capsys: pytest.CaptureFixture[str]

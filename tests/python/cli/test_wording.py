@@ -3,8 +3,10 @@
 import ast
 import importlib
 import inspect
+import json
 import pickle
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -373,3 +375,14 @@ def test_a_unit_that_is_wrong_is_told_by_an_option_that_there_is(tmp_path, capsy
     said = capsys.readouterr().err
     assert "give --signal reference=NAME:deg --signal indicated=NAME:deg" in said
     assert "--period" not in said
+
+
+@pytest.mark.parametrize("name", ['my "ref"', "pos", "it's", '"'])
+def test_what_a_command_prints_as_json_stays_json(name):
+    """Options with quotes are told, and the JSON around them holds the same text."""
+    words = Wording()
+    words.parser = parsers()["fit"]
+    text = f"give `signals={{'reference': {(name, 'deg')!r}}}`"
+    told = words(text)
+    assert shlex.split(told) == ["give", "--signal", f"reference={name}:deg"]
+    assert json.loads(words(json.dumps({"note": text}))) == {"note": told}

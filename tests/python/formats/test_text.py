@@ -5,6 +5,7 @@ import io
 import math
 import re
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -266,6 +267,24 @@ def test_a_degree_sign_of_an_old_code_page(tmp_path):
     path.write_bytes("t,ref [°],enc [°]\n".encode("cp1252") + table().encode())
     (run,) = ta.read_runs(path, signals=NAMES)
     np.testing.assert_allclose(run.reference, REFERENCE)
+
+
+@pytest.mark.usefixtures("way")
+@pytest.mark.parametrize("first", [1, 2500])
+def test_an_old_code_page_is_read_in_cells_as_in_headers(first, tmp_path, monkeypatch):
+    """Wherever it stands, with UTF-8 in other rows; corrected copies keep the bytes."""
+    monkeypatch.chdir(tmp_path)
+    labels = [b"Pr\xfcfstand" if i < first else "Prüfling \u2019".encode() for i in range(2999)]
+    rows = [b"%s,%d,%d" % (label, i % 360, i % 360) for i, label in enumerate(labels)]
+    path = tmp_path / "old.csv"
+    path.write_bytes(b"\n".join([b"run,reference_deg,indicated_deg", *rows]) + b"\n")
+    runs = ta.read_runs(path)
+    assert [(run.label, len(run)) for run in runs] == [
+        ("Prüfstand", first), ("Prüfling \u2019", 2999 - first)
+    ]  # fmt: skip
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.1])], period=360.0)
+    ta.correct_logs(path, model, "o.csv")
+    assert b"\nPr\xfcfstand,0,0," in Path("o.csv").read_bytes()
 
 
 @pytest.mark.usefixtures("way")

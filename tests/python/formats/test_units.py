@@ -80,3 +80,19 @@ def test_times_of_a_table_in_memory_are_seconds(kind, first, unit):
     seconds = 0.25 * np.arange(first, 12)
     wanted = seconds if kind == "durations" else seconds - seconds[0]
     np.testing.assert_allclose(run.time, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("written", "turn"),
+    [('["]', 1_296_000.0), ("[\u2033]", 1_296_000.0), ("[arcseconds]", 1_296_000.0),
+     ("[']", 21_600.0), ("[\u2032]", 21_600.0)],
+)  # fmt: skip
+@pytest.mark.parametrize("apart", [False, True])
+def test_signs_of_seconds_and_minutes_of_arc(written, turn, apart, tmp_path):
+    """In the name of a column, and in a line of units."""
+    between = "\n[deg]," if apart else " "
+    head = f"reference,error{between}{written}" if apart else f"reference_deg,error {written}"
+    rows = [f"{x},{12.5 + x}" for x in PLACES]
+    (tmp_path / "a.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    (run,) = ta.read_runs(tmp_path / "a.csv")
+    np.testing.assert_allclose(run.indicated - PLACES, (12.5 + PLACES) * 360.0 / turn, rtol=1e-9)

@@ -155,12 +155,15 @@ def test_steps_that_may_be_a_turn_more_or_less_tell_no_ratio(step: float, told: 
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_ratio_near_one_is_no_gear(sign: float) -> None:
+def test_a_ratio_near_one_is_named_where_dividing_by_it_makes_the_angles_agree(sign: float) -> None:
     reference = np.linspace(0.0, 20_000.0, 3000)
-    for away, gear in ((0.14, False), (0.16, True)):
+    scatter = np.random.default_rng(77).uniform(-180.0, 180.0, reference.size)
+    for away, teeth in ((0.16, ""), (0.02, "51/50" if sign > 0 else "49/50")):
         found = message(reference, (1.0 + sign * away) * reference)
-        assert (f"it moves {1.0 + sign * away:.6g} times as far" in found) == gear
-        assert ("check units, sign, gear ratio" in found) == (not gear)
+        assert f"it moves {1.0 + sign * away:.6g} times as far" in found
+        assert teeth in found
+        found = message(reference, (1.0 + sign * away) * reference + scatter)
+        assert "check units, sign, gear ratio" in found
 
 
 @pytest.mark.parametrize(

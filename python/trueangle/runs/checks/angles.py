@@ -15,8 +15,12 @@ from .fault import DataFault
 from .record import Record
 
 #: Travel (degrees) from which on a ratio of the channels means anything, and how far from 1
-#: it may be: errors of several degrees over a short travel are still errors.
-LEAST_TRAVEL, AGREES = 5.0, 0.15
+#: it may be: errors of several degrees over a short travel are still errors. A periodic error
+#: changes the slope over n turns by 1 / n^2 of that, and what drifts by less than the last.
+LEAST_TRAVEL, AGREES, DRIFTS = 5.0, 0.15, 0.004
+
+#: Degrees between readings beyond which nobody knows which way the joint went.
+COARSE = 90.0
 
 #: Ratios by which angles in one unit differ from those in another.
 UNITS = {
@@ -28,6 +32,8 @@ UNITS = {
 #: Denominators of gear ratios that are offered, round ones first, and how near one must be.
 DENOMINATORS = (1, 2, 3, 4, 5, 10, 6, 7, 8, 9, 11, 12, 13)
 RATIONAL = 2e-3
+#: How near the whole number of teeth must be of wheels that differ by one, in shares of it.
+TOOTH = 0.01
 
 #: Share by which a part's values and steps are those of another unit.
 UNIT_SPREAD = 0.35
@@ -60,8 +66,19 @@ def angle_ratio(records: list[Record]) -> float | None:
     return float(median(slopes)) if slopes else None
 
 
-def ratio_suggestion(ratio: float | None) -> str:
-    """What a ratio of indicated to reference suggests.
+def told_ratio(records: list[Record]) -> tuple[float | None, str]:
+    """The ratio of indicated to reference, and what it suggests."""
+    ratio = angle_ratio(records)
+    if ratio is None and any(float(np.ptp(record.reference)) > LEAST_TRAVEL for record in records):
+        return None, f"readings more than {COARSE:g} deg apart do not show it; read more densely"
+    wrong = next(wrong_ratio(records), None) is not None
+    if ratio is not None and abs(ratio - 1.0) >= AGREES and not wrong:
+        return ratio, "no straight line: an error of the joint over this travel"
+    return ratio, ratio_suggestion(ratio, 0.0 if wrong else AGREES)
+
+
+def ratio_suggestion(ratio: float | None, agrees: float = AGREES) -> str:
+    """What a ratio of indicated to reference suggests; nearer to 1 than ``agrees`` it is 1.
 
     Examples
     --------
@@ -72,7 +89,7 @@ def ratio_suggestion(ratio: float | None) -> str:
     """
     if ratio is None:
         return "the joint hardly moved"
-    if abs(ratio - 1.0) < AGREES:
+    if abs(ratio - 1.0) < agrees:
         return "the indicated angle is reduced to the output"
     if abs(ratio + 1.0) < AGREES:
         return "the indicated angle counts the other way"
@@ -86,8 +103,14 @@ def ratio_suggestion(ratio: float | None) -> str:
                 return name + sign
     for denominator in DENOMINATORS:
         best = Fraction(round(size * denominator), denominator)
-        if abs(float(best) - size) < RATIONAL * size:
+        if best != 1 and abs(float(best) - size) < RATIONAL * size:
             return f"a gear of ratio {best} between the two that is not reduced{sign}"
+    # Wheels that differ by a tooth, as those of a harmonic drive with one or the other held.
+    departure = abs(size - 1.0)
+    teeth = round(1.0 / departure) if departure > DRIFTS else 0
+    if teeth > max(DENOMINATORS) and abs(teeth * departure - 1.0) < TOOTH:
+        best = Fraction(teeth + (1 if size > 1.0 else -1), teeth)
+        return f"a gear of ratio {best} between the two that is not reduced{sign}"
     return f"the indicated angle moves {size:.4g} times as far as the reference{sign}"
 
 
@@ -96,7 +119,7 @@ def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
     turned: dict[str, list[tuple[str, float]]] = {}
     for record in records:
         slope = _straight(record)
-        if slope is None or abs(slope - 1.0) < AGREES:
+        if slope is None or abs(slope - 1.0) < _bending(record):
             continue
         kind = "wrong_sign" if abs(slope + 1.0) < AGREES else "wrong_gear_ratio"
         turned.setdefault(kind, []).append((record.label, slope))
@@ -118,7 +141,7 @@ def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
                 labels,
                 (),
                 f"in {which} the indicated angle moves {value:.6g} times as far as the "
-                f"reference: {ratio_suggestion(value)}",
+                f"reference: {ratio_suggestion(value, 0.0)}",
                 f"divide the indicated angle by {value:.6g}, or give the right unit",
             )
 
@@ -286,13 +309,19 @@ def _straight(record: Record) -> float | None:
     return float(line[1]) if float(median(np.abs(rest))) < STRAIGHT * size else None
 
 
+def _bending(record: Record) -> float:
+    """How far from 1 an error of the joint may bring the slope over the travel of a run."""
+    turns = float(np.ptp(record.unwrapped[0])) / 360.0
+    return max(AGREES / max(turns, 1.0) ** 2, DRIFTS)
+
+
 def _slope(record: Record) -> float | None:
     """Travel of the indicated angle per travel of the reference; None without travel."""
     reference, indicated = record.unwrapped
     if len(record) < 4 or np.ptp(reference) < LEAST_TRAVEL:
         return None
     steps = np.abs(np.diff(reference))
-    if float(quantile(steps, 0.9)) > 90.0:
+    if float(quantile(steps, 0.9)) > COARSE:
         return None  # too coarse to say which way it went
     x = reference - reference.mean()
     return float(x @ (indicated - indicated.mean()) / (x @ x))

@@ -12,12 +12,10 @@ from ...support.argumentkinds import told_kinds
 from ..run import runs_or_data
 from ..source import ReadingOptions
 from .angles import (
-    AGREES,
     UNUSABLE_ANGLES,
-    angle_ratio,
     mixed_units,
-    ratio_suggestion,
     swapped_channels,
+    told_ratio,
 )
 from .fault import DataFault
 from .jumps import missed_counts
@@ -71,7 +69,6 @@ def check(data: Any, **reading: Unpack[ReadingOptions]) -> Check:
     if not records:
         raise ArgumentError("no data: give at least one file or run")
     extent = extent_of(records)
-    ratio = angle_ratio(records)
     can, cannot = extent_verdicts(extent)
     unused = sorted({name for record in records for name in record.deviations})
     if unused:
@@ -87,14 +84,11 @@ def check(data: Any, **reading: Unpack[ReadingOptions]) -> Check:
             entry["because"] = f"column '{clocks[0]}' is not used"
             entry["measure"] = "nothing anew: give it the role time, with its unit"
     faults = data_faults(records)
-    wrong = any(fault.fault in ("wrong_sign", "wrong_gear_ratio") for fault in faults)
-    bent = ratio is not None and abs(ratio - 1.0) >= AGREES and not wrong
+    ratio, suggestion = told_ratio(records)
     return Check(
         (*faults, *outliers(records, faults)),
         ratio,
-        "no straight line: an error of the joint over this travel"
-        if bent
-        else ratio_suggestion(ratio),
+        suggestion,
         extent,
         tuple(can),
         tuple(cannot),

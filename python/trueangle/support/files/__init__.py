@@ -27,6 +27,7 @@ from .kinds import (
     ending_of,
     kind_of_log,
     promised_format,
+    refuse_own,
 )
 from .named import named_output
 from .outputs import check_output, external_output, publish, written_atomically
@@ -61,6 +62,7 @@ __all__ = [
     "promised_format",
     "publish",
     "read_whole",
+    "refuse_own",
     "remove_leftovers",
     "restore",
     "same_file",

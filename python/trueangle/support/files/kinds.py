@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
@@ -145,3 +146,28 @@ PICTURE: Final = FileKind("a picture (PNG, SVG or PDF)", (".png", ".svg", ".pdf"
 CERTIFICATE: Final = FileKind("a certificate (PDF)", (".pdf",))
 #: What `Report.save` writes, by the ending.
 REPORT: Final = FileKind("a report (HTML or PDF)", (*PAGE.endings, *PDF.endings))
+
+#: Files of this package, by the format that they state.
+_OWN: Final = {
+    b"model": "a correction model",
+    b"robot": "the correction models of a robot",
+    b"fleet": "a fleet",
+}
+_STATED: Final = re.compile(rb'\A\s*\{\s*"format":\s*"trueangle-(model|robot|fleet)"')
+
+
+def refuse_own(path: str | PathLike[str], head: bytes, wanted: str) -> None:
+    """Refuse a model or fleet in place of ``wanted``, by the first bytes of a file.
+
+    Raises
+    ------
+    FileError
+    """
+    found = _STATED.match(head)
+    if found:
+        remedy = (
+            f'`ta.fit("RUNS", prior="{path}")`'
+            if found[1] == b"fleet"
+            else f'`ta.correct_logs("LOG", model="{path}", output="OUT")`'
+        )
+        raise FileError(path, f"is {_OWN[found[1]]}, not {wanted}; it is used by {remedy}")

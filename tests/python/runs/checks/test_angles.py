@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import trueangle as ta
+from trueangle.errors import ArgumentError
 from trueangle.runs.checks.angles import (
     angle_ratio,
     mixed_units,
     ratio_suggestion,
     swapped_channels,
+    told_ratio,
     wrapped_reference,
     wrong_ratio,
 )
@@ -246,3 +249,45 @@ def test_what_can_and_cannot_be_known() -> None:
 def test_ratios_of_up_to_thirteen_teeth_are_offered(teeth: int) -> None:
     """No smaller pair of wheels comes near one more tooth on the one than on the other."""
     assert f"a gear of ratio {2 * teeth + 1}/{teeth} between" in ratio_suggestion(2.0 + 1.0 / teeth)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "teeth"), [(51 / 50, "51/50"), (50 / 51, "50/51"), (1.01, "101/100"), (1.1, "11/10")]
+)
+def test_wheels_that_differ_by_a_tooth_are_told_from_an_error_by_the_travel(ratio, teeth) -> None:
+    """An error of 25 deg bends the slope over n turns by n^-2 of that over one."""
+    rng = np.random.default_rng(31_600)
+
+    def over(turns: float, slope: float, error: float, lost: float = 0.0) -> Record:
+        x = np.linspace(0.0, 360.0 * turns, 4000)
+        read = slope * x + error * np.sin(np.radians(x)) - lost * np.round(x / x[-1])
+        return record(x, read + rng.normal(0.0, 1e-3, x.size))
+
+    (fault,) = wrong_ratio([over(6.0, ratio, 0.05)])
+    assert fault.fault == "wrong_gear_ratio"
+    assert f"a gear of ratio {teeth} between the two that is not reduced" in fault.says
+    assert told_ratio([over(6.0, ratio, 0.05)], True)[1] in fault.says
+    for turns in (1.0, 1.3, 2.0, 2.7, 6.0):
+        assert not list(wrong_ratio([over(turns, 1.0, 25.0)])), turns
+    lost = over(6.0, 1.0, 0.1, 36.0)  # counts lost halfway are no ratio
+    assert not list(wrong_ratio([lost]))
+    assert told_ratio([lost], False)[1] == "the indicated angle is reduced to the output"
+
+
+def test_a_fit_of_a_steep_ratio_names_it_and_no_number_of_orders() -> None:
+    x = np.linspace(0.0, 1080.0, 2000)
+    for ratio, teeth in ((1.1, "11/10"), (1.02, "51/50")):
+        told = rf"{ratio:g} times .* ratio {teeth} .*; divide the indicated"
+        with pytest.raises(ArgumentError, match=told):
+            ta.fit({"reference_deg": x, "indicated_deg": ratio * x}, range(1, 18))
+
+
+@pytest.mark.parametrize("turns", [3, 120])
+def test_a_ratio_that_coarse_readings_hide_is_no_lack_of_travel(turns) -> None:
+    coarse = record(np.linspace(0.0, 360.0 * turns, 3 * turns + 1))
+    told = (None, "readings more than 90 deg apart do not show it; read more densely")
+    assert told_ratio([coarse], False) == told
+    assert told_ratio([record(np.linspace(0.0, 4.9, 20))], False) == (
+        None,
+        "the joint hardly moved",
+    )
