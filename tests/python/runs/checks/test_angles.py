@@ -266,12 +266,12 @@ def test_wheels_that_differ_by_a_tooth_are_told_from_an_error_by_the_travel(rati
     (fault,) = wrong_ratio([over(6.0, ratio, 0.05)])
     assert fault.fault == "wrong_gear_ratio"
     assert f"a gear of ratio {teeth} between the two that is not reduced" in fault.says
-    assert told_ratio([over(6.0, ratio, 0.05)], True)[1] in fault.says
+    assert told_ratio([over(6.0, ratio, 0.05)])[1] in fault.says
     for turns in (1.0, 1.3, 2.0, 2.7, 6.0):
         assert not list(wrong_ratio([over(turns, 1.0, 25.0)])), turns
     lost = over(6.0, 1.0, 0.1, 36.0)  # counts lost halfway are no ratio
     assert not list(wrong_ratio([lost]))
-    assert told_ratio([lost], False)[1] == "the indicated angle is reduced to the output"
+    assert told_ratio([lost])[1] == "the indicated angle is reduced to the output"
 
 
 def test_a_fit_of_a_steep_ratio_names_it_and_no_number_of_orders() -> None:
@@ -286,8 +286,8 @@ def test_a_fit_of_a_steep_ratio_names_it_and_no_number_of_orders() -> None:
 def test_a_ratio_that_coarse_readings_hide_is_no_lack_of_travel(turns) -> None:
     coarse = record(np.linspace(0.0, 360.0 * turns, 3 * turns + 1))
     told = (None, "readings more than 90 deg apart do not show it; read more densely")
-    assert told_ratio([coarse], False) == told
-    assert told_ratio([record(np.linspace(0.0, 4.9, 20))], False) == (
+    assert told_ratio([coarse]) == told
+    assert told_ratio([record(np.linspace(0.0, 4.9, 20))]) == (
         None,
         "the joint hardly moved",
     )
