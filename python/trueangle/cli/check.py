@@ -9,7 +9,7 @@ from ..errors import FileError
 from ..support.plainresult import json_text
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, robot_messages
-from .signal_options import add_signals, reading_options
+from .signal_options import add_signals, of_joint, reading_options
 
 if TYPE_CHECKING:
     from .robots import JointAsked
@@ -78,7 +78,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
         plain = {joint: result.to_dict() for joint, result in checks.items()}
         print(json_text({"joints": plain, "ranking": plain_ranking(ranking)}, indent=2))
     else:
-        texts = {row.joint: checks[row.joint].summary() for row in ranking}
+        texts = {row.joint: of_joint(checks[row.joint].summary(), row.joint) for row in ranking}
         print(
             robot_messages(f"Data of {name or 'the robot'}, the worst joint first:", ranking, texts)
         )

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from shlex import quote
+from typing import TYPE_CHECKING, Any
 
-from ..errors import ArgumentError, NoModelError, TrueAngleError
+from ..errors import ArgumentError, FileError, NoModelError, TrueAngleError
 from ..support.deadline import ending_early
 from ..support.files import MODEL, SENSOR, SIMULATION
 from ..support.plainresult import json_text
@@ -21,12 +22,14 @@ from .options import (
 )
 from .paths import Input, Output
 from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
-from .signal_options import reading_options, signals_by_joint
+from .signal_options import of_joint, reading_options, signals_by_joint
 from .values import declared_shafts, seconds
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
     from ..model.model import HarmonicModel
+    from ..runs.joining.simulated import MeasuredMinusSimulated
+    from ..runs.run import CalibrationRun
     from ..simulation import Simulation
     from .robots import JointAsked
 
@@ -142,11 +145,7 @@ def run(args: argparse.Namespace) -> int:
     runs = read_checked_runs(args)
     simulated = None
     if args.simulated is not None:
-        from ..runs.joining import minus_simulated
-
-        columns = (signals_by_joint(own, single=False) or {}).get("simulated")
-        given = {**reading_options(args), "signals": columns}
-        simulated = minus_simulated(runs, args.simulated, by=args.simulated_by, **given)
+        simulated = _minus_simulated(runs, args, own)
     with ending_early() as interruption:
         result = diagnose(
             runs, simulation, simulated=simulated, within=args.within, progress=args.progress
@@ -159,6 +158,31 @@ def run(args: argparse.Namespace) -> int:
         raise KeyboardInterrupt(_unwritten(args, result.complete))
     _written(result, args, model)
     return 0
+
+
+def _minus_simulated(
+    runs: list[CalibrationRun], args: argparse.Namespace, own: list[Any]
+) -> MeasuredMinusSimulated:
+    """The runs without what the log of the simulator states, whose columns ``own`` names.
+
+    Raises
+    ------
+    FileError
+        The log lacks a column; says how those that were named of the runs are named of it.
+    """
+    from ..runs.joining import minus_simulated
+
+    columns = (signals_by_joint(own, single=False) or {}).get("simulated")
+    given = {**reading_options(args), "signals": columns}
+    try:
+        return minus_simulated(runs, args.simulated, by=args.simulated_by, **given)
+    except FileError as error:
+        told = of_joint(error.problem, "simulated")
+        missing = [entry for entry in args.signal if entry[1] not in (columns or {})]
+        if told != error.problem and missing:
+            again = " ".join(f"--signal {quote(f'simulated.{entry.text}')}" for entry in missing)
+            told += f"; --signal ROLE=NAME is of the runs only, for the same names add {again}"
+        raise FileError(error.path, told, line=error.line, column=error.column) from None
 
 
 def _refuse_idle(args: argparse.Namespace) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import ArgumentError, NoModelError, NotInvertibleError, RankError, TrueAngleError
 from ..support.display_units import ErrorsIn
-from .signal_options import signal_option, signals_by_joint
+from .signal_options import of_joint, signal_option, signals_by_joint
 
 if TYPE_CHECKING:
     from ..model.model import HarmonicModel
@@ -126,6 +126,7 @@ def _asked(
     signals = [type(e)((None, *e[1:])) for e in own.values()]
     signals += [e for e in entries if e[0] == _SIMULATED]
     changed: dict[str, Any] = {"signal": signals, "robot": None, "joint": None}
+    changed["of_joint"] = joint.name
     if args.robot is not None:
         changed |= {
             "gear_ratio": joint.gear_ratio,
@@ -166,7 +167,8 @@ def each_joint(
             except ArgumentError as error:
                 if type(error) is not ArgumentError:
                     raise
-                raise ArgumentError(f"joint {joint.name}: {error}") from None
+                told = of_joint(str(error), joint.name)
+                raise ArgumentError(f"joint {joint.name}: {told}") from None
     if not found:
         raise NoModelError("; ".join(f"joint {joint}: {error}" for joint, error in failed.items()))
     return found, failed

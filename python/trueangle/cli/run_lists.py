@@ -10,7 +10,7 @@ from ..errors import ArgumentError
 from ..runs.files import read_runs
 from ..runs.run import CalibrationRun
 from ..support.suggestions import did_you_mean, listed_names
-from .signal_options import reading_options
+from .signal_options import of_joint, reading_options
 
 __all__ = ["listed_names", "read_selected_runs"]
 
@@ -56,5 +56,6 @@ def read_checked_runs(args: argparse.Namespace) -> list[CalibrationRun]:
 
     runs = read_runs(args.runs, **reading_options(args))
     for fault in data_faults(records_of(runs)):
-        print(f"trueangle: warning: {fault}", file=sys.stderr)
+        told = of_joint(str(fault), getattr(args, "of_joint", None))
+        print(f"trueangle: warning: {told}", file=sys.stderr)
     return runs

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -122,6 +123,19 @@ def signals_by_joint(
             raise ArgumentError(f"--signal: {role} is named twice, {roles[role][0]!r} and {name!r}")
         roles[role] = (name, unit)
     return found or None
+
+
+def of_joint(text: str, joint: str | None) -> str:
+    """A message whose columns are those of a joint, or of a simulator's log: options name it.
+
+    Examples
+    --------
+    >>> of_joint("give `signals={'torque': 'tau'}`", "arm")
+    "give `signals={'arm': {'torque': 'tau'}}`"
+    """
+    if joint is None:
+        return text
+    return re.sub(r"`signals=\{([^`]+)\}`", rf"`signals={{{joint!r}: {{\1}}}}`", text)
 
 
 def reading_options(args: argparse.Namespace) -> dict[str, Any]:

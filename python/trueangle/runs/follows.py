@@ -14,6 +14,7 @@ from ..errors import ArgumentError, UnitWarning
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.quantiles import quantile
+from ..support.roles import role_code
 from .checks.angles import UNUSABLE_ANGLES, angle_ratio, ratio_suggestion
 from .checks.record import records_of
 from .run import CalibrationRun
@@ -146,7 +147,8 @@ def _warn_of_degrees(run: CalibrationRun, reference: Array, indicated: Array) ->
 
 def _remedies(period: float) -> dict[str, float]:
     """What the indicated angle may be instead, with the factor that puts it right."""
-    found = {"it runs backwards: change its sign": -1.0}
+    code = role_code("indicated", "-NAME", None)
+    found = {f"it runs backwards: change its sign with {code}": -1.0}
     # A column is converted when it is read: its unit need not be that of the run, which
     # is only the likeliest.
     columns = sorted(_TURNS, key=lambda unit: not math.isclose(_TURNS[unit], period))

@@ -23,6 +23,9 @@ _ROOM: Final = 20
 #: How a line begins that is there to be copied, and stays whole.
 _COPIED: Final = ("--", "trueangle ")
 
+#: What stands for a blank at which no line is cut.
+_JOINED: Final = "\0"
+
 #: What further lines of an entry stand under: the text behind a mark, a number or a label.
 _LEAD: Final = re.compile(r"\s*(?:- |! |\[\d+\] |\d+\. |note: |\S.{0,28}? {2,}(?=\S))?")
 
@@ -68,14 +71,15 @@ def wrapped_lines(text: str, indent: int = 0, first: int = 0) -> list[str]:
     >>> wrapped_lines("a word and " * 8 + "an end", indent=2)[1]
     '  word and an end'
     """
-    return textwrap.wrap(
-        text,
+    lines = textwrap.wrap(
+        _whole_code(text),
         text_columns(),
         initial_indent=" " * first,
         subsequent_indent=" " * indent,
         break_long_words=False,
         break_on_hyphens=False,
     )
+    return [line.replace(_JOINED, " ") for line in lines]
 
 
 def laid_out(lines: Iterable[str]) -> str:
@@ -102,6 +106,7 @@ def laid_out(lines: Iterable[str]) -> str:
 def _folded(line: str, width: int, indent: int) -> list[str]:
     """One line as several, cut at blanks."""
     parts: list[str] = []
+    line = _whole_code(line)
     while len(line) > width:
         cut = line.rfind(" ", indent + 1, width + 1)
         cut = cut if cut > 0 else line.find(" ", width)
@@ -109,7 +114,12 @@ def _folded(line: str, width: int, indent: int) -> list[str]:
             break
         parts.append(line[:cut].rstrip())
         line = " " * indent + line[cut:].lstrip()
-    return [*parts, line.rstrip()]
+    return [part.replace(_JOINED, " ") for part in (*parts, line.rstrip())]
+
+
+def _whole_code(text: str) -> str:
+    """``text`` with no blank in the code that backquotes hold: it is there to be copied."""
+    return re.sub(r"`[^`\n]+`", lambda code: code[0].replace(" ", _JOINED), text)
 
 
 def counted(things: Sized | int, one: str, several: str = "") -> str:

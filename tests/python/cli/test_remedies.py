@@ -294,6 +294,63 @@ def test_a_model_or_fleet_in_place_of_another_file_is_named_with_its_use(
         assert main([*typed.split(), *(["-o", "n.json"] if what == "a fleet" else [])]) == 0
 
 
+@pytest.mark.parametrize("columns", ["60", "100"])
+@pytest.mark.parametrize("name", ["indicated_deg", "motor encoder left", 'the "enc"'])
+@pytest.mark.parametrize("minus", ["", "-"])
+def test_the_option_that_changes_a_sign_works(
+    name: str, minus: str, columns: str, desk: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """Whole in a line, however narrow the terminal, with the unit where it was given."""
+    monkeypatch.setenv("COLUMNS", columns)
+    x = np.linspace(0.0, 350.0, 60)
+    quoted = name.replace('"', '""')
+    y = -x if minus == "" else x
+    rows = [f"{p},{q}" for p, q in zip(x, y, strict=True)]
+    Path("r.csv").write_text("\n".join([f'reference_deg,"{quoted}"', *rows]) + "\n")
+    unit = "" if name == "indicated_deg" else ":deg"
+    words = ["check", "r.csv", "--signal", f"indicated={minus}{name}{unit}"]
+    assert main(words) == 1
+    said = capsys.readouterr().out
+    (line,) = [line for line in said.splitlines() if "--signal" in line]
+    option = shlex.split(line[line.index("--signal") :].split(", which")[0])
+    assert option == ["--signal", f"indicated={'' if minus else '-'}{name}:deg"]
+    assert main(["check", "r.csv", *option]) == 0
+    assert f"'{option[1][10:-4]}' in deg" in " ".join(capsys.readouterr().out.split())
+    assert main(["fit", "r.csv", "-o", "m.json", "--orders", "1", *words[2:]]) == 1
+    assert "change its sign with --signal indicated=-NAME" in capsys.readouterr().err
+    assert main(["fit", "r.csv", "-o", "m.json", "--orders", "1", *option]) == 0
+
+
+def test_columns_of_a_simulators_log_are_named_by_an_option_that_works(
+    desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = Path("runs.csv").read_text()
+    for name, ref, enc in (("a.csv", "laser", "q 1"), ("b.csv", "true", "seen")):
+        head = text.replace("reference_deg", ref, 1).replace("indicated_deg", enc, 1)
+        Path(name).write_text(head)
+    words = [
+        "diagnose",
+        "a.csv",
+        "--signal",
+        "reference=laser:deg",
+        "--signal",
+        "indicated=q 1:deg",
+    ]
+    assert main([*words, "--simulated", "b.csv"]) == 1
+    said = capsys.readouterr().err
+    assert "another named with --signal simulated.reference=NAME:UNIT)" in said
+    assert "--signal ROLE=NAME is of the runs only, for the same names add --signal sim" in said
+    assert main([*words, "--simulated", "a.csv"]) == 1
+    added = shlex.split(capsys.readouterr().err.split("same names add ")[1])
+    named = ["simulated.reference=laser:deg", "simulated.indicated=q 1:deg"]
+    assert added == ["--signal", named[0], "--signal", named[1]]
+    assert main([*words, "--simulated", "a.csv", *added[:2]]) == 1
+    rest = shlex.split(capsys.readouterr().err.split("same names add ")[1])
+    assert rest == added[2:]
+    assert main([*words, "--simulated", "a.csv", *added]) == 0
+
+
 @pytest.mark.parametrize("name", ['my "ref" []', "it's [x]", "pos act", 'ref "'])
 def test_a_unit_that_is_missing_is_told_as_an_option_that_works(
     name: str, desk: Path, capsys: pytest.CaptureFixture[str]

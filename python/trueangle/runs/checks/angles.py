@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...support.arrays import Array
 from ...support.quantiles import median, quantile
+from ...support.roles import role_code
 from .fault import DataFault
 from .record import Record
 
@@ -117,6 +118,9 @@ def ratio_suggestion(ratio: float | None, agrees: float = AGREES) -> str:
 def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
     """A sign, unit or gear ratio that is not the output's."""
     turned: dict[str, list[tuple[str, float]]] = {}
+    named = (r.columns["indicated"] for r in records if "indicated" in r.columns)
+    name, unit = next(named, ("NAME", None))
+    code = role_code("indicated", name[1:] if name.startswith("-") else f"-{name}", unit)
     for record in records:
         slope = _straight(record)
         if slope is None or abs(slope - 1.0) < _bending(record):
@@ -133,7 +137,7 @@ def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
                 labels,
                 (),
                 f"in {which} the indicated angle falls where the reference rises",
-                "change the sign of one of the two columns",
+                f"give {code}, which changes the sign of one of the two columns",
             )
         else:
             yield DataFault.of(

@@ -37,7 +37,7 @@ class Record:
     time, velocity, temperature, torque, mount : ndarray or None
         s, deg/s, Celsius, Nm, degrees.
     columns : mapping of role to (name, unit)
-        The columns of the file that were understood.
+        The columns of the file that were understood, with a minus those of a reversed sensor.
     deviations : tuple of str
         Columns of no role that look like deviations from a nominal angle.
     clocks : tuple of str
@@ -110,7 +110,10 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
     found: list[Record] = []
     for table in read_columns(data, checked_reading_options(reading)):
         scale = 360.0 / table.period
-        columns = {role: (c.name, c.unit) for role, c in table.table.roles.items()}
+        columns = {
+            role: (f"-{c.name}" if c.is_reversed else c.name, c.unit)
+            for role, c in table.table.roles.items()
+        }
         for labels, rows in table.groups:
             signals = {name: values[rows] for name, values in table.signals.items()}
             velocity, mount = signals.get("velocity"), signals.get("mount")

@@ -98,7 +98,8 @@ def multiplied(record, fault):
 
 
 def sign_changed(record, fault):
-    assert fault.mend == "change the sign of one of the two columns"
+    code = "`signals={'indicated': '-NAME'}`"
+    assert fault.mend == f"give {code}, which changes the sign of one of the two columns"
     return replace(record, indicated=-record.indicated)
 
 
