@@ -313,7 +313,7 @@ def test_the_option_that_changes_a_sign_works(
     assert main(words) == 1
     said = capsys.readouterr().out
     (line,) = [line for line in said.splitlines() if "--signal" in line]
-    option = shlex.split(line[line.index("--signal") :].split(", which")[0])
+    option = shlex.split(line[line.index("--signal") :])[:2]
     assert option == ["--signal", f"indicated={'' if minus else '-'}{name}:deg"]
     assert main(["check", "r.csv", *option]) == 0
     assert f"'{option[1][10:-4]}' in deg" in " ".join(capsys.readouterr().out.split())

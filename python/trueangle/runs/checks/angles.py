@@ -137,7 +137,7 @@ def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
                 labels,
                 (),
                 f"in {which} the indicated angle falls where the reference rises",
-                f"give {code}, which changes the sign of one of the two columns",
+                f"give {code} to change the sign of one of the two columns",
             )
         else:
             yield DataFault.of(

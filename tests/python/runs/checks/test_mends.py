@@ -99,7 +99,7 @@ def multiplied(record, fault):
 
 def sign_changed(record, fault):
     code = "`signals={'indicated': '-NAME'}`"
-    assert fault.mend == f"give {code}, which changes the sign of one of the two columns"
+    assert fault.mend == f"give {code} to change the sign of one of the two columns"
     return replace(record, indicated=-record.indicated)
 
 
