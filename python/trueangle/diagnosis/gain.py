@@ -86,6 +86,28 @@ class Gain(ShownResult):
         return found
 
 
+def _acts_within(regression: Regression, before: Array, after: Array) -> bool:
+    """Whether zeros of the runs make most of an error, and less of what a finding takes off it.
+
+    A pattern is then judged about the zero of each run: no pattern can take that off.
+    """
+    clean = ~regression.outlying
+    whole, taken = (
+        float(np.sum(_about_zeros(regression, e)[clean] ** 2) / max(np.sum(e[clean] ** 2), 1e-300))
+        for e in (before, before - after)
+    )
+    return whole < 0.5 < taken
+
+
+def _about_zeros(regression: Regression, e: Array) -> Array:
+    """Residuals about the mean of each run, outliers left out of it."""
+    found = e.copy()
+    for start, stop in regression.bounds:
+        used = ~regression.outlying[start:stop]
+        found[start:stop] -= e[start:stop][used].mean() if used.any() else 0.0
+    return found
+
+
 def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> list[Gain] | None:
     """Gain of every finding (its terms' indices) beside the others, by leaving out runs.
 
@@ -117,7 +139,11 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
     found = []
     for k, group in enumerate(groups):
         cause = regression.terms[group[0]].cause
-        before, after = left[k + 1][clean], left[0][clean]
+        both = left[k + 1], left[0]
+        within = own_zero or _acts_within(regression, *both)
+        if within and not own_zero:
+            both = _about_zeros(regression, both[0]), _about_zeros(regression, both[1])
+        before, after = both[0][clean], both[1][clean]
         transfers = effect_or_unnamed(cause).transfers
         share = interval = control = None
         if transfers:
@@ -126,7 +152,7 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
         found.append(
             Gain(
                 f"{what} ({parts} parts)"
-                + (", zero of each held-out run taken from itself" if own_zero else ""),
+                + (", zero of each held-out run taken from itself" if within else ""),
                 error_numbers(before),
                 error_numbers(after),
                 share,

@@ -20,14 +20,15 @@ _LOOKED_AT: Final = 512
 
 
 def check_worth(fit: FitResult) -> None:
-    """Refuse a correction that is expected to add more error than it takes.
+    """Refuse a correction whose amplitude is below its own standard error.
 
     ::
 
-        Σ_i g_iᵀ b bᵀ g_i < Σ_i g_iᵀ V g_i
+        2 Σ_i g_iᵀ b bᵀ g_i < Σ_i g_iᵀ V g_i
 
     over the places read, with rows ``g_i`` of the series less their mean, coefficients b and
-    their covariance V. Single coefficients may be below their errors where orders nearly cancel.
+    their covariance V. Of one order this is an amplitude below its error; of several, single ones
+    may be below theirs where they nearly cancel.
 
     Raises
     ------
@@ -43,12 +44,13 @@ def check_worth(fit: FitResult) -> None:
     rows = design_matrix(places, shafts, model.period)
     rows = (rows - rows.mean(axis=0))[:, 1:]
     pairs = [(a, b) for s in model.shafts for a, b in zip(s.cosine, s.sine, strict=True)]
-    size = float(np.mean((rows @ np.ravel(pairs)) ** 2))
+    size = 2.0 * float(np.mean((rows @ np.ravel(pairs)) ** 2))
     error = float(np.mean(np.einsum("ij,jk,ik->i", rows, model.covariance[1:, 1:], rows)))
     if size < error:
         size, error = (ARCSEC_PER_TURN / model.period * math.sqrt(x) for x in (size, error))
         unit = error_unit("auto", sine_of_rms(error))
         raise NoModelError(
-            f"no correction can be given: the error fitted is {unit.text(size)} rms, below its own "
-            f"standard error of {unit.text(error)}; measure more runs, or declare the --orders"
+            f"no correction can be given: the error fitted, of {unit.text(size)} amplitude, is "
+            f"below its own standard error of {unit.text(error)}; measure more runs, or declare "
+            "the --orders"
         )
