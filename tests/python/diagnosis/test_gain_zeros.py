@@ -7,7 +7,9 @@ import trueangle as ta
 from trueangle.simulation import Simulation
 
 
-@pytest.mark.parametrize(("bits", "zeros"), [(12, (3.0, 4.5)), (10, (0.0, 6.45)), (11, (1.0, -2.0))])
+@pytest.mark.parametrize(
+    ("bits", "zeros"), [(12, (3.0, 4.5)), (10, (0.0, 6.45)), (11, (1.0, -2.0))]
+)
 def test_an_order_that_is_the_error_of_every_run_has_its_share(bits, zeros):
     """To and fro at two speeds: slip, play or delay, none of which can be told from another."""
     count, size = 360.0 / 2.0**bits, 400.0 / 2.0**bits
