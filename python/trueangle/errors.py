@@ -25,6 +25,7 @@ __all__ = [
     "TrueAngleError",
     "UnitWarning",
     "UnlikeRunsWarning",
+    "UnreadColumnWarning",
     "level_of_caller",
 ]
 
@@ -193,6 +194,10 @@ class NotCorrectedWarning(UserWarning):
 
 class UnlikeRunsWarning(UserWarning):
     """Runs that do not show one pattern were fitted together; the message names them."""
+
+
+class UnreadColumnWarning(UserWarning):
+    """A column with the name of a role was left aside: it holds what that role cannot be."""
 
 
 class LargeModelWarning(UserWarning):

@@ -21,6 +21,7 @@ from .arrowtables import (
     column_batches,
     corrected_schema,
     element_names,
+    other_names,
     top_names,
 )
 from .budget import FileExtent, check_part
@@ -42,6 +43,12 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
     """Names of the top columns, elements of lists of one length as ``state[3]``."""
     with _opened(path) as (schema, _batches, _options):
         return element_names(schema, lambda name: 0)
+
+
+def unread(path: Path) -> list[str]:
+    """Names of columns of other types; see `format.FormatModule`."""
+    with _opened(path) as (schema, _batches, _options):
+        return other_names(schema)
 
 
 class BatchRange(NamedTuple):

@@ -50,6 +50,11 @@ def element_names(schema: pa.Schema, first: Callable[[str], int]) -> list[str]:
     return found
 
 
+def other_names(schema: pa.Schema) -> list[str]:
+    """Columns that hold neither numbers nor texts."""
+    return [field.name for field in schema if not (is_number(field.type) or is_label(field.type))]
+
+
 def top_names(schema: pa.Schema, names: Iterable[str]) -> list[str]:
     """The columns that hold some columns and elements, each once."""
     return list(dict.fromkeys(_top(schema, name)[0] for name in names))

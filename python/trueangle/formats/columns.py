@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+import warnings
+from collections.abc import Collection, Iterator, Sequence
 
-from ..errors import FileError
+from ..errors import FileError, UnreadColumnWarning, level_of_caller
 from ..support.angles import UNIT_PERIODS
 from ..support.roles import (
     ANGLE_UNITS,
@@ -91,6 +92,21 @@ def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[st
         if candidates:
             found[role] = candidates[0]
     return found
+
+
+def warn_of_unread(path: object, names: Sequence[str], roles: Collection[str]) -> None:
+    """Report columns that hold neither numbers nor text and have the name of a role.
+
+    ``names`` are those of such columns, ``roles`` are filled by others.
+    """
+    for role in (*LABELS, *SIGNALS):  # where an angle is missing that is an error
+        for column in () if role in roles else _by_name(names, role):
+            warnings.warn(
+                f"{path}: column {column.name!r} is left aside: it holds neither numbers nor text; "
+                f"write it as one of them to use it as the role {role}, or rename it",
+                UnreadColumnWarning,
+                stacklevel=level_of_caller(),
+            )
 
 
 _HEAD = re.compile(r"head[1-9][0-9]?(_| *[\[(])")

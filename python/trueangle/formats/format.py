@@ -142,8 +142,9 @@ class FormatModule(Protocol):
     of: then the batches of that part only, and parts may be read side by side; ``line_of(path,
     row)`` and ``header_line(path)``, formats of text, the line that a row or the names come
     from; and ``together(path, needed, others)``, formats whose columns need not be equally
-    long, those of ``others`` that are. Formats of text that know no more of their length than
-    their first lines tell need no ``extent``.
+    long, those of ``others`` that are; and ``unread(path)``, formats of further types, the names
+    of the columns that hold neither numbers nor labels. Formats of text that know no more of
+    their length than their first lines tell need no ``extent``.
     """
 
     def columns(self, path: Path, topic: str | None) -> list[str]:
@@ -220,6 +221,11 @@ class Format:
         """Rows of a file and bytes of columns in memory, as far as that is known before."""
         find = getattr(self.module, "extent", None)
         return text_extent(path) if find is None else find(path, names, topic)
+
+    def unread(self, path: Path) -> list[str]:
+        """Columns that hold neither numbers nor labels."""
+        find = getattr(self.module, "unread", None)
+        return [] if find is None else list(find(path))
 
     @contextmanager
     def at_header(self, path: Path) -> Iterator[None]:

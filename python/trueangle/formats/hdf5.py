@@ -52,6 +52,12 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return _names(file)
 
 
+def unread(path: Path) -> list[str]:
+    """Paths of the other data sets; see `format.FormatModule`."""
+    with _opened(path) as file:
+        return _names(file, lambda data: not is_number_or_text(data))
+
+
 def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of data sets; see `format.FormatModule`."""
     with _opened(path) as file:

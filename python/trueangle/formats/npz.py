@@ -40,6 +40,13 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
         return list(_columns(archive))
 
 
+def unread(path: Path) -> list[str]:
+    """Names of the other arrays; see `format.FormatModule`."""
+    with _opened(path) as archive:
+        arrays = {name for name in archive.namelist() if name.endswith(".npy")}
+        return sorted({name.removesuffix(".npy") for name in arrays} - _columns(archive).keys())
+
+
 def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
     """Rows and bytes of arrays; see `format.FormatModule`."""
     with _opened(path) as archive:

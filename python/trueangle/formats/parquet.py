@@ -20,6 +20,7 @@ from .arrowtables import (
     column_batches,
     corrected_schema,
     element_names,
+    other_names,
     top_names,
 )
 from .budget import FileExtent
@@ -49,6 +50,12 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
     """Names of the top columns, elements of lists as ``state[3]``."""
     with _opened(path) as file:
         return element_names(file.schema_arrow, lambda name: _first_length(file, name))
+
+
+def unread(path: Path) -> list[str]:
+    """Names of columns of other types; see `format.FormatModule`."""
+    with _opened(path) as file:
+        return other_names(file.schema_arrow)
 
 
 def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:

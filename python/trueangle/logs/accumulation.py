@@ -22,7 +22,7 @@ import trueangle._core as _core
 from ..errors import FileError
 from ..estimation.moments import Moments
 from ..formats.ahead import side_by_side
-from ..formats.columns import find_columns
+from ..formats.columns import find_columns, warn_of_unread
 from ..formats.format import Format as LogFormat
 from ..formats.format import Labels, Selection, row_labels
 from ..formats.formats import find_format
@@ -218,6 +218,7 @@ def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_LogPart]:
     kind = find_format(path)
     header = kind.module.columns(path, settings.topic)
     roles = find_columns(path, header, settings.signals)
+    warn_of_unread(path, kind.unread(path), roles)
     angles = find_run_angles(
         path,
         header,

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeAlias, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import EmptyCellsWarning, FileError, level_of_caller
+from ..errors import EmptyCellsWarning, FileError, UnreadColumnWarning, level_of_caller
 from ..support.argumentkinds import told_kinds
 from ..support.files import InputFile
 from ..support.layout import counted
@@ -333,10 +333,14 @@ def _groups(table: FileReadings, size: int) -> Groups:
     days = {text: local_day(text) for text in set(columns.get("when", ()))}
     if not all(days.values()):
         row = next(i for i, text in enumerate(columns["when"]) if not days[text])
+        got = repr(columns["when"][row])[:60]
+        problem = f"a date and time (ISO 8601) is needed, got {got}"
+        error = table.error(problem, table.roles["when"].name, row)
         if table.roles["when"].is_asked:
-            got = repr(columns["when"][row])[:60]
-            problem = f"a date and time (ISO 8601) is needed, got {got}"
-            raise table.error(problem, table.roles["when"].name, row)
+            raise error
+        warnings.warn(
+            f"{error}; the column is left aside", UnreadColumnWarning, stacklevel=level_of_caller()
+        )
         del columns["when"]  # a column of this name that holds something else
         days = {}
     if not columns:

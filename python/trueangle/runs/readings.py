@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from ..formats.budget import DecodedSizeError, check_decoded
-from ..formats.columns import find_columns
+from ..formats.columns import find_columns, warn_of_unread
 from ..formats.csvcells import cell_number
 from ..formats.format import TEXTS, Batch, Format, Labels, Selection
 from ..formats.formats import format_of_content
@@ -181,6 +181,7 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Fil
     # Of a partitioned folder; what the file itself says comes first.
     keys = {k: v for k, v in partition_keys(path).items() if k not in header}
     roles = find_columns(path, [*header, *keys], wanted)
+    warn_of_unread(path, kind.unread(path), roles)
     needed = list(dict.fromkeys(c.name for c in roles.values() if c.name not in keys))
     known = set(needed)
     others = [name for name in header if name not in known][:_KEPT]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.errors import UnreadColumnWarning
 
 h5py = pytest.importorskip("h5py")
 pa = pytest.importorskip("pyarrow")
@@ -71,3 +72,62 @@ def test_a_text_is_no_angle_to_correct(tmp_path):
     report = ta.correct_logs(path, model, tmp_path / "out.h5", column="run", unit="deg")
     assert "no such column; its columns are" in str(report.logs[0].error)
     assert not (tmp_path / "out.h5").exists()
+
+
+def lists(path, name):
+    """A column of this name of a type that is neither number nor text, in every format with one."""
+    x, y, run = readings()
+    if path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            file["reference_deg"], file["indicated_deg"] = x, y
+            file[name] = np.zeros(x.size, [("a", "f4"), ("b", "i2")])
+    elif path.suffix == ".npz":
+        more = {name: np.full(x.size, "2026-11-28", "M8[D]")}
+        np.savez(path, reference_deg=x, indicated_deg=y, **more)
+    else:
+        kept = pa.array([[name] for name in run])
+        table = pa.table({"reference_deg": x, "indicated_deg": y, name: kept})
+        if path.suffix == ".parquet":
+            pq.write_table(table, path)
+            return
+        with pa.ipc.new_file(path, table.schema) as writer:
+            writer.write_table(table)
+
+
+@pytest.mark.parametrize("ending", ["h5", "npz", "parquet", "arrow"])
+@pytest.mark.parametrize(
+    ("name", "role"), [("run", "run"), ("direction", "direction"), ("torque_Nm", "torque")]
+)
+def test_a_column_with_the_name_of_a_role_that_is_left_aside_is_reported(
+    ending, name, role, tmp_path
+):
+    path = tmp_path / f"runs.{ending}"
+    lists(path, name)
+    told = (
+        rf"runs\.{ending}: column '{name}' is left aside: it holds neither numbers nor text; write "
+        f"it as one of them to use it as the role {role}, or rename it"
+    )
+    with pytest.warns(UnreadColumnWarning, match=told):
+        (run,) = ta.read_runs(path)
+    assert run.label is None
+    with pytest.warns(UnreadColumnWarning, match=told):
+        ta.fit_logs(path, orders=[1, 2])
+    lists(path, f"my_{name}")
+    ta.read_runs(path)  # of no role: nothing is said
+
+
+@pytest.mark.parametrize("ending", ["csv", "h5"])
+def test_a_text_that_is_no_date_is_left_aside_and_reported(ending, tmp_path):
+    path = tmp_path / f"runs.{ending}"
+    x, y, _ = readings()
+    if ending == "h5":
+        with h5py.File(path, "w") as file:
+            file["reference_deg"], file["indicated_deg"] = x, y
+            file["when"] = [b"spring"] * x.size
+    else:
+        rows = "".join(f"{a},{b},spring\n" for a, b in zip(x, y, strict=True))
+        path.write_text(f"reference_deg,indicated_deg,when\n{rows}")
+    told = r"line 2, column 'when': a date and time .* got 'spring'; the column is left aside"
+    with pytest.warns(UnreadColumnWarning, match=told):
+        (run,) = ta.read_runs(path)
+    assert run.when is None

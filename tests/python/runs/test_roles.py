@@ -305,6 +305,7 @@ def test_days_of_tables_in_memory(kind):
     assert [np.datetime64(run.when[:19]) for run in runs] == [when[0], when[15]]
 
 
+@pytest.mark.filterwarnings("ignore::trueangle.errors.UnreadColumnWarning")
 def test_a_column_called_when_that_holds_no_dates(tmp_path):
     columns = {"reference_deg": NOMINAL, "indicated_deg": READ}
     for when in (np.arange(ROWS), ["early", "late"] * (ROWS // 2)):
