@@ -138,8 +138,8 @@ def evidence_between(
                         beside = deviance_left(regression.jointly_with(column), error, noise)
                         per_rival.setdefault(other.cause, []).append((beside, beside))
                 continue
-            alone = _with_error(regression, error)
-            price = _price(EFFECTS[one.cause].propose(alone))
+            alone, own = _shown(regression, one, k, error)
+            price = _price(own)
             per_rival.setdefault("", []).append((left, left - price - STRONG))
             for imitator in _imitators(one.cause, rivals):
                 imitation = EFFECTS[imitator].propose(alone)
@@ -161,8 +161,7 @@ def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Ambiguit
     ``spots`` are what the design of the readings cannot tell.
     """
     error = one.errors(regression.signals, regression.belief)[0]
-    shown = _with_error(regression, error)
-    found = EFFECTS[one.cause].propose(shown)
+    shown, found = _shown(regression, one, 0, error)
     if found is None:
         # Causes of the scatter are looked for elsewhere; others could not be found.
         return EFFECTS[one.cause].find_scatter(shown) is None
@@ -170,11 +169,21 @@ def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Ambiguit
     return any(doubt is not None and doubt.common != one.cause for doubt in doubts)
 
 
-def _with_error(regression: Regression, error: Array) -> Regression:
-    """The same readings with a further error; what follows from the motion is worked out once."""
-    readings = regression.readings.less(-error)
-    cache = regression.cache.for_other_errors()
-    return Regression.of_readings(readings, regression.whiten.rho, cache, regression)
+def _shown(
+    regression: Regression, one: Hypothesis, draw: int, error: Array
+) -> tuple[Regression, Extension | None]:
+    """The same readings with the error of a hypothesis, and what its cause proposes of them.
+
+    What follows from the motion is worked out once, and the rest once for each draw.
+    """
+
+    def build() -> tuple[Regression, Extension | None]:
+        readings = regression.readings.less(-error)
+        cache = regression.cache.for_other_errors()
+        alone = Regression.of_readings(readings, regression.whiten.rho, cache, regression)
+        return alone, EFFECTS[one.cause].propose(alone)
+
+    return regression.cache.of_fit(("with the error of", one, draw), build)
 
 
 def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:

@@ -29,6 +29,7 @@ from .limits import Limits
 from .questions import Question, question_of
 from .worth import (
     ALIKE,
+    MOST_EVIDENCE,
     NOTHING,
     Answer,
     Worth,
@@ -134,13 +135,13 @@ class DesignScales:
         designs: Sequence[RunDesign],
         start: Signals | None,
         changes: int = 0,
-        least: int = 0,
+        least: Worth = NOTHING,
     ) -> Worth:
         """What designs tell beside earlier runs.
 
-        ``changes`` are those from the plainest run. The evidence of designs that open fewer than
-        ``least`` of the questions is not worked out: they are worth less whatever it is. A search
-        comes back to designs that it has weighed: one in six.
+        ``changes`` are those from the plainest run. The evidence of designs that are worth no more
+        than ``least`` whatever it is is not worked out. A search comes back to designs that it has
+        weighed: one in six.
         """
         key = (*designs,), start is None
         if key in self._known:
@@ -148,11 +149,16 @@ class DesignScales:
             return replace(self._known[key], plain=-changes)
         regression = self._readings(self._signals(designs, start))
         spots = blind_spots(regression)
-        are_open = [self._open(question, regression, spots) for question in self.questions]
-        opened = sum(are_open)
+        shown = sum(not self._hidden(question, spots) for question in self.questions)
+        clear = -sum(len(self._unclear(question, spots)) for question in self.questions)
         seconds = -sum(map(run_seconds, designs))
-        if opened < least:
-            return replace(NOTHING, opened=opened, plain=-changes, seconds=seconds)
+        foretold = run_is_foretold(regression)
+        most = Worth(shown, shown, foretold, clear, MOST_EVIDENCE, -changes, seconds)
+        if most > least:
+            are_open = [self._open(question, regression, spots) for question in self.questions]
+            most = replace(most, opened=sum(are_open), told=sum(are_open))
+        if most <= least:
+            return replace(NOTHING, opened=most.opened, plain=-changes, seconds=seconds)
         self._left -= 1
         told, total = 0, 0.0
         for question, is_open in zip(self.questions, are_open, strict=True):
@@ -160,8 +166,7 @@ class DesignScales:
             total += worth_of_evidence(evidence, question)
             told += is_open and is_strong_answer(evidence)
         halves = round(total / (np.log(ALIKE) * len(self.questions)))
-        clear = -sum(len(self._unclear(question, spots)) for question in self.questions)
-        worth = Worth(opened, told, run_is_foretold(regression), clear, halves, -changes, seconds)
+        worth = replace(most, told=told, evidence=halves)
         self._known[key] = worth
         return worth
 
@@ -251,7 +256,7 @@ class DesignScales:
 
     def _open(self, question: Question, regression: Regression, spots: Sequence[Ambiguity]) -> bool:
         """Whether nothing in the design of the readings hides one of the causes."""
-        if any(spot.hides(cause) for spot in spots for cause in question.causes):
+        if self._hidden(question, spots):
             return False
         return not (
             self._searches
@@ -260,6 +265,11 @@ class DesignScales:
                 for one in (*question.hypotheses, *question.draws)
             )
         )
+
+    @staticmethod
+    def _hidden(question: Question, spots: Sequence[Ambiguity]) -> bool:
+        """Whether the design of the readings shows one of the causes in nothing."""
+        return any(spot.hides(cause) for spot in spots for cause in question.causes)
 
     def _unclear(self, question: Question, spots: Sequence[Ambiguity]) -> set[str]:
         """What acts on whole runs, may be taken for a cause in question, and is not told by these.

@@ -12,7 +12,7 @@ from ..simulation.designs import RunDesign
 from .further import count_of_changes, dialled_number, plainest_run, run_amounts, run_choices
 from .limits import Limits
 from .scales import DesignScales
-from .worth import NOTHING, Worth
+from .worth import NOTHING, Worth, barely
 
 #: Runs in a row that open nothing, after which no further one is tried; by themselves the first
 #: open nothing, whatever they are.
@@ -125,7 +125,7 @@ class RunSearch:
             if design == designs[k] or self.scales.over:
                 continue
             tried = [*designs[:k], design, *designs[k + 1 :]]
-            worth = self.scales.weighed(tried, start, count_of_changes(design, kinds), best.opened)
+            worth = self.scales.weighed(tried, start, count_of_changes(design, kinds), best)
             if worth > best:
                 best, picked = worth, tried
         return picked, best
@@ -136,7 +136,7 @@ class RunSearch:
         """The runs without those that tell nothing beside the later ones."""
         for design in designs[:-1]:
             fewer = [other for other in designs if other is not design]
-            found = self.scales.weighed(fewer, start, 0, worth.opened)
+            found = self.scales.weighed(fewer, start, 0, barely(worth.reached))
             if found.reached >= worth.reached and worth.told:
                 designs, worth = fewer, found
         return [replace(d, label=_label(k)) for k, d in enumerate(designs)], worth
@@ -168,7 +168,7 @@ class RunSearch:
             for tried in (again, _at_more_speeds(again)):
                 if not self.scales.repeated(tried, start):
                     continue
-                found = self.scales.weighed(tried, start, 0, worth.opened)
+                found = self.scales.weighed(tried, start, 0, barely(worth.reached))
                 if found.reached >= worth.reached:
                     return tried, found
         return designs, worth
@@ -185,7 +185,7 @@ class RunSearch:
         share = least
         while most / least > NEAR and not self.scales.over:
             fewer = _with_readings(designs, share)
-            found = self.scales.weighed(fewer, start, 0, goal[0])
+            found = self.scales.weighed(fewer, start, 0, barely(goal))
             if found.reached >= goal:
                 best, worth, most = fewer, found, share
             else:

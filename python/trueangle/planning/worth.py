@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -23,6 +24,9 @@ HARDLY = 0.01
 
 #: Factor of the evidence below which two designs are alike, and the plainer one is taken.
 ALIKE = 1.5
+
+#: Such factors of evidence at most: of the causes in question, and of the least of all.
+MOST_EVIDENCE = round(2.0 * math.log(ENOUGH) / math.log(ALIKE))
 
 
 @dataclass(frozen=True, order=True)
@@ -54,6 +58,11 @@ class Worth:
 
 #: What is told before anything is tried.
 NOTHING = Worth(0, 0, False, -1_000, -1_000, 0, 0.0)
+
+
+def barely(reached: tuple[int, int, bool, int]) -> Worth:
+    """The least that reaches so much."""
+    return Worth(*reached, NOTHING.evidence, NOTHING.plain, NOTHING.seconds)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,13 @@ from trueangle.effects import EFFECTS
 from trueangle.effects.ambiguity import Ambiguity
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
-from trueangle.planning.evidence import ExpectedEvidence, Hypothesis, ReadingNoise, evidence_between
+from trueangle.planning.evidence import (
+    ExpectedEvidence,
+    Hypothesis,
+    ReadingNoise,
+    evidence_between,
+    is_doubted,
+)
 from trueangle.planning.questions import effect_of_size, question_of
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
 
@@ -60,6 +66,21 @@ def test_what_a_rival_leaves_is_that_of_dense_generalised_least_squares(rho):
     # The form of the delay's columns follows the pattern as fitted, within the noise.
     expected = dense(signals, error, both, rho)
     assert found["backlash", "latency"] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_cause_is_looked_for_in_its_own_error_once(monkeypatch):
+    searched, propose = [], Backlash.propose.__func__
+
+    def counted(cls, regression):
+        searched.append(regression)
+        return propose(cls, regression)
+
+    monkeypatch.setattr(Backlash, "propose", classmethod(counted))
+    fitted, one = regression(0.3), RIVALS[0]
+    assert not is_doubted(fitted, one, ())
+    for _ in range(2):
+        evidence_between(fitted, [one], ReadingNoise(1.0, 0.3))
+    assert len(searched) == 1
 
 
 def test_evidence_grows_with_the_square_of_the_size_and_falls_with_the_variance():

@@ -10,9 +10,10 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError, FileError
 from trueangle.joint.signals import join_runs
-from trueangle.planning import Limits, load_limits
+from trueangle.planning import Limits, load_limits, scales
 from trueangle.planning.further import plainest_run, run_choices, run_seconds, run_steps
 from trueangle.planning.scales import DesignScales
+from trueangle.planning.worth import NOTHING
 from trueangle.simulation import (
     Backlash,
     Harmonic,
@@ -106,7 +107,7 @@ def test_designs_that_were_weighed_are_worth_what_they_were(found, plan, monkeyp
     """And of two that tell as much the shorter and plainer one is worth more."""
     weighed, known = DesignScales.weighed, []
 
-    def anew(self, designs, start, changes=0, least=0):
+    def anew(self, designs, start, changes=0, least=NOTHING):
         known.append(len(self._known))
         self._known.clear()
         worth = weighed(self, designs, start, changes, least)
@@ -117,6 +118,24 @@ def test_designs_that_were_weighed_are_worth_what_they_were(found, plan, monkeyp
     monkeypatch.setattr(DesignScales, "weighed", anew)
     assert found.plan().to_dict() == plan.to_dict()
     assert max(known) == 1
+
+
+def test_designs_that_cannot_be_better_cost_no_evidence(found, plan, monkeypatch):
+    weighed, between, asked = DesignScales.weighed, scales.evidence_between, []
+
+    def counted(*args):
+        asked.append(1)
+        return between(*args)
+
+    def in_full(self, designs, start, changes=0, least=NOTHING):
+        return weighed(self, designs, start, changes)
+
+    monkeypatch.setattr(scales, "evidence_between", counted)
+    assert found.plan().to_dict() == plan.to_dict()
+    bounded = len(asked)
+    monkeypatch.setattr(DesignScales, "weighed", in_full)
+    assert found.plan().to_dict() == plan.to_dict()
+    assert bounded < 0.7 * (len(asked) - bounded)
 
 
 def test_without_reversals_none_is_planned(found):
