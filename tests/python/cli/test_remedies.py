@@ -340,7 +340,7 @@ def test_columns_of_a_simulators_log_are_named_by_an_option_that_works(
     assert main([*words, "--simulated", "b.csv"]) == 1
     said = capsys.readouterr().err
     assert "another named with --signal simulated.reference=NAME:UNIT)" in said
-    assert "--signal ROLE=NAME is of the runs only, for the same names add --signal sim" in said
+    assert "; --signal ROLE=NAME is of the runs only, for the same names add --signal sim" in said
     assert main([*words, "--simulated", "a.csv"]) == 1
     added = shlex.split(capsys.readouterr().err.split("same names add ")[1])
     named = ["simulated.reference=laser:deg", "simulated.indicated=q 1:deg"]
