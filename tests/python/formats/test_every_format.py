@@ -15,6 +15,7 @@ from trueangle.formats.formats import FORMATS, find_format, known_format
 from trueangle.formats.textfile import create_text
 
 from .test_wpilog import record, started
+from .workbook import needs_library
 
 SEED = 31_400
 #: Rows, and rows in hand at once: one, less than a block, whole blocks, and a rest.
@@ -52,6 +53,7 @@ def write_packed(write):
     """As ``write`` does, packed as the ending says."""
 
     def packed(path, columns):
+        needs_library(path.suffix)
         plain = path.with_suffix("")
         write(plain, columns)
         with create_text(path) as file:

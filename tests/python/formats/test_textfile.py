@@ -19,7 +19,7 @@ from trueangle.formats.format import CopyTask, Selection
 from trueangle.formats.formats import find_format
 from trueangle.formats.textfile import create_text, open_text, text_extent
 
-from .workbook import CLOCK, DATE, ELAPSED, write_workbook
+from .workbook import CLOCK, DATE, ELAPSED, needs_library, write_workbook
 
 NAMES = ["run", "reference_deg", "indicated_deg"]
 
@@ -40,7 +40,8 @@ def text_of(cells):
 @pytest.fixture
 def desk(tmp_path, monkeypatch):
     """One table in every way it may be stored, and a model of it."""
-    pytest.importorskip("python_calamine")
+    needs_library(".xlsx")
+    needs_library(".zst")
     monkeypatch.chdir(tmp_path)
     for name in ("a.csv", "a.csv.gz", "a.csv.zst"):
         with create_text(tmp_path / name) as file:
@@ -119,6 +120,7 @@ def test_a_damaged_file_is_named(name, desk):
 def test_a_packed_file_that_is_no_text_is_refused(unpack, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     name = unpack.split()[1]
+    needs_library(name)
     with create_text(tmp_path / name) as file:
         np.save(file, np.arange(40_000.0))
     told = f"{name}: only text is read packed; unpack it: {unpack}"
@@ -159,7 +161,7 @@ def test_rows_of_a_packed_log_are_known_before_it_is_read(desk):
 
 def test_cells_of_a_sheet_are_those_of_a_csv_file(tmp_path):
     """A preamble, units, dates, gaps, and numbers to their last digit; other sheets are named."""
-    pytest.importorskip("python_calamine")
+    needs_library(".xlsx")
     table = [
         [None, "Rig 7"],
         [],
@@ -192,7 +194,7 @@ def test_cells_of_a_sheet_are_those_of_a_csv_file(tmp_path):
 
 
 def test_a_workbook_that_cannot_be_read_is_refused(tmp_path, monkeypatch):
-    pytest.importorskip("python_calamine")
+    needs_library(".xlsx")
     book = tmp_path / "a.xlsx"
     write_workbook(book, {"A": [NAMES, *rows()]})
     whole = book.read_bytes()
@@ -239,6 +241,7 @@ def test_an_extra_that_is_not_installed_is_named(library, name, extra, tmp_path,
 
 @pytest.mark.parametrize("packed", [".gz", ".zst"])
 def test_serial_logs_are_packed_as_well(packed, tmp_path):
+    needs_library(packed)
     lines = [f"ref:{x},enc:{x + 0.25}\n" for x in range(700)]
     source, target = tmp_path / f"robot.log{packed}", tmp_path / f"out.txt{packed}"
     with create_text(source) as file:

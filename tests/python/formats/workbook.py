@@ -1,6 +1,9 @@
 """Small Excel files, written by hand: what a spreadsheet stores of a table, and nothing else."""
 
+import sys
 import zipfile
+
+import pytest
 
 _MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 _RELATION = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
@@ -8,6 +11,14 @@ _PACKAGE = "http://schemas.openxmlformats.org/package/2006"
 #: Styles: a number, a date with a time, an elapsed time, a time of the day.
 _FORMATS = ("0", "yyyy-mm-dd hh:mm:ss.000", "[h]:mm:ss", "hh:mm:ss")
 DATE, ELAPSED, CLOCK = 1, 2, 3
+
+
+def needs_library(ending):
+    """Skip where what reads files of this ending is not installed."""
+    if ending.endswith("zst") and sys.version_info < (3, 14):
+        pytest.importorskip("backports.zstd")
+    if ending.endswith("xlsx"):
+        pytest.importorskip("python_calamine")
 
 
 def _cell(value, place):
