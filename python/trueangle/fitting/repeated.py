@@ -88,13 +88,15 @@ def covariance_with_repeats(
     positions = distinct_positions(problem.runs)
     if len(positions) == kept:
         return found
+    rounded = rounding_variance(_weighted(problem, weights), positions)
+    basis = None if asked == "white" else _orders_left_out(problem, positions)
+    if rounded == 0.0 and basis is None:
+        return found
     sums = _repeats(problem, fitted, positions, weights, penalty)
     if sums is None:
         return found
-    rounded = rounding_variance(_weighted(problem, weights), positions)
-    basis = _orders_left_out(problem, positions)
     left, freedom = 0.0, math.inf
-    if basis is not None and asked != "white":
+    if basis is not None:
         left, freedom = _left_out(sums, basis)
         left = max(left - rounded, 0.0)
     if rounded == left == 0.0:

@@ -86,8 +86,9 @@ _KINDS = {
 def _table(fit: FittedCoefficients, shown: ErrorUnit) -> list[str]:
     model = fit.model
     with_std = model.covariance is not None
-    amplitude_std = fit.amplitude_std if with_std else np.full(model.amplitudes.size, np.nan)
-    phase_std = fit.phase_std if with_std else np.full(model.amplitudes.size, np.nan)
+    amplitudes, phases = model.amplitudes, model.phases
+    amplitude_std = fit.amplitude_std if with_std else np.full(amplitudes.size, np.nan)
+    phase_std = fit.phase_std if with_std else np.full(amplitudes.size, np.nan)
     width = max([5, *(len(shaft.name) for shaft in model.shafts)])
     table = f"  {{:<{width}}}  {{:>5}}  {{:>10}} {{:>7}}  {{:>8}} {{:>6}}"
     lines = [table.format("shaft", "order", "amplitude", "+-", "phase", "+-")]
@@ -95,12 +96,10 @@ def _table(fit: FittedCoefficients, shown: ErrorUnit) -> list[str]:
     rows = ((shaft, i) for shaft in model.shafts for i in range(len(shaft.orders)))
     for n, (shaft, i) in enumerate(rows):
         size, spread = shown.pair(
-            arcsec(float(model.amplitudes[n]), model.period),
+            arcsec(float(amplitudes[n]), model.period),
             arcsec(float(amplitude_std[n]), model.period),
         )
-        phase, phase_std_text = rounded_phase(
-            math.degrees(model.phases[n]), math.degrees(phase_std[n])
-        )
+        phase, phase_std_text = rounded_phase(math.degrees(phases[n]), math.degrees(phase_std[n]))
         lines.append(table.format(shaft.name, shaft.orders[i], size, spread, phase, phase_std_text))
     return lines
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.fitting import repeated
 from trueangle.fitting.uncertainty import Uncertainty, coefficient_uncertainty
 
 ARCSEC = 3600.0
@@ -140,6 +141,15 @@ def test_nothing_is_added_where_nothing_is_known_to_repeat(why):
     fit = ta.fit(runs, orders=[1], covariance=asked)
     alone = coefficient_uncertainty(fit.problem, fit.fitted, fit.problem.base, fit.ridge, asked)
     np.testing.assert_array_equal(fit.covariance, alone.covariance)
+
+
+@pytest.mark.parametrize("covariance", ["auto", "white"])
+def test_what_repeats_is_not_summed_where_nothing_could_be_added(covariance, monkeypatch):
+    rng = np.random.default_rng(29)
+    places = np.arange(1200) * 0.3 if covariance == "auto" else np.arange(40) * 4.0
+    fit = ta.fit(read(rng, places, 2, 0.3, 0.0), orders=[1], covariance=covariance)
+    monkeypatch.setattr(repeated, "_repeats", None)
+    assert fit.covariance.shape == (3, 3)
 
 
 def test_it_is_said_with_how_much_wider_they_are():
