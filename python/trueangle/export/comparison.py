@@ -155,7 +155,9 @@ def compare(
 
         Δ(r) = θ_a(r) - θ_b(r)
 
-    with its mean taken out: two corrections of one device, whatever their zeros.
+    with its mean taken out: two corrections of one device, whatever their zeros. Where one of
+    them is of a reversed sensor and the other is not, as a table for its firmware, both are taken
+    as the sensor counts.
 
     Parameters
     ----------
@@ -180,6 +182,8 @@ def compare(
     360.0
     """
     first, second = (m if isinstance(m, HarmonicModel) else load_model(m) for m in (a, b))
+    if first.indicated_sign != second.indicated_sign:
+        first, second = first.in_sensor_sense(), second.in_sensor_sense()
     one, two = TurnPattern(first), TurnPattern(second)
     orders = sorted({*one.lines, *two.lines})
     if not (one.is_periodic and two.is_periodic) and first.argument != second.argument:

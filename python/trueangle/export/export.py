@@ -52,6 +52,9 @@ def export_model(
     by least-squares knots, rounded; a target that looks up at the true angle gets the error
     itself. Every reading of up to 24 bits is then evaluated in the target's arithmetic.
 
+    Of a model whose ``indicated_sign`` is -1 the table is that of the sensor's own reading
+    (`HarmonicModel.in_sensor_sense`), and a note states it. "mujoco" holds the model as it is.
+
     Parameters
     ----------
     model : HarmonicModel or path
@@ -102,7 +105,7 @@ def export_model(
             given["name"] = Path(path).stem
     if "name" in given and given["name"] is None:
         given["name"] = "angle"
-    pattern = TurnPattern(loaded)
+    pattern = TurnPattern(loaded.in_sensor_sense() if found.at_sensor else loaded)
     holds_any = any(map(found.holds, pattern.left_out)) or found.may_be_empty(given)
     if pattern.is_empty and not holds_any:
         raise ArgumentError(
@@ -130,6 +133,8 @@ def export_model(
             f"most {max_arcsec:g} is asked for"
         )
     notes = [*made.notes, *_notes(found, pattern, made)]
+    if found.at_sensor and loaded.indicated_sign < 0:
+        notes.insert(0, _REVERSED)
     result = Exported(
         target=target,
         sign=found.sign_of(given),
@@ -346,6 +351,13 @@ def _lost(made: Made, pattern: TurnPattern) -> list[dict[str, float]]:
     part = made.part
     found = lost_orders(part.corrections[0], part.exact, pattern.lines)
     return [{"order": float(order), "arcsec": lost} for order, lost in found.items()]
+
+
+#: Of every table for a sensor that counts the other way than the reference.
+_REVERSED = (
+    "the sensor counts the other way than the reference: readings, corrected angles, velocity and "
+    "direction count as the sensor does"
+)
 
 
 def _notes(target: Target, pattern: TurnPattern, made: Made) -> list[str]:

@@ -38,6 +38,7 @@ class MuJoCo(Target):
     sign = "add"
     argument = "reference"
     arithmetic_known = False
+    at_sensor = False  # the error is put on MuJoCo's angle of the joint
     options = {
         "joint": Option(str, "joint", "name of the joint in MuJoCo"),
         "frictionloss": Option(float, None, "dry friction, Nm"),

@@ -169,6 +169,9 @@ class Target(ABC):
     #: The target's arithmetic is known: what is stated is proven.
     arithmetic_known: ClassVar[bool] = True
 
+    #: It takes what the sensor reads, not the joint's own angle.
+    at_sensor: ClassVar[bool] = True
+
     #: It takes what follows the direction of travel besides the pattern.
     takes_direction: ClassVar[bool] = False
 

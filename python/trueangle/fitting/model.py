@@ -36,6 +36,7 @@ def _build_model(fit: FittedCoefficients) -> HarmonicModel:
         condition_number=condition if np.isfinite(condition) else None,
         fit=_record(fit),
         provenance=Provenance(tuple(sources), f"trueangle {__version__}"),
+        indicated_sign=fit.problem.indicated_sign,
     )
 
 

@@ -16,7 +16,7 @@ from ..joint.shafts import ShaftOrders
 from ..model.model import Argument
 from ..runs.run import CalibrationRun
 from ..runs.travel import over_turns
-from ..support.angles import circular_mean
+from ..support.angles import circular_mean, common_sign
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
 
@@ -137,6 +137,7 @@ class Problem:
         self.method = method
         self.threads = threads
         self.period = runs[0].period
+        self.indicated_sign = common_sign(run.indicated_sign for run in runs)
         self.base: list[Array | None] = [run.weights for run in runs]
         #: Reference, indicated angle and weights of every run, as the core takes them.
         self.rows = [(run.reference, run.indicated, run.weights) for run in self.runs]

@@ -33,6 +33,8 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
     head[3] = (label, text + f"{fit.degrees_of_freedom:.6g} degrees of freedom")
     if model.covariance is not None:
         head.append(("intervals", _intervals(fit)))
+    if model.indicated_sign < 0:
+        head.append(("indicated", "minus what the sensor reads"))
     lines = ["Harmonic model of the angle error (error = indicated - reference)", ""]
     lines += [f"  {label:<10} {text}" for label, text in head]
     lines += ["", *_table(fit, shown)]

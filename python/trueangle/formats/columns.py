@@ -117,6 +117,8 @@ def _by_name(header: Sequence[str], role: str) -> list[RoleColumn]:
     if role in LABELS:
         return [RoleColumn(role, name, None) for name in header if name == role]
     names = dict(_standard(role))
+    if role == "indicated":  # as runs of a reversed sensor are written
+        names |= {f"-{name}": unit for name, unit in names.items()}
     exact = [RoleColumn(role, name, names[name]) for name in header if name in names]
     if exact:
         # One clock in several units is one clock, and its seconds are taken.

@@ -32,7 +32,7 @@ from ..runs.facets import Facets
 from ..runs.follows import check_usable
 from ..runs.paths import unit_of_path
 from ..runs.run import CalibrationRun
-from ..support.angles import wrap
+from ..support.angles import common_sign, wrap
 from ..support.arrays import Array
 from ..support.files import partition_keys
 from ..support.times import local_day
@@ -139,6 +139,8 @@ class Accumulated:
         What is counted of every run.
     kept : Kept
         Some readings of every run.
+    indicated_sign : int
+        As of `CalibrationRun`.
     """
 
     moments: Moments
@@ -148,6 +150,7 @@ class Accumulated:
     rows: int = 0
     missing: int = 0
     tallies: dict[Hashable, RunTally] = field(default_factory=dict)
+    indicated_sign: int = 1
 
     def add(self, other: Accumulated) -> Accumulated:
         """Itself with the next stretch of the same log, or the next log, taken in."""
@@ -245,6 +248,7 @@ def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -
         KeptReadings(settings.kept, settings.part),
         (str(path),),
         (_sha256(path) if settings.checksums and is_first else "",),
+        indicated_sign=stretch.angles.indicated_sign,
     )
     labels = [*stretch.labels.values()]
     names = [*dict.fromkeys([*stretch.angles.names, *labels])]
@@ -351,6 +355,7 @@ def merged_moments(parts: Sequence[Accumulated]) -> Accumulated:
                 f"its reference is in another unit than that of {parts[0].files[0]}; convert one",
             )
     # On a cluster a part may be merged again, after its worker was lost: none is changed.
+    common_sign(part.indicated_sign for part in parts)
     found = copy(parts[0])
     found.moments, found.kept = found.moments.copy(), deepcopy(found.kept)
     found.tallies = deepcopy(found.tallies)

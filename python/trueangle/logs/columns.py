@@ -26,7 +26,7 @@ SIGNAL_COLUMNS = {
 class AngleColumn(NamedTuple):
     """The column to correct, its unit, and the column that is added.
 
-    Of a reversed sensor the period is negative: what is added is reversed as the column is.
+    Of a reversed sensor the period is negative: what is added counts as the column does.
     """
 
     name: str
@@ -46,6 +46,7 @@ def find_angle_column(
     column: str | None = None,
     unit: str | None = None,
     counts_per_turn: float | None = None,
+    sign: int = 1,
 ) -> AngleColumn:
     """The indicated angle of ``joint`` among the columns of ``path``.
 
@@ -53,7 +54,9 @@ def find_angle_column(
     ``_count``; for a named joint ``JOINT_indicated_deg``, ``indicated_deg_JOINT``,
     ``JOINT_deg`` or ``JOINT``. Groups of a file are part of the name, with a slash:
     ``JOINT/indicated_deg``. The unit is ``unit``, else the ending of the name, else that of
-    the model.
+    the model. A column is what the sensor reads, and of a model with the ``sign`` -1 it is
+    reversed, as ``-NAME`` is of any model; one whose own name begins with a minus was reversed
+    before.
 
     Raises
     ------
@@ -85,8 +88,9 @@ def find_angle_column(
         raise FileError(
             path, "is there already: this log was corrected before", line=1, column=corrected
         )
-    period = -period if is_reversed else period
-    return AngleColumn(column, unit, float(period), corrected, stated is None and not is_reversed)
+    if is_reversed or (sign < 0 and not column.startswith("-")):
+        period = -period
+    return AngleColumn(column, unit, float(period), corrected, stated is None and period > 0.0)
 
 
 def find_joint_signal(
@@ -118,7 +122,7 @@ def find_joint_signal(
 def _search(path: object, header: Sequence[str], joint: str | None) -> str:
     if joint is None:
         wanted = {f"indicated_{unit}" for unit in UNITS}
-        found = [name for name in header if name.rpartition("/")[2] in wanted]
+        found = [name for name in header if name.rpartition("/")[2].removeprefix("-") in wanted]
         if len(found) == 1:
             return found[0]
         problem = (

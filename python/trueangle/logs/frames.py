@@ -305,14 +305,15 @@ def _block(block: Any, settings: LogSettings, state: Any = None) -> Any:
 
 
 def _array_channel(settings: LogSettings, state: Any = None) -> JointChannel:
-    """Bare angles are those of the one joint, in the model's unit."""
+    """Bare angles are what the sensor of the one joint reads, in the model's unit."""
     from ..support.angles import unit_name
     from .columns import AngleColumn
 
     if len(settings.joints) > 1:
         raise ArgumentError("an array holds one joint: give one model")
     (joint,) = settings.joints
-    angle = AngleColumn("", unit_name(joint.model.period), joint.model.period, "")
+    turn = joint.model.indicated_sign * joint.model.period
+    angle = AngleColumn("", unit_name(joint.model.period), turn, "")
     return JointChannel(joint, angle, {}, JointState(state) if state else JointState(), settings)
 
 

@@ -127,6 +127,7 @@ class LogSettings:
                 column=joint.column,
                 unit=joint.unit or self.unit or unit,
                 counts_per_turn=self.counts_per_turn,
+                sign=joint.model.indicated_sign,
             )
             taken.append(angle.corrected)
             state = (before or {}).get(joint.name or "", JointState())

@@ -236,7 +236,13 @@ def _summed(found: Accumulated, argument: Argument) -> SummedReadings:
         day = next(iter(days), None)
         runs.append(
             CalibrationRun(
-                *kept, moments.period, label=label, unit=unit, when=day, source=sources[file]
+                *kept,
+                moments.period,
+                label=label,
+                unit=unit,
+                when=day,
+                source=sources[file],
+                indicated_sign=found.indicated_sign,
             )
         )
         outliers += [(label or str(i), row) for row in tallies[run].outliers]

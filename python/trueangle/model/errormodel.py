@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ import trueangle._core as _core
 
 from ..errors import ArgumentError
 from ..joint.shafts import Shaft
-from ..support.angles import check_period
+from ..support.angles import check_period, checked_sign
 from ..support.argumentkinds import all_of_type
 from ..support.arrays import Array
 from ..support.signals import AT_RUN_TIME
@@ -41,11 +41,13 @@ class ErrorModel(Evaluation):
     fit: FitRecord | None = None
     provenance: Provenance = field(default_factory=Provenance)
     terms: tuple[Term, ...] = ()
+    indicated_sign: int = 1
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "period", check_period(self.period))
         put(self, "constant", float(self.constant))
+        put(self, "indicated_sign", checked_sign(self.indicated_sign))
         put(self, "shafts", all_of_type("shafts", self.shafts, Shaft, "a trueangle.Shaft"))
         if self.argument not in ("reference", "indicated"):
             raise ArgumentError(
@@ -190,6 +192,41 @@ class ErrorModel(Evaluation):
             self.covariance.reshape(-1),
         )
         return band.reshape(x.shape)
+
+    def in_sensor_sense(self) -> Self:
+        """The model of what the sensor reads, in the sense in which the sensor counts.
+
+        ::
+
+            r = -y,    ε_r(φ) = -ε(-φ),    φ = -θ
+
+        of a reversed sensor (``indicated_sign`` -1), else the model itself. A velocity, a
+        direction and the angles of the fit's record count as the sensor does; torque, current,
+        temperature and the angles of other joints are as they were.
+
+        Examples
+        --------
+        >>> import trueangle as ta
+        >>> shaft = ta.Shaft("output", 1, [1], [0.3], [0.5])
+        >>> model = ta.HarmonicModel([shaft], 0.1, period=360.0, indicated_sign=-1)
+        >>> round(model.in_sensor_sense().correct(-90.5) + model.correct(90.5), 12)
+        0.0
+        """
+        if self.indicated_sign > 0:
+            return self
+        covariance = self.covariance
+        if covariance is not None:
+            flips = np.array([-1.0, *(-1.0, 1.0) * len(self.orders)])
+            covariance = covariance * np.outer(flips, flips)
+        return replace(
+            self,
+            shafts=tuple(replace(s, cosine=tuple(-a for a in s.cosine)) for s in self.shafts),
+            constant=-self.constant,
+            covariance=covariance,
+            fit=None if self.fit is None else self.fit.mirrored(),
+            terms=tuple(term.mirrored() for term in self.terms),
+            indicated_sign=1,
+        )
 
     # -- identity -----------------------------------------------------------------
 

@@ -45,6 +45,7 @@ _KEYS = {
     "version": True,
     "period": True,
     "argument": True,
+    "indicated": False,
     "shafts": True,
     "constant": True,
     "terms": False,
@@ -173,6 +174,7 @@ class _ModelReader(RecordReader):
                 fit=self.fit(content.get("fit"), period),
                 provenance=self.provenance(content.get("provenance")),
                 terms=self.terms(content.get("terms")),
+                indicated_sign=self.sign(content.get("indicated", {"sign": 1})),
             )
             if model.terms:
                 self.check_finite(model)
@@ -226,6 +228,13 @@ class _ModelReader(RecordReader):
         if number < 0.0:
             raise self.error(f"must not be negative, got {number!r}", "condition_number")
         return number
+
+    def sign(self, value: Any) -> int:
+        """Of the indicated angle against what the sensor reads."""
+        sign = self.table(value, {"sign": True}, "indicated")["sign"]
+        if isinstance(sign, bool) or sign not in (1, -1):
+            raise self.error(f"must be 1 or -1, got {shown_value(sign)}", "indicated.sign")
+        return int(sign)
 
     def covariance(self, value: Any, shafts: tuple[Shaft, ...]) -> Array | None:
         if value is None:

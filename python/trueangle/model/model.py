@@ -63,6 +63,10 @@ class HarmonicModel(ErrorModel):
     fit : FitRecord, optional
     provenance : Provenance, optional
     terms : iterable of Term, optional
+    indicated_sign : {1, -1}
+        -1 where the sensor counts the other way: the indicated angle is minus what it reads.
+        `error`, `correct`, `corrector` and `compensator` take and give indicated angles all the
+        same; `trueangle.correct` and `trueangle.export_model` take what the sensor reads.
 
     Raises
     ------
@@ -104,9 +108,9 @@ class HarmonicModel(ErrorModel):
 
         ``step.swap(model)`` corrects by another model from the next step on, in every thread that
         holds the step: a step in another thread ends with the model it began with. Both have the
-        same period, and terms or none. What is known of the travel stays where the terms of the
-        other model can hold it, else it begins anew. The new model is made ready first (some
-        tenths of a millisecond), by the thread that swaps.
+        same period and ``indicated_sign``, and terms or none. What is known of the travel stays
+        where the terms of the other model can hold it, else it begins anew. The new model is made
+        ready first (some tenths of a millisecond), by the thread that swaps.
 
         Examples
         --------
@@ -176,10 +180,10 @@ def _rebuild(values: dict[str, Any]) -> HarmonicModel:
 def _swap(core: Any, first: HarmonicModel, model: HarmonicModel) -> None:
     """Let ``core``, made for the ``first`` model, correct by another one."""
     of_type("model", model, HarmonicModel, "a HarmonicModel")
-    if model.period != first.period:
-        raise ArgumentError(
-            f"swap: model has the period {model.period:g}, and the step {first.period:g}"
-        )
+    for name in ("period", "indicated_sign"):
+        own, other = getattr(first, name), getattr(model, name)
+        if own != other:
+            raise ArgumentError(f"swap: model has the {name} {other:g}, and the step {own:g}")
     if bool(model.terms) != bool(first.terms):
         has = "terms, and the step none" if model.terms else "no terms, and the step some"
         raise ArgumentError(f"swap: model has {has}: take its own compensator()")
@@ -194,6 +198,7 @@ def _line(model: ErrorModel) -> str:
         + (f" of {_names([shaft.name for shaft in model.shafts])}" if model.shafts else ""),
         f"period {model.period:g}",
         f"argument {model.argument}",
+        *(["reversed sensor"] if model.indicated_sign < 0 else []),
     ]
     if model.terms:
         parts.append(f"with {_names([term.kind for term in model.terms])}")

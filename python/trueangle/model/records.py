@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from ..support.decoding import Decoder, shown_value
@@ -67,6 +67,18 @@ class FitRecord:
     freedom: float | None = None
     signals: tuple[tuple[str, float, float], ...] = ()
     table: TableRecord | None = None
+
+    def mirrored(self) -> FitRecord:
+        """The record of the same fit with every angle counted the other way."""
+        return replace(
+            self,
+            span=(-self.span[1], -self.span[0]),
+            offsets=tuple(-zero for zero in self.offsets),
+            signals=tuple(
+                (name, -high, -low) if name == "velocity" else (name, low, high)
+                for name, low, high in self.signals
+            ),
+        )
 
 
 @dataclass(frozen=True)

@@ -245,10 +245,13 @@ def _rebuilt(models: dict[str, HarmonicModel], name: str, signals: dict[str, Any
 def _swap(core: _core.RobotStep, first: Robot, robot: Robot) -> None:
     """Let ``core``, made for the ``first`` robot, correct by another one's models."""
     of_type("robot", robot, Robot, "a Robot")
-    joints = [(name, model.period) for name, model in first.items()]
-    if [(name, model.period) for name, model in robot.items()] != joints:
+    joints, others = (
+        [(name, model.period, model.indicated_sign) for name, model in entry.items()]
+        for entry in (first, robot)
+    )
+    if others != joints:
         raise ArgumentError(
             f"swap: robot has the joints {', '.join(robot)}; they must be {', '.join(first)}, with "
-            "the same periods"
+            "the same periods and signs"
         )
     core.swap(robot._prepared())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
 from ..errors import ArgumentError
@@ -36,6 +36,8 @@ class Term:
         It contains the harmonics of its model.
     optional : tuple of str
         Parameters that model files name only where they differ from the default.
+    odd : tuple of str
+        Parameters with the other sign where angles are counted the other way (`mirrored`).
 
     Raises
     ------
@@ -49,6 +51,7 @@ class Term:
     follows_travel: ClassVar[bool] = False
     is_built_on_harmonics: ClassVar[bool] = False
     optional: ClassVar[tuple[str, ...]] = ()
+    odd: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -121,6 +124,22 @@ class Term:
         left_out = self._left_out()
         values = {name: value for name, value in asdict(self).items() if name not in left_out}
         return {"kind": self.kind, **values}
+
+    def mirrored(self) -> Self:
+        """The term with angles, velocity and direction counted the other way.
+
+        ::
+
+            ε'(φ, v, d, ...) = -ε(-φ, -v, -d, ...)
+
+        Torque, current, temperature and the angles of other joints are as they were.
+        """
+        values = {name: getattr(self, name) for name in self.odd}
+        changed: Any = {
+            name: tuple(-x for x in value) if isinstance(value, tuple) else -value
+            for name, value in values.items()
+        }
+        return replace(self, **changed)
 
     def forms(self) -> tuple[Form, ...]:
         """The forms of the compiled core that add up to this term."""

@@ -34,6 +34,7 @@ def plain_model(model: ErrorModel) -> dict[str, Any]:
         "version": VERSION,
         "period": model.period,
         "argument": model.argument,
+        "indicated": {"sign": model.indicated_sign},
         "shafts": [asdict(shaft) for shaft in model.shafts],
         "constant": model.constant,
         "terms": [term.to_table() for term in model.terms],

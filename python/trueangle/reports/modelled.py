@@ -53,6 +53,7 @@ def model_content(fit: FitResult, name: LineNames) -> dict[str, Any]:
         )
     return {
         "argument": model.argument,
+        "indicated_sign": model.indicated_sign,
         "span_deg": list(fitted_degrees(model)),
         "constant_deg": model.constant * 360.0 / model.period,
         "coefficients": coefficients,

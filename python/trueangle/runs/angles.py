@@ -47,6 +47,8 @@ class RunAngles(NamedTuple):
     offsets: tuple[_Part, ...] = ()
     mount: _Part | None = None
     facets: Facets | None = None
+    #: -1 where the indicated angle is minus what the sensor reads.
+    indicated_sign: int = 1
 
     @property
     def names(self) -> list[str]:
@@ -174,6 +176,7 @@ def find_run_angles(
         tuple(offsets),
         mount,
         facets,
+        found["indicated"].sign if "indicated" in found else 1,
     )
 
 

@@ -58,12 +58,12 @@ def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationR
     **reading
         ``counts_per_turn``, ``counts_per_turn_reference``: counts in one turn of the output,
         of an indicated angle or reference in counts. ``signals``: columns with other names,
-        ``{"torque": "tau", "reference": ("pos act", "rad")}``; ``"-pos"`` is a reversed sensor,
-        and ``"reference_offset"`` (a list for several) is added to the reference. ``facets``: a
-        file of a polygon's facets (``reference_deg``, ``deviation_arcsec``), added at its
-        nominal angles. ``unit_from``: a regular expression; what it finds in the name of a file
-        is the unit of its runs. ``period``: one turn in the unit
-        of angles whose columns name none; these may then be called ``reference`` and
+        ``{"torque": "tau", "reference": ("pos act", "rad")}``; ``"-pos"`` is a reversed sensor
+        (`CalibrationRun.indicated_sign`), and ``"reference_offset"`` (a list for several) is
+        added to the reference. ``facets``: a file of a polygon's facets (``reference_deg``,
+        ``deviation_arcsec``), added at its nominal angles. ``unit_from``: a regular expression;
+        what it finds in the name of a file is the unit of its runs. ``period``: one turn in the
+        unit of angles whose columns name none; these may then be called ``reference`` and
         ``indicated``. ``by``: the column that tells the runs apart (default: ``run``).
         ``topic``: JointState topic of a ROS bag (default: the only one).
 
@@ -192,6 +192,7 @@ class _RunColumns(NamedTuple):
     groups: Groups
     left_out: list[int]
     source: InputFile
+    indicated_sign: int
 
 
 def read_columns(data: Any, reading: ReadingOptions) -> list[_RunColumns]:
@@ -241,7 +242,17 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
         groups.append((found, present))
         left_out.append(rows.size - present.size)
     _warn_of_empty(table, missing, {"reference": reference, "indicated": indicated, **signals})
-    return _RunColumns(table, period, reference, indicated, signals, groups, left_out, table.source)
+    return _RunColumns(
+        table,
+        period,
+        reference,
+        indicated,
+        signals,
+        groups,
+        left_out,
+        table.source,
+        angles.indicated_sign,
+    )
 
 
 def _entries(table: FileReadings, counts: float | None) -> _RunColumns:
@@ -264,7 +275,9 @@ def _entries(table: FileReadings, counts: float | None) -> _RunColumns:
     left_out = indicated.size - rows.size
     _warn_of_empty(table, np.isnan(indicated), {"indicated": indicated})
     groups: Groups = [(_RunLabels(), rows)]
-    return _RunColumns(table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source)
+    return _RunColumns(
+        table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source, column.sign
+    )
 
 
 def _runs_of_readings(table: FileReadings, given: Conversion) -> list[CalibrationRun]:
@@ -291,6 +304,7 @@ def _runs_of_readings(table: FileReadings, given: Conversion) -> list[Calibratio
                 signals={k: v[rows] for k, v in signals.items() if k not in FIELDS},
                 columns={name: values[rows] for name, values in others.items()},
                 source=found.source,
+                indicated_sign=found.indicated_sign,
             )
         )
     return runs

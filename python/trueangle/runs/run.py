@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError, KindError
-from ..support.angles import check_period, circular_mean, wrap
+from ..support.angles import check_period, checked_sign, circular_mean, wrap
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.files import InputFile
@@ -61,6 +61,9 @@ class CalibrationRun:
         Further columns of the file, kept and ignored.
     source : Source, optional
         The file the readings came from, for the provenance of models.
+    indicated_sign : {1, -1}
+        -1 of a sensor that counts the other way: ``indicated`` is minus what it reads. Models of
+        the run keep it, for `trueangle.correct` and `trueangle.export_model`.
 
     Raises
     ------
@@ -91,6 +94,7 @@ class CalibrationRun:
     left_out: int = field(default=0, kw_only=True)
     columns: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
     source: InputFile | None = field(default=None, kw_only=True)
+    indicated_sign: int = field(default=1, kw_only=True)
 
     if TYPE_CHECKING:  # what is taken is more than what is kept
 
@@ -113,11 +117,13 @@ class CalibrationRun:
             left_out: int = 0,
             columns: Mapping[str, Any] = ...,
             source: InputFile | None = None,
+            indicated_sign: int = 1,
         ) -> None: ...
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "period", check_period(self.period))
+        put(self, "indicated_sign", checked_sign(self.indicated_sign))
         reference = signal_column("reference", self.reference, None)
         put(self, "reference", reference)
         indicated = signal_column("indicated", self.indicated, reference.size)

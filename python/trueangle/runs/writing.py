@@ -24,7 +24,8 @@ def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path
 
     Columns: run, reference_deg, indicated_deg and those of the signals of
     `trueangle.support.signals.SIGNALS` that every run has, such as time_s and current_A; ``unit``
-    and ``when`` where a run has one.
+    and ``when`` where a run has one. The indicated angle of a reversed sensor is
+    ``-indicated_deg``: minus what the sensor reads.
 
     Parameters
     ----------
@@ -53,7 +54,8 @@ def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path
     """
     found = as_runs(runs)
     scale = 360.0 / found[0].period
-    kept = [("reference_deg", "reference", scale), ("indicated_deg", "indicated", scale)]
+    minus = "-" if found[0].indicated_sign < 0 else ""
+    kept = [("reference_deg", "reference", scale), (f"{minus}indicated_deg", "indicated", scale)]
     for name in (*_ORDER, *found[0].signals):
         if all(run.signal(name) is not None for run in found):
             signal = find_signal(name)

@@ -12,6 +12,7 @@ from ..errors import NotInvertibleError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
+from ..support.angles import common_sign
 from .recording import Recording
 from .result import ARCSEC, OrderEstimate
 
@@ -78,6 +79,7 @@ def reference_free_model(
             covariance=np.diag(variances),
             fit=fit,
             provenance=made_by,
+            indicated_sign=common_sign(r.indicated_sign for r in recordings),
         )
     except NotInvertibleError as error:
         raise NotInvertibleError(

@@ -39,6 +39,7 @@ class Recording:
     current: Array | None = None
     file: str = ""
     source: InputFile | None = None
+    indicated_sign: int = 1
 
     def __len__(self) -> int:
         for channel in (self.indicated, self.motor, self.reference, *self.heads.values()):
@@ -90,6 +91,7 @@ def _of_run(run: CalibrationRun) -> Recording:
         current=run.signal("current"),
         file=run.source.file if run.source else "",
         source=run.source,
+        indicated_sign=run.indicated_sign,
     )
 
 
@@ -114,7 +116,9 @@ def _of_table(table: FileReadings, reading: ReadingOptions) -> list[Recording]:
         )
     labels = [table.columns[table.roles[role].name] for role in _LABELS if role in table.roles]
     file = str(table.path) if table.format.module_name else ""  # none of a table in memory
-    return _split(channels, labels, file, table.source)
+    read = (table.roles[role] for role in ("indicated", "head1") if role in table.roles)
+    sign = next((column.sign for column in read), 1)
+    return _split(channels, labels, file, table.source, sign)
 
 
 def _in_radians(column: RoleColumn, table: FileReadings, reading: ReadingOptions) -> Array:
@@ -129,6 +133,7 @@ def _split(
     labels: Sequence[NDArray[Any]],
     file: str,
     source: InputFile,
+    indicated_sign: int,
 ) -> list[Recording]:
     """One recording per unit and run, in the order of their first row, without empty rows."""
     if not channels:
@@ -157,6 +162,7 @@ def _split(
                 ),
                 file=file,
                 source=source,
+                indicated_sign=indicated_sign,
             )
         )
     return found

@@ -67,6 +67,8 @@ class SensorLayer:
     environments are read at once, also by models with a state. Angles that turn further than
     half a turn from one reading to the next are counted wrongly by models with a state. A joint
     that is coupled to another one takes its reading, where that is in the layer; else its angle.
+    Readings count as the joint does: the sensor of a model whose ``indicated_sign`` is -1 reads
+    minus them.
 
     Examples
     --------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +38,27 @@ def check_period(period: float) -> float:
             f"(2*pi, 360, 1 or the counts per turn; 1e-30 to 1e30), got {period!r}"
         )
     return value
+
+
+def checked_sign(sign: int) -> int:
+    """``indicated_sign`` as it is, or an `ArgumentError` that says what it must be."""
+    if isinstance(sign, bool) or sign not in (1, -1):
+        raise ArgumentError(
+            "indicated_sign must be 1, or -1 where the indicated angle is minus what the sensor "
+            f"reads, got {sign!r}"
+        )
+    return int(sign)
+
+
+def common_sign(signs: Iterable[int]) -> int:
+    """The ``indicated_sign`` that all runs have, or an `ArgumentError` where they differ."""
+    found = set(signs)
+    if len(found) > 1:
+        raise ArgumentError(
+            "the indicated angles of some runs are minus what the sensor reads (-NAME, or "
+            "indicated_sign=-1) and those of others are not: fit them one by one"
+        )
+    return found.pop() if found else 1
 
 
 def zero_text(value: float, period: float) -> str:

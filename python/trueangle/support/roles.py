@@ -77,7 +77,7 @@ class RoleColumn(NamedTuple):
     is_asked : bool
         It was named, not found by its name.
     is_reversed : bool
-        Its sign is the other one.
+        Its values are taken with the other sign.
     """
 
     role: str
@@ -85,6 +85,11 @@ class RoleColumn(NamedTuple):
     unit: str | None
     is_asked: bool = False
     is_reversed: bool = False
+
+    @property
+    def sign(self) -> int:
+        """-1 where the values taken are minus what the sensor reads; a minus in the name is one."""
+        return -1 if self.is_reversed or self.name.startswith("-") else 1
 
     def values(
         self, raw: NDArray[Any], period: float, counts_per_turn: float | None = None

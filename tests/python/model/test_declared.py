@@ -94,6 +94,32 @@ def test_a_term_is_built_on_harmonics_where_it_changes_with_them():
     assert {term.kind for term in every_term()} == own
 
 
+@pytest.mark.parametrize("argument", ["reference", "indicated"])
+def test_a_mirrored_term_is_that_of_angles_counted_the_other_way(argument):
+    """There, back and on: what follows travel takes the same way."""
+    shaft = ta.Shaft("output", 1, [1, 3], [0.2, 0.0], [0.0, 0.1])
+    places = np.concatenate([PLACES, PLACES[::-1] - 0.3, PLACES + 0.2])
+    way = np.repeat([1.0, -1.0, 1.0], PLACES.size)
+    others = (
+        VaryingLine(**lines((1.0, 2.0)), follows="torque"),
+        ta.StiffeningCompliance(A, A, A, 1.0),
+        ta.LoadDependentGearError(*lines((1.0, 2.0)).values(), "signed"),
+    )
+    for term in (*every_term(), *others):
+        model = ta.HarmonicModel([shaft], 0.7, 360.0, argument, terms=(term,), indicated_sign=-1)
+        own = model.in_sensor_sense()
+        assert own.terms[0].mirrored() == term
+        signals = {name: SIGNALS.get(name, places) for name in model.uses_signals}
+        kept = {k: v for k, v in signals.items() if k not in ("velocity", "direction")}
+        for given in ({"direction": way, "velocity": 3.0 * way}, {}):
+            moving = {k: v for k, v in given.items() if k in signals}
+            if set(model.signals) <= {*kept, *moving}:
+                against = {k: -v for k, v in moving.items()}
+                expected = -model.error(places, **kept, **moving)
+                found = own.error(-places, **kept, **against)
+                np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12, err_msg=term.kind)
+
+
 #: A term by one of its parameters, the values next to a border that are taken, and the border's
 #: or those beyond that are not.
 BORDERS = {

@@ -34,6 +34,7 @@ def models(draw):
         condition_number=draw(st.none() | st.floats(1, 1e9)),
         fit=FitRecord(37, 2, (0.0, 360.0), 0.1, offsets=(draw(numbers), 1 / 3), note="n"),
         provenance=Provenance((InputFile("a.csv", "00ff"),), "trueangle 0"),
+        indicated_sign=draw(st.sampled_from([1, -1])),
     )
 
 
@@ -111,8 +112,19 @@ REFUSED = {
     "a wrong covariance": ({"change": lambda c: c.update(covariance=[[1.0]])}, "covariance"),
     "a ragged covariance": ({"change": lambda c: c.update(covariance=[[1], [2, 3]])}, "square"),
     "terms of the future": ({"change": lambda c: c.update(terms=[{"kind": "x"}])}, "term"),
+    "a sign of 0": (
+        {"change": lambda c: c.update(indicated={"sign": 0})},
+        r"\.sign.*1 or -1, got 0",
+    ),
+    "a sign that is true": ({"change": lambda c: c.update(indicated={"sign": True})}, "1 or -1"),
+    "a sign of no object": ({"change": lambda c: c.update(indicated=-1)}, "indicated.*object"),
+    "two signs": ({"change": lambda c: c.update(indicated={"sign": 1, "x": 1})}, r"indicated\.x"),
     "nested too deep": ({"text": lambda s: "[" * 100_000}, "not"),
 }
+
+
+def test_a_file_without_a_sign_is_that_of_a_sensor_that_counts_as_the_reference(tmp_path):
+    assert ta.load_model(written(tmp_path, lambda c: c.pop("indicated"))).indicated_sign == 1
 
 
 @pytest.mark.parametrize("case", REFUSED)

@@ -53,6 +53,8 @@ def test_what_cannot_take_the_place_is_refused_and_nothing_changes(rng):
     step = one.compensator()
     with pytest.raises(ta.errors.ArgumentError, match="period 1, and the step 360"):
         step.swap(drawn(rng, period=1.0))
+    with pytest.raises(ta.errors.ArgumentError, match="indicated_sign -1, and the step 1"):
+        step.swap(drawn(rng).replace(indicated_sign=-1))
     with pytest.raises(ta.errors.ArgumentError, match=r"has terms.*its own compensator\(\)"):
         step.swap(drawn(rng, [ta.Backlash(0.05)]))
     with pytest.raises(ta.errors.KindError, match="model must be a HarmonicModel"):
@@ -71,6 +73,8 @@ def test_all_joints_of_a_robot_are_swapped_together(rng):
     np.testing.assert_allclose(step(angles), fresh(angles), atol=1e-12)
     with pytest.raises(ta.errors.ArgumentError, match="joints b, a; they must be a, b"):
         step.swap(ta.Robot({name: other[name] for name in ("b", "a")}))
+    with pytest.raises(ta.errors.ArgumentError, match="with the same periods and signs"):
+        step.swap(ta.Robot({"a": other["a"].replace(indicated_sign=-1), "b": other["b"]}))
 
 
 def test_a_pickled_step_swaps_its_own_model(rng):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import html
 import json
 import re
@@ -91,6 +92,15 @@ def test_one_run_has_no_gain_and_says_so(runs) -> None:
     assert "One run only" in made.content["why_no_gain"]
     assert "Not verified" in made.html
     assert any("repeatability" in e["what"] for e in made.content["unknowns"])
+
+
+def test_a_reversed_sensor_is_stated_with_the_model(runs) -> None:
+    words = "; the indicated angle is minus what the sensor reads"
+    for sign in (1, -1):
+        told = [dataclasses.replace(run, indicated_sign=sign) for run in runs[:1]]
+        made = ta.report(told, orders=[1])
+        assert made.content["model"]["indicated_sign"] == sign
+        assert (words in made.html) == (sign < 0)
 
 
 def test_unknowns_follow_from_the_conditions(runs) -> None:

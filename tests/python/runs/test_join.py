@@ -278,6 +278,24 @@ def test_the_command_writes_runs_and_tells_what_it_did(tmp_path, capsys):
     assert main(["join", str(joint), str(laser), "-o", str(joint), *signals]) == 1  # an input
 
 
+def test_a_reversed_sensor_is_joined_and_written_as_such(tmp_path):
+    joint, laser = logs(tmp_path, 1)
+    time, angle = np.loadtxt(joint, delimiter=",", skiprows=1).T
+    plain = ta.join(joint, laser).runs[0]
+    signals = {"indicated": ("-indicated_deg", "deg")}
+    found = ta.join(log(joint, "indicated", time, -angle), laser, signals=signals).runs[0]
+    np.testing.assert_array_equal(found.indicated, plain.indicated)
+    assert (plain.indicated_sign, found.indicated_sign) == (1, -1)
+    output = tmp_path / "runs.csv"
+    given = ["--signal", "indicated=-indicated_deg"]
+    assert main(["join", str(joint), str(laser), "-o", str(output), *given]) == 0
+    (run,) = ta.read_runs(output)
+    np.testing.assert_array_equal(run.indicated, found.indicated)
+    assert run.indicated_sign == -1
+    with pytest.raises(FileError, match="column 'encoder': no such column"):
+        ta.join(joint, laser, signals={"indicated": "-encoder"})
+
+
 def test_logs_that_cannot_be_joined(tmp_path):
     joint, laser = logs(tmp_path, 1)
     with pytest.raises(ArgumentError, match=r"one log must hold indicated_deg"):

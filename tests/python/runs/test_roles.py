@@ -1,6 +1,7 @@
 """What the angles of a run are made of: reversed sensors, errors, offsets, facets; and when."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import trueangle as ta
@@ -21,7 +22,7 @@ def saved(path, **columns):
     return path
 
 
-def each_door(path, tmp_path, **reading):
+def each_door(path, tmp_path, sign=1, **reading):
     """First order in arcsec, in memory, in one pass, and of the table in memory."""
     fits = [ta.fit(path, [1], **reading), ta.fit_logs(path, [1], loss="linear", **reading)]
     import trueangle.logs.fitting as fitting
@@ -34,6 +35,7 @@ def each_door(path, tmp_path, **reading):
         (shaft,) = fit.model.shafts
         arcsec = 1_296_000.0 / fit.model.period
         found.append((shaft.cosine[0] * arcsec, shaft.sine[0] * arcsec))
+    assert {fit.model.indicated_sign for fit in fits} == {sign}
     np.testing.assert_allclose(found[1:], found[:1] * 2, atol=1e-6)
     return found[0]
 
@@ -41,7 +43,7 @@ def each_door(path, tmp_path, **reading):
 def test_a_reversed_sensor_by_every_door(tmp_path):
     path = saved(tmp_path / "a.csv", reference_deg=NOMINAL, enc=-READ)
     signals = {"indicated": ("-enc", "deg")}
-    assert np.allclose(each_door(path, tmp_path, signals=signals), (0.0, 20.0), atol=1e-6)
+    assert np.allclose(each_door(path, tmp_path, -1, signals=signals), (0.0, 20.0), atol=1e-6)
     path = saved(tmp_path / "b.csv", ref=-NOMINAL, indicated_deg=READ)
     signals = {"reference": ("-ref", "deg")}
     assert np.allclose(each_door(path, tmp_path, signals=signals), (0.0, 20.0), atol=1e-6)
@@ -52,6 +54,7 @@ def test_a_column_whose_name_begins_with_a_minus_is_itself(tmp_path):
     path = saved(tmp_path / "a.csv", **columns)
     (run,) = ta.read_runs(path, signals={"indicated": ("-enc", "deg")})
     np.testing.assert_array_equal(run.indicated, READ)
+    assert run.indicated_sign == -1
     with pytest.raises(FileError, match=r"column 'encoder': no such column"):
         ta.read_runs(path, signals={"indicated": ("-encoder", "deg")})
 
@@ -74,6 +77,53 @@ def test_a_reversed_sensor_is_corrected_in_its_own_sense(partial, tmp_path):
     plain = saved(tmp_path / "plain.csv", enc=angles + error)
     report = ta.correct_logs(plain, model, tmp_path / "other.csv", column="enc", unit="deg")
     assert report.logs[0].result["joints"][0]["outside_span"] == joint["outside_span"]
+
+
+@pytest.mark.parametrize("name", ["enc", "-enc"])
+@pytest.mark.parametrize("period", [360.0, 1.0])
+def test_a_model_of_a_reversed_sensor_corrects_what_it_reads_by_every_door(name, period, tmp_path):
+    """The minus is taken once, whether the column is named with it or not."""
+    unit = period / 360.0
+    run = ta.CalibrationRun(NOMINAL * unit, (READ + 3.0) * unit, period, indicated_sign=-1)
+    model = ta.fit([run], [1]).model
+    read, wanted = -(READ + 3.0), -NOMINAL
+    path = saved(tmp_path / "log.csv", enc=read)
+    columns = {"indicated": (name, "deg")}
+    assert ta.correct_logs(path, model, tmp_path / "out.csv", signals=columns).is_done
+    after = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)[:, -1]
+    np.testing.assert_allclose(after, wanted, atol=1e-7)
+    table = pd.DataFrame({"enc": read})
+    after = ta.correct(table, model, signals=columns)["corrected_deg"]
+    np.testing.assert_allclose(after, wanted, atol=1e-7)
+    for bare in (read * unit, table["enc"] * unit):
+        np.testing.assert_allclose(ta.correct(bare, model), wanted * unit, atol=1e-7)
+    np.testing.assert_allclose(model.correct((READ + 3.0) * unit), NOMINAL * unit, atol=1e-7)
+
+
+def test_runs_of_a_reversed_sensor_are_written_and_read_as_such(tmp_path):
+    run = ta.CalibrationRun(NOMINAL, READ, 360.0, indicated_sign=-1)
+    path = tmp_path / "runs.csv"
+    ta.write_runs(run, path)
+    assert np.allclose(each_door(path, tmp_path, -1), (0.0, 20.0), atol=1e-6)
+    model = ta.fit([run], [1]).model
+    assert ta.correct_logs(path, model, tmp_path / "out.csv").is_done
+    table = np.genfromtxt(tmp_path / "out.csv", delimiter=",", names=True, deletechars="")
+    np.testing.assert_allclose(table["-corrected_deg"], NOMINAL, atol=1e-7)
+
+
+def test_sensors_that_count_either_way_are_not_fitted_as_one(tmp_path):
+    runs = [ta.CalibrationRun(NOMINAL, READ, 360.0, indicated_sign=s) for s in (1, -1)]
+    refused = pytest.raises(ArgumentError, match="indicated angles of some runs are minus what")
+    with refused:
+        ta.fit(runs, [1])
+    for k, run in enumerate(runs):
+        ta.write_runs(run, tmp_path / f"{k}.csv")
+    with pytest.MonkeyPatch.context() as patched, refused:
+        patched.setattr("trueangle.logs.fitting.logs_hold_at_most", lambda *_args: False)
+        ta.fit_logs(tmp_path, [1])
+    for wrong in (0, 2, True, "-1"):
+        with pytest.raises(ArgumentError, match="indicated_sign must be 1, or -1 where"):
+            ta.CalibrationRun(NOMINAL, READ, 360.0, indicated_sign=wrong)
 
 
 @pytest.mark.parametrize("beside", ["reference", "indicated"])

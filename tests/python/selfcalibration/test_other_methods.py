@@ -89,6 +89,20 @@ def test_heads_that_share_a_zero_need_their_angles():
     assert np.abs(off(found)).max() < FAR
 
 
+def test_a_model_without_a_reference_keeps_the_sign_of_reversed_columns():
+    log = heads_log([0.0, 119.2, 203.7], 41)
+    reversed_ = {name.removesuffix("_rad"): -values for name, values in log.items()}
+    columns = {name: (f"-{name}", "rad") for name in reversed_}
+    found = ta.selfcal(reversed_, orders=range(1, 9), signals=columns)
+    assert found.model.indicated_sign == -1
+    assert ta.selfcal(log, orders=range(1, 9)).model.shafts == found.model.shafts
+    assert np.abs(off(found)).max() < FAR
+    log = shifts_log([0.0, 33.0, 101.0], 42)
+    log["enc"] = -log.pop("indicated_rad")
+    found = ta.selfcal(log, orders=range(1, 9), signals={"indicated": ("-enc", "rad")})
+    assert found.model.indicated_sign == -1
+
+
 @pytest.mark.parametrize("raw", [True, False])
 def test_three_shifts_tell_both_patterns(raw):
     found = ta.selfcal(shifts_log([0.0, 84.4, 240.7], 8200, raw=raw), orders=range(1, 9))

@@ -34,6 +34,7 @@ class TorsionalComplianceTerm(Term):
     sine: tuple[float, ...] = ()
 
     kind: ClassVar[str] = "torsional_compliance"
+    odd: ClassVar[tuple[str, ...]] = ("per_Nm", "cosine")
     signals: ClassVar[tuple[str, ...]] = ("torque",)
 
     def check(self) -> None:
@@ -71,6 +72,12 @@ class StiffeningComplianceTerm(Term):
 
     kind: ClassVar[str] = "stiffening_compliance"
     signals: ClassVar[tuple[str, ...]] = ("torque",)
+
+    @property
+    def odd(self) -> tuple[str, ...]:  # type: ignore[override]
+        # The moment of a weight changes sign with the angle, and the wind-up with it.
+        linear = ("per_Nm", "per_Nm3", "beyond_knee_per_Nm")
+        return linear if self.gravity is None else ("gravity",)
 
     def check(self) -> None:
         if self.knee_Nm < 0.0:
@@ -110,6 +117,7 @@ class LoadDependentGearErrorTerm(Term):
     torque: str = "signed"
 
     kind: ClassVar[str] = "load_dependent_gear_error"
+    odd: ClassVar[tuple[str, ...]] = ("cosine",)
     signals: ClassVar[tuple[str, ...]] = ("torque",)
 
     def check(self) -> None:
@@ -143,6 +151,7 @@ class CurrentCouplingTerm(Term):
     sine: tuple[float, ...] = ()
 
     kind: ClassVar[str] = "current_coupling"
+    odd: ClassVar[tuple[str, ...]] = ("per_A", "cosine")
     signals: ClassVar[tuple[str, ...]] = ("current",)
 
     def check(self) -> None:

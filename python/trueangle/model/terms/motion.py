@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 from .. import forms
 from ..forms import Form
@@ -108,6 +108,9 @@ class ChannelSkewTerm(Term):
     def is_periodic(self) -> bool:
         return self.order == int(self.order)
 
+    def mirrored(self) -> Self:
+        return replace(self, phase_deg=180.0 - self.phase_deg)
+
     def forms(self) -> tuple[Form, ...]:
         half, phase = 0.5 * self.delay_s, math.radians(self.phase_deg)
         line = (self.order, half * math.sin(phase), half * math.cos(phase))
@@ -136,6 +139,10 @@ class VaryingLineTerm(Term):
     follows: str = "velocity"
 
     kind: ClassVar[str] = "varying_line"
+
+    @property
+    def odd(self) -> tuple[str, ...]:  # type: ignore[override]
+        return ("sine",) if self.follows == "velocity" else ("cosine",)
 
     @property
     def needs(self) -> tuple[str, ...]:

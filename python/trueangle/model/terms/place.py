@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 from ...errors import ArgumentError
 from ...support.signals import COUPLED
@@ -51,6 +51,9 @@ class ScaleErrorTerm(Term):
         if self.stop <= self.start:
             raise self._out_of_range("stop", f"beyond start ({self.start!r})")
 
+    def mirrored(self) -> Self:
+        return replace(self, start=-self.stop, stop=-self.start)
+
     def forms(self) -> tuple[Form, ...]:
         return (forms.Ramp(self.relative_error, self.start, self.stop),)
 
@@ -82,6 +85,7 @@ class LocalDefectTerm(Term):
     cycles_per_turn: float = 1.0
 
     kind: ClassVar[str] = "local_defect"
+    odd: ClassVar[tuple[str, ...]] = ("place", "height")
 
     @property
     def is_periodic(self) -> bool:
@@ -129,6 +133,7 @@ class ThermalDriftTerm(Term):
     reference_C: float = 20.0
 
     kind: ClassVar[str] = "thermal_drift"
+    odd: ClassVar[tuple[str, ...]] = ("zero_per_K", "cosine")
     signals: ClassVar[tuple[str, ...]] = ("temperature",)
 
     def check(self) -> None:
@@ -169,6 +174,7 @@ class JointCouplingTerm(Term):
     factor: float
 
     kind: ClassVar[str] = "joint_coupling"
+    odd: ClassVar[tuple[str, ...]] = ("factor",)
 
     @property
     def needs(self) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ class BacklashTerm(Term):
     sine: tuple[float, ...] = ()
 
     kind: ClassVar[str] = "backlash"
+    odd: ClassVar[tuple[str, ...]] = ("sine",)
     follows_travel: ClassVar[bool] = True
     optional: ClassVar[tuple[str, ...]] = ("orders", "cosine", "sine")
 
@@ -77,6 +78,7 @@ class DirectionalPatternTerm(Term):
     sine: tuple[float, ...]
 
     kind: ClassVar[str] = "direction_dependent_pattern"
+    odd: ClassVar[tuple[str, ...]] = ("sine",)
     signals: ClassVar[tuple[str, ...]] = ("direction",)
     follows_travel: ClassVar[bool] = True
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ArgumentError, FileError
-from ...formats.columns import matching_column
+from ...formats.columns import signed_name
 from ...support.angles import ARCSEC_PER_TURN
 from ...support.argumentkinds import told_kinds
 from ...support.arrays import Array
@@ -170,7 +170,7 @@ def _assigned(
         if fitting:
             tables[i] = read_readings(paths[i], {**fitting, **own[i]}, topics[i])
     for role in shared.keys() - used:  # says what was meant
-        matching_column(tables[0].path, list(tables[0].columns), _name(shared[role]))
+        signed_name(tables[0].path, list(tables[0].columns), _name(shared[role]))
     for one, other in (tables, tables[::-1]):
         if "indicated" in one.roles and "reference" in other.roles:
             return one, other
@@ -189,7 +189,7 @@ def _name(wanted: Any) -> str:
 
 def _has(table: FileReadings, wanted: Any) -> bool:
     try:
-        matching_column(table.path, list(table.columns), _name(wanted))
+        signed_name(table.path, list(table.columns), _name(wanted))
     except FileError:
         return False
     return True
@@ -234,6 +234,7 @@ def _joined(
                 label=label,
                 signals={k: v for k, v in signals.items() if k not in FIELDS},
                 source=indicated.table.source,
+                indicated_sign=indicated.table.roles["indicated"].sign,
                 **fields,
             )
         )
