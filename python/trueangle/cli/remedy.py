@@ -30,6 +30,9 @@ _PERHAPS = (
     "; a diagnosis names what else there is, and with --corrected-model FILE writes the model of it"
 )
 
+#: Fewest readings of a diagnosis (`diagnosis.diagnose.LEAST_READINGS`, which takes numpy).
+_LEAST_READINGS = 20
+
 
 def command_that_helps(error: TrueAngleError, args: argparse.Namespace, build: Build) -> str:
     """``; run: trueangle ...``, or nothing where no command is known to help.
@@ -40,7 +43,10 @@ def command_that_helps(error: TrueAngleError, args: argparse.Namespace, build: B
     words = _words(error, args, build)
     if not words:
         return ""
-    perhaps = _PERHAPS if isinstance(error, NoOrderError) else ""
+    perhaps = ""
+    if isinstance(error, NoOrderError):
+        more = f"; take {_LEAST_READINGS} readings or more"
+        perhaps = _PERHAPS if words[0] == "diagnose" else more
     return f"{perhaps}; run: {shlex.join(['trueangle', *words])}"
 
 
@@ -56,6 +62,8 @@ def _words(error: TrueAngleError, args: argparse.Namespace, build: Build) -> lis
         return _plan(error, args) if command == "selfcal" else []
     if isinstance(error, RankError):
         return _again(build, args, "orders", (), (), without=("orders",))
+    if isinstance(error, NoOrderError) and 0 < error.readings < _LEAST_READINGS:
+        return ["plan", "--arc", "0:360", "--readings", str(_LEAST_READINGS)]
     if isinstance(error, NoModelError):
         # Without a gear nothing but the output turns, and that is said.
         known = args.gear_ratio is not None

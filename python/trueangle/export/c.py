@@ -24,7 +24,7 @@ class CHeader(PortableTarget):
 
     name = "c"
     what = "a C99 header with tables and one inline function per shaft"
-    kind: ClassVar[FileKind] = FileKind("a C header", (".h", ".hpp"))
+    kind: ClassVar[FileKind] = FileKind("a C header", (".h", ".hpp", ".txt"))
 
     def write(self, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
         """The header."""

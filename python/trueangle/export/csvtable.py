@@ -24,13 +24,16 @@ from .target import CommentBlock, Made, Option, TablePart, Target
 #: Distance of two printed numbers, in degrees: 9 decimals.
 _LAST_DIGIT = 1e-9
 
+#: Lines to a turn, at most.
+_MOST = 1_000_000
+
 
 class CsvTable(Target):
     """Target ``csv``: ``indicated_deg, correction_deg``, to be interpolated linearly."""
 
     name = "csv"
     what = "lines of indicated_deg,correction_deg to interpolate between"
-    kind: ClassVar[FileKind] = FileKind("a table of corrections (CSV)", (".csv",))
+    kind: ClassVar[FileKind] = FileKind("a table of corrections (CSV)", (".csv", ".txt"))
     sign = "subtract"
     tried = (36, 45, 60, 72, 90, 120, 180, 240, 360, 720, 1440, 3600, 7200, 36000)
     options = {
@@ -40,11 +43,10 @@ class CsvTable(Target):
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         entries = options["entries"]
-        if not 4 <= entries <= 1_000_000:
-            raise ArgumentError(f"entries must be from 4 to 1000000, got {entries}")
+        if not 4 <= entries <= _MOST:
+            raise ArgumentError(f"entries must be from 4 to {_MOST}, got {entries}")
         pattern.check_one_turn(self.name)
-        top = max(pattern.lines, default=0.0)
-        pattern.check_orders(entries, self.name, f"use `entries={int(2 * top) + 1}` or more")
+        pattern.check_orders(entries, self.name, pattern.least_entries(), _MOST)
         values = np.round(linear_knots(pattern.correction, entries) * 360.0, 9)
         knots = np.concatenate([values, values[:1]])
         places = np.arange(entries + 1) * 360.0 / entries

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
 from collections.abc import Sequence
@@ -302,13 +303,11 @@ def _smallest(
     sizes = target.sizes(options)
     if not sizes:
         return _made(target, pattern, options)
-    finer = target.finer(options)
-    if finer is not None:
-        try:
-            return _first(target, pattern, options, max_arcsec, sizes)
-        except TrueAngleError:
-            options, sizes = dict(finer), target.sizes(finer)
-    return _first(target, pattern, options, max_arcsec, sizes)
+    *others, last = options, *target.finer(options)
+    for tried in others:
+        with contextlib.suppress(TrueAngleError):
+            return _first(target, pattern, dict(tried), max_arcsec, target.sizes(tried))
+    return _first(target, pattern, dict(last), max_arcsec, target.sizes(last))
 
 
 def _first(

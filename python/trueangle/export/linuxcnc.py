@@ -43,13 +43,15 @@ class LinuxCnc(Target):
     )
     options = {
         "type": Option(("0", "1"), "1", "COMP_FILE_TYPE: 0 positions, 1 trims"),
-        "entries": Option(int, 180, "to a turn; 256 in all"),
+        "entries": Option(
+            int, None, "to a turn; 256 in all (default: 180, or what orders and travel leave)"
+        ),
         **ENDS,
         "bits": POSITIONS,
     }
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        travel = SetpointTravel.of(pattern, self.name, options, MOST)
+        travel = SetpointTravel.of(pattern, self.name, options, MOST, usual=180)
         # The motor is told position + trim: the trim is the error.
         forward, reverse = (
             np.round(values * 360.0, _DECIMALS) for values in (travel.forward, travel.reverse)

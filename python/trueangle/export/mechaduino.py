@@ -30,7 +30,9 @@ class Mechaduino(Target):
 
     name = "mechaduino"
     what = "the lookup array of Mechaduino's Parameters.cpp"
-    kind: ClassVar[FileKind] = FileKind("a C++ source for Mechaduino", (".h", ".cpp", ".ino"))
+    kind: ClassVar[FileKind] = FileKind(
+        "a C++ source for Mechaduino", (".h", ".cpp", ".ino", ".txt")
+    )
     sign = "absolute"
     files = ("existing",)
     options = {
@@ -39,7 +41,7 @@ class Mechaduino(Target):
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         pattern.check_one_turn(self.name)
-        pattern.check_orders(ENTRIES, self.name, 'use `target="c"`')
+        pattern.check_orders(ENTRIES, self.name, None)
         counts = np.arange(ENTRIES) / ENTRIES
         exact = counts - pattern.correction(counts)
         zero = 0.0

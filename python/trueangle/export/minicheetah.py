@@ -27,7 +27,7 @@ class MiniCheetah(Tinymovr):
 
     name = "minicheetah"
     what = "the offset_lut of a Mini Cheetah motor controller"
-    kind: ClassVar[FileKind] = FileKind("a C source for the motor controller", (".h", ".c"))
+    kind: ClassVar[FileKind] = FileKind("a C source for the motor controller", (".h", ".c", ".txt"))
     unknown = (
         "the firmware's own calibration fills the table and keeps it in words 6 to 133 of its "
         "settings in flash; where the table is changed otherwise, the electrical zero is found anew"

@@ -54,7 +54,7 @@ class Moteus(Target):
             raise ArgumentError(f"source must be 0, 1 or 2, got {source}")
         if options["bits"] > 24:
             raise ArgumentError("bits must be at most 24: moteus takes readings as floats")
-        knots = -one_turn_knots(pattern, ENTRIES, self.name, True)
+        knots = -one_turn_knots(pattern, ENTRIES, self.name)
         scale, table = _scaled(knots)
 
         def text(header: CommentBlock) -> str:

@@ -34,7 +34,7 @@ class MuJoCo(Target):
 
     name = "mujoco"
     what = "a fragment of MJCF: the sensor's model, friction, damping and torque ripple of a joint"
-    kind: ClassVar[FileKind] = FileKind("a fragment of MJCF (XML)", (".xml", ".mjcf"))
+    kind: ClassVar[FileKind] = FileKind("a fragment of MJCF (XML)", (".xml", ".mjcf", ".txt"))
     sign = "add"
     argument = "reference"
     arithmetic_known = False

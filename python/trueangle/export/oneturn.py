@@ -13,11 +13,12 @@ from .pattern import TurnPattern
 
 
 def one_turn_knots(
-    pattern: TurnPattern, entries: int, target: str, fixed: bool, binary: bool = False
+    pattern: TurnPattern, entries: int, target: str, most: int = 0, binary: bool = False
 ) -> Array:
     """Least-squares knots, in turns, of the correction of a reading.
 
-    A table may have a ``fixed`` number of entries, or a ``binary`` one: a power of two.
+    A table may have up to ``most`` entries (0: no other number), or a ``binary`` number of them: a
+    power of two.
 
     Raises
     ------
@@ -25,10 +26,8 @@ def one_turn_knots(
         Orders that the table cannot hold, or shafts of which it holds no whole turn.
     """
     pattern.check_one_turn(target)
-    top = int(max(pattern.lines, default=0.0))
-    least = 1 << (2 * top).bit_length() if binary else 2 * top + 1
-    smallest = 'use `target="c"`' if fixed else f"use `entries={least}` or more"
-    pattern.check_orders(entries, target, smallest)
+    least = pattern.least_entries()
+    pattern.check_orders(entries, target, 1 << (least - 1).bit_length() if binary else least, most)
     return linear_knots(pattern.correction, entries)
 
 

@@ -124,8 +124,14 @@ class TurnPattern:
         """Whether one turn of the output holds all of it."""
         return self.model.is_periodic
 
-    def check_orders(self, entries: int, target: str, smallest: str) -> None:
+    def least_entries(self) -> int:
+        """Entries to a turn with which a table holds all orders."""
+        return 2 * math.ceil(max(self.lines, default=0.0)) + 1
+
+    def check_orders(self, entries: int, target: str, least: int | None, most: int = 0) -> None:
         """Refuse orders at or above the Nyquist order of a table.
+
+        With ``least`` entries it would hold them, of which the target takes ``most``.
 
         Raises
         ------
@@ -137,7 +143,12 @@ class TurnPattern:
         if beyond:
             raise ArgumentError(
                 f"{target}: {entries} entries hold orders up to {limit}, the model has "
-                f"{_orders(beyond)}: {smallest}"
+                f"{_orders(beyond)}: "
+                + (
+                    f"use `entries={least}` or more"
+                    if least and least <= most
+                    else 'use `target="c"`'
+                )
             )
 
     def check_one_turn(self, target: str) -> None:

@@ -36,7 +36,7 @@ class Pmac(Target):
 
     name = "pmac"
     what = "the leadscrew compensation table of a PMAC motor"
-    kind: ClassVar[FileKind] = FileKind("commands for PMAC", (".pmc", ".cfg"))
+    kind: ClassVar[FileKind] = FileKind("commands for PMAC", (".pmc", ".cfg", ".txt"))
     sign = "add"
     argument = "reference"
     unknown = (
@@ -68,9 +68,7 @@ class Pmac(Target):
         counts = self._counts(options)
         divisors = [n for n in range(4, min(counts, _MOST) + 1) if counts % n == 0]
         entries = options["entries"]
-        if entries is None:
-            entries = max((n for n in divisors if n <= 360), default=0)
-        if entries not in divisors:
+        if not divisors or entries not in (None, *divisors):
             near = sorted(divisors, key=lambda n: abs(n - (entries or 256)))[:3]
             raise ArgumentError(
                 f"entries must be a divisor of {counts} from 4 to {_MOST}, got {entries}; near it "
@@ -80,6 +78,7 @@ class Pmac(Target):
         # One column for both directions: what follows the direction is left out.
         pattern = TurnPattern(pattern.model)
         travel = SetpointTravel.of(pattern, self.name, whole_turn, _MOST + 1, divided=counts)
+        entries = travel.entries
         # The correction at zero is zero by definition: what it is there is left to the zero.
         first = float(travel.forward[0])
         values = np.rint((travel.forward - first) * counts * SIXTEENTHS).astype(np.int64)

@@ -46,7 +46,7 @@ class PortableTarget(Target):
         "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
         "entries": Option(int, None, "of each table, a power of two (default: by the model)"),
         "method": Option(METHODS, None, "of interpolation"),
-        "number": Option(NUMBERS, None, "int16, int32 or float (default: q15, else q31)"),
+        "number": Option(NUMBERS, None, "int16, int32 or float (default: the first that holds it)"),
         "name": Option(str, None, "of the functions (default: the file's)"),
         "direction": Option(
             DIRECTIONS, "auto", "what tells the direction of travel, where a term follows it"
@@ -59,10 +59,10 @@ class PortableTarget(Target):
         free = options["method"] is None and options["number"] is None
         return tuple(size for size in _SIZES if not free or size <= _LARGEST_LINES)
 
-    def finer(self, options: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    def finer(self, options: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
         if options["entries"] or options["method"] or options["number"]:
-            return None
-        return {**options, "method": "cubic", "number": "q31"}
+            return ()
+        return [{**options, "method": "cubic", "number": number} for number in NUMBERS[1:]]
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         chain = _chain(pattern, options)
@@ -151,9 +151,10 @@ def _chain(pattern: TurnPattern, options: Mapping[str, Any]) -> Chain:
     if not shafts:  # all that there is follows travel, speed, heat or load
         return make_chain(pattern, "linear", "q31", [])
     method, number, entries = (options[key] for key in ("method", "number", "entries"))
+    numbers = NUMBERS if number is None else (number,)
     if entries is not None:
         _check(shafts, entries)
-        return _first_that_fits(pattern, method, number, [entries] * len(shafts))
+        return _first_that_fits(pattern, method or "linear", numbers, [entries] * len(shafts))
     # The smallest tables that leave less than the model itself does not know.
     known = pattern.uncertainty_arcsec
     allowed = None if known is None else known * _SHARE
@@ -162,33 +163,32 @@ def _chain(pattern: TurnPattern, options: Mapping[str, Any]) -> Chain:
         sizes.append(_smallest(part, cycles, method or "linear", number or "q15", allowed))
     if method is None and number is None and max(sizes) > 256:
         # Cubic tables of 32 bits hold fine patterns in less flash than lines do.
-        sizes = [_smallest(part, cycles, "cubic", "q31", allowed) for _, cycles, part in shafts]
-        return make_chain(pattern, "cubic", "q31", sizes)
-    return _first_that_fits(pattern, method, number, sizes)
+        sizes = [_smallest(part, cycles, "cubic", "q15", allowed) for _, cycles, part in shafts]
+        return _first_that_fits(pattern, "cubic", NUMBERS[1:], sizes)
+    return _first_that_fits(pattern, method or "linear", numbers, sizes)
 
 
 def _first_that_fits(
-    pattern: TurnPattern, method: str | None, number: str | None, sizes: list[int]
+    pattern: TurnPattern, method: str, numbers: Sequence[str], sizes: list[int]
 ) -> Chain:
-    """int16 lines where their floor is below the model's uncertainty, else int32."""
-    if number is None:
-        allowed = pattern.uncertainty_arcsec
+    """The first number that holds the corrections, int16 with a floor below the uncertainty."""
+    *tried, last = numbers
+    allowed = pattern.uncertainty_arcsec
+    for number in tried:
         try:
-            chain = make_chain(pattern, method or "linear", "q15", sizes)
-            floor = math.hypot(*(table.floor_arcsec for table in chain.tables), 0.0)
-            if allowed is None or floor <= allowed:
-                return chain
+            chain = make_chain(pattern, method, number, sizes)
         except ArgumentError:
-            pass
-        number = "q31"
-    return make_chain(pattern, method or "linear", number, sizes)
+            continue
+        floor = math.hypot(*(table.floor_arcsec for table in chain.tables), 0.0)
+        if number != "q15" or allowed is None or floor <= allowed:
+            return chain
+    return make_chain(pattern, method, last, sizes)
 
 
 def _check(shafts: Sequence[tuple[str, float, TurnPattern]], entries: int) -> None:
     for name, _, part in shafts:
-        top = max(part.lines, default=0.0)
-        needed = 1 << (int(2 * top) + 1).bit_length() if top else 4
-        part.check_orders(entries, f"shaft {name}", f"use `entries={max(needed, 4)}` or more")
+        needed = max(4, 1 << (part.least_entries() - 1).bit_length())
+        part.check_orders(entries, f"shaft {name}", needed, _SIZES[-1])
 
 
 def _smallest(

@@ -26,7 +26,7 @@ class RustModule(PortableTarget):
 
     name = "rust"
     what = "a Rust module without std, tables and one function per shaft"
-    kind: ClassVar[FileKind] = FileKind("a Rust module", (".rs",))
+    kind: ClassVar[FileKind] = FileKind("a Rust module", (".rs", ".txt"))
 
     def write(self, chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> str:
         """The module."""

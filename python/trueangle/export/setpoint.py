@@ -8,7 +8,7 @@ column for each direction of travel.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,9 +36,17 @@ POSITIONS = Option(int, 20, "2^bits positions are evaluated, and more where entr
 #: Of a degree, as nominal positions are written.
 NOMINAL_DECIMALS = 7
 
+#: Entries to a turn.
+_MOST = 36_000
+
 #: Points per turn between which a pattern that follows direction is taken: 1e-4 arcsec off where
 #: order 8 is as steep as may be.
 _GRID = 1 << 18
+
+
+def _usual(allowed: Sequence[int], usual: int) -> int:
+    """The usual number of entries, else the largest that is allowed below it, or at all."""
+    return max((n for n in allowed if n <= usual), default=max(allowed, default=usual))
 
 
 @dataclass(frozen=True)
@@ -76,35 +84,38 @@ class SetpointTravel:
         most: int,
         function: Function | None = None,
         divided: int = 0,
+        usual: int = 360,
     ) -> SetpointTravel:
         """Knots over the travel that is asked for, else over what the model was fitted on.
 
         They are of the error at the true angle, for each direction, or of a ``function``. Where
-        entries to a turn must be divisors of a number, that is ``divided``.
+        entries to a turn must be divisors of a number, that is ``divided``. Without a number that
+        is asked for they are the ``usual`` one, or the best that orders and travel leave.
 
         Raises
         ------
         ArgumentError
             More entries than the target takes, too few for the orders, no travel.
         """
-        entries = options["entries"]
         ends = zip(("start", "stop"), _calibrated_travel(pattern), strict=True)
         start, stop = (end if options[key] is None else options[key] for key, end in ends)
         if not stop > start:
             raise ArgumentError(f"stop must be above `start=`, got {start:g} to {stop:g} deg")
         pattern.check_one_turn(target)
-        if not 4 <= entries <= 36_000:
-            raise ArgumentError(f"entries must be from 4 to 36000 a turn, got {entries}")
-        top = int(max(pattern.lines, default=0.0))
-        whole = (n for n in range(2 * top + 1, divided + 1) if divided % n == 0)
-        least = next(whole, 2 * top + 1)
-        pattern.check_orders(entries, target, f"use `entries={least}` or more")
+        largest = min(int((most - 1) * 360.0 / (stop - start) + 1e-9), _MOST)
+        allowed = [
+            n for n in range(max(pattern.least_entries(), 4), largest + 1) if not divided % n
+        ]
+        entries = _usual(allowed, usual) if options["entries"] is None else options["entries"]
+        if not 4 <= entries <= _MOST:
+            raise ArgumentError(f"entries must be from 4 to {_MOST} a turn, got {entries}")
+        pattern.check_orders(entries, target, min(allowed, default=None), largest)
         count = math.ceil((stop - start) * entries / 360.0 - 1e-9) + 1
         if count > most:
-            fits = int((most - 1) * 360.0 / (stop - start))
+            fits = f"`entries={max(allowed)}` or less" if allowed else '`target="c"`'
             raise ArgumentError(
                 f"{target} takes {most} entries, and {entries} a turn over {stop - start:g} deg "
-                f"are {count}: use `entries={fits}` or less, or a shorter travel"
+                f"are {count}: use {fits}, or a shorter travel"
             )
         first = start / 360.0
         forward, reverse = (

@@ -33,7 +33,7 @@ class Siemens840d(Target):
     name = "siemens840d"
     what = "the $AA_ENC_COMP table of a rotary axis of a SINUMERIK"
     kind: ClassVar[FileKind] = FileKind(
-        "a compensation file of SINUMERIK", (".ini", ".mpf", ".spf")
+        "a compensation file of SINUMERIK", (".ini", ".mpf", ".spf", ".txt")
     )
     sign = "add"
     tried = (36, 45, 60, 72, 90, 120, 144, 180, 240, 360, 480, 720, 1440)
@@ -42,7 +42,7 @@ class Siemens840d(Target):
         "file before the axis works with it"
     )
     options = {
-        "entries": Option(int, 360, "to a turn"),
+        "entries": Option(int, None, "to a turn (default: 360, or what orders and travel leave)"),
         **ENDS,
         "axis": Option(str, "AX1", "name of the machine axis"),
         "encoder": Option(("0", "1"), "0", "measuring system of the axis, from 0"),

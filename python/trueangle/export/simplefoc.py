@@ -37,6 +37,8 @@ _2PI = np.float32(6.28318530718)
 _FIXED = 128
 #: Value of a uint16 entry: (entry - 32767) / 10430.2192 rad.
 _MIDDLE = 32767
+#: Entries, at most.
+_MOST = 32767
 _PER_RADIAN = np.float32(10430.2192)
 
 _SIZES = (16, 24, 32, 48, 64, 100, 128, 200, 256, 400, 512, 800, 1024, 2048, 4096)
@@ -48,7 +50,7 @@ class SimpleFoc(Target):
     name = "simplefoc"
     what = "the calibrationLut array of SimpleFOC's CalibratedSensor"
     kind: ClassVar[FileKind] = FileKind(
-        "a C++ source for SimpleFOC", (".h", ".cpp", ".hpp", ".ino")
+        "a C++ source for SimpleFOC", (".h", ".cpp", ".hpp", ".ino", ".txt")
     )
     sign = "subtract"
     unknown = (
@@ -71,12 +73,12 @@ class SimpleFoc(Target):
         variant = options["variant"]
         old = variant == "plus-float"
         entries = _FIXED if old else options["entries"]
-        if not 4 <= entries <= 32767:
-            raise ArgumentError(f"entries must be from 4 to 32767, got {entries}")
+        if not 4 <= entries <= _MOST:
+            raise ArgumentError(f"entries must be from 4 to {_MOST}, got {entries}")
         if not old:
-            knots = one_turn_knots(pattern, entries, self.name, False)
+            knots = one_turn_knots(pattern, entries, self.name, _MOST)
         else:
-            knots = one_turn_knots(pattern, entries, f"{self.name} of variant {variant}", True)
+            knots = one_turn_knots(pattern, entries, f"{self.name} of variant {variant}")
         # What moves with the zero would move the motor's electrical zero.
         knots, zero_deg = without_mean(knots, pattern)
         radians = knots * (2.0 * math.pi)

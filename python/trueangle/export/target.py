@@ -219,9 +219,9 @@ class Target(ABC):
         """Entries to try for ``max_arcsec``, increasing; none where the size is fixed."""
         return self.tried
 
-    def finer(self, options: Mapping[str, Any]) -> Mapping[str, Any] | None:
-        """Options to try where no size keeps ``max_arcsec``."""
-        return None
+    def finer(self, options: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+        """Options with which its sizes are tried again where none keeps a maximum."""
+        return ()
 
     def checked(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """All options with their defaults.

@@ -27,7 +27,7 @@ class Tinymovr(Target):
 
     name = "tinymovr"
     what = "the rec_table of a Tinymovr sensor"
-    kind: ClassVar[FileKind] = FileKind("a C source for Tinymovr", (".h", ".c"))
+    kind: ClassVar[FileKind] = FileKind("a C source for Tinymovr", (".h", ".c", ".txt"))
     sign = "add"
     unknown = (
         "no command that writes rec_table from outside is known: the firmware fills it by its own "
@@ -46,7 +46,8 @@ class Tinymovr(Target):
         if entries & (entries - 1) or not 4 <= entries <= 1 << bits:
             raise ArgumentError(f"entries must be a power of two up to 2^bits, got {entries}")
         ticks = 1 << bits
-        knots = -one_turn_knots(pattern, entries, self.name, False, binary=True) * ticks
+        most = ticks if "entries" in self.options else 0
+        knots = -one_turn_knots(pattern, entries, self.name, most, binary=True) * ticks
         # The shift between two entries cuts down: half a tick less on the mean.
         tried = [rounded_knots(knots + lift).astype(np.int64) for lift in (0.0, 0.5)]
         readings = np.arange(ticks)

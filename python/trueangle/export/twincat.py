@@ -49,7 +49,7 @@ class TwinCat(Target):
     )
     options = {
         "variant": Option(("cnc", "nc"), "cnc", "cnc: kw.ssfk list; nc: Position,Compensation"),
-        "entries": Option(int, 360, "to a turn"),
+        "entries": Option(int, None, "to a turn (default: 360, or what orders and travel leave)"),
         **ENDS,
         "bits": POSITIONS,
     }

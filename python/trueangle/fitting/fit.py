@@ -386,5 +386,7 @@ def _selected(
         runs = [without_spikes(run) for run in runs]
     selection = selected_orders(runs, **sought, summed=summed)
     if not selection.orders:
-        raise NoOrderError(f"no order is supported by the data: {selection.reason}")
+        raise NoOrderError(
+            f"no order is supported by the data: {selection.reason}", sum(map(len, runs))
+        )
     return selection, selection.by_shaft

@@ -14,6 +14,7 @@ from ..errors import ArgumentError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
+from ..runs.checks.copies import duplicate_rows, duplicate_runs
 from ..runs.checks.jumps import missed_counts
 from ..runs.checks.record import records_of
 from ..support.angles import wrap
@@ -52,8 +53,9 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         rows = "row" if fit.missing == 1 else "rows"
         yield f"{fit.missing} {rows} with an empty cell left out."
     yield from (_sentence(remark) for remark in fit.remarks)
-    for fault in () if fit.moments is not None else missed_counts(records_of(fit.runs)):
-        yield _sentence(f"{fault.says}; {fault.mend}")
+    records = records_of(fit.runs) if fit.moments is None else []
+    for test in (duplicate_runs, duplicate_rows, missed_counts):
+        yield from (_sentence(f"{fault.says}; {fault.mend}") for fault in test(records))
     if fit.ridge > 0.0:
         where = "arc" if fit.problem.is_periodic else "travel"
         yield (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -13,6 +14,9 @@ from ..support.signals import SIGNALS
 from ..support.suggestions import check_choice, did_you_mean
 
 UNITS = (*UNIT_PERIODS, "count")
+
+#: A column of corrected angles, as `_corrected_name` names it.
+_CORRECTED = re.compile(rf"(?:^|[_/])corrected_(?:{'|'.join(UNITS)})(?:_|$)")
 
 #: Column endings of the signals that terms of a model may need.
 SIGNAL_COLUMNS = {
@@ -71,6 +75,14 @@ def find_angle_column(
         column = _search(path, header, joint)
     else:
         column, is_reversed = signed_name(path, header, column)
+    if _CORRECTED.search(column):
+        raise FileError(
+            path,
+            "holds corrected angles: name the indicated ones as `column=`; to correct them once "
+            "more, rename it",
+            line=1,
+            column=column,
+        )
     stated = unit or _unit_of(column, joint)
     unit = stated or unit_name(model_period)
     period = ANGLE_UNITS.get(unit) or counts_per_turn

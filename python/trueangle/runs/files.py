@@ -17,6 +17,7 @@ from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, u
 from ..support.signals import FIELDS
 from ..support.times import local_day
 from .angles import find_run_angles
+from .channels import two_channels
 from .facets import Facets, read_facets
 from .readings import FileReadings
 from .run import CalibrationRun, as_runs, runs_or_data
@@ -238,7 +239,8 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
     for found, rows in _groups(table, reference.size):
         present = rows[~missing[rows]]
         if not present.size:
-            raise FileError(path, f"every row of run {found.run or path.name} has an empty cell")
+            problem = f"every row of run {found.run or path.name} has an empty cell"
+            raise FileError(path, problem + two_channels(table, given, reference, indicated))
         groups.append((found, present))
         left_out.append(rows.size - present.size)
     _warn_of_empty(table, missing, {"reference": reference, "indicated": indicated, **signals})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from collections.abc import Callable
 from pathlib import Path
@@ -218,9 +219,20 @@ def coarse() -> list[ta.CalibrationRun]:
     return one_run(theta, 300.0 * np.sin(np.radians(theta)))
 
 
+def few() -> list[ta.CalibrationRun]:
+    theta = np.arange(0.0, 360.0, 33.0)
+    return one_run(theta, np.random.default_rng(6).normal(0.0, 5.0, theta.size))
+
+
 #: What is refused: readings, the command, words of the message, the command that helps.
 REFUSALS: dict[str, tuple[Callable[[], list[ta.CalibrationRun]], list[str], str, str]] = {
     "no order": (noise, ["fit", "R", "-o", "m.json"], "no order is supported", "diagnose"),
+    "no order, few readings": (
+        few,
+        ["fit", "R", "-o", "m.json"],
+        "take 20 readings or more",
+        "plan",
+    ),
     "no order, a gear": (
         noise,
         ["fit", "R", "-o", "m.json", "--gear-ratio", "50.5", "--fixed-member", "none"],
@@ -420,3 +432,113 @@ def test_nothing_believed_needs_a_joint_and_a_joint_no_file(
         if f["cause"] == "missing_order"
     ]
     assert 200.0 in orders
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        ("report R --orders 1 -o", "r.txt"),
+        ("plot R --orders 1 -o", "p.xyz"),
+        ("fit R --orders 1 -o", "m.mdl"),
+        ("correct R -m M -o", "x.yyy"),
+        ("export M --to c -o", "t.inc"),
+        ("export M --to moteus -o", "t.toml"),
+    ],
+)
+def test_the_name_that_an_unknown_ending_should_have_is_taken(
+    command: str, name: str, desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.0])], period=360.0).save("m.json")
+    words = [{"R": "runs.csv", "M": "m.json"}.get(word, word) for word in command.split()]
+    if words[0] == "report":
+        pytest.importorskip("bokeh")
+    assert main([*words, name]) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert f"{name}: the ending .{name[2:]} " in said
+    assert not (desk / name).exists()
+    better = said.rpartition("; name it ")[2].strip()
+    assert main([*words, better]) == 0
+    assert (desk / better).is_file()
+
+
+@pytest.mark.parametrize("units", [":deg", ""])
+def test_two_channels_in_one_file_are_joined_as_it_says(
+    units: str, desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A log on change: either angle has rows of its own."""
+    ending = "" if units else "_deg"
+    time = np.arange(300) * 0.1
+    theta = 40.0 * time + 30.0 * np.sin(time)
+    rows = [f"time_s,reference{ending},indicated{ending}"]
+    for t, x in zip(time, theta, strict=True):
+        rows += [f"{t:.4f},{x:.6f},", f"{t + 0.037:.4f},,{0.2 + x + 1.48:.6f}"]
+    (desk / "two logs.csv").write_text("\n".join(rows) + "\n")
+    asked = [f"{role}={role}{units}" for role in ("reference", "indicated") if units]
+    words = [word for one in asked for word in ("--signal", one)]
+    for command in (["check"], ["fit", "-o", "m.json"]):
+        assert main([command[0], "two logs.csv", *command[1:], *words]) == 1
+        said = capsys.readouterr().err
+        assert "the two angles have rows of their own" in said
+    program, *again = shlex.split(said.split("; run: ")[1])
+    assert (program, again[0]) == ("trueangle", "join")
+    assert main(again) == 0
+    (run,) = ta.read_runs(again[again.index("-o") + 1])
+    assert len(run) > 290
+
+
+@pytest.mark.parametrize(
+    ("order", "words", "steps"),
+    [
+        (400, "minicheetah", 1),
+        (400, "linuxcnc", 1),
+        (100, "linuxcnc", 0),
+        (40, "linuxcnc --stop 720", 0),
+        (40, "linuxcnc --stop 720 --entries 180", 1),
+        (40, "linuxcnc --entries 60", 1),
+        (100, "tinymovr", 1),
+        (5000, "tinymovr", 1),
+        (100, "simplefoc", 1),
+        (300, "moteus", 1),
+        (200, "csv", 1),
+        (300, "pmac --counts-per-turn 65536", 0),
+        (300, "pmac --counts-per-turn 65536 --entries 512", 1),
+        (900, "twincat", 1),
+        (40, "c --entries 16 --bits 12", 1),
+    ],
+)
+def test_the_entries_or_the_target_that_is_advised_works(
+    order: int, words: str, steps: int, desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shaft = ta.Shaft("output", 1, [1, order], [0.1, 0.0], [0.0, 1e-4])
+    ta.HarmonicModel([shaft], period=360.0).save("m.json")
+    target, *more = words.split()
+    for _ in range(steps):
+        assert main(["export", "m.json", "-o", "t.txt", "--to", target, *more]) == 1
+        advice = re.search(r": use --(\w+) (\w+)", capsys.readouterr().err)
+        assert advice is not None
+        if advice[1] == "to":
+            target, more = advice[2], []
+        elif "--entries" in more:
+            more[more.index("--entries") + 1] = advice[2]
+        else:
+            more += ["--entries", advice[2]]
+    assert main(["export", "m.json", "-o", "t.txt", "--to", target, *more]) == 0
+
+
+@pytest.mark.parametrize("amplitude", [12.0, 40.0, 55.0])
+@pytest.mark.parametrize("target", ["c", "rust"])
+def test_a_steep_model_is_exported_without_options(
+    target: str, amplitude: float, desk: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shaft = ta.Shaft("output", 1, [1, 2], [amplitude, 0.0], [0.0, 0.3])
+    ta.HarmonicModel([shaft], period=360.0).save("m.json")
+    words = ["export", "m.json", "--to", target, "-o", "t.txt", "--bits", "12"]
+    assert main(words) == 0
+    assert main([*words, "--max-arcsec", "300"]) == 0
+    assert main([*words, "--number", "q15", "--method", "cubic"]) == (amplitude > 11.25)
+    said = capsys.readouterr().err
+    if said:
+        advice = re.search(r"; use --number (\w+)", said)
+        assert advice is not None
+        assert main([*words, "--method", "cubic", "--number", advice[1]]) == 0

@@ -31,6 +31,10 @@ REFUSED = [
     ({"column": "x"}, ["y"], "'x': no such column"),
     ({"column": "x", "unit": "count"}, ["x"], "`counts_per_turn=`"),
     ({}, ["indicated_deg", "corrected_deg"], "corrected before"),
+    *(
+        ({"column": name, "unit": "turn"}, [name], "holds corrected angles: name the indicated")
+        for name in ("corrected_deg", "corrected_rad_j3", "j3_corrected_count", "a/corrected_turn")
+    ),
 ]
 
 

@@ -165,7 +165,8 @@ def test_names_that_name_no_file(name, tmp_path, model, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "ending", [".csv", ".parquet", ".PDF", ".html", ".toml", ".json.gz", ".xlsx", ".png"]
+    "ending",
+    [".csv", ".parquet", ".PDF", ".html", ".toml", ".json.gz", ".xlsx", ".png", ".v2", ".dat"],
 )
 def test_an_ending_of_another_format_is_refused(ending, tmp_path, model):
     with pytest.raises(FileError, match=r"ending .*name it .*\.json"):
@@ -173,8 +174,8 @@ def test_an_ending_of_another_format_is_refused(ending, tmp_path, model):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["joint.json", "joint.JSON", "joint", "joint.v2", ".model"])
-def test_endings_that_promise_nothing_else_are_taken(name, tmp_path, model):
+@pytest.mark.parametrize("name", ["joint.json", "joint.JSON", "joint", ".model"])
+def test_endings_of_the_format_and_none_are_taken(name, tmp_path, model):
     model.save(tmp_path / name)
     assert ta.load_model(tmp_path / name) == model
 

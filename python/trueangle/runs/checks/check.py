@@ -17,10 +17,11 @@ from .angles import (
     swapped_channels,
     told_ratio,
 )
+from .copies import duplicate_rows, duplicate_runs
 from .fault import DataFault
 from .jumps import missed_counts
 from .outliers import outliers
-from .record import LEAST_READINGS, Record, read_records, records_of
+from .record import Record, read_records, records_of
 from .still import stuck_readings
 
 if TYPE_CHECKING:
@@ -103,49 +104,6 @@ def _records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
     return read_records(data, reading)
 
 
-def duplicate_runs(records: list[Record]) -> Iterator[DataFault]:
-    """Runs whose readings are equal to the last digit."""
-    if len(records) < 2:
-        return
-    import hashlib
-
-    same: dict[bytes, list[str]] = {}
-    for record in records:
-        if len(record) >= LEAST_READINGS and np.ptp(record.indicated) > 0.0:
-            data = np.concatenate([record.reference, record.indicated]).tobytes()
-            same.setdefault(hashlib.sha256(data).digest(), []).append(record.label)
-    for labels in same.values():
-        if len(labels) > 1:
-            yield DataFault.of(
-                "duplicate_runs",
-                labels,
-                (),
-                f"runs {_listed(labels)} hold the same readings, to the last digit: "
-                "noise and repeatability would come out too good",
-                "keep one of them",
-            )
-
-
-def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
-    """Rows with one time stamp and the same readings."""
-    for record in records:
-        if record.time is None:
-            continue
-        table = np.column_stack([record.time, record.reference, record.indicated])
-        order = np.lexsort(table.T)
-        again = np.flatnonzero((np.diff(table[order], axis=0) == 0.0).all(axis=1)) + 1
-        if again.size:
-            rows = np.sort(record.rows[order[again]])
-            yield DataFault.of(
-                "duplicate_rows",
-                [record.label],
-                rows.tolist(),
-                f"{rows.size} row{'s' * (rows.size > 1)} of run {record.label} (first: row "
-                f"{rows[0]}) are there twice, time stamp and readings",
-                "drop the second of each",
-            )
-
-
 def unsorted_time(records: list[Record]) -> Iterator[DataFault]:
     """Time that runs backwards within a run."""
     for record in records:
@@ -163,10 +121,6 @@ def unsorted_time(records: list[Record]) -> Iterator[DataFault]:
                 f"{record.time[k]:g} s after {record.time[k - 1]:g} s)",
                 "sort the rows by time, or give what follows another run label",
             )
-
-
-def _listed(labels: list[str]) -> str:
-    return f"{', '.join(labels[:-1])} and {labels[-1]}"
 
 
 #: Every test of the data, in the order in which they are told.

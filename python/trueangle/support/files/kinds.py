@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from ...errors import FileError
+from ..suggestions import listed_names
 
 #: Endings that promise a format, by its name: a file of another must not bear them. Those of
 #: logs are declared by their formats.
@@ -71,12 +72,17 @@ def ending_of(path: str | PathLike[str]) -> str:
 class FileKind(NamedTuple):
     """A kind of file: what it is called, and the endings it may bear.
 
-    Endings that promise no format (``.txt``, ``.dat``, none) fit every kind.
+    A name without an ending fits every kind.
 
     Examples
     --------
-    >>> MODEL.check("joint.json"), MODEL.check("joint.model")
+    >>> MODEL.check("joint.json"), MODEL.check("joint")
     (None, None)
+    >>> MODEL.check("joint.mdl")
+    Traceback (most recent call last):
+    ...
+    trueangle.errors.FileError: joint.mdl: the ending .mdl is none of a model (JSON) (.json); \
+name it joint.json
     >>> MODEL.check("joint.csv")
     Traceback (most recent call last):
     ...
@@ -88,7 +94,7 @@ a model (JSON); name it joint.json
     endings: tuple[str, ...]
 
     def check(self, path: str | PathLike[str]) -> None:
-        """Refuse an ending that promises another format.
+        """Refuse an ending that is none of these.
 
         Raises
         ------
@@ -96,16 +102,18 @@ a model (JSON); name it joint.json
         """
         better = self.fitting(path)
         if better != Path(path):
-            raise FileError(
-                path,
-                f"the ending {ending_of(path)} means {promised_format(path)}, but what is written "
-                f"is {self.what}; name it {better}",
+            promised = promised_format(path)
+            why = (
+                f"is none of {self.what} ({listed_names(self.endings)})"
+                if promised is None
+                else f"means {promised}, but what is written is {self.what}"
             )
+            raise FileError(path, f"the ending {ending_of(path)} {why}; name it {better}")
 
     def fitting(self, path: str | PathLike[str]) -> Path:
-        """The name, with an ending of this kind in place of one that promises another format."""
+        """The name, with an ending of this kind in place of another."""
         named, ending = Path(path), ending_of(path)
-        if ending in self.endings or promised_format(path) is None:
+        if not ending or ending in self.endings:
             return named
         return named.with_name(named.name[: -len(ending)] + self.endings[0])
 
@@ -123,7 +131,8 @@ def kind_of_log(path: str | PathLike[str]) -> FileKind:
         if ending in endings and name:
             return FileKind(f"{name}, as the log is", (ending, *endings))
     texts = [entry for entry in log_endings() if entry.startswith((".csv", ".tsv", ".tab", ".txt"))]
-    return FileKind("text, as the log is", tuple(texts))
+    own = [ending] if promised_format(path) is None else []
+    return FileKind("text, as the log is", (*own, *texts))
 
 
 def promised_format(path: str | PathLike[str]) -> str | None:
@@ -138,7 +147,7 @@ FLEET: Final = FileKind("a fleet (JSON)", (".json",))
 SIMULATION: Final = FileKind("a simulation (TOML)", (".toml",))
 #: What a simulator takes, by the ending.
 SENSOR: Final = FileKind("a sensor of a simulator (MJCF or FMU)", (".xml", ".fmu"))
-RUNS: Final = FileKind("a table of runs (CSV)", (".csv",))
+RUNS: Final = FileKind("a table of runs (CSV)", (".csv", ".txt"))
 PAGE: Final = FileKind("a report (HTML)", (".html", ".htm"))
 PDF: Final = FileKind("a report (PDF)", (".pdf",))
 #: What a picture is written as, by the ending.

@@ -175,6 +175,15 @@ def test_rows_and_runs_that_are_there_twice() -> None:
         "1 row "
     )
     assert not list(duplicate_rows([record(SWEEP[twice])]))
+    copied = np.random.default_rng(3).permutation(np.repeat(np.arange(160), 3))
+    (found,) = duplicate_rows([record(SWEEP[copied])])
+    assert len(found.rows) == 2 * 160
+    assert found.says.startswith(
+        f"every reading of run 1 is there 3 times, to the last digit (first again: row "
+        f"{found.rows[0]})"
+    )
+    assert not list(duplicate_rows([record(SWEEP[copied[1:]])]))
+    assert not list(duplicate_rows([record(SWEEP[[5, 9, 5, 9]])]))
     assert not list(duplicate_rows([record(SWEEP, time=time)]))
     assert not list(duplicate_rows([record(SWEEP[one], time=np.arange(161.0))]))
     back = time.copy()

@@ -211,3 +211,26 @@ def test_one_column_is_label_and_mount(tmp_path: Path) -> None:
         FileError, match="line 50, column 'turned': a number is needed, got 'third'"
     ):
         ta.read_runs(path, signals={"run": "turned", "mount": ("turned", "deg")})
+
+
+@pytest.mark.parametrize("times", [2, 5])
+def test_copies_of_all_rows_are_told_by_check_and_fit(times: int, tmp_path: Path, capsys) -> None:
+    rng = np.random.default_rng(times)
+    theta = rng.uniform(0.0, 360.0, 90)
+    error = 0.1 * np.sin(np.radians(theta)) + rng.normal(0.0, 3e-3, 90)
+    rows = [f"{t:.4f},{t + e:.4f}" for t, e in zip(theta, error, strict=True)]
+    path = tmp_path / "r.csv"
+    for count in (1, times):
+        path.write_text("\n".join(["reference_deg,indicated_deg", *count * rows]) + "\n")
+        words = f"very reading of run 1 is there {count} times, to the last digit"
+        told = [str(fault) for fault in ta.check(path).data_faults if words in fault.says]
+        notes = [note for note in ta.fit(path, orders=[1]).notes if words in note]
+        assert main(["fit", str(path), "--orders", "1", "-o", str(tmp_path / "m.json")]) == 0
+        assert (words in capsys.readouterr().err) == (count > 1)
+        assert len(told) == len(notes) == (count > 1)
+    assert f"(first again: row {90 + 1})" in notes[0]
+    assert notes[0].endswith("drop the copies.")
+    # It is done as it says.
+    (fault,) = ta.check(path).data_faults
+    kept = [row for k, row in enumerate(times * rows, 1) if k not in fault.rows]
+    assert kept == rows
