@@ -31,6 +31,7 @@ from .robust import (
     without_spikes,
 )
 from .uncertainty import CovarianceKind, check_covariance
+from .worth import of_worth
 
 if TYPE_CHECKING:
     from .orders.result import OrderSelection
@@ -181,7 +182,7 @@ def fit(
             (posterior.note(),),
             posterior=posterior,
         )
-    return fitted_to(
+    result = fitted_to(
         runs_of(runs, reading),
         orders,
         gear_ratio=gear_ratio,
@@ -196,6 +197,7 @@ def fit(
         method=method,
         threads=threads,
     )
+    return result if result.evidence is None else of_worth(result)
 
 
 def fitted_to(
@@ -312,7 +314,7 @@ def fitted_to(
         remarks.append(unsettled_weights_sentence(weighted))
     if summed is not None:
         remarks.append(summed.note)
-    result = FitResult(
+    return FitResult(
         problem,
         fitted,
         weighted,
@@ -325,11 +327,6 @@ def fitted_to(
         covariance,
         taken,
     )
-    if selection is not None:
-        from .worth import check_worth
-
-        check_worth(result)
-    return result
 
 
 def _weighted_runs(

@@ -163,22 +163,23 @@ def folds(count: int, most: int) -> list[list[int]]:
 
 
 def _refit(fit: FitResult, train: Sequence[CalibrationRun]) -> HarmonicModel:
-    from .fit import fit as fit_runs
+    from .fit import fitted_to
 
-    loss = cast(Loss, fit.loss)
-    argument = fit.problem.argument
-    shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.problem.shafts}
-    if fit.evidence is None:
-        orders = {shaft.name: shaft.orders for shaft in fit.problem.shafts}
-        return fit_runs(train, orders, shafts=shafts, argument=argument, loss=loss).bare_model
     ratio, member = fit.joint
-    return fit_runs(
+    shafts, orders = None if fit.evidence is None else fit.evidence.shafts, None
+    if fit.evidence is None:
+        ratio = None
+        shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.problem.shafts}
+        orders = {shaft.name: shaft.orders for shaft in fit.problem.shafts}
+    return fitted_to(
         train,
+        orders,
         gear_ratio=ratio,
         fixed_member=member,
-        shafts=fit.evidence.shafts,
-        argument=argument,
-        loss=loss,
+        shafts=shafts,
+        argument=fit.problem.argument,
+        loss=cast(Loss, fit.loss),
+        covariance="auto",
     ).bare_model
 
 

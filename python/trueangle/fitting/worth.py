@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 _LOOKED_AT: Final = 512
 
 
-def check_worth(fit: FitResult) -> None:
-    """Refuse a correction whose amplitude is below its own standard error.
+def of_worth(fit: FitResult) -> FitResult:
+    """The fit; refuse a correction whose amplitude is below its own standard error.
 
     ::
 
@@ -37,7 +37,7 @@ def check_worth(fit: FitResult) -> None:
     """
     model = fit.model
     if model.covariance is None:
-        return
+        return fit
     places = np.concatenate(fit.problem.angles)
     places = places[:: 1 + places.size // _LOOKED_AT]
     shafts = [(shaft.cycles_per_turn, shaft.orders) for shaft in model.shafts]
@@ -54,3 +54,4 @@ def check_worth(fit: FitResult) -> None:
             f"below its own standard error of {unit.text(error)}; measure more runs, or declare "
             "the --orders"
         )
+    return fit

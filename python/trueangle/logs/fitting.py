@@ -16,6 +16,7 @@ from ..fitting.result import FitResult
 from ..fitting.robust import without_spikes
 from ..fitting.summed import SummedReadings
 from ..fitting.uncertainty import CovarianceKind, check_covariance
+from ..fitting.worth import of_worth
 from ..joint.shafts import resolve_orders
 from ..runs.files import read_runs
 from ..runs.follows import check_usable
@@ -153,7 +154,8 @@ def fit_logs(
     def fitted(summed: SummedReadings) -> FitResult:
         return fitted_to(summed.runs, orders, summed=summed, threads=threads, **options)  # type: ignore[arg-type]
 
-    return fitted(passes.first(argument)) if loss == "linear" else passes.settled(argument, fitted)
+    found = fitted(passes.first(argument)) if loss == "linear" else passes.settled(argument, fitted)
+    return found if found.evidence is None else of_worth(found)
 
 
 def select_log_orders(

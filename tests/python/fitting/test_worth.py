@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import ArgumentError, NoModelError
-from trueangle.fitting.worth import check_worth
+from trueangle.fitting.worth import of_worth
 
 SEED = 88_200
 
@@ -20,7 +20,7 @@ def refused(amplitude: float, seed: int, stop: float = 360.0, ridge: float | Non
     if stop < 360.0:  # a coefficient is hardly known, the curve is
         assert (fit.amplitude_std > 0.3 * fit.amplitudes).any()
     try:
-        check_worth(fit)
+        of_worth(fit)
     except NoModelError:
         return True
     return False
