@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +12,16 @@ from ..support.arrays import Array
 from ..support.roles import RoleColumn
 
 if TYPE_CHECKING:
-    from .files import Conversion
     from .readings import FileReadings
 
 
-def two_channels(table: FileReadings, given: Conversion, reference: Array, indicated: Array) -> str:
-    """The command that joins two angles with rows of their own; empty for others."""
+def two_channels(
+    table: FileReadings, counts: Mapping[str, float | None], reference: Array, indicated: Array
+) -> str:
+    """The command that joins two angles with rows of their own; empty for others.
+
+    ``counts`` are those of a turn, by the option that states them.
+    """
     both = np.isfinite(reference) & np.isfinite(indicated)
     roles = table.roles
     if both.any() or not {"reference", "indicated", "time"} <= roles.keys():
@@ -25,10 +30,9 @@ def two_channels(table: FileReadings, given: Conversion, reference: Array, indic
     for role, log in (("indicated", "a."), ("reference", "b."), ("time", "")):
         if log or roles[role].is_asked:
             words += ["--signal", f"{log}{role}={_typed(roles[role])}"]
-    counts = {"": given.counts, "-reference": given.reference_counts}
-    for ending, count in counts.items():
+    for option, count in counts.items():
         if count is not None:
-            words += [f"--counts-per-turn{ending}", f"{count:g}"]
+            words += [option, f"{count:.17g}"]
     return f": the two angles have rows of their own; run: {shlex.join(words)}"
 
 

@@ -240,7 +240,11 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
         present = rows[~missing[rows]]
         if not present.size:
             problem = f"every row of run {found.run or path.name} has an empty cell"
-            raise FileError(path, problem + two_channels(table, given, reference, indicated))
+            counts = {
+                "--counts-per-turn": given.counts,
+                "--counts-per-turn-reference": given.reference_counts,
+            }
+            raise FileError(path, problem + two_channels(table, counts, reference, indicated))
         groups.append((found, present))
         left_out.append(rows.size - present.size)
     _warn_of_empty(table, missing, {"reference": reference, "indicated": indicated, **signals})

@@ -462,7 +462,7 @@ def test_the_name_that_an_unknown_ending_should_have_is_taken(
     assert (desk / better).is_file()
 
 
-@pytest.mark.parametrize("units", [":deg", ""])
+@pytest.mark.parametrize("units", [":deg", ":count", ""])
 def test_two_channels_in_one_file_are_joined_as_it_says(
     units: str, desk: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -476,6 +476,8 @@ def test_two_channels_in_one_file_are_joined_as_it_says(
     (desk / "two logs.csv").write_text("\n".join(rows) + "\n")
     asked = [f"{role}={role}{units}" for role in ("reference", "indicated") if units]
     words = [word for one in asked for word in ("--signal", one)]
+    if units == ":count":
+        words += ["--counts-per-turn", "360", "--counts-per-turn-reference", "360"]
     for command in (["check"], ["fit", "-o", "m.json"]):
         assert main([command[0], "two logs.csv", *command[1:], *words]) == 1
         said = capsys.readouterr().err
