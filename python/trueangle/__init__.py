@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
 
-from ._core import __version__
-
+TYPE_CHECKING = False  # without typing, and without the core: Ctrl-C in here has a traceback
 if TYPE_CHECKING:
+    from typing import Any
+
     from . import errors as errors
     from . import plots as plots
+    from ._core import __version__ as __version__
     from .diagnosis import Diagnosis as Diagnosis
     from .diagnosis.diagnose import diagnose as diagnose
     from .errors import TrueAngleError as TrueAngleError
@@ -63,6 +64,7 @@ if TYPE_CHECKING:
 
 #: Public names and the modules that define them; a module is imported at first use.
 _PUBLIC = {
+    "__version__": "_core",
     "TrueAngleError": "errors",
     "wrap": "support.angles",
     "CalibrationRun": "runs.run",
@@ -122,7 +124,7 @@ _PUBLIC = {
 #: Modules that are reached as attributes, likewise imported at first use.
 _MODULES = {"errors": "errors", "plots": "plots", "terms": "model.terms"}
 
-__all__ = ["__version__", *sorted([*_PUBLIC, *_MODULES])]
+__all__ = sorted([*_PUBLIC, *_MODULES])
 
 
 def __getattr__(name: str) -> Any:

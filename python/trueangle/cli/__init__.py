@@ -16,15 +16,10 @@ from typing import NoReturn, Protocol
 from .._core import __version__
 from ..errors import ArgumentError, TrueAngleError, shortened
 from ..support.layout import wrapped_lines
+from .ending import Ending
 from .parser import Parser
 from .paths import check_paths
-from .terminal import (
-    STANDARD_OUTPUT,
-    Ending,
-    ending_by_signals,
-    plain_streams,
-    silence_output,
-)
+from .terminal import STANDARD_OUTPUT, plain_streams, silence_output
 from .wording import Wording
 
 __all__ = ["COMMANDS", "main", "process"]
@@ -116,21 +111,24 @@ def main(argv: Sequence[str] | None = None) -> int:
         shell says it, 130, 143, 129 interrupted (Ctrl-C, SIGTERM, SIGHUP) and 141: who read
         standard output has gone.
     """
-    wording = Wording()
-    with plain_streams(wording), ending_by_signals() as ending:
-        words = list(sys.argv[1:] if argv is None else argv)
-        # The others are looked at only where their names are to be told.
-        called = words[:1] if words and words[0] in COMMANDS else COMMANDS
-        parser = build_parser(words, called)
-        wording.parser = parser.commands.get(words[0] if words else "")
-        args = parser.parse_args(words)
-        before, warnings.showwarning = warnings.showwarning, _print_warning
+    wording, ending = Wording(), Ending()
+    args = argparse.Namespace(debug=False)
+    before = warnings.showwarning
+    with plain_streams(wording):
         try:
-            check_paths(args)
-            status: int = args.handler(args)
-            # What waits to be printed can fail as well: a full disk, a reader that has gone.
-            if sys.stdout is not None:
-                sys.stdout.flush()
+            with ending:
+                words = list(sys.argv[1:] if argv is None else argv)
+                # The others are looked at only where their names are to be told.
+                called = words[:1] if words and words[0] in COMMANDS else COMMANDS
+                parser = build_parser(words, called)
+                wording.parser = parser.commands.get(words[0] if words else "")
+                args = parser.parse_args(words)
+                warnings.showwarning = _print_warning
+                check_paths(args)
+                status: int = args.handler(args)
+                # What waits to be printed can fail as well: a full disk, a reader that has gone.
+                if sys.stdout is not None:
+                    sys.stdout.flush()
         except SystemExit:
             raise
         except BaseException as error:  # a panic of the core is no Exception
@@ -160,8 +158,8 @@ def _failed(
         import traceback  # brings the tokenizer with it
 
         traceback.print_exception(error)
-    if isinstance(error, KeyboardInterrupt):
-        told = str(error)
+    if ending.came or isinstance(error, KeyboardInterrupt):
+        told = str(error) if isinstance(error, KeyboardInterrupt) else ""
         _say(ending.text + (f": {told}" if told else ""))
         return ending.status
     if isinstance(error, OSError) and error.filename == STANDARD_OUTPUT:

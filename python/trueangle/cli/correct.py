@@ -10,11 +10,11 @@ from ..errors import ArgumentError, TrueAngleError
 from ..support.display_units import ErrorsIn, error_unit
 from ..support.plainresult import json_text
 from ..support.suggestions import did_you_mean, listed_names
+from .ending import own_interrupts
 from .options import add_errors_in, errors_in
 from .paths import Input, ModelInput
 from .robots import add_robot, joints_asked
 from .signal_options import add_signals, signals_by_joint
-from .terminal import own_interrupts
 
 if TYPE_CHECKING:
     from ..logs.batch import BatchReport, LogReport

@@ -6,8 +6,8 @@ import argparse
 from typing import Any, Final
 
 from ..errors import ArgumentError
+from .ending import own_interrupts
 from .signal_options import reading_options
-from .terminal import own_interrupts
 from .values import declared_shafts
 
 #: Readings, two numbers of 8 bytes each, that are read into runs: 256 MiB of them.

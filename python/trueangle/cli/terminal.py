@@ -1,14 +1,12 @@
-"""The terminal: plain streams that nothing steers, colours where it has them, ending by signals."""
+"""The terminal: plain streams that nothing steers, colours where it has them."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import re
-import signal
 import sys
 from collections.abc import Callable, Iterator
-from types import FrameType
 from typing import Any, Final, TextIO
 
 STANDARD_OUTPUT: Final = "standard output"
@@ -19,10 +17,6 @@ _UNPRINTABLE: Final = (
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2028\u2029"
     "\u2066-\u2069\ufeff\ud800-\udfff]"
 )
-#: Signals beside Ctrl-C that ask a command to end: what kill, a service manager and a closed
-#: terminal send.
-_ENDINGS: Final = ("SIGTERM", "SIGHUP")
-
 #: What lays out text is no control character here.
 _LAID_OUT: Final = {ord("\t"): None, ord("\n"): None}
 
@@ -124,18 +118,6 @@ def plain_streams(wording: Callable[[str], str] = str) -> Iterator[None]:
         yield
 
 
-def own_interrupts() -> None:
-    """Let Ctrl-C reach Python alone, before logs are read.
-
-    While it parses a block, pyarrow takes signals itself, and now and then loses one.
-    """
-    try:
-        import pyarrow
-    except ImportError:
-        return
-    pyarrow.enable_signal_handlers(False)
-
-
 def silence_output() -> None:
     """Send what is still to be printed nowhere: Python would complain of it at its end."""
     try:
@@ -184,49 +166,3 @@ def coloured_text(text: str) -> str:
     for pattern, code in _RULES:
         text = pattern.sub(f"\x1b[{code}m\\g<0>\x1b[0m", text)
     return text
-
-
-class Ending:
-    """The signal that ended the work; Ctrl-C's where none of the others came."""
-
-    number = int(signal.SIGINT)
-
-    @property
-    def status(self) -> int:
-        """The exit status, as a shell tells it."""
-        return 128 + self.number
-
-    @property
-    def text(self) -> str:
-        """What is told of it."""
-        named = "" if self.number == signal.SIGINT else f" by {signal.Signals(self.number).name}"
-        return f"interrupted{named}"
-
-
-@contextlib.contextmanager
-def ending_by_signals() -> Iterator[Ending]:
-    """Let SIGTERM and SIGHUP raise KeyboardInterrupt, where they would end the process at once.
-
-    What ignores them (``nohup``) or has handlers of its own keeps them; so do threads other
-    than the main one. A second one does not disturb the clearing up after the first.
-    """
-    found = Ending()
-    before: dict[int, Any] = {}
-
-    def end(number: int, frame: FrameType | None) -> None:
-        found.number = number
-        for other in before:
-            signal.signal(other, signal.SIG_IGN)
-        raise KeyboardInterrupt
-
-    for name in _ENDINGS:
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
-            with contextlib.suppress(ValueError):  # outside the main thread
-                signal.signal(number, end)
-                before[number] = signal.SIG_DFL
-    try:
-        yield found
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

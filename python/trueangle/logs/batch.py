@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ..errors import TrueAngleError, UnitWarning
 from ..model.model import HarmonicModel
@@ -22,6 +22,8 @@ from .report import BatchReport, LogReport, done_before
 from .sources import LogTarget, output_places
 
 __all__ = ["BatchReport", "LogReport", "correct_logs"]
+
+_Error = TypeVar("_Error", bound=BaseException)
 
 
 @told_kinds
@@ -123,8 +125,8 @@ def correct_logs(
                 from .cluster import on_cluster
 
                 on_cluster(scheduler, found, result.logs, settings, manifests, shown, finished)
-        except KeyboardInterrupt:
-            result.interrupted = True
+        except KeyboardInterrupt as interruption:
+            result.interrupted = _without_locals(interruption)
         finally:
             shown.clear()
             # Ctrl-C may have come while the place of a finished log was cleared, and a worker
@@ -147,7 +149,7 @@ def _warn_of_units(logs: Sequence[LogReport]) -> None:
         warnings.warn(f"{notes[0]}{more}", UnitWarning, stacklevel=3)
 
 
-def _without_locals(error: Exception) -> Exception:
+def _without_locals(error: _Error) -> _Error:
     """``error``, to be kept: what the frames of its traceback held (arrays, open files) is freed.
 
     HDF5 ends the process with a fault where a virtual data set is open to its end.

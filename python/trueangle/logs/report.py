@@ -59,7 +59,8 @@ class BatchReport(PlainResult):
 
     logs: list[LogReport]
     seconds: float = 0.0
-    interrupted: bool = False
+    #: What ended it early; a command interrupts once more what no longer has it.
+    interrupted: KeyboardInterrupt | None = None
 
     @property
     def is_done(self) -> bool:

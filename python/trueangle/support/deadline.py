@@ -237,7 +237,7 @@ class _Interruption:
 
 @contextlib.contextmanager
 def ending_early() -> Iterator[_Interruption]:
-    """Let a first Ctrl-C ask the work at its pace to end with what it has; a second one ends it.
+    """Let a first Ctrl-C ask the work at its pace to end with what it has; a second is as before.
 
     Where no pace is in force, outside the main thread, or where Ctrl-C is ignored (a job in the
     background), it is what it always is.
@@ -249,16 +249,19 @@ def ending_early() -> Iterator[_Interruption]:
         return
 
     def stop(number: int, frame: FrameType | None) -> None:
+        signal.signal(number, before)  # for a second one
         current = _CURRENT.get()
-        if current is None or current.stopped:
-            raise KeyboardInterrupt
-        found.happened = current.stopped = True
+        if current is None:
+            signal.raise_signal(number)
+        else:
+            found.happened = current.stopped = True
 
     before = signal.signal(signal.SIGINT, stop)
     try:
         yield found
     finally:
-        signal.signal(signal.SIGINT, before)
+        if signal.getsignal(signal.SIGINT) is stop:  # who took it meanwhile keeps it
+            signal.signal(signal.SIGINT, before)
 
 
 def _clock_text(seconds: float) -> str:

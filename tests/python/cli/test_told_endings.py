@@ -2,7 +2,10 @@
 
 import contextlib
 import signal
+import subprocess
 import sys
+import time
+import weakref
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,7 +13,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.cli.terminal import Ending
+from trueangle.cli.ending import Ending
 from trueangle.errors import ArgumentError, TrueAngleError
 
 DEFECT = "; this is a defect of trueangle: please report this line and what --debug prints"
@@ -19,6 +22,8 @@ DEFECT = "; this is a defect of trueangle: please report this line and what --de
 class Panic(BaseException):
     """As a panic of the core arrives."""
 
+
+HAS_TIMER = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="has no timer")
 
 #: Errors of a command and the line that is told of each.
 TOLD = {
@@ -62,6 +67,42 @@ def test_an_error_is_one_line(line, models, monkeypatch, capsys):
     assert capsys.readouterr().err == f"trueangle: {line}\n"
 
 
+def ignored(number):
+    """Python ignores what a callback of a weak reference raises; h5py has one in every object."""
+
+    class Held:
+        pass
+
+    held = Held()
+    _known = weakref.ref(held, lambda _: signal.raise_signal(number))
+    del held
+    time.sleep(60.0)
+
+
+def cleared(number):
+    """As pyarrow does with what comes in its import."""
+    with contextlib.suppress(BaseException):
+        signal.raise_signal(number)
+    time.sleep(60.0)
+
+
+def misnamed(number):
+    """As numpy names what ends its import."""
+    try:
+        signal.raise_signal(number)
+    except BaseException:
+        raise ImportError("its installation is broken") from None
+
+
+@pytest.mark.parametrize(
+    "reach",
+    [
+        signal.raise_signal,
+        misnamed,
+        pytest.param(ignored, marks=HAS_TIMER),
+        pytest.param(cleared, marks=HAS_TIMER),
+    ],
+)
 @pytest.mark.parametrize(
     ("name", "status"),
     [
@@ -70,25 +111,67 @@ def test_an_error_is_one_line(line, models, monkeypatch, capsys):
         ("SIGINT", 130),
     ],
 )
-def test_a_signal_is_told_with_its_status(name, status, models, monkeypatch, capsys):
+def test_a_signal_is_told_with_its_status(name, status, reach, models, monkeypatch, capsys):
     number = getattr(signal, name)
-
-    def ended(*_):
-        signal.raise_signal(number)
-
-    monkeypatch.setattr("trueangle.export.compare", ended)
+    monkeypatch.setattr("trueangle.export.compare", lambda *_: reach(number))
     before = signal.getsignal(number)
     if name != "SIGINT":
         signal.signal(number, signal.SIG_DFL)  # under nohup it is ignored
     try:
-        ours = signal.getsignal(number)
+        ours, hook = signal.getsignal(number), sys.unraisablehook
+        began = time.monotonic()
         assert main(models) == status
-        assert signal.getsignal(number) == ours
+        assert time.monotonic() - began < 10.0
+        assert (signal.getsignal(number), sys.unraisablehook) == (ours, hook)
     finally:
         signal.signal(number, before)
     by = "" if name == "SIGINT" else f" by {name}"
     assert capsys.readouterr().err == f"trueangle: interrupted{by}\n"
     assert (Ending().status, Ending().text) == (130, "interrupted")
+
+
+#: A signal that comes while a module is looked for.
+IMPORTING = """\
+import signal, sys
+class Moment:
+    def find_spec(name, *_):
+        if name == {module!r}:
+            signal.raise_signal(signal.{name})
+sys.meta_path.insert(0, Moment)
+"""
+#: One that comes in the work of `compare`.
+WORKING = """\
+import signal
+import trueangle.export
+def compare(*_):
+    {work}
+trueangle.export.compare = compare
+"""
+FROM_TEXT = WORKING.format(work="exec('signal.raise_signal(signal.SIGTERM)')")
+TWICE = WORKING.format(
+    work="""try: signal.raise_signal(signal.SIGTERM)
+    finally: signal.raise_signal(signal.SIGINT)"""
+)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="has no processes that signals end")
+@pytest.mark.parametrize(
+    ("moment", "status", "told"),
+    [
+        (IMPORTING.format(module="argparse", name="SIGINT"), -signal.SIGINT, ""),
+        (IMPORTING.format(module="argparse", name="SIGTERM"), -signal.SIGTERM, ""),
+        (IMPORTING.format(module="trueangle.cli.compare", name="SIGINT"), 130, ""),
+        (IMPORTING.format(module="trueangle.cli.compare", name="SIGTERM"), 143, " by SIGTERM"),
+        (IMPORTING.format(module="numpy.linalg", name="SIGHUP"), 129, " by SIGHUP"),
+        (FROM_TEXT, 143, " by SIGTERM"),
+        (TWICE, -signal.SIGINT, ""),
+    ],
+)
+def test_a_process_ends_by_a_signal_at_any_moment(moment, status, told, models):
+    code = f"{moment}\nfrom trueangle.__main__ import start\nstart()"
+    done = subprocess.run([sys.executable, "-c", code, *models], capture_output=True, text=True)
+    line = f"trueangle: interrupted{told}\n" if status > 0 else ""
+    assert (done.returncode, done.stdout, done.stderr) == (status, "", line)
 
 
 def test_a_reader_that_has_gone_is_told_nothing(models, monkeypatch, capsys):

@@ -127,6 +127,41 @@ def check_corrected(found, source):
     assert found["corrected_deg"].null_count == 0
 
 
+@pytest.fixture(scope="module")
+def packed(tmp_path_factory):
+    """A log whose correction takes seconds, nearly all of them in h5py."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path_factory.mktemp("packed") / "a.h5"
+    with h5py.File(path, "w") as file:
+        angles = np.linspace(0.0, 36000.0, 3_000_000) % 360.0
+        file.create_dataset("indicated_deg", data=angles, chunks=(4096,), compression="gzip")
+    return path
+
+
+@pytest.mark.parametrize(("name", "status"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+@pytest.mark.parametrize(
+    "seconds",
+    [0.12, *(pytest.param(0.05 * i, marks=pytest.mark.slow) for i in range(16))],
+)
+def test_a_signal_ends_whatever_a_library_does(seconds, name, status, packed, model_file, tmp_path):
+    """As h5py, whose callbacks take most of them: nothing is left, and nothing told but that."""
+    arguments = command(packed, model_file, "-o", tmp_path / "b.h5")
+    line = [sys.executable, "-m", "trueangle", *arguments]
+    process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
+    while not list(tmp_path.iterdir()):
+        assert process.poll() is None
+        time.sleep(0.01)
+    time.sleep(seconds)
+    process.send_signal(getattr(signal, name))
+    sent = time.monotonic()
+    told = process.communicate()[1]
+    assert (process.returncode, told.count("\n")) == (status, 1), told
+    assert told.startswith("trueangle: interrupted")
+    assert ": 0 of 1 logs are corrected" in told
+    assert time.monotonic() - sent < 10.0  # a second, where nobody else works
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_running_again_does_nothing_twice(logs, model_file, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(command(logs, model_file, "-o", out, "--json")) == 0

@@ -263,11 +263,24 @@ def test_ctrl_c_asks_first_and_ends_then():
             os.kill(os.getpid(), signal.SIGINT)
             assert work.over
             assert interruption.happened
-            with pytest.raises(KeyboardInterrupt):
-                os.kill(os.getpid(), signal.SIGINT)
+            assert signal.getsignal(signal.SIGINT) is before  # for a second one
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
+    with ending_early() as interruption, pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGINT)
+    assert not interruption.happened
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_who_takes_ctrl_c_meanwhile_keeps_it():
+    """As a command does that SIGTERM is ending: the next signal must end it at once."""
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        with ending_early():
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def made(folder, samples):
