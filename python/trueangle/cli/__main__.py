@@ -1,5 +1,0 @@
-"""``python -m trueangle.cli``."""
-
-from . import process
-
-process()
