@@ -20,15 +20,15 @@ _LOOKED_AT: Final = 512
 
 
 def of_worth(fit: FitResult) -> FitResult:
-    """The fit; refuse a correction whose amplitude is below its own standard error.
+    """The fit; refuse a correction of which every order, and the curve, are below their errors.
 
     ::
 
         2 Σ_i g_iᵀ b bᵀ g_i < Σ_i g_iᵀ V g_i
 
     over the places read, with rows ``g_i`` of the series less their mean, coefficients b and
-    their covariance V. Of one order this is an amplitude below its error; of several, single ones
-    may be below theirs where they nearly cancel.
+    their covariance V. Of one order this is an amplitude below its error; of several all may be
+    below theirs, and the curve not, where they nearly cancel.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def of_worth(fit: FitResult) -> FitResult:
         The fitted error is below its standard error.
     """
     model = fit.model
-    if model.covariance is None:
+    if model.covariance is None or (fit.amplitudes >= fit.amplitude_std).any():
         return fit
     places = np.concatenate(fit.problem.angles)
     places = places[:: 1 + places.size // _LOOKED_AT]

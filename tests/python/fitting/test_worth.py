@@ -27,9 +27,9 @@ def refused(amplitude: float, seed: int, stop: float = 360.0, ridge: float | Non
 
 
 def test_noise_is_no_correction_and_a_curve_is():
-    """Three orders of noise: a chi-squared variable of six is below half its mean in 19 %."""
+    """Three orders of noise: rarely is each amplitude below its own error."""
     print("seed", SEED)
-    assert 0.1 < np.mean([refused(0.0, k) for k in range(200)]) < 0.3
+    assert 0.01 < np.mean([refused(0.0, k) for k in range(200)]) < 0.2
     assert not any(refused(0.01, k) for k in range(50))
     assert not any(refused(0.2, k, 110.0, 0.0) for k in range(20))
 
