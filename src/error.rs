@@ -107,6 +107,19 @@ pub enum Error {
         got: u32,
     },
 
+    /// Orders are positive and finite, in increasing order.
+    #[error(
+        "orders must be positive, finite and in increasing order, got orders[{index}] = {got} after {previous}"
+    )]
+    OrderValue {
+        /// Its position.
+        index: usize,
+        /// The order before (0 at the start).
+        previous: f64,
+        /// The offending order.
+        got: f64,
+    },
+
     /// A weight or a penalty is negative or not finite.
     #[error("{what}[{index}] must be finite and not negative, got {got}")]
     Weight {

@@ -23,6 +23,7 @@
 // Loops over small arrays read as the equations do.
 #![allow(clippy::needless_range_loop)]
 
+mod candidates;
 mod estimate;
 mod gains;
 mod gram;

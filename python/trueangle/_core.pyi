@@ -199,8 +199,8 @@ class Evidence:
     CORRELATION_TIMES: ClassVar[list[float]]
     def __new__(
         cls,
-        runs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]],
-        orders: Sequence[int],
+        runs: Sequence[tuple[NDArray[np.float64] | None, ...]],
+        orders: Sequence[float],
     ) -> Evidence: ...
     def posterior(
         self, noise: Sequence[float], tau: Sequence[float], omega: Sequence[float]
@@ -212,10 +212,13 @@ class Evidence:
         self, probabilities: Sequence[float]
     ) -> tuple[
         NDArray[np.float64],
+        list[int],
         NDArray[np.float64],
         NDArray[np.float64],
         NDArray[np.float64],
         list[tuple[float, list[float], list[float]]],
+        list[tuple[float, list[float], float]],
+        list[tuple[float, float, float, float] | None],
     ]: ...
 
 @final

@@ -7,6 +7,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::candidates::Inside;
+use super::gains::Candidate;
 use super::gram::Gram;
 use super::model::Model;
 use super::noise::NoiseFit;
@@ -21,10 +23,17 @@ use crate::threads;
 const WINDOW: f64 = 6.0;
 
 /// Rounds of noise and search at most.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 5;
 
 /// Strongest orders that the second search starts from.
 const STRONGEST: usize = 6;
+
+/// Orders looked at closely at first, and readings for each; more are added as they stand out.
+const FIRST: usize = 24;
+const READINGS: usize = 6;
+
+/// Orders added after a round at most.
+const MORE: usize = 12;
 
 /// Weight over the greatest below which a model under a noise does not count.
 const LIGHT: f64 = 1e-4;
@@ -40,59 +49,166 @@ const NOTHING: f64 = 1e-200;
 pub struct Estimate {
     /// Probability that each order is in.
     pub probabilities: Vec<f64>,
-    /// Mean of each coefficient: cosine and sine of every order in turn.
+    /// Places of the orders that some model has.
+    pub places: Vec<usize>,
+    /// Mean of each of their coefficients: cosine and sine of every order in turn.
     pub mean: DVector<f64>,
-    /// Covariance of the coefficients.
+    /// Covariance of these coefficients.
     pub covariance: DMatrix<f64>,
     /// The noise of most evidence.
     pub noise: Noise,
-    /// Models of the mixture, best first: weight and prior variances.
+    /// Models of the mixture over these orders, best first: weight and prior variances.
     pub models: Vec<(f64, Model)>,
+    /// Gram matrices of these orders under the noise.
+    pub grams: Vec<Gram>,
+    /// Every order beside those of the most probable set.
+    pub alone: Vec<Candidate>,
+}
+
+/// What a noise and a search that agree with each other have found.
+struct Mode {
+    fit: NoiseFit,
+    looked: Vec<usize>,
+    models: Vec<Found>,
+    others: Vec<Candidate>,
+    scores: Vec<f64>,
 }
 
 impl Readings {
     /// The estimate under prior probabilities of each order.
     ///
-    /// None where no evidence can be computed: a covariance is not positive by rounding.
+    /// Noise and orders are sought from both sides: with the strongest orders in, so that none passes
+    /// for slow noise, and with none, so that slow noise passes for no order. Where these end apart,
+    /// the mixture has both. None where no evidence can be computed: a covariance is not positive by
+    /// rounding.
     pub fn estimate(&self, probabilities: &[f64]) -> Option<Estimate> {
-        let orders = self.orders().len();
-        let (total, scale) = self.scales(orders)?;
+        let total = self.variance();
         let prior = Prior::of(probabilities.to_vec(), total, self.runs().len());
-        let noise_prior = NoisePrior { scale };
-        let mut start = noise_prior.centre();
-        let mut model = Model::of_orders(orders, total);
-        let mut models = Vec::new();
+        let looked = self.first(&prior, total);
+        let noise_prior = NoisePrior {
+            scale: self.among(&looked).left(total)?,
+        };
+        let every = (looked.clone(), Model::of_orders(looked.len(), total));
+        let none = (Vec::new(), Model::of_orders(0, 0.0));
+        let mut modes = vec![self.settled(&prior, noise_prior, (&looked, total), every)?];
+        let other = self.settled(&prior, noise_prior, (&looked, total), none)?;
+        if modes[0].fit.is_far_from(&other.fit.position) {
+            modes.push(other);
+        }
+        self.mixture(&modes, &prior, noise_prior)
+    }
+
+    /// Noise and search in turn until the set of orders stays, from orders that the noise is first
+    /// sought beside.
+    fn settled(
+        &self,
+        prior: &Prior,
+        noise_prior: NoisePrior,
+        (looked, total): (&[usize], f64),
+        (mut set, mut model): (Vec<usize>, Model),
+    ) -> Option<Mode> {
+        let mut looked = looked.to_vec();
+        let mut start = noise_prior.start();
         let mut active = None;
-        for _ in 0..ROUNDS {
-            let fit = self.noise(&model, noise_prior, start)?;
+        let mut round = 1;
+        loop {
+            let fit = self.among(&set).noise(&model, noise_prior, start)?;
             start = fit.position;
-            let mut search = Search::new(&fit.grams, &prior, WINDOW);
-            let first = search.from(Model::of_orders(orders, 0.0))?;
-            let second = search.from(self.strongest(&fit.grams, 0.1 * total))?;
-            model = if second.score > first.score {
+            let part = self.among(&looked);
+            let grams = part.grams(fit.noise);
+            let own = prior.among(&looked);
+            let mut search = Search::new(&grams, &own, WINDOW);
+            let first = search.from(Model::of_orders(looked.len(), 0.0))?;
+            let second = search.from(part.strongest(&grams, 0.1 * total))?;
+            let best = if second.score > first.score {
                 second.model
             } else {
                 first.model
             };
-            models = search.models();
-            let set = Some(model.active());
-            if active == set {
-                break;
+            search.widen()?;
+            let models = search.models();
+            let posterior = best.posterior(&grams)?;
+            let has: Vec<usize> = (0..looked.len()).filter(|&k| best.has(k)).collect();
+            set = has.iter().map(|&k| looked[k]).collect();
+            model = best.among(&has);
+            let shared: Vec<usize> = best.active().iter().map(|&k| looked[k]).collect();
+            let inside = Inside {
+                places: &shared,
+                mean: posterior.mean.as_slice(),
+                covariance: &posterior.covariance(),
+            };
+            let others = self.candidates(fit.noise, &inside);
+            let score =
+                |(k, other): (usize, &Candidate)| other.best(&prior.sizes).1 + prior.log_in(k);
+            let scores: Vec<f64> = others.iter().enumerate().map(score).collect();
+            let more = self.standing_out(&scores, &looked);
+            let is_same = active.replace(set.clone()) == Some(set.clone());
+            if more.is_empty() && is_same || round == ROUNDS {
+                let fit = self.among(&set).noise(&model, noise_prior, start)?;
+                return Some(Mode {
+                    fit,
+                    looked,
+                    models,
+                    others,
+                    scores,
+                });
             }
-            active = set;
+            looked.extend(more);
+            looked.sort_unstable();
+            round += 1;
         }
-        let fit = self.noise(&model, noise_prior, start)?;
-        self.mixture(&fit, &prior, noise_prior, models)
     }
 
-    /// Variances of the errors, and of what all orders leave of them.
-    fn scales(&self, orders: usize) -> Option<(f64, f64)> {
+    /// Orders looked at first: the lowest, which slow noise resembles, and the strongest.
+    fn first(&self, prior: &Prior, total: f64) -> Vec<usize> {
+        let most = ((self.len() - self.runs().len()) / READINGS).clamp(1, FIRST);
+        let white = Noise::of([total, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let inside = Inside {
+            places: &[],
+            mean: &[],
+            covariance: &DMatrix::zeros(0, 0),
+        };
+        let rank = |(k, own): (usize, &Candidate)| own.best(&prior.sizes).1 + prior.log_in(k);
+        let each: Vec<f64> = self
+            .candidates(white, &inside)
+            .iter()
+            .enumerate()
+            .map(rank)
+            .collect();
+        let mut ranked: Vec<usize> = (0..each.len()).collect();
+        ranked.sort_by(|&a, &b| each[b].total_cmp(&each[a]));
+        let lowest = (0..each.len()).take(most / 2);
+        let mut found: Vec<usize> = lowest.collect();
+        for k in ranked {
+            if found.len() < most.min(each.len()) && !found.contains(&k) {
+                found.push(k);
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    /// Orders beside those looked at that a model within the window may have, the best of them.
+    fn standing_out(&self, scores: &[f64], looked: &[usize]) -> Vec<usize> {
+        let is_new = |k: &usize| scores[*k] > -WINDOW && looked.binary_search(k).is_err();
+        let mut found: Vec<usize> = (0..scores.len()).filter(is_new).collect();
+        found.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]));
+        found.truncate(MORE);
+        found
+    }
+
+    /// Variance of the errors.
+    fn variance(&self) -> f64 {
         let squares = |run: &super::Run| run.error().iter().map(|e| e * e).sum::<f64>();
         let total: f64 = self.runs().iter().map(squares).sum();
-        let total = (total / self.len() as f64).max(NOTHING);
+        (total / self.len() as f64).max(NOTHING)
+    }
+
+    /// Variance of what all orders leave of the errors.
+    fn left(&self, total: f64) -> Option<f64> {
         let grams = self.grams(Noise::of([total, 0.0, 0.0, 0.0, 0.0, 0.0]));
         let wide = 1e6 * total;
-        let found = Model::of_orders(orders, wide).posterior(&grams)?;
+        let found = Model::of_orders(self.orders().len(), wide).posterior(&grams)?;
         let unknowns: f64 = found
             .covariance()
             .diagonal()
@@ -100,7 +216,7 @@ impl Readings {
             .sum();
         let free = (self.len() - self.runs().len()) as f64 - unknowns;
         let left = total * found.residual[(0, 0)] / free.max(1.0);
-        Some((total, left.max(EXACT * total)))
+        Some(left.max(EXACT * total))
     }
 
     /// The orders that the error follows most.
@@ -122,65 +238,80 @@ impl Readings {
     }
 
     /// Over models and points of the noise's posterior.
-    fn mixture(
-        &self,
-        fit: &NoiseFit,
-        prior: &Prior,
-        noise_prior: NoisePrior,
-        models: Vec<Found>,
-    ) -> Option<Estimate> {
-        let points = fit.points();
-        let models: Vec<(f64, Model)> = models
-            .into_iter()
-            .map(|found| (prior.log_probability(&found.model), found.model))
-            .collect();
-        let part = |i: usize| {
-            let at = noise_prior.log_density(&points[i]);
-            let grams = self.grams(noise_prior.noise(&points[i]));
-            let own = |(log_prior, model): &(f64, Model)| {
-                let found = model.posterior(&grams)?;
-                Some((found.log_evidence + log_prior + at, found))
-            };
-            models.iter().map(own).collect::<Vec<_>>()
+    fn mixture(&self, modes: &[Mode], prior: &Prior, noise_prior: NoisePrior) -> Option<Estimate> {
+        let has = |mode: &Mode, k: usize| mode.models.iter().any(|found| found.model.has(k));
+        let own = |mode: &Mode| -> Vec<usize> {
+            let kept = (0..mode.looked.len()).filter(|&k| has(mode, k));
+            kept.map(|k| mode.looked[k]).collect()
         };
-        let parts: Vec<_> = threads::map_parts(points.len(), self.threads(), part).collect();
-        let scores = parts.iter().flatten().flatten().map(|(score, _)| *score);
+        let mut places: Vec<usize> = modes.iter().flat_map(own).collect();
+        places.sort_unstable();
+        places.dedup();
+        let readings = self.among(&places);
+        let some = prior.among(&places);
+        let mut parts = Vec::new();
+        for (m, mode) in modes.iter().enumerate() {
+            let points = mode.fit.points();
+            let volume = mode.fit.log_volume();
+            let models: Vec<Model> = mode
+                .models
+                .iter()
+                .map(|found| found.model.among_places(&mode.looked, &places))
+                .collect();
+            let part = |i: usize| {
+                let at = noise_prior.log_density(&points[i]) + volume;
+                let grams = readings.grams(noise_prior.noise(&points[i]));
+                let own = |model: &Model| {
+                    let found = model.posterior(&grams)?;
+                    Some((found.log_evidence + some.log_odds(model) + at, found))
+                };
+                models.iter().map(own).collect::<Vec<_>>()
+            };
+            let each: Vec<_> = threads::map_parts(points.len(), self.threads(), part).collect();
+            for (k, model) in models.iter().enumerate() {
+                let at_points = each.iter().filter_map(|point| point[k].clone());
+                parts.push((m, model.clone(), at_points.collect::<Vec<_>>()));
+            }
+        }
+        let scores = parts
+            .iter()
+            .flat_map(|(_, _, at)| at.iter().map(|(score, _)| *score));
         let best = scores.clone().fold(f64::NEG_INFINITY, f64::max);
         let whole: f64 = scores.map(|score| (score - best).exp()).sum();
-        let mut weights = vec![0.0; models.len()];
         let mut heavy = Vec::new();
-        for part in &parts {
-            for (k, found) in part.iter().enumerate() {
-                let Some((score, posterior)) = found else {
-                    continue;
-                };
+        let mut of_modes = vec![0.0; modes.len()];
+        let mut models = Vec::new();
+        for (m, model, at) in &parts {
+            let mut weight = 0.0;
+            for (score, posterior) in at {
                 let relative = (score - best).exp();
-                weights[k] += relative / whole;
+                weight += relative / whole;
                 if relative > LIGHT {
                     heavy.push((relative, posterior));
                 }
             }
+            of_modes[*m] += weight;
+            models.push((weight, model.clone()));
         }
-        let (mean, covariance) = mixed(2 * self.orders().len(), &heavy);
-        let probability = |k: usize| {
-            let own = models
-                .iter()
-                .zip(&weights)
-                .filter(|((_, model), _)| model.tau[k] > 0.0);
-            own.map(|(_, weight)| weight).sum()
-        };
-        let probabilities = (0..self.orders().len()).map(probability).collect();
-        let mut models: Vec<(f64, Model)> = weights
-            .into_iter()
-            .zip(models.into_iter().map(|(_, model)| model))
-            .collect();
+        let (mean, covariance) = mixed(2 * places.len(), &heavy);
+        let first = usize::from(of_modes.len() > 1 && of_modes[1] > of_modes[0]);
+        let mode = &modes[first];
+        let outside = |k: usize| mode.scores[k].min(-WINDOW).exp();
+        let mut probabilities: Vec<f64> = (0..self.orders().len()).map(outside).collect();
+        for (k, &place) in places.iter().enumerate() {
+            let own = models.iter().filter(|(_, model)| model.tau[k] > 0.0);
+            probabilities[place] = own.map(|(weight, _)| weight).sum();
+        }
         models.sort_by(|a, b| b.0.total_cmp(&a.0));
         Some(Estimate {
             probabilities,
             mean,
             covariance,
-            noise: fit.noise,
+            noise: mode.fit.noise,
             models,
+            grams: readings.grams(mode.fit.noise),
+            alone: mode.others.clone(),
+            places,
         })
     }
 }

@@ -25,6 +25,17 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// Of its own sums.
+    pub(super) fn new(s: DMatrix<f64>, q: DVector<f64>) -> Self {
+        Self { s, q }
+    }
+
+    /// Least squares of its coefficients: `s^-1 q` and `s^-1`; None where the others hold it.
+    pub fn alone(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let inverse = Cholesky::new(self.s.clone())?.inverse();
+        Some((&inverse * &self.q, inverse))
+    }
+
     /// Change of the log evidence by letting the group in with this variance.
     pub fn gain(&self, tau: f64) -> f64 {
         let m = self.q.len();

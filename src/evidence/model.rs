@@ -31,6 +31,34 @@ impl Model {
         (0..self.tau.len()).filter(|&k| self.tau[k] > 0.0).collect()
     }
 
+    /// True of a group that has a variance.
+    pub fn has(&self, group: usize) -> bool {
+        self.tau[group] > 0.0 || self.omega[group] > 0.0
+    }
+
+    /// Some groups alone.
+    pub fn among(&self, groups: &[usize]) -> Self {
+        let picked = |values: &[f64]| groups.iter().map(|&k| values[k]).collect();
+        Self {
+            widths: groups.iter().map(|&k| self.widths[k]).collect(),
+            tau: picked(&self.tau),
+            omega: picked(&self.omega),
+        }
+    }
+
+    /// Of groups at places `from`, the same at places `to`.
+    pub fn among_places(&self, from: &[usize], to: &[usize]) -> Self {
+        let at = |values: &[f64]| {
+            let value = |place: &usize| from.binary_search(place).map_or(0.0, |k| values[k]);
+            to.iter().map(value).collect()
+        };
+        Self {
+            widths: vec![2; to.len()],
+            tau: at(&self.tau),
+            omega: at(&self.omega),
+        }
+    }
+
     /// First column and the one past the last of each group.
     pub fn bounds(&self) -> Vec<(usize, usize)> {
         let ends = self.widths.iter().scan(0, |end, width| {

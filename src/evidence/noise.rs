@@ -160,6 +160,18 @@ fn newton(
 }
 
 impl NoiseFit {
+    /// True of a position beyond one standard deviation of this posterior.
+    pub(super) fn is_far_from(&self, position: &[f64; VARIANCES]) -> bool {
+        let apart = DVector::from_fn(VARIANCES, |j, _| position[j] - self.position[j]);
+        apart.dot(&(&self.precision * &apart)) > 1.0
+    }
+
+    /// Logarithm of the volume of its posterior, but for a constant.
+    pub(super) fn log_volume(&self) -> f64 {
+        let powers = self.precision.clone().symmetric_eigen().eigenvalues;
+        -0.5 * powers.iter().map(|power| power.ln()).sum::<f64>()
+    }
+
     /// The maximum, and a point on both sides of it along each principal axis of the curvature.
     pub fn points(&self) -> Vec<[f64; VARIANCES]> {
         let axes = self.precision.clone().symmetric_eigen();

@@ -4,10 +4,16 @@ use super::model::Model;
 use super::whitening::{Noise, VARIANCES};
 
 /// Standard deviation of the logarithm of each variance of the noise.
-const SPREAD: f64 = 3.0;
+const SPREAD: f64 = 4.0;
 
 /// Share of the variance of residuals at which the white variance and each of the terms are centred.
-const SHARES: [f64; VARIANCES] = [0.5, 0.03, 0.03, 0.03, 0.03, 0.03];
+const SHARES: [f64; VARIANCES] = [0.5, 0.003, 0.003, 0.003, 0.003, 0.003];
+
+/// Probability that a group that is in differs from run to run.
+const EFFECT: f64 = 0.2;
+
+/// Shares from which a maximum is sought: white and a little of every term.
+const START: [f64; VARIANCES] = [0.5, 0.1, 0.1, 0.1, 0.1, 0.1];
 
 /// Logarithms of the smallest and greatest variance over that of residuals.
 const RANGE: (f64, f64) = (-12.0, 4.0);
@@ -19,14 +25,14 @@ pub struct Prior {
     pub probabilities: Vec<f64>,
     /// Variances of shared coefficients that a group may have, equally probable.
     pub sizes: Vec<f64>,
-    /// Variances of what differs from run to run; a variance of 0 has half of the probability;
-    /// empty where there is one run.
+    /// Variances of what differs from run to run, each as probable as others; empty where there is
+    /// one run.
     pub effects: Vec<f64>,
 }
 
 impl Prior {
     /// Of groups in readings of variance `total`: sizes from 1e-4 to 4 times that, effects of runs
-    /// from 1e-5 to 0.1 times.
+    /// from 1e-5 to 1 times.
     pub fn of(probabilities: Vec<f64>, total: f64, runs: usize) -> Self {
         let powers = |first: f64, step: f64, count: usize| {
             let power = move |k| total * 10.0_f64.powf(first + step * k as f64);
@@ -36,10 +42,18 @@ impl Prior {
             probabilities,
             sizes: powers(-4.0, 0.8, 7),
             effects: if runs > 1 {
-                powers(-5.0, 1.0, 5)
+                powers(-5.0, 1.0, 6)
             } else {
                 Vec::new()
             },
+        }
+    }
+
+    /// Of some groups alone.
+    pub fn among(&self, groups: &[usize]) -> Self {
+        Self {
+            probabilities: groups.iter().map(|&k| self.probabilities[k]).collect(),
+            ..self.clone()
         }
     }
 
@@ -53,21 +67,36 @@ impl Prior {
     pub fn log_effect(&self, omega: f64) -> f64 {
         match self.effects.len() {
             0 => 0.0,
-            _ if omega == 0.0 => 0.5_f64.ln(),
-            count => (0.5 / count as f64).ln(),
+            _ if omega == 0.0 => (1.0 - EFFECT).ln(),
+            count => (EFFECT / count as f64).ln(),
         }
+    }
+
+    /// Logarithm of the probability of a group with these variances over that it has none.
+    ///
+    /// What runs do not share alone (`tau` of 0) is as probable as that and something shared.
+    pub fn log_odds_of(&self, k: usize, tau: f64, omega: f64) -> f64 {
+        if tau == 0.0 && omega == 0.0 {
+            return 0.0;
+        }
+        let sizes = if tau == 0.0 {
+            self.sizes.len() as f64
+        } else {
+            1.0
+        };
+        self.log_in(k) - self.log_effect(0.0) + self.log_effect(omega) + sizes.ln()
+    }
+
+    /// Logarithm of the probability of a model over that of none of the groups.
+    pub fn log_odds(&self, model: &Model) -> f64 {
+        let own = |k: usize| self.log_odds_of(k, model.tau[k], model.omega[k]);
+        (0..model.tau.len()).map(own).sum()
     }
 
     /// Logarithm of the probability of a model.
     pub fn log_probability(&self, model: &Model) -> f64 {
-        let group = |k: usize| {
-            let out = (1.0 - self.probabilities[k]).ln();
-            if model.tau[k] == 0.0 {
-                return out;
-            }
-            out + self.log_in(k) - self.log_effect(0.0) + self.log_effect(model.omega[k])
-        };
-        (0..model.tau.len()).map(group).sum()
+        let none: f64 = self.probabilities.iter().map(|p| (1.0 - p).ln()).sum();
+        none + self.log_odds(model)
     }
 }
 
@@ -79,6 +108,11 @@ pub struct NoisePrior {
 }
 
 impl NoisePrior {
+    /// Variances that a search starts from: all terms have a share.
+    pub fn start(&self) -> [f64; VARIANCES] {
+        START.map(|share| (self.scale * share).ln())
+    }
+
     /// Where it is greatest.
     pub fn centre(&self) -> [f64; VARIANCES] {
         SHARES.map(|share| (self.scale * share).ln())

@@ -1,5 +1,7 @@
 //! Readings of runs, and the rows of their columns: zero, cosines and sines of orders, error.
 
+use std::sync::Arc;
+
 use super::rows::Rows;
 use super::whitening::{Terms, decays};
 use crate::check::{finite, same_length};
@@ -21,6 +23,8 @@ pub struct Run {
     error: Vec<f64>,
     mean: f64,
     decays: Vec<Terms>,
+    /// What each row is multiplied by, so that the noise of all is alike.
+    roots: Option<Vec<f64>>,
 }
 
 impl Run {
@@ -48,7 +52,22 @@ impl Run {
             error: error.iter().map(|e| e - mean).collect(),
             mean,
             decays,
+            roots: None,
         })
+    }
+
+    /// With weights above 0: the noise of a reading is as of weight 1, over their roots.
+    pub fn weighted(mut self, weights: &[f64]) -> Result<Self, Error> {
+        same_length("weights", weights.len(), "theta", self.len())?;
+        if let Some(index) = weights.iter().position(|w| !(*w > 0.0 && w.is_finite())) {
+            return Err(Error::Weight {
+                what: "weights",
+                index,
+                got: weights[index],
+            });
+        }
+        self.roots = Some(weights.iter().map(|w| w.sqrt()).collect());
+        Ok(self)
     }
 
     /// Readings.
@@ -114,18 +133,20 @@ fn in_steps(time: &[f64]) -> Result<Vec<f64>, Error> {
 /// Runs, and the orders that are tested.
 #[derive(Clone, Debug)]
 pub struct Readings {
-    runs: Vec<Run>,
-    orders: Vec<u32>,
+    runs: Arc<Vec<Run>>,
+    orders: Vec<f64>,
+    /// The orders as whole numbers, where they are.
+    whole: Option<Vec<u32>>,
 }
 
 impl Readings {
-    /// Of orders from 1 in increasing order.
-    pub fn new(runs: Vec<Run>, orders: Vec<u32>) -> Result<Self, Error> {
-        let mut previous = 0;
-        for &got in &orders {
-            if got <= previous {
-                return Err(Error::Orders {
-                    shaft: 0,
+    /// Of positive orders in increasing order.
+    pub fn new(runs: Vec<Run>, orders: Vec<f64>) -> Result<Self, Error> {
+        let mut previous = 0.0;
+        for (index, &got) in orders.iter().enumerate() {
+            if !(got > previous && got.is_finite()) {
+                return Err(Error::OrderValue {
+                    index,
                     previous,
                     got,
                 });
@@ -135,7 +156,25 @@ impl Readings {
         if runs.is_empty() {
             return Err(Error::NoReadings);
         }
-        Ok(Self { runs, orders })
+        let places: Vec<usize> = (0..orders.len()).collect();
+        let all = Self {
+            runs: Arc::new(runs),
+            orders,
+            whole: None,
+        };
+        Ok(all.among(&places))
+    }
+
+    /// The same readings with some of the orders.
+    pub fn among(&self, places: &[usize]) -> Self {
+        let orders: Vec<f64> = places.iter().map(|&k| self.orders[k]).collect();
+        let is_whole = |k: &f64| k.fract() == 0.0 && *k <= f64::from(u32::MAX);
+        let whole = orders.iter().all(is_whole);
+        Self {
+            runs: Arc::clone(&self.runs),
+            whole: whole.then(|| orders.iter().map(|&k| k as u32).collect()),
+            orders,
+        }
     }
 
     /// The runs.
@@ -144,7 +183,7 @@ impl Readings {
     }
 
     /// The orders.
-    pub fn orders(&self) -> &[u32] {
+    pub fn orders(&self) -> &[f64] {
         &self.orders
     }
 
@@ -169,8 +208,16 @@ impl Readings {
         let mut rows = Rows::zeros(count, columns);
         let mut waves = vec![0.0; 2 * self.orders.len() * count];
         let theta = &run.theta[start..start + count];
-        let answer = waves::Answer::default();
-        waves::rows(theta, &self.orders, answer, &mut waves).expect("lengths are right");
+        if let Some(orders) = &self.whole {
+            let answer = waves::Answer::default();
+            waves::rows(theta, orders, answer, &mut waves).expect("lengths are right");
+        } else {
+            for (order, pair) in self.orders.iter().zip(waves.chunks_exact_mut(2 * count)) {
+                for (i, x) in theta.iter().enumerate() {
+                    (pair[count + i], pair[i]) = (order * x).sin_cos();
+                }
+            }
+        }
         for i in 0..count {
             let row = rows.row_mut(i);
             row[0] = 1.0;
@@ -178,6 +225,11 @@ impl Readings {
                 row[c + 1] = waves[c * count + i];
             }
             row[columns - 1] = run.error[start + i];
+            if let Some(roots) = &run.roots {
+                for x in &mut row[..columns] {
+                    *x *= roots[start + i];
+                }
+            }
         }
         rows
     }

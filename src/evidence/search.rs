@@ -20,6 +20,10 @@ const MOVES: usize = 200;
 /// Gain below which a move is rounding.
 const GAIN: f64 = 1e-7;
 
+/// Models whose neighbours are met at last, and how near to the best they must be.
+const WIDENED: usize = 8;
+const NEAR: f64 = 1.5;
+
 /// A model and the logarithm of its evidence times its prior.
 #[derive(Clone, Debug)]
 pub struct Found {
@@ -37,7 +41,7 @@ pub struct Search<'a> {
     window: f64,
     best: f64,
     /// The best sizes of each set of groups with their effects of runs (bits of `omega`).
-    met: BTreeMap<Vec<(usize, u64)>, Found>,
+    met: BTreeMap<Vec<(usize, bool, u64)>, Found>,
     /// Sums without the effects of runs, for the variances used last.
     sums: Option<(Vec<f64>, Sums)>,
 }
@@ -85,6 +89,21 @@ impl<'a> Search<'a> {
         })
     }
 
+    /// Meets the neighbours of the models that are nearly the best, so that orders which are alike
+    /// are treated alike.
+    pub fn widen(&mut self) -> Option<()> {
+        let mut near: Vec<Found> = self.met.values().cloned().collect();
+        near.sort_by(|a, b| b.score.total_cmp(&a.score));
+        for found in near.into_iter().take(WIDENED) {
+            if found.score < self.best - NEAR {
+                break;
+            }
+            let solved = self.solved(found.model)?;
+            self.best_move(&solved, found.score)?;
+        }
+        Some(())
+    }
+
     /// Models within the window of the best, best first.
     pub fn models(self) -> Vec<Found> {
         let least = self.best - self.window;
@@ -118,8 +137,9 @@ impl<'a> Search<'a> {
             model: model.clone(),
             score,
         };
-        let key = model.active().into_iter();
-        let key = key.map(|k| (k, model.omega[k].to_bits())).collect();
+        let has = (0..model.tau.len()).filter(|&k| model.has(k));
+        let key = has.map(|k| (k, model.tau[k] > 0.0, model.omega[k].to_bits()));
+        let key = key.collect();
         let own = self.met.entry(key).or_insert_with(found);
         if score > own.score {
             *own = found();
@@ -163,6 +183,11 @@ impl<'a> Search<'a> {
                 if omega != own {
                     self.factorised(with(&now.model, &[(k, tau, omega)]), &mut best)?;
                 }
+                // The effect alone, or nothing of what was an effect alone.
+                let is_alone = now.model.tau[k] == 0.0;
+                if (omega > 0.0 || is_alone) && !(is_alone && omega == own) {
+                    self.factorised(with(&now.model, &[(k, 0.0, omega)]), &mut best)?;
+                }
             }
         }
         best
@@ -183,8 +208,14 @@ impl<'a> Search<'a> {
     /// A group in.
     fn enter(&mut self, now: &Solved, j: usize, score: f64, best: &mut Option<Found>) {
         let (tau, gain) = now.outside(j).best(&self.prior.sizes);
-        let model = || with(&now.model, &[(j, tau, 0.0)]);
-        self.offer(model, score + gain + self.prior.log_in(j), best);
+        let omega = now.model.omega[j];
+        let model = || with(&now.model, &[(j, tau, omega)]);
+        self.offer(model, score + gain + self.coming(j, tau, omega), best);
+    }
+
+    /// What the prior gives a group that comes in and keeps its effect of runs.
+    fn coming(&self, j: usize, tau: f64, omega: f64) -> f64 {
+        self.prior.log_odds_of(j, tau, omega) - self.prior.log_odds_of(j, 0.0, omega)
     }
 
     /// Another size of a group.
@@ -218,8 +249,9 @@ impl<'a> Search<'a> {
         self.offer(|| with(&now.model, &[(k, 0.0, 0.0)]), left, best);
         for &j in outside {
             let (tau, gain) = without.other(j).best(&self.prior.sizes);
-            let model = || with(&now.model, &[(k, 0.0, 0.0), (j, tau, 0.0)]);
-            self.offer(model, left + gain + self.prior.log_in(j), best);
+            let omega = now.model.omega[j];
+            let model = || with(&now.model, &[(k, 0.0, 0.0), (j, tau, omega)]);
+            self.offer(model, left + gain + self.coming(j, tau, omega), best);
         }
         Some(())
     }

@@ -16,16 +16,37 @@ type Vector<'py> = Bound<'py, PyArray1<f64>>;
 type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 type Column<'py> = PyReadonlyArray1<'py, f64>;
 
+/// Angles, errors, times and weights of a run.
+type Given<'py> = (
+    Column<'py>,
+    Column<'py>,
+    Option<Column<'py>>,
+    Option<Column<'py>>,
+);
+
 /// Log evidence, mean and covariance of all coefficients.
 type Solution<'py> = (f64, Vector<'py>, Matrix<'py>);
 
-/// Probabilities, mean, covariance, variances of the noise; weight, tau and omega of each model.
+/// Weight, tau and omega of a model.
+type Weighted = (f64, Vec<f64>, Vec<f64>);
+
+/// Information about a run's zero, weighted means of the columns, and level.
+type Zero = (f64, Vec<f64>, f64);
+
+/// Cosine and sine of an order beside the others, and their variances.
+type Alone = (f64, f64, f64, f64);
+
+/// Probabilities, places of the orders that some model has, their mean and covariance, variances of
+/// the noise, models, zeros of the runs, and each order by itself (None where the others hold it).
 type Estimated<'py> = (
     Vector<'py>,
+    Vec<usize>,
     Vector<'py>,
     Matrix<'py>,
     Vector<'py>,
-    Vec<(f64, Vec<f64>, Vec<f64>)>,
+    Vec<Weighted>,
+    Vec<Zero>,
+    Vec<Option<Alone>>,
 );
 
 const LOST: &str = "no evidence can be computed: a covariance is not positive by rounding";
@@ -39,26 +60,24 @@ impl PyEvidence {
     #[classattr]
     const CORRELATION_TIMES: [f64; TERMS] = CORRELATION_TIMES;
 
-    /// Of angles in radians, errors and times (None: equally spaced) of each run.
+    /// Of angles in radians, errors, times (None: equally spaced) and weights of each run.
     #[new]
-    fn new(
-        py: Python<'_>,
-        runs: Vec<(Column<'_>, Column<'_>, Option<Column<'_>>)>,
-        orders: Vec<i64>,
-    ) -> PyResult<Self> {
-        let whole = |k: &i64| u32::try_from(*k).map_err(|_| *k);
-        let orders: Result<Vec<u32>, i64> = orders.iter().map(whole).collect();
-        let orders = orders.map_err(|k| {
-            argument_error(py, format!("orders must be from 1 to 4294967295, got {k}"))
-        })?;
+    fn new(py: Python<'_>, runs: Vec<Given<'_>>, orders: Vec<f64>) -> PyResult<Self> {
         let given: Vec<_> = runs
             .iter()
-            .map(|(theta, error, time)| (values(theta), values(error), time.as_ref().map(values)))
+            .map(|(theta, error, time, weights)| {
+                let more = [time, weights].map(|column| column.as_ref().map(values));
+                (values(theta), values(error), more)
+            })
             .collect();
         let made = detached(py, || {
             let mut runs = Vec::with_capacity(given.len());
-            for (run, (theta, error, time)) in given.iter().enumerate() {
+            for (run, (theta, error, [time, weights])) in given.iter().enumerate() {
                 let made = Run::new(theta, error, time.as_deref());
+                let made = made.and_then(|own| match weights {
+                    Some(weights) => own.weighted(weights),
+                    None => Ok(own),
+                });
                 runs.push(made.map_err(|cause| Error::InRun {
                     run,
                     cause: Box::new(cause),
@@ -138,15 +157,26 @@ impl PyEvidence {
         let found = detached(py, || self.0.estimate(&probabilities))?;
         let found = found.ok_or_else(|| argument_error(py, LOST.into()))?;
         let n = found.mean.len();
+        let alone = found.alone.iter().map(|own| {
+            let (b, variance) = own.alone()?;
+            Some((b[0], b[1], variance[(0, 0)], variance[(1, 1)]))
+        });
         let models = found.models.into_iter();
+        let zeros = found.grams.iter().zip(self.0.runs()).map(|(gram, run)| {
+            let level = run.mean() + gram.level;
+            (gram.information, gram.means.as_slice().to_vec(), level)
+        });
         Ok((
             vector(py, &found.probabilities)?,
+            found.places,
             vector(py, found.mean.as_slice())?,
             columns(py, found.covariance.as_slice(), &[n, n])?,
             vector(py, &found.noise.variances())?,
             models
                 .map(|(weight, model)| (weight, model.tau, model.omega))
                 .collect(),
+            zeros.collect(),
+            alone.collect(),
         ))
     }
 }

@@ -72,9 +72,9 @@ pub fn in_steps(time: &[f64]) -> Vec<f64> {
     time.iter().map(|t| t / step).collect()
 }
 
-pub fn harmonics(theta: &[f64], orders: &[u32]) -> DMatrix<f64> {
+pub fn harmonics(theta: &[f64], orders: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(theta.len(), 2 * orders.len(), |i, c| {
-        let angle = f64::from(orders[c / 2]) * theta[i];
+        let angle = orders[c / 2] * theta[i];
         if c % 2 == 0 { angle.cos() } else { angle.sin() }
     })
 }
@@ -108,9 +108,9 @@ pub fn cases(lengths: &[usize]) -> Vec<Case> {
 
 pub const LENGTHS: [usize; 4] = [90, 1, 300, 40];
 
-pub const ORDERS: [u32; 4] = [1, 2, 3, 17];
+pub const ORDERS: [f64; 4] = [1.0, 2.0, 3.0, 17.0];
 
-pub fn readings(cases: &[Case], orders: &[u32]) -> Readings {
+pub fn readings(cases: &[Case], orders: &[f64]) -> Readings {
     let run = |case: &Case| Run::new(&case.theta, &case.error, Some(&case.time)).unwrap();
     Readings::new(cases.iter().map(run).collect(), orders.to_vec()).unwrap()
 }

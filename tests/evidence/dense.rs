@@ -108,7 +108,7 @@ fn grams_are_those_of_the_dense_inverse() {
 fn joined(
     cases: &[Case],
     noise: &Noise,
-    orders: &[u32],
+    orders: &[f64],
     omega: &[f64],
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let n = cases.iter().map(|case| case.theta.len()).sum();

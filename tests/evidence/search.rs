@@ -33,14 +33,17 @@ fn readings_that_cannot_be_used_are_refused() {
     assert_eq!(time(&[4.0; 3]), wrong(1, 4.0, 4.0));
     assert_eq!(time(&[4.0, 4.0, 5.0]), None);
     assert_eq!(
-        Readings::new(Vec::new(), vec![1]).err(),
+        Readings::new(Vec::new(), vec![1.0]).err(),
         Some(Error::NoReadings)
     );
     let run = Run::new(&[1.0], &[2.0], None).unwrap();
-    let orders = |orders: &[u32]| Readings::new(vec![run.clone()], orders.to_vec()).err();
-    assert!(matches!(orders(&[0]), Some(Error::Orders { .. })));
-    assert!(matches!(orders(&[2, 2]), Some(Error::Orders { .. })));
-    assert_eq!(orders(&[1, 7]), None);
+    let orders = |orders: &[f64]| Readings::new(vec![run.clone()], orders.to_vec()).err();
+    assert!(matches!(orders(&[0.0]), Some(Error::OrderValue { .. })));
+    assert!(matches!(
+        orders(&[2.0, 2.0]),
+        Some(Error::OrderValue { .. })
+    ));
+    assert_eq!(orders(&[0.5, 7.0]), None);
 }
 
 /// Change of the evidence by factorising both models anew.
@@ -256,7 +259,7 @@ fn readings_that_tell_nothing_leave_the_prior() {
         vec![single.clone(), single],
         vec![still],
     ] {
-        let found = Readings::new(runs, vec![1, 2])
+        let found = Readings::new(runs, vec![1.0, 2.0])
             .unwrap()
             .estimate(&[0.1, 0.6])
             .unwrap();

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,12 @@ from ..support.arrays import Array
 #: Correlation times of the noise's exponential terms, in median steps of a run's time.
 CORRELATION_TIMES = tuple(Evidence.CORRELATION_TIMES)
 
+#: Part of the variance of the curve that orders left out of a model may take from its mean.
+_LEFT_OUT: Final = 0.25
+
+#: Singular values of columns, over the largest, below which they are one column at the angles.
+_ALIKE: Final = 1e-6
+
 
 class RunReadings(NamedTuple):
     """Readings of one run in the order in which they were read."""
@@ -21,6 +27,15 @@ class RunReadings(NamedTuple):
     theta: Array  #: Angles, radians.
     error: Array  #: Errors, any unit.
     time: Array | None = None  #: Times that do not decrease; None: equally spaced.
+    weights: Array | None = None  #: Above 0; the noise of a reading is over their roots.
+
+
+class RunZero(NamedTuple):
+    """What the readings tell of the zero of a run."""
+
+    information: float  #: Inverse variance, where the coefficients are known.
+    columns: Array  #: Weighted mean of each column, as that of ``level``.
+    level: float  #: Weighted mean of the errors.
 
 
 class WeightedModel(NamedTuple):
@@ -31,49 +46,135 @@ class WeightedModel(NamedTuple):
     omega: Array  #: Variance of what differs from run to run, of each order.
 
 
+class Alone(NamedTuple):
+    """One order by itself, beside those of the most probable model."""
+
+    cosine: float
+    sine: float
+    cosine_variance: float
+    sine_variance: float
+
+    @property
+    def statistic(self) -> float:
+        """Sum of squares of both over their variances; 2 on average where there is none."""
+        return self.cosine**2 / self.cosine_variance + self.sine**2 / self.sine_variance
+
+
 @dataclass(frozen=True)
 class EvidenceEstimate:
     """Posterior of orders, coefficients and noise.
 
     Attributes
     ----------
-    orders : tuple of int
-        The orders that were tested.
+    orders : tuple of float
+        The orders that were looked at.
     probability : ndarray, shape (K,)
-        Posterior probability that each order is in the error.
-    mean, covariance : ndarray, shapes (2 K,) and (2 K, 2 K)
-        Of the cosine and the sine of every order in turn; the mixture over models and noises.
+        Posterior probability that each of them is in the error.
+    told : tuple of float
+        Orders that some model of the mixture has.
+    mean, covariance : ndarray, shapes (2 M,) and (2 M, 2 M)
+        Of the cosine and the sine of every order of ``told`` in turn; the mixture over models and
+        noises.
     noise : ndarray, shape (6,)
         Variances of the noise at the maximum of the evidence: its white part, and the terms with
         the correlation times `CORRELATION_TIMES`.
     models : tuple of WeightedModel
-        Models of the mixture, the most probable first.
+        Models of the mixture over ``told``, the most probable first.
+    zeros : tuple of RunZero
+        Of the runs in turn.
+    readings : int
+    alone : tuple of Alone or None
+        Each of ``orders`` by itself; None where the readings do not tell it from the others.
     """
 
-    orders: tuple[int, ...]
+    orders: tuple[float, ...]
     probability: Array
+    told: tuple[float, ...]
     mean: Array
     covariance: Array
     noise: Array
     models: tuple[WeightedModel, ...]
+    zeros: tuple[RunZero, ...]
+    alone: tuple[Alone | None, ...]
+    readings: int
 
     @property
-    def included(self) -> tuple[int, ...]:
+    def included(self) -> tuple[float, ...]:
         """Orders that are more probably in the error than not."""
         return tuple(k for k, p in zip(self.orders, self.probability, strict=True) if p > 0.5)
 
     def curve(self, theta: Array) -> tuple[Array, Array]:
         """Error curve at angles in radians, less its mean over them, and its standard deviation."""
-        waves = np.multiply.outer(theta, self.orders)
-        columns = np.stack([np.cos(waves), np.sin(waves)], axis=2).reshape(len(theta), -1)
-        columns -= columns.mean(axis=0)
+        return self._curve(theta, ())
+
+    def carriers(self, theta: Array, beside: Sequence[float] = ()) -> tuple[float, ...]:
+        """The fewest orders that hold the curve at these angles.
+
+        These are the orders that are there with more than half of the probability, and, where
+        orders stand for each other, the likeliest of the others, until what they leave out of
+        the mean curve has less than a quarter of the curve's variance.
+
+        Parameters
+        ----------
+        theta : ndarray
+            Angles in radians.
+        beside : sequence of float
+            Orders that are fitted and not wanted.
+        """
+        chance = dict(zip(self.orders, self.probability, strict=True))
+        ranked = sorted((k for k in self.told if k not in beside), key=lambda k: -chance[k])
+        count = sum(chance[k] >= 0.5 for k in ranked)
+        curve, std = self._curve(theta, beside)
+        while count < len(ranked):
+            mean, _ = self.among(sorted(ranked[:count]), theta, beside)
+            held = _columns(theta, sorted(ranked[:count])) @ mean
+            # A curve within its own standard deviation is none.
+            share = _LEFT_OUT if count else 1.0
+            if np.mean((curve - held) ** 2) <= share * np.mean(std**2):
+                break
+            count += 1
+        return tuple(sorted(ranked[:count]))
+
+    def among(
+        self, orders: Sequence[float], theta: Array, beside: Sequence[float] = ()
+    ) -> tuple[Array, Array]:
+        """Mean and covariance of coefficients whose curve at these angles is nearest to this one.
+
+        ::
+
+            b_S = M b,   M = argmin |X_S M - X|
+
+        so that an order that is not among those wanted is held by those it looks like.
+        """
+        columns = _columns(theta, orders)
+        onto = np.zeros((2 * len(orders), 2 * len(self.told)))
+        for i, order in enumerate(self.told):
+            own = slice(2 * i, 2 * i + 2)
+            if order in orders:
+                place = 2 * list(orders).index(order)
+                onto[place : place + 2, own] = np.eye(2)
+            elif order not in beside and len(orders):
+                other = _columns(theta, [order])
+                onto[:, own] = np.linalg.lstsq(columns, other, rcond=_ALIKE)[0]
+        return onto @ self.mean, onto @ self.covariance @ onto.T
+
+    def _curve(self, theta: Array, beside: Sequence[float]) -> tuple[Array, Array]:
+        columns = _columns(theta, self.told)
+        columns[:, np.repeat(np.isin(self.told, list(beside)), 2)] = 0.0
         variance = np.einsum("ij,jk,ik->i", columns, self.covariance, columns)
         return columns @ self.mean, np.sqrt(np.maximum(variance, 0.0))
 
 
+def _columns(theta: Array, orders: Sequence[float]) -> Array:
+    """Cosine and sine of every order in turn, less their means over the angles."""
+    waves = np.multiply.outer(theta, np.asarray(orders, dtype=float))
+    columns = np.stack([np.cos(waves), np.sin(waves)], axis=2).reshape(len(theta), -1)
+    return np.asarray(columns - columns.mean(axis=0))
+
+
 def estimate_by_evidence(
     runs: Sequence[RunReadings],
-    orders: Sequence[int],
+    orders: Sequence[float],
     probability: Sequence[float] | None = None,
 ) -> EvidenceEstimate:
     """Estimate orders, their coefficients and the noise of runs together.
@@ -92,16 +193,16 @@ def estimate_by_evidence(
     Parameters
     ----------
     runs : sequence of RunReadings
-    orders : sequence of int
-        From 1, increasing.
+    orders : sequence of float
+        Positive, increasing; as many as one likes, for those that do not stand out cost a pass.
     probability : sequence of float, optional
         Prior probability of each order, above 0 and below 1; 1/K of each by default, or 1/2 of one.
 
     Raises
     ------
     ArgumentError
-        Readings that are not finite or not equally many, times that decrease, orders that do not
-        increase.
+        Readings that are not finite or not equally many, times that decrease, weights that are not
+        above 0, orders that do not increase.
 
     Examples
     --------
@@ -113,14 +214,23 @@ def estimate_by_evidence(
     """
     if probability is None:
         probability = [1.0 / max(len(orders), 2)] * len(orders)
-    given = [
-        (np.asarray(run.theta, float), np.asarray(run.error, float), _times(run.time))
-        for run in runs
-    ]
-    own, mean, covariance, noise, models = Evidence(given, orders).estimate(probability)
-    weighted = (WeightedModel(w, np.array(tau), np.array(omega)) for w, tau, omega in models)
-    return EvidenceEstimate(tuple(orders), own, mean, covariance, noise, tuple(weighted))
+    given = [tuple(map(_column, run)) for run in runs]
+    own, places, mean, covariance, noise, models, zeros, alone = Evidence(given, orders).estimate(
+        probability
+    )
+    return EvidenceEstimate(
+        tuple(orders),
+        own,
+        tuple(orders[k] for k in places),
+        mean,
+        covariance,
+        noise,
+        tuple(WeightedModel(w, np.array(tau), np.array(omega)) for w, tau, omega in models),
+        tuple(RunZero(n, np.array(columns), level) for n, columns, level in zeros),
+        tuple(None if own is None else Alone(*own) for own in alone),
+        sum(len(run.theta) for run in runs),
+    )
 
 
-def _times(time: Array | None) -> Array | None:
-    return None if time is None else np.asarray(time, float)
+def _column(values: Array | None) -> Array | None:
+    return None if values is None else np.asarray(values, float)

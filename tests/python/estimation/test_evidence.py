@@ -59,7 +59,9 @@ def test_posterior_is_that_of_the_dense_covariance(noise: list[float]) -> None:
     inner = zeros.T @ inverse @ zeros
     left = inverse - inverse @ zeros @ np.linalg.solve(inner, zeros.T @ inverse)
     expected = -0.5 * (np.linalg.slogdet(whole)[1] + np.linalg.slogdet(inner)[1] + y @ left @ y)
-    log_evidence, mean, spread = Evidence(runs, orders).posterior(noise, tau, omega)
+    log_evidence, mean, spread = Evidence([RunReadings(*run) for run in runs], orders).posterior(
+        noise, tau, omega
+    )
     assert log_evidence == pytest.approx(expected - 0.5 * 162 * LOG_TURN, abs=1e-9)
     np.testing.assert_allclose(mean, prior @ x.T @ left @ y, atol=1e-10)
     np.testing.assert_allclose(spread, prior - prior @ x.T @ left @ x @ prior, atol=1e-10)
@@ -77,7 +79,7 @@ def test_likelihood_of_the_noise_is_that_of_celerite2(noise: list[float]) -> Non
     information = process.apply_inverse(np.ones(240)).sum()
     zero = process.apply_inverse(error).sum() / information
     expected = process.log_likelihood(error - zero) + 0.5 * (LOG_TURN - math.log(information))
-    found = Evidence([(theta, error, time)], [1]).posterior(noise, [0.0], [0.0])
+    found = Evidence([RunReadings(theta, error, time)], [1]).posterior(noise, [0.0], [0.0])
     assert found[0] == pytest.approx(expected, abs=1e-8)
 
 
@@ -101,7 +103,7 @@ def test_effects_of_runs_are_those_of_statsmodels() -> None:
         data=table,
     ).fit(reml=True)
     white, omega = float(fitted.scale), float(fitted.vcomp[0])
-    evidence = Evidence(runs, [2])
+    evidence = Evidence([RunReadings(*run) for run in runs], [2])
 
     def at(white: float, omega: float) -> tuple[float, np.ndarray, np.ndarray]:
         return evidence.posterior([white, 0.0, 0.0, 0.0, 0.0, 0.0], [1e7], [omega])
@@ -215,10 +217,32 @@ def test_what_differs_from_run_to_run_widens_the_interval() -> None:
         std = np.sqrt(np.diag(found.covariance))
         pulls += list((found.mean[:2] - [50.0, -20.0]) / std[:2])
         differs += found.models[0].omega[0] > 0.0
-        assert std[6] < 0.25 * std[0]
+        assert std[2 * found.told.index(4)] < 0.25 * std[0]
     assert 0.6 < np.sqrt(np.mean(np.square(pulls))) < 1.4
     assert np.mean(np.abs(pulls) < 1.96) >= 0.9
     assert differs >= 14
+
+
+def test_weights_and_orders_that_are_not_whole_are_those_of_scaled_columns() -> None:
+    """A noise that is over the roots of the weights, and order 2.5: as in a dense covariance."""
+    rng = np.random.default_rng(69)
+    theta, error, time = scattered(rng, 80)
+    weights = rng.gamma(2.0, 0.5, 80)
+    run = RunReadings(theta, error, time, weights)
+    log_evidence, mean, spread = Evidence([run], [2.5]).posterior(NOISES[0], [4.0], [0.0])
+    x = np.stack([np.cos(2.5 * theta), np.sin(2.5 * theta)], axis=1)
+    root = np.sqrt(np.outer(weights, weights))
+    inverse = np.linalg.inv(covariance(NOISES[0], time) / root + 4.0 * x @ x.T)
+    ones = np.ones(80)
+    left = inverse - np.outer(inverse @ ones, ones @ inverse) / (ones @ inverse @ ones)
+    np.testing.assert_allclose(mean, 4.0 * x.T @ left @ error, atol=1e-10)
+    np.testing.assert_allclose(spread, 4.0 * np.eye(2) - 16.0 * x.T @ left @ x, atol=1e-10)
+    plain = run._replace(weights=np.full(80, 1.0))
+    again = Evidence([plain], [2.5]).posterior(NOISES[0], [4.0], [0.0])[0]
+    assert (
+        again == Evidence([run._replace(weights=None)], [2.5]).posterior(NOISES[0], [4.0], [0.0])[0]
+    )
+    assert again != log_evidence
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.7])
@@ -251,6 +275,25 @@ def test_orders_that_the_places_cannot_distinguish_share_their_probability() -> 
     assert np.abs(between).max() < 6.0
 
 
+def test_an_order_left_out_is_held_by_those_it_looks_like() -> None:
+    """Over 40 deg orders 1 and 2 hold what order 3 makes there, mean and band."""
+    theta = np.radians(np.linspace(0.0, 40.0, 200))
+    rng = np.random.default_rng(70)
+    run = RunReadings(theta, 6.0 * np.cos(3.0 * theta + 0.4) + 0.1 * rng.normal(size=200))
+    found = estimate_by_evidence([run], [1, 2, 3])
+    mean, spread = found.among([1, 2], theta)
+    columns = harmonics(theta, [1, 2])
+    columns -= columns.mean(axis=0)
+    curve, std = found.curve(theta)
+    np.testing.assert_allclose(columns @ mean, curve, atol=0.02)
+    own = np.sqrt(np.einsum("ij,jk,ik->i", columns, spread, columns))
+    np.testing.assert_allclose(own, std, rtol=0.2, atol=0.005)
+    # All of them are themselves, and those beside are left away.
+    every, _ = found.among(found.told, theta)
+    np.testing.assert_array_equal(every, found.mean)
+    assert not found.among([1], theta, beside=[k for k in found.told if k != 1])[0][2:].any()
+
+
 def test_the_noise_is_that_of_the_readings() -> None:
     """White and one term, both from long runs: each variance to a quarter."""
     rng = np.random.default_rng(68)
@@ -262,13 +305,13 @@ def test_the_noise_is_that_of_the_readings() -> None:
         for i in range(1, 4000):
             drift[i] = decay * drift[i - 1] + 3.0 * math.sqrt(1.0 - decay**2) * rng.normal()
         theta = np.linspace(0.0, 30.0, 4000)
-        runs.append((theta, 8.0 * np.cos(theta) + drift + rng.normal(size=4000), None))
+        runs.append(RunReadings(theta, 8.0 * np.cos(theta) + drift + rng.normal(size=4000)))
     evidence = Evidence(runs, [1, 2])
     white, *terms = evidence.noise([64.0, 64.0], [0.0, 0.0], 10.0)
     assert white == pytest.approx(1.0, rel=0.25)
     assert terms[1] == pytest.approx(9.0, rel=0.25)
     assert sum(terms) - terms[1] < 1.0
-    assert evidence.estimate([0.5, 0.5])[3][2] == pytest.approx(terms[1], rel=0.1)
+    assert evidence.estimate([0.5, 0.5])[4][2] == pytest.approx(terms[1], rel=0.1)
 
 
 def test_what_cannot_be_used_is_refused_with_the_run_and_the_reading() -> None:
@@ -286,10 +329,13 @@ def test_what_cannot_be_used_is_refused_with_the_run_and_the_reading() -> None:
             estimate_by_evidence([wrong], [1])
     with pytest.raises(ArgumentError, match="at least 1 run"):
         estimate_by_evidence([], [1])
-    with pytest.raises(ArgumentError, match="increasing order, got 2 before 2"):
+    with pytest.raises(ArgumentError, match=r"increasing order, got orders\[1\] = 2 after 2"):
         estimate_by_evidence([good], [2, 2])
-    with pytest.raises(ArgumentError, match="orders must be from 1 to 4294967295, got -2"):
+    with pytest.raises(ArgumentError, match=r"orders must be positive, .* got orders\[0\] = -2"):
         estimate_by_evidence([good], [-2])
+    weighted = good._replace(weights=np.array([1.0, 0.0, 1.0, 1.0]))
+    with pytest.raises(ArgumentError, match=r"runs\[0\]: weights\[1\]"):
+        estimate_by_evidence([weighted], [1])
     with pytest.raises(ArgumentError, match="above 0 and below 1, got 1"):
         estimate_by_evidence([good], [2], [1.0])
     with pytest.raises(ArgumentError, match="probabilities has 2 elements, orders has 1"):
