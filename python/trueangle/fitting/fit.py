@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 from ..errors import ArgumentError, NoOrderError, UnlikeRunsWarning
@@ -17,7 +16,6 @@ from ..runs.run import CalibrationRun
 from ..runs.source import ReadingOptions
 from ..runs.travel import CONDITION, travelled_span, without_drift
 from ..support.argumentkinds import told_kinds
-from ..support.arrays import Array
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument, ArgumentChoice, choose_argument
 from .problem import Problem
@@ -135,8 +133,7 @@ def fit(
     RankError
         The readings cannot tell the orders apart; names those at fault.
     NoModelError
-        Orders were to be selected and the data support none, or such that do not hold from run
-        to run or from stretch to stretch, so that a further one would be made worse; says why.
+        Orders were to be selected and the data support none; says why.
     ArgumentError
         Runs in different units, an indicated angle that does not follow the reference
         (wrong unit or sign), unknown shafts, and the like.
@@ -217,15 +214,24 @@ def fitted_to(
     threads: int | None = None,
     summed: SummedReadings | None = None,
     evidence: OrderSelection | None = None,
+    candidates: Iterable[float] | None = None,
 ) -> FitResult:
     """As `fit`; with ``summed`` of all readings of which the runs are some.
 
-    ``evidence`` stands for a selection of orders that was made before.
+    ``evidence`` stands for a selection of orders among ``candidates`` that was made before.
     """
     check_choice("argument", argument, ARGUMENTS)
     check_covariance(covariance, len(found))
     check_usable(found)
     selection = evidence
+    sought: dict[str, Any] = {
+        "candidates": candidates,
+        "gear_ratio": gear_ratio,
+        "fixed_member": fixed_member,
+        "argument": argument,
+        "shafts": shafts,
+        "reference_orders": (),
+    }
     beside = _beside(nuisance, reference_orders)
     given = found
     if evidence is not None:
@@ -238,14 +244,7 @@ def fitted_to(
             found, _ = take_out_nuisance(
                 given, beside.kinds, likely, _angle(argument), beside.reference
             )
-        sought = {
-            "gear_ratio": gear_ratio,
-            "fixed_member": fixed_member,
-            "argument": argument,
-            "covariance": covariance,
-            "shafts": shafts,
-            "reference_orders": beside.reference,
-        }
+        sought["reference_orders"] = beside.reference
         selection, orders = _selected(found, orders, loss, sought, summed)
     wanted = resolve_orders(orders, gear_ratio, fixed_member, shafts)
     taken = None
@@ -263,7 +262,22 @@ def fitted_to(
             found = [without_drift(run, cycles) for run in found]
     else:
         choice = choose_argument(found, argument, wanted)
-    if summed is None:
+    known = None
+    usual = covariance == "auto" and ridge is None and method is None and taken is None
+    usual &= loss in ("auto", "linear")
+    if usual and selection is not None and selection.is_of_all_readings:
+        from .mixture import fit_mixture
+
+        selection, problem, weighted, known = fit_mixture(
+            found,
+            selection,
+            lambda runs: _choice(runs, sought),
+            lambda own: resolve_orders(own.by_shaft, gear_ratio, fixed_member, shafts),
+            loss == "auto",
+            ROUNDING * found[0].period,
+        )
+        wanted, ridge = list(problem.shafts), 0.0
+    elif summed is None:
         problem = Problem(found, wanted, choice.argument, method, threads)
         weighted = fit_robustly(problem, loss, ROUNDING * problem.period)
     else:
@@ -271,10 +285,6 @@ def fitted_to(
 
         problem = SummedProblem(summed, wanted, threads)
         weighted = fit_without_outliers(problem, len(summed.outliers))
-    if selection is not None and len(found) > 1:
-        from .transfer import check_new_run
-
-        check_new_run(_weighted_runs(found, weighted.weights), wanted, choice.argument, summed)
     span = travelled_span(problem.travel, problem.period, problem.is_periodic)
     if ridge is None:
         tame = (span.full and problem.is_periodic) or weighted.fitted.solution.is_conditioned_below(
@@ -286,10 +296,6 @@ def fitted_to(
 
             ridge = choose_ridge(problem, weighted.weights or problem.base)
     fitted = weighted.fitted
-    if selection is not None:
-        from .transfer import check_later_segment
-
-        check_later_segment(problem, weighted.weights or problem.base)
     if ridge > 0.0:
         fitted = problem.penalised(fitted, weighted.weights or problem.base, ridge)
     if problem.argument == "reference":
@@ -326,16 +332,8 @@ def fitted_to(
         tuple(remarks),
         covariance,
         taken,
+        known=known,
     )
-
-
-def _weighted_runs(
-    runs: Sequence[CalibrationRun], weights: Sequence[Array] | None
-) -> Sequence[CalibrationRun]:
-    """The runs with the weights of the robust fit, so that every hold-out rejects its outliers."""
-    if weights is None:
-        return runs
-    return [replace(run, weights=w) for run, w in zip(runs, weights, strict=True)]
 
 
 class _Beside(NamedTuple):
@@ -377,13 +375,17 @@ def _selected(
     """Orders with evidence, from readings without spikes."""
     if orders not in (None, "auto"):
         raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
-    from .orders.choice import selected_orders
-
     if loss != "linear":
         runs = [without_spikes(run) for run in runs]
-    selection = selected_orders(runs, **sought, summed=summed)
+    selection = _choice(runs, {**sought, "summed": summed})
     if not selection.orders:
         raise NoOrderError(
             f"no order is supported by the data: {selection.reason}", sum(map(len, runs))
         )
     return selection, selection.by_shaft
+
+
+def _choice(runs: Sequence[CalibrationRun], sought: dict[str, Any]) -> OrderSelection:
+    from .orders.choice import selected_orders
+
+    return selected_orders(runs, **sought)

@@ -43,6 +43,7 @@ class FitData(PlainResult):
     covariance_asked: CovarianceKind = "auto"
     nuisance: Nuisance | None = None
     posterior: Posterior | None = None
+    known: Uncertainty | None = None
 
     @property
     def weights(self) -> list[Array] | None:
@@ -125,12 +126,14 @@ class FitData(PlainResult):
 
     @property
     def method(self) -> str:
-        """The way taken: ``"plain"``, ``"moments"``, ``"qr"`` or ``"counts"``, see `fit`."""
+        """``"evidence"`` of orders chosen by it, else the core's way: see `fit`."""
         return self.fitted.solution.method
 
     @cached_property
     def uncertainty(self) -> Uncertainty:
         """Covariance, its kind and the degrees of freedom of each coefficient's variance."""
+        if self.known is not None:
+            return self.known
         if self.posterior is not None:
             covariance = np.asarray(self.fitted.solution.covariance)
             return Uncertainty(

@@ -45,7 +45,7 @@ class PlainSolution(NamedTuple):
     degrees_of_freedom: float
     rank: int
     condition_number: float
-    method: Literal["plain", "moments", "qr", "counts"]
+    method: Literal["plain", "moments", "qr", "counts", "evidence"]
     residual_bound: float = math.inf
 
 

@@ -48,6 +48,8 @@ class FitResult(FittedCoefficients):
         What was taken out of the readings beside the pattern: `runs` are without it.
     posterior : Posterior or None
         What a prior did: the share of each order that is the unit's own (`fit`, ``prior=``).
+    known : Uncertainty or None
+        Covariance that came with the coefficients, where orders were chosen by evidence.
     """
 
     def plot(self, kind: Picture = "errors", ax: Axes | None = None, **options: Any) -> Axes:

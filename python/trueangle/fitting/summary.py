@@ -80,6 +80,7 @@ def _intervals(fit: FittedCoefficients) -> str:
 
 _KINDS = {
     "white": "white noise",
+    "evidence": "noise of any correlation and what else it may be, by evidence",
     "cluster": "by the scatter between runs",
     "hac": "by the scatter of segments of the readings",
 }

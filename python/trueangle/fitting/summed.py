@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.linear import NormalEquations
 from ..estimation.moments import Moments
 from ..model.model import Argument
 from ..runs.run import CalibrationRun
@@ -52,13 +51,6 @@ class SummedReadings:
     def sums(self, orders: Sequence[float]) -> HarmonicSums:
         """Normal equations of orders, run by run, from all readings."""
         return _sums_of_moments(self.moments, orders)
-
-    def parts(self, orders: Array, share: float) -> Iterator[NormalEquations]:
-        """Normal equations of every run as a share of its readings would have them."""
-        sums = self.sums(orders.tolist())
-        every = range(len(orders))
-        for unit in range(sums.units):
-            yield sums.equations(unit, every).share(share)
 
     @property
     def note(self) -> str:

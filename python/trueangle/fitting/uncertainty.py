@@ -46,7 +46,7 @@ class Uncertainty(NamedTuple):
     the coefficients set aside; None for those of ``freedom``.
     """
 
-    kind: Literal["white", "cluster", "hac"]
+    kind: Literal["white", "cluster", "hac", "evidence"]
     covariance: Array
     freedom: Array
     note: str = ""

@@ -52,6 +52,6 @@ def of_worth(fit: FitResult) -> FitResult:
         raise NoModelError(
             f"no correction can be given: the error fitted, of {unit.text(size)} amplitude, is "
             f"below its own standard error of {unit.text(error)}; measure more runs, or declare "
-            "the --orders"
+            "the `orders=`"
         )
     return fit

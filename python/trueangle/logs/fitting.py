@@ -189,7 +189,7 @@ def select_log_orders(
     except NoModelError:
         summed = passes.last
         runs = [without_spikes(run) for run in summed.runs]
-        found = selected_orders(runs, **options, summed=summed)  # type: ignore[arg-type]
+        found = selected_orders(runs, **joint, argument=argument, summed=summed)  # type: ignore[arg-type]
     return found.with_notes((*found.notes, passes.last.note))
 
 

@@ -106,7 +106,7 @@ def travelled_span(angles: Sequence[Array], period: float, periodic: bool) -> Sp
     return Span(low, high, False)
 
 
-def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> tuple[float, bool]:
+def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> float:
     """Order from which on a line is told from what changes in time, over a short single pass.
 
     On an arc that one run passed once, drift in time is a function of the angle as well, and a
@@ -120,16 +120,16 @@ def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> tu
     >>> theta = np.linspace(0.0, 24.0, 500)
     >>> run = CalibrationRun(theta, theta + 0.001 * theta, period=360.0)
     >>> held_orders([run], [360.0])
-    (30.0, False)
+    30.0
     """
     if len(runs) != 1 or len(runs[0]) < _LONG:
-        return 0.0, False
+        return 0.0
     (run,) = runs
     reference = run.unwrapped_reference
     travel = float(np.ptp(reference)) / run.period
     passed = float(np.abs(np.diff(reference)).sum()) / run.period
     if not 0.0 < travel < _SHORT or passed > _ONE_PASS * travel:
-        return 0.0, False
+        return 0.0
     held = [k for k in declared if k * travel >= _PERIODS]
     part = slice(0, _COMPARED)
     x = (reference[part] - reference[0]) / (travel * run.period)
@@ -142,7 +142,7 @@ def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> tu
     left = error - design @ np.linalg.lstsq(design, error, rcond=None)[0]
     size = float(left @ left)
     agree = size > 0.0 and float(left[:-1] @ left[1:]) > _CORRELATED * size
-    return (_PERIODS / travel if held or agree else 0.0), agree
+    return _PERIODS / travel if held or agree else 0.0
 
 
 def without_drift(run: CalibrationRun, orders: Sequence[float]) -> CalibrationRun:

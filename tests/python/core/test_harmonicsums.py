@@ -1,16 +1,12 @@
 """Sums of a selection against the plain design matrix, and the core's one pass."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
 
 import trueangle as ta
 from trueangle.fitting.orders import harmonicsums, noise
-from trueangle.fitting.orders.evidence import choose_forward, fit_chosen_orders, held_out_gains
+from trueangle.fitting.orders.chosen import held_out_gains
 from trueangle.fitting.orders.harmonicsums import harmonic_sums
-from trueangle.fitting.orders.noisespectrum import NoiseSpectrum, log_chance
-from trueangle.fitting.orders.significance import examine_orders
 from trueangle.fitting.orders.zerogroups import ZeroGroupReadings, zero_groups
 from trueangle.runs.aliasing import distinct_positions
 
@@ -79,31 +75,8 @@ def test_450_orders_take_one_pass(monkeypatch):
         runs.append(ta.CalibrationRun(angles, noisy, period=360.0))
     chosen = ta.select_orders(runs, candidates=range(1, 451))
     assert chosen.orders == (3, 402)
-    assert passes == [60_000] * 3
-
-
-def test_statistics_are_those_of_least_squares():
-    units = some_units(3)
-    orders = (1, 2, 3, 4, 5)
-    sums = harmonic_sums(units, orders)
-    root = np.concatenate([np.sqrt(u.weights) for u in units])
-    zero = np.repeat(np.eye(3), [u.turns.size for u in units], axis=0)
-    turns = np.concatenate([u.turns for u in units])
-    error = np.concatenate([u.error for u in units])
-
-    def residual(used):
-        x = 2 * np.pi * turns[:, None] * np.asarray(used, dtype=float)
-        full = np.concatenate([np.cos(x), np.sin(x), zero], axis=1) * root[:, None]
-        solution = np.linalg.lstsq(full, error * root, rcond=None)[0]
-        return solution, float(((error * root - full @ solution) ** 2).sum())
-
-    solution, left = residual((3, 1))
-    coefficients, _, squares = fit_chosen_orders(sums, [2, 0])
-    np.testing.assert_allclose(coefficients, solution[:4], rtol=1e-8)
-    assert squares == pytest.approx(left)
-    test = examine_orders(sums, [2, 0], [0, 4], NoiseSpectrum.flat(0.01, 50.0, 2), None)
-    assert test.statistic[0] == pytest.approx((residual((3,))[1] - left) / 0.01)
-    assert test.statistic[1] == pytest.approx((left - residual((3, 1, 5))[1]) / 0.01)
+    assert len(passes) == 3
+    assert sum(passes) < 9000  # of more readings some tell the orders
 
 
 def test_held_out_errors_are_those_of_leaving_units_out():
@@ -126,37 +99,6 @@ def test_held_out_errors_are_those_of_leaving_units_out():
     assert model == pytest.approx(left_out([2, 1]))
     assert without == pytest.approx([left_out([2]), left_out([1]), left_out([2, 1])])
     assert with_ == pytest.approx([left_out([2, 1]), left_out([2, 1]), left_out([2, 1, 3])])
-
-
-def test_forward_choice_takes_the_lowest_of_aliases():
-    turns = np.arange(36) / 36.0
-    unit = ZeroGroupReadings(turns, np.sin(2 * np.pi * 202 * turns), np.ones(36), "")
-    sums = harmonic_sums([unit], (14, 202, 22))
-    assert choose_forward(sums, np.full(3, -3.0), 35, NoiseSpectrum.flat(0.01, 100.0, 3)) == [0]
-
-
-def test_a_choice_among_many_orders_changes_no_matrix_of_all_of_them():
-    rng = np.random.default_rng(52)
-    turns = rng.uniform(0.0, 1.0, 3000)
-    error = sum(np.sin(2 * np.pi * k * turns + k) for k in (1, 7, 90, 91, 212))
-    unit = ZeroGroupReadings(turns, error + rng.normal(0, 0.1, 3000), np.ones(3000), "")
-    sums = harmonic_sums([unit], range(1, 301))
-    matrix, _, _ = sums.total()
-    before = matrix.copy()
-    tracemalloc.start()
-    chosen = choose_forward(sums, np.full(300, np.log(1e-6)), 2999, None)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert sorted(sums.orders[chosen]) == [1, 7, 90, 91, 212]
-    assert peak < 0.2 * matrix.nbytes
-    np.testing.assert_array_equal(matrix, before)
-
-
-def test_tail_of_the_f_distribution():
-    stats = pytest.importorskip("scipy.stats")
-    for t, dof in ((3.0, 5.0), (15.0, 140.0), (40.0, 1000.0)):
-        assert log_chance(t, dof) == pytest.approx(stats.f.logsf(t / 2, 2, dof))
-    assert log_chance(15.0, np.inf) == pytest.approx(stats.chi2.logsf(15.0, 2))
 
 
 @pytest.mark.parametrize("sizes", [[2, 1, 7, 40], [2000, 3000]])
@@ -207,16 +149,10 @@ def test_parts_of_the_normal_matrix_are_parts_of_it(orders):
         for n in (50, 700)
     ]
     sums = harmonic_sums(units, orders)
-    size = len(orders)
-    everything = range(size)
-    for unit, own in enumerate(sums.blocks()):
-        whole = sums.gram(unit, everything)
+    for unit in range(sums.units):
+        whole = sums.gram(unit, range(len(orders)))
         part = sums.gram(unit, [2, 0], [1])
         assert np.array_equal(part, whole[np.ix_(sums.columns([2, 0]), sums.columns([1]))])
-        for k in everything:
-            assert np.allclose(
-                own[k], whole[np.ix_([k, k + size], [k, k + size])], rtol=1e-13, atol=0
-            )
 
 
 @pytest.mark.parametrize("name", ["turns", "error", "weights"])

@@ -7,7 +7,6 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import NoModelError
-from trueangle.fitting.transfer import gains_of_runs
 from trueangle.support.angles import circular_mean
 
 SEED = 41
@@ -21,21 +20,6 @@ def joint(phase, amplitude=0.1, label=None, seed=0, n=400):
     return ta.CalibrationRun(x, x + error, 360.0, label=label)
 
 
-def test_gains_are_those_of_refits():
-    runs = [joint(0.1 * i, label=str(i), seed=i) for i in range(4)]
-    gains, noise, *_ = gains_of_runs(runs, [2.0], "reference")
-    for i, run in enumerate(runs):
-        others = [other for j, other in enumerate(runs) if j != i]
-        model = ta.fit(others, [2], argument="reference", loss="linear").model
-        before = run.error - run.error.mean()
-        after = before - model.error(run.reference)
-        after -= after.mean()
-        # The gram's ridge of 1e-6, twice.
-        assert gains[i] == pytest.approx(np.mean(before**2) - np.mean(after**2), rel=1e-5)
-    # By noise: 4 s^2 A^2/2 n, of the amplitude left after averaging.
-    assert noise == pytest.approx(4.0 * NOISE**2 * 0.5 * 0.1**2 / 400, rel=0.1)
-
-
 def test_runs_of_one_joint_pass_however_weak():
     for amplitude in (0.1, 0.005):
         runs = [joint(0.3, amplitude, str(i), seed=i) for i in range(8)]
@@ -45,18 +29,12 @@ def test_runs_of_one_joint_pass_however_weak():
 def test_runs_of_unlike_joints_are_refused():
     phases = (0.0, 0.3, 1.4, 2.9, 0.2, 4.0)
     runs = [joint(p, 0.1, f"unit {i}", seed=i) for i, p in enumerate(phases)]
-    with pytest.raises(NoModelError, match=r"no correction can be given|no order is supported"):
+    with pytest.raises(NoModelError, match="no order is supported"):
         ta.fit(runs)
     # Declared orders are the user's.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert ta.fit(runs, [2]).orders == (2,)
-
-
-def test_one_run_or_few_readings_cannot_say():
-    assert gains_of_runs([joint(0.0)], [2.0], "reference") is None
-    few = [joint(0.0, seed=i, n=3) for i in range(2)]
-    assert gains_of_runs(few, [1.0, 2.0], "reference") is None
 
 
 @pytest.mark.parametrize(

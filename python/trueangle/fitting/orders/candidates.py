@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import ArgumentError
 from ...joint.gear import COMMON_RATIOS, HIGHEST_LOW_ORDER, gear_orders
@@ -26,9 +25,6 @@ SHAFT_HARMONICS: Final = (1, 2, 3, 4)
 #: Orders scanned beyond the low ones where the angles are free.
 HIGHEST_SCANNED: Final = 450
 
-#: Part of the allowed false alarm that the scan may use up.
-_SCAN_SHARE: Final = 0.2
-
 #: Coherence from which two orders are hardly told apart: they come half a cycle apart over the
 #: travel. Fitted side by side they nearly cancel, and part again where nothing was read.
 _UNRESOLVED: Final = 2.0 / math.pi
@@ -38,6 +34,13 @@ _SAME: Final = 1.0 - 1e-9
 
 #: Aliases are listed at least up to this order.
 _LEAST_ALIAS: Final = 404
+
+#: Orders of a shaft that errors are known to have, and how likely each is; what is fitted in any
+#: case is certain but for rounding.
+_KNOWN: Final = (1, 2, 4)
+_LIKELY: Final = 0.25
+_UNKNOWN: Final = 0.2
+_CERTAIN: Final = 1.0 - 1e-9
 
 #: Side bands of a reference order: modulation by its eccentricity and tilt.
 _SIDE_BANDS: Final = (-2, -1, 1, 2)
@@ -115,15 +118,19 @@ class Candidates:
         """Indices of the orders looked at closely."""
         return [i for i, k in enumerate(self.orders) if k in self.main]
 
-    def log_limits(self, false_alarm: float) -> NDArray[np.float64]:
-        """Log of the false-alarm chance of each order, ``false_alarm`` in all."""
-        main = np.array([k in self.main for k in self.orders], dtype=bool)
-        scanned = int((~main).sum())
-        share = 1.0 - _SCAN_SHARE if scanned else 1.0
-        limits = np.empty(main.size)
-        limits[main] = math.log(share * false_alarm / max(1, int(main.sum())))
-        limits[~main] = math.log(_SCAN_SHARE * false_alarm / max(1, scanned))
-        return limits
+    def probabilities(self) -> list[float]:
+        """Of each order before any reading: one in five sets has one without a reason.
+
+        Reasons are known of 1, 2 and 4 of the output (eccentricity, tilt and the sensor's
+        quadrature) and of the shafts that were declared.
+        """
+        chance = min(_LIKELY, _UNKNOWN / max(1, len(self.orders)))
+        cycles = declared_cycles(self.gear_ratio, self.shafts)
+        reasons = {k * f for k in _KNOWN for f in (1.0, *map(abs, cycles))}
+        fitted = set(self.reference)
+        return [
+            _CERTAIN if k in fitted else _LIKELY if k in reasons else chance for k in self.orders
+        ]
 
 
 def _effective_positions(positions: Positions) -> Positions:

@@ -17,7 +17,6 @@ from ...support.arrays import Array
 from ...support.blas import one_blas_thread
 from ...support.suggestions import check_choice
 from ..argument import AnyArgument, choose_argument, run_at_indicated
-from ..uncertainty import CovarianceKind, check_covariance
 from .candidates import are_whole, choose_candidates, declared_cycles
 from .result import OrderSelection
 from .selection import EvidenceSelection
@@ -40,7 +39,6 @@ def selected_orders(
     method: Method = "evidence",
     *,
     argument: AnyArgument = "auto",
-    covariance: CovarianceKind = "auto",
     shafts: Mapping[str, float] | None = None,
     nuisance: str | Iterable[str] = "none",
     reference_orders: Iterable[float] = (),
@@ -49,7 +47,6 @@ def selected_orders(
 ) -> OrderSelection:
     """As `trueangle.select_orders`; with ``summed`` of all readings of which the runs are some."""
     check_choice("method", method, ("evidence", "paper"))
-    check_covariance(covariance, len(found))
     kept = [run for run in map(_without_zero_weights, found) if run is not None]
     if not kept:
         raise ArgumentError("all readings have weight 0: nothing is left to select orders from")
@@ -78,9 +75,7 @@ def selected_orders(
     # The ends of the travel are known of all readings.
     ends = [] if summed is None else [CalibrationRun(summed.ends, summed.ends, kept[0].period)]
     positions = distinct_positions([*kept, *ends], tolerance)
-    held_from, agree = held_orders(kept, declared_cycles(gear_ratio, shafts))
-    if agree and covariance == "auto":
-        covariance = "hac"
+    held_from = held_orders(kept, declared_cycles(gear_ratio, shafts))
     chosen = choose_candidates(
         positions,
         candidates,
@@ -96,7 +91,7 @@ def selected_orders(
 
         selection = select_by_paper(kept, positions, chosen)
     else:
-        selection = EvidenceSelection(kept, positions, chosen, covariance, summed).result()
+        selection = EvidenceSelection(kept, positions, chosen, summed).result()
     notes = (*filter(None, (choice.note,)), *said, *selection.notes)
     return replace(selection, argument=choice.argument, notes=notes, shafts=dict(shafts or {}))
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ...estimation.linear import NormalEquations
 from ...support.arrays import Array
 from ...support.powersums import power_sums
 from .unitgroups import GROUPS, MOST_UNITS, sums_of_unit_means, units_in_groups
@@ -62,7 +61,6 @@ class HarmonicSums:
         self._spectra = spectra
         self._means = means
         self._total: Array | None = None
-        self._blocks: Array | None = None
 
     @property
     def units(self) -> int:
@@ -77,15 +75,6 @@ class HarmonicSums:
     def rhs(self, unit: int, index: Sequence[int] | NDArray[np.intp]) -> Array:
         """``X' W y`` of a unit about its means, for the orders at ``index``."""
         return np.asarray(self._rhs[unit, self.columns(index)])
-
-    def equations(self, unit: int, index: Sequence[int] | NDArray[np.intp]) -> NormalEquations:
-        """Normal equations of a unit about its means, for the orders at ``index``."""
-        return NormalEquations(
-            self.gram(unit, index),
-            self.rhs(unit, index),
-            float(self.squares[unit]),
-            float(self.count[unit]),
-        )
 
     def gram(
         self,
@@ -119,28 +108,6 @@ class HarmonicSums:
         gram[:size, : columns.size], gram[size:, : columns.size] = cosine.real, cosine.imag
         gram[:size, columns.size :], gram[size:, columns.size :] = sine.imag, -sine.real
         return gram
-
-    def blocks(self) -> Array:
-        """``X' W X`` of every unit for each order by itself, shape (units, orders, 2, 2)."""
-        if self._blocks is None:
-            self._blocks = np.stack([self._own(unit) for unit in range(self.units)])
-        return self._blocks
-
-    def _own(self, unit: int) -> Array:
-        size = self.orders.size
-        if self._grams is not None:
-            pairs = np.stack([np.arange(size), np.arange(size) + size], axis=1)
-            return np.asarray(self._grams[unit][pairs[:, :, None], pairs[:, None, :]])
-        assert self._spectra is not None
-        whole, twice = (
-            self._spectra[unit, 0].real,
-            self._spectra[unit, 2 * self._places.astype(np.int64)],
-        )
-        own = np.empty((size, 2, 2))
-        own[:, 0, 0], own[:, 1, 1] = whole + twice.real, whole - twice.real
-        own[:, 0, 1] = own[:, 1, 0] = twice.imag
-        mean = self._means[unit].reshape(2, size).T
-        return np.asarray(0.5 * own - self.weight[unit] * mean[:, :, None] * mean[:, None, :])
 
     def named(self, orders: Sequence[float]) -> HarmonicSums:
         """The same sums under other names: orders of the output for cycles of a base shaft."""

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from ...runs.aliasing import Positions, position_coherence
-from .evidence import fit_chosen_orders
+from .chosen import fit_chosen_orders
 from .harmonicsums import harmonic_sums
 from .zerogroups import ZeroGroupReadings
 

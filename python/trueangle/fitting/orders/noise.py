@@ -1,4 +1,4 @@
-"""The noise of readings: pure error of repeats, scatter by units, runs and orders."""
+"""The noise of readings: pure error of repeats."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runs.aliasing import Positions
-from ...support.arrays import Array
-from .evidence import COLLINEAR, fit_chosen_orders
-from .harmonicsums import HarmonicSums
 from .zerogroups import ZeroGroupReadings
 
 #: Sweeps of alternating means (positions, zeros); whole grids need one.
@@ -32,7 +29,7 @@ class ReadingVariance(NamedTuple):
     degrees_of_freedom : int
     source : str
         ``"repeats"`` (readings at the same position), ``"residual"`` (of the model with
-        all candidates) or ``"model"`` (residual of the orders kept so far).
+        all candidates) or ``"evidence"`` (that of most evidence).
     """
 
     variance: float
@@ -97,68 +94,3 @@ def _components(pairs: NDArray[np.int64], units: int, positions: int) -> int:
         if (new == label).all():
             return len(set(label.tolist()))
         label = new
-
-
-def run_scatter(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]) -> Array:
-    """Variance of one reading as each order's coefficients vary between the units.
-
-    ::
-
-        s_k² = (1 / (2(R-1))) Σ_r h_rkᵀ H_rk⁻¹ h_rk
-
-    with the scores ``h = X' W (y - model)`` of each unit about their common fit: the
-    noise at that order, whatever its colour, including what really changes from run to
-    run. Infinite with one unit.
-    """
-    index = np.asarray(orders, dtype=np.intp)
-    if sums.units < 2 or index.size == 0:
-        return np.full(index.size, math.inf)
-    coefficients, _, _ = fit_chosen_orders(sums, chosen)
-    # What one order has in common with itself does not depend on those chosen.
-    own = sums.blocks()[:, index]
-    # At one unit's places an order may vanish, up to rounding: it says nothing there.
-    most = np.trace(own, axis1=2, axis2=3).max(axis=1)
-    own = own + np.maximum(1e-9 * most, 1e-150)[:, None, None, None] * np.eye(2)
-    scores = [
-        sums.rhs(unit, index) - sums.gram(unit, index, chosen) @ coefficients
-        for unit in range(sums.units)
-    ]
-    score = np.reshape(scores, (sums.units, 2, -1)).transpose(0, 2, 1)
-    common = np.linalg.solve(own.sum(axis=0), score.sum(axis=0)[..., None])
-    a, b = (score - (own @ common)[..., 0]).transpose(2, 0, 1)
-    aa, ab, bb = own[..., 0, 0], own[..., 0, 1], own[..., 1, 1]
-    quadratic = (bb * a * a - 2.0 * ab * a * b + aa * b * b) / (aa * bb - ab * ab)
-    return np.asarray(quadratic.sum(axis=0) / (2.0 * (sums.units - 1)))
-
-
-def remaining_scatter(sums: HarmonicSums, chosen: Sequence[int]) -> Array:
-    """Variance of one reading as each order that was not chosen tells it.
-
-    ::
-
-        v_k = T_k / 2
-
-    with the reduction ``T`` of the sum of squares by the order beside the chosen ones: two degrees
-    of freedom. nan for the chosen ones, and where an order is nearly one of them.
-    """
-    taken = set(chosen)
-    others = np.array([i for i in range(sums.orders.size) if i not in taken], dtype=np.intp)
-    found = np.full(sums.orders.size, math.nan)
-    if others.size == 0:
-        return found
-    total, rhs, _ = sums.total()
-    coefficients, inverse, _ = fit_chosen_orders(sums, chosen)
-    base = sums.columns(chosen)
-    cosine, sine = others, others + sums.orders.size
-    to_cosine, to_sine = total[np.ix_(base, cosine)], total[np.ix_(base, sine)]
-    by_cosine, by_sine = inverse @ to_cosine, inverse @ to_sine
-    aa = total[cosine, cosine] - np.einsum("bk,bk->k", to_cosine, by_cosine)
-    bb = total[sine, sine] - np.einsum("bk,bk->k", to_sine, by_sine)
-    ab = total[cosine, sine] - np.einsum("bk,bk->k", to_cosine, by_sine)
-    a = rhs[cosine] - to_cosine.T @ coefficients
-    b = rhs[sine] - to_sine.T @ coefficients
-    det = aa * bb - ab * ab
-    seen = det > (COLLINEAR * (total[cosine, cosine] + total[sine, sine])) ** 2
-    gain = (bb * a * a - 2.0 * ab * a * b + aa * b * b)[seen] / det[seen]
-    found[others[seen]] = 0.5 * np.maximum(gain, 0.0)
-    return found

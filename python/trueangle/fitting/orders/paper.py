@@ -22,10 +22,9 @@ from ...support.quantiles import median
 from .candidates import Candidates
 from .lookalikes import find_lookalikes
 from .noise import ReadingVariance
-from .noisespectrum import log_chance
 from .phases import circular_range_deg
 from .result import OrderSelection
-from .search import FALSE_ALARM
+from .selection import FALSE_ALARM
 from .table import OrderRow
 from .verdicts import row_with_verdict, selection_notes
 from .zerogroups import ZeroGroupReadings, zero_groups
@@ -37,6 +36,21 @@ PHASE_RANGE_DEG: Final = 60.0
 
 #: A retained order has at least this share of the largest amplitude.
 PROMINENCE: Final = 0.1
+
+
+#: Degrees of freedom from which a variance is known.
+_NORMAL: Final = 1e9
+
+
+def log_chance(statistic: float, dof: float) -> float:
+    """Logarithm of the probability that noise alone reaches ``statistic`` of two coefficients.
+
+    ::
+
+        P{2 F(2, ν) > T} = (1 + T / ν)^(-ν / 2)
+    """
+    v = min(dof, _NORMAL)
+    return -0.5 * v * math.log1p(max(statistic, 0.0) / v)
 
 
 def _run_coefficients(
@@ -127,7 +141,7 @@ def select_by_paper(
     rows, share = [], math.log(len(orders) / FALSE_ALARM)
     for n, k in enumerate(orders):
         t = float(amplitude[n] ** 2 / scatter[n]) if scatter[n] > 0.0 else math.inf
-        chance = (float(log_chance(t, dof)) + math.log(len(orders))) / math.log(10.0)
+        chance = (log_chance(float(t), dof) + math.log(len(orders))) / math.log(10.0)
         verdict = "retained" if kept[n] else ("small" if not prominent[n] else "phase varies")
         row = OrderRow(
             order=k,

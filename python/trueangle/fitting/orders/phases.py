@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...support.arrays import Array
-from .evidence import fit_chosen_orders
+from .chosen import fit_chosen_orders
 from .harmonicsums import HarmonicSums
 
 

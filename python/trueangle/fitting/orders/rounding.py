@@ -17,7 +17,7 @@ def orders_beyond_rounding(
     units: Sequence[ZeroGroupReadings],
     step: float,
     orders: Sequence[float],
-    limits: Sequence[float],
+    limit: float,
     forced: int = 0,
 ) -> list[int]:
     """Places of those orders, the strongest first, that the steps of the readings tell of.
@@ -29,7 +29,7 @@ def orders_beyond_rounding(
         Of the sensor, in the unit of the errors.
     orders : sequence of float
         Strongest first; the first ``forced`` of them are always in the model and not told of.
-    limits : sequence of float
+    limit : float
         Log of the chance below which an order is one: of the likelihood ratio with both of its
         coefficients, which is of χ² with two degrees of freedom without it.
     """
@@ -51,7 +51,7 @@ def orders_beyond_rounding(
         if fit.within:
             break
         other = fit_rounded(orthonormal_basis(columns([*told, k])), error, step)
-        if fit.log_likelihood - other.log_likelihood < limits[k]:
+        if fit.log_likelihood - other.log_likelihood < limit:
             told.append(k)
             fit = other
     return told[forced:]

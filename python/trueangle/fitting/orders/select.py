@@ -14,7 +14,8 @@ from ...runs.source import ReadingOptions
 from ...support.argumentkinds import told_kinds
 from ..argument import AnyArgument
 from ..fit import fitted_to
-from ..uncertainty import CovarianceKind
+from ..robust import without_spikes
+from ..uncertainty import CovarianceKind, check_covariance
 from .choice import Method, selected_orders
 from .result import OrderSelection
 
@@ -39,18 +40,15 @@ def select_orders(
 ) -> OrderSelection:
     """Orders of the angle error that the readings support.
 
-    An order is retained when it is significant,
+    The readings of every run are taken as one linear model of its zero, the orders, what of them
+    differs from run to run, and a noise that is white and drifts on any time scale
+    (`trueangle.estimation.evidence.estimate_by_evidence`). An order is retained when it is there
+    with a probability of one half and more, given the readings and all that the noise and the other
+    orders may be. Before the readings, orders 1, 2 and 4 of a shaft are likely, and one of all
+    others is expected.
 
-    ::
-
-        P{2 F(2, ν) > T_k} ≤ α_k / K_k,
-        T_k = (reduction of the sum of squares) / σ²,
-
-    with a bound for all the orders searched (0.5 % chance of any false order), **and**
-    when it lowers the error of readings that took no part in the fit. Held out are whole
-    runs, with several mounts whole parts of them; with a single run whole blocks of
-    neighbouring positions. Rows of the same positions are never split at random: a wrong
-    order that repeats at all of them would pass.
+    Where orders stand for each other over the travel, they share their probability: those that hold
+    the curve together are among ``orders`` with the verdict "shared".
 
     Parameters
     ----------
@@ -71,11 +69,7 @@ def select_orders(
         Which angle the orders are sought in. ``"auto"``: the true angle, unless every run has
         an arbitrary zero of the reference (`trueangle.fitting.argument.choose_argument`).
     covariance : {"auto", "white", "cluster", "hac"}
-        Of what an order must stand out: of independent noise (``"white"``), of what scatters
-        between the runs at the orders near it, and at itself where that is more (``"cluster"``), or
-        of what the orders near it take off the residual (``"hac"``). ``"auto"``: between runs, or
-        between the whole turns of a single run; in a single turn of independent noise, unless the
-        other orders show that it remembers the reading before.
+        Of the coefficients of retained orders, as in `trueangle.fit`.
     shafts : mapping of str to float, optional
         Further shafts and their cycles per output turn (a worm: 144): once, twice, three and
         four times per turn of theirs are candidates, and are named.
@@ -102,11 +96,8 @@ def select_orders(
 
     Notes
     -----
-    The noise comes from the scatter between runs or turns, smooth over the orders
-    (`trueangle.fitting.orders.noisespectrum`). An order that varies by more than that is judged by
-    its own scatter. In a single turn it comes from repeats of the same position where
-    there are enough (pure error, no model enters), else from the residual. One pass over the
-    readings, whatever the number of candidates.
+    Of more than 8000 readings as many are looked at, in blocks from all of them; their fit takes
+    all. Cost O(N) for N of those and a pass for any number of candidates. Nothing is random.
 
     Examples
     --------
@@ -118,17 +109,24 @@ def select_orders(
     (3,)
     """
     found = runs_of(runs, reading)
+    check_covariance(covariance, len(found))
     joint: dict[str, Any] = {"gear_ratio": gear_ratio, "fixed_member": fixed_member}
-    joint |= {"shafts": shafts, "covariance": covariance, "nuisance": nuisance}
+    joint |= {"shafts": shafts, "nuisance": nuisance}
     joint |= {"reference_orders": tuple(limited_orders(reference_orders, "reference_orders"))}
+    given = found if method == "paper" else [without_spikes(run) for run in found]
     selection = selected_orders(
-        found, candidates, method=method, argument=argument, tolerance=tolerance, **joint
+        given, candidates, method=method, argument=argument, tolerance=tolerance, **joint
     )
-    return selection if method == "paper" else _as_fitted(selection, found, joint)
+    if method == "paper":
+        return selection
+    return _as_fitted(selection, found, candidates, {**joint, "covariance": covariance})
 
 
 def _as_fitted(
-    selection: OrderSelection, runs: Sequence[CalibrationRun], joint: Mapping[str, Any]
+    selection: OrderSelection,
+    runs: Sequence[CalibrationRun],
+    candidates: Iterable[float] | None,
+    joint: Mapping[str, Any],
 ) -> OrderSelection:
     """With the figures of the fit of its orders; as it is where they cannot be fitted."""
     if not selection.orders:
@@ -138,8 +136,14 @@ def _as_fitted(
             # What the fit would warn of is said by `trueangle.fit`.
             warnings.simplefilter("ignore", UnlikeRunsWarning)
             fit = fitted_to(
-                runs, None, argument=selection.argument, loss="auto", evidence=selection, **joint
+                runs,
+                None,
+                argument=selection.argument,
+                loss="auto",
+                evidence=selection,
+                candidates=candidates,
+                **joint,
             )
     except TrueAngleError:
         return selection
-    return selection.as_fitted(fit.model, fit.standard_errors)
+    return selection if fit.selection is None else fit.selection

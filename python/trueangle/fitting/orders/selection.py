@@ -4,34 +4,57 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...estimation.evidence import Alone, EvidenceEstimate, RunReadings, estimate_by_evidence
+from ...model.validity import greatest_slope
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
+from ...support.arrays import Array
 from ...support.display_units import brief_number
-from ..rounding import rounding_over_repeats, rounding_step
-from ..uncertainty import CovarianceKind
+from ..rounding import rounding_step
 from .candidates import Candidates
+from .chosen import held_out_gains
 from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
-from .noise import pure_error
-from .ordernoise import OrderNoise
+from .noise import ReadingVariance
 from .phases import circular_range_deg, unit_phases
 from .result import OrderSelection
-from .search import FALSE_ALARM, EvidenceSearch
-from .table import OrderRow
+from .table import IN_MODEL, OrderRow
 from .verdicts import row_with_verdict, selection_notes, verdict_reason
-from .zerogroups import folds_of_run, passes_of_run, zero_groups
+from .zerogroups import folds_of_run, some_angles, some_readings, zero_groups
 
 if TYPE_CHECKING:
     from ..summed import SummedReadings
 
-__all__ = ["FALSE_ALARM", "EvidenceSelection"]
+#: Readings of which orders are told; of more, as many are looked at.
+MOST_READINGS: Final = 8000
+
+#: Chance, over the whole search, that the rounding of a coarse sensor alone makes an order.
+FALSE_ALARM: Final = 0.005
+
+#: An order is left out as negligible when its amplitude is below this share of the whole
+#: error (root sum of squares of the amplitudes) ...
+NEGLIGIBLE_SHARE: Final = 0.01
+#: ... and at the same time below this share of one reading's scatter: correcting it would
+#: change the error of no reading by anything to speak of.
+NEGLIGIBLE_NOISE: Final = 0.1
+
+#: Bound of the error's slope that the retained orders must keep: from 1 on an indicated
+#: angle stands for several true ones, as ill-determined orders on a short arc make it.
+STEEPEST: Final = 0.95
+
+#: Amplitudes below this part of a turn are rounding of angles.
+_ROUNDING: Final = 1e-12
+
+#: Sizes that an order may have, equally probable.
+_SIZES: Final = 7
 
 
-class EvidenceSelection(EvidenceSearch):
+class EvidenceSelection:
     """One selection by evidence from the readings of runs."""
 
     def __init__(
@@ -39,60 +62,89 @@ class EvidenceSelection(EvidenceSearch):
         runs: Sequence[CalibrationRun],
         positions: Positions,
         candidates: Candidates,
-        covariance: CovarianceKind = "auto",
         summed: SummedReadings | None = None,
     ) -> None:
-        self.runs = runs
-        self.candidates = candidates
-        self.units, places = zero_groups(runs, candidates.whole)
+        self.runs, self.candidates, self.period = runs, candidates, runs[0].period
+        units, places = zero_groups(runs, candidates.whole)
         self.positions = positions.of_rows(places)
-        orders = candidates.orders
-        sums = harmonic_sums(self.units, orders) if summed is None else summed.sums(orders)
-        units = len(self.units) if summed is None else len(runs)
-        reference = set(candidates.reference)
-        passes = None
-        if units > 1:
-            self.holdout = "one run at a time"
-            if units > len(runs):
-                self.holdout = "one mount at a time"
-            if sums.units < units:
-                self.holdout = f"one of {sums.units} groups of runs at a time"
-            folds: HarmonicSums | None = sums
-        else:
-            parts = folds_of_run(self.units[0], self.positions)
-            self.holdout = "whole blocks of neighbouring positions (single run)"
-            folds = harmonic_sums(parts, candidates.orders) if parts else None
-            path = runs[0].unwrapped_reference / runs[0].period
-            turns = passes_of_run(self.units[0], path) if positions.span >= 1.0 else []
-            passes = harmonic_sums(turns, candidates.orders) if turns else None
-        repeats = pure_error(self.units, self.positions)
-        self.samples = int(sums.count.sum())
-        self.step = rounding_step(runs, self.positions)
-        noise = OrderNoise(
-            sums,
-            self.samples - units,
-            repeats,
-            covariance,
-            rounding_over_repeats(self.step, repeats, self.samples / len(self.positions)),
-            min(1.0, self.positions.span),
-            passes,
-            candidates.closed,
+        self.samples = (
+            sum(unit.turns.size for unit in units) if summed is None else summed.moments.count
         )
-        forced = [i for i, k in enumerate(candidates.orders) if k in reference]
-        limits = candidates.log_limits(FALSE_ALARM)
-        super().__init__(noise, limits, runs[0].period, folds, forced)
+        self.step = rounding_step(runs, self.positions)
+        #: Angles of the readings in radians, as many as tell the travel.
+        self.travel = some_angles(units)
+        self.units = some_readings(units, MOST_READINGS)
+        self.orders = list(candidates.orders)
+        reference = set(candidates.reference)
+        self.forced = [i for i, k in enumerate(self.orders) if k in reference]
+        self.sums = harmonic_sums(self.units, self.orders)
+        self.folds: HarmonicSums | None = self.sums
+        if len(self.units) > 1:
+            self.holdout = "one run at a time"
+            if len(self.units) > len(runs):
+                self.holdout = "one mount at a time"
+            if self.sums.units < len(self.units):
+                self.holdout = f"one of {self.sums.units} groups of runs at a time"
+        else:
+            self.holdout = "whole blocks of neighbouring positions (single run)"
+            parts = folds_of_run(units[0], self.positions) if len(units) == 1 else []
+            self.folds = harmonic_sums(parts, self.orders) if parts else None
 
     def result(self) -> OrderSelection:
         """The selection with its table."""
-        chosen, dropped = self._beyond_rounding(*self.search())
-        lookalikes = self._lookalikes(chosen)
-        lowest = self._lowest(chosen, lookalikes)
-        if lowest != chosen:
-            lookalikes = self._lookalikes(lowest)
-        return self._report(lowest, dropped, lookalikes)
+        readings = [
+            RunReadings(
+                2.0 * math.pi * unit.turns,
+                unit.error,
+                None if unit.time is None or unit.time.size < 2 else unit.time,
+                None if (unit.weights == 1.0).all() else unit.weights,
+            )
+            for unit in self.units
+        ]
+        estimate = estimate_by_evidence(readings, self.orders, self.candidates.probabilities())
+        chosen, dropped = self._carriers(estimate)
+        unknowns = len(self.units) + 2 * len(chosen)
+        freedom = max(sum(unit.turns.size for unit in self.units) - unknowns, 1)
+        noise = ReadingVariance(float(estimate.noise.sum()), freedom, "evidence")
+        chosen, dropped = self._beyond_rounding(chosen, dropped, estimate)
+        return self._report(estimate, noise, chosen, dropped)
+
+    def _carriers(self, estimate: EvidenceEstimate) -> tuple[list[int], dict[int, str]]:
+        """Orders that hold the curve of an estimate, and those too small to change any reading."""
+        reference = self.candidates.reference
+        carriers = estimate.carriers(self.travel, reference)
+        mean, _ = estimate.among(carriers, self.travel, reference)
+        amplitude = np.hypot(*mean.reshape(-1, 2).T)
+        share = amplitude / max(math.sqrt(float((amplitude**2).sum())), 1e-300)
+        scatter = math.sqrt(float(estimate.noise.sum()))
+        small = (share < NEGLIGIBLE_SHARE) & (amplitude < NEGLIGIBLE_NOISE * scatter)
+        small |= amplitude < _ROUNDING * self.period
+        places = [self.orders.index(k) for k in carriers]
+        dropped = {i: "negligible" for i, s in zip(places, small, strict=True) if s}
+        kept = [i for i in places if i not in dropped]
+        steep = self._too_steep(estimate, kept)
+        dropped |= dict.fromkeys(steep, "too steep")
+        return self.forced + [i for i in kept if i not in steep], dropped
+
+    def _too_steep(self, estimate: EvidenceEstimate, places: Sequence[int]) -> list[int]:
+        """Orders to leave out so that the error can be corrected: the steepest weak ones.
+
+        One by one that order goes which adds most slope for the energy that it explains,
+        its order over its amplitude, until the greatest slope of the rest is below `STEEPEST`.
+        """
+        kept, gone = list(places), list[int]()
+        while kept:
+            orders = [self.orders[i] for i in kept]
+            mean, _ = estimate.among(orders, self.travel, self.candidates.reference)
+            cosine, sine = mean.reshape(-1, 2).T
+            if greatest_slope(orders, cosine, sine, self.period) < STEEPEST:
+                break
+            price = np.asarray(orders) / np.maximum(np.hypot(cosine, sine), 1e-300)
+            gone.append(kept.pop(int(np.argmax(price))))
+        return gone
 
     def _beyond_rounding(
-        self, chosen: list[int], dropped: dict[int, str]
+        self, chosen: list[int], dropped: dict[int, str], estimate: EvidenceEstimate
     ) -> tuple[list[int], dict[int, str]]:
         """Without the orders that the rounding of a coarse sensor may have made."""
         mine = [i for i in chosen if i not in self.forced]
@@ -100,83 +152,70 @@ class EvidenceSelection(EvidenceSearch):
             return chosen, dropped
         from .rounding import orders_beyond_rounding  # most readings are fine enough
 
-        test = self.examined(chosen, mine)
-        strongest = np.argsort(-np.hypot(test.cosine, test.sine), kind="stable")
+        mean, _ = estimate.among(
+            [self.orders[i] for i in mine], self.travel, self.candidates.reference
+        )
+        strongest = np.argsort(-np.hypot(*mean.reshape(-1, 2).T), kind="stable")
         places = [*self.forced, *(mine[k] for k in strongest)]
         told = orders_beyond_rounding(
             self.units,
             self.step,
-            self.orders_of(places),
-            self.limits[places].tolist(),
+            [self.orders[i] for i in places],
+            math.log(FALSE_ALARM / len(self.orders)),
             len(self.forced),
         )
         kept = {*self.forced, *(places[k] for k in told)}
         dropped |= {i: "rounding" for i in chosen if i not in kept}
         return [i for i in chosen if i in kept], dropped
 
-    def _lookalikes(self, chosen: Sequence[int]) -> dict[int, dict[int, float]]:
-        """Aliases of every chosen order that these readings cannot exclude."""
-        found = find_lookalikes(
+    def _report(
+        self,
+        estimate: EvidenceEstimate,
+        noise: ReadingVariance,
+        chosen: list[int],
+        dropped: Mapping[int, str],
+    ) -> OrderSelection:
+        shown = sorted({*chosen, *dropped, *self.candidates.main_indices})
+        gains, model = self._gains(chosen, shown)
+        phases = unit_phases(self.sums, chosen, shown)
+        lookalikes = find_lookalikes(
             self.units,
             self.positions,
             [self.orders[i] for i in chosen],
-            self.noise(chosen).variance,
+            noise.variance,
             self.candidates.highest_alias,
         )
-        return dict(zip(chosen, found, strict=True))
-
-    def _lowest(
-        self, chosen: list[int], lookalikes: Mapping[int, Mapping[int, float]]
-    ) -> list[int]:
-        """Where the readings say nothing, the lowest candidate stands for its aliases."""
-        result = list(chosen)
-        enough = self.noise(chosen).variance
-        for i, losses in lookalikes.items():
-            lower = [m for m, loss in losses.items() if m < self.orders[i] and loss < enough]
-            known = [j for j in self.candidates.main_indices if self.orders[j] in lower]
-            free = [j for j in known if j not in result]
-            if free and i not in self.forced:
-                result[result.index(i)] = free[0]
-        return result
-
-    def _report(
-        self,
-        chosen: list[int],
-        dropped: Mapping[int, str],
-        lookalikes: Mapping[int, Mapping[int, float]],
-    ) -> OrderSelection:
-        shown = sorted({*chosen, *dropped, *self.candidates.main_indices})
-        test = self.examined(chosen, shown)
-        log_p, needed = test.log_p, test.needed(self.limits[shown])
-        gains, model = self.gains_and_model(chosen, shown)
-        phases = unit_phases(self.sums, chosen, shown)
-        verdicts = {**dict.fromkeys(chosen, "retained"), **dict.fromkeys(self.forced, "reference")}
+        aliases = dict(zip(chosen, lookalikes, strict=True))
+        chance = estimate.probability
+        verdicts = {i: "retained" if chance[i] >= 0.5 else "shared" for i in chosen}
+        verdicts |= dict.fromkeys(self.forced, "reference") | dict(dropped)
+        needed = self._needed()
         rows = []
         for n, i in enumerate(shown):
-            usable = math.isfinite(test.cosine[n])
-            verdict = verdicts.get(i) or dropped.get(i) or ("noise" if usable else "alias")
-            if verdict == "noise" and log_p[n] <= self.limits[i]:
-                verdict = "no held-out gain" if not gains[n] > 0.0 else "weak"
+            alone = estimate.alone[i]
+            own = alone or Alone(0.0, 0.0, math.inf, math.inf)
+            verdict = verdicts.get(i) or ("alias" if alone is None else "noise")
+            std = math.sqrt(0.5 * (own.cosine_variance + own.sine_variance))
             rows.append(
                 OrderRow(
                     order=self.orders[i],
                     retained=verdict == "retained",
                     verdict=verdict,
-                    cosine=float(test.cosine[n]) if usable else 0.0,
-                    sine=float(test.sine[n]) if usable else 0.0,
-                    standard_error=math.sqrt(test.variance[n]) if usable else math.inf,
-                    statistic=float(test.statistic[n]),
-                    log10_false_alarm=self._false_alarm(float(log_p[n]), i),
+                    cosine=own.cosine,
+                    sine=own.sine,
+                    standard_error=std,
+                    statistic=own.statistic,
+                    log10_false_alarm=self._false_alarm(own.statistic),
                     holdout_gain=float(gains[n]),
                     phase_spread_deg=circular_range_deg(phases[:, n]),
-                    aliases=tuple(lookalikes.get(i, ())),
-                    needed=float(needed[n]) if usable else math.nan,
+                    aliases=tuple(aliases.get(i, ())),
+                    needed=std * needed[i] if math.isfinite(std) else math.nan,
+                    probability=float(chance[i]),
                 )
             )
-        retained = {row.order: row.amplitude for row in rows if row.retained}
+        retained = {row.order: row.amplitude for row in rows if row.verdict in IN_MODEL}
         rows = [row_with_verdict(row, self.candidates, self.positions, retained) for row in rows]
         orders = tuple(retained)
-        without, with_ = self._held_out_rms(model)
         selection = OrderSelection(
             orders=orders,
             table=tuple(rows),
@@ -186,10 +225,11 @@ class EvidenceSelection(EvidenceSearch):
             positions=self.positions,
             samples=self.samples,
             runs=len(self.runs),
-            noise=self.noise(chosen),
+            noise=noise,
             holdout=self.holdout,
-            holdout_rms=(without, with_),
+            holdout_rms=self._held_out_rms(model),
             gear_ratio=self.candidates.gear_ratio,
+            estimate=estimate,
         )
         return selection.with_notes(selection_notes(selection, self.candidates, self.runs))
 
@@ -200,17 +240,23 @@ class EvidenceSelection(EvidenceSearch):
                 f"{len(self.positions)} distinct positions can tell no order from the zero: "
                 "read at three positions or more"
             )
-        best = min(rows, key=lambda row: row.log10_false_alarm)
+        best = max(rows, key=lambda row: row.probability)
         beside = f"the strongest of {len(self.orders)} orders searched, {best.order:g},"
         if best.verdict == "reference":
             return "the only orders that stand out are the reference's own"
-        if best.verdict != "noise":
+        if best.verdict not in ("noise", "alias"):
             return f"{beside} {verdict_reason(best.verdict)}"
-        chance = 100.0 * 10.0**best.log10_false_alarm
         return (
             f"{beside} does not stand out of the noise "
-            f"(noise alone does as well in {brief_number(chance)} % of such searches)"
+            f"(it is there with a probability of {brief_number(100.0 * best.probability)} %)"
         )
+
+    def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> tuple[Array, float]:
+        """Part by which each order lowers the held-out mean square; that of the chosen orders."""
+        if self.folds is None:
+            return np.full(len(orders), math.nan), math.nan
+        without, with_, model = held_out_gains(self.folds, chosen, orders)
+        return np.asarray((without - with_) / np.maximum(np.abs(without), 1e-300)), model
 
     def _held_out_rms(self, model: float) -> tuple[float, float]:
         """Held-out rms with no order at all and with the chosen ones."""
@@ -220,6 +266,19 @@ class EvidenceSelection(EvidenceSearch):
         none = float(self.folds.squares.sum())
         return math.sqrt(none / weight), math.sqrt(max(0.0, model) / weight)
 
-    def _false_alarm(self, log_p: float, i: int) -> float:
-        """Log10 of the chance in the whole search: the limit stands for `FALSE_ALARM`."""
-        return min(0.0, (log_p - float(self.limits[i]) + math.log(FALSE_ALARM)) / math.log(10.0))
+    def _needed(self) -> NDArray[np.float64]:
+        """Amplitudes, in standard errors, from which orders are more likely there than not.
+
+        A size ``τ`` that fits the statistic T of two coefficients changes the odds by
+        ``exp(T/2) / (1 + T/2)``.
+        """
+        chance = np.array(self.candidates.probabilities())
+        odds = np.log(_SIZES * (1.0 - chance) / chance)
+        half = np.maximum(odds, 0.0)
+        for _ in range(30):
+            half = np.maximum(odds + np.log1p(half), 0.0)
+        return np.asarray(np.sqrt(2.0 * half))
+
+    def _false_alarm(self, statistic: float) -> float:
+        """Log10 of the chance that noise alone makes any order stand out as much."""
+        return min(0.0, math.log10(len(self.orders)) - 0.5 * statistic / math.log(10.0))

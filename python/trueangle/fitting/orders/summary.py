@@ -6,11 +6,15 @@ import math
 from collections.abc import Sequence
 from typing import Any, Final
 
+from ...estimation.evidence import CORRELATION_TIMES
 from ...support.angles import arcsec
 from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, rounded_phase, sine_of_rms
 from ...support.layout import laid_out, wrapped_lines
 from ...support.plainresult import finite_or_none
 from .table import OrderRow, OrderTable
+
+#: Parts of the noise that are told: of its standard deviation at least.
+_SHOWN: Final = 0.2
 
 #: Rejected orders listed beside the retained ones, the strongest first.
 _REJECTED = 8
@@ -27,8 +31,8 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
     lines = [
         f"Orders of the angle error ({selection.method})",
         f"  {selection.samples} readings in {runs}, {selection.positions.describe()}",
-        f"  noise of one reading  {unit.number(noise, noise_std)} {unit.name}, "
-        f"from {_source(selection)}",
+        f"  noise of one reading  {unit.number(noise, noise_std)} {unit.name}"
+        f"{_source(selection, unit)}",
         f"  held-out rms          {unit.number(before)} -> {unit.number(after)} {unit.name} "
         f"({selection.holdout})",
     ]
@@ -62,7 +66,7 @@ def selection_error_unit(selection: OrderTable, errors_in: ErrorsIn = "auto") ->
 
 _COLUMNS: Final = "  {:>5} {:>9} {:>7} {:>7} {:>5} {:>6} {:>11} {:>8}  {}"
 _HEADER: Final = _COLUMNS.format(
-    "order", "amplitude", "+-", "phase", "+-", "spread", "false alarm", "held out", "verdict"
+    "order", "amplitude", "+-", "phase", "+-", "spread", "probability", "held out", "verdict"
 )
 
 
@@ -74,9 +78,7 @@ def _units(unit: ErrorUnit) -> str:
 
 def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
     size, std = unit.pair(arcsec(row.amplitude, period), arcsec(row.standard_error, period))
-    chance = f"{10.0**row.log10_false_alarm:.3g}"
-    if -math.inf < row.log10_false_alarm < -3:
-        chance = f"1e{math.floor(row.log10_false_alarm):d}"
+    chance = f"{row.probability:.3f}" if math.isfinite(row.probability) else "-"
     spread = f"{row.phase_spread_deg:.0f}" if math.isfinite(row.phase_spread_deg) else "-"
     phase, phase_std = rounded_phase(row.phase_deg, row.phase_error_deg)
     gain = f"{100.0 * row.holdout_gain:.3g}"
@@ -95,14 +97,25 @@ def _explanations(rows: Sequence[OrderRow]) -> list[str]:
     return ["What they may be:", *lines, ""] if lines else []
 
 
-def _source(selection: OrderTable) -> str:
+def _source(selection: OrderTable, unit: ErrorUnit) -> str:
+    """Where the noise is known from, or the parts of it that a reading shows."""
     noise = selection.noise
+    if selection.estimate is not None:
+        white, *drifts = (arcsec(math.sqrt(v), selection.period) for v in selection.estimate.noise)
+        least = _SHOWN * arcsec(noise.standard_deviation, selection.period)
+        parts = [
+            f"drift {unit.text(size)} over {length:g} readings"
+            for size, length in zip(drifts, CORRELATION_TIMES, strict=True)
+            if size > least
+        ]
+        if not parts:
+            return ", white"
+        return f": {', '.join([f'white {unit.text(white)}', *parts])}"
     what = {
         "repeats": "repeats at the same positions",
         "residual": "the residual of all candidates",
-        "model": "the residual of the retained orders",
     }[noise.source]
-    return f"{what} ({noise.degrees_of_freedom} degrees of freedom)"
+    return f", from {what} ({noise.degrees_of_freedom} degrees of freedom)"
 
 
 def plain_selection(selection: OrderTable) -> dict[str, Any]:
@@ -132,6 +145,7 @@ def _row(row: OrderRow, scale: float) -> dict[str, Any]:
         "order": row.order,
         "retained": row.retained,
         "verdict": row.verdict,
+        "probability": finite_or_none(row.probability),
         "amplitude_arcsec": finite_or_none(scale * row.amplitude),
         "phase_deg": finite_or_none(row.phase_deg % 360.0),
         "std_arcsec": finite_or_none(scale * row.standard_error),

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Final, Self
 
+from ...estimation.evidence import EvidenceEstimate
 from ...joint.gear import Explanation
 from ...model.model import Argument, HarmonicModel
 from ...runs.aliasing import Positions
 from ...support.arrays import Array
 from ...support.plainresult import PlainResult
 from .noise import ReadingVariance
+
+#: Verdicts of orders that a model has.
+IN_MODEL: Final = ("retained", "shared")
 
 
 @dataclass(frozen=True)
@@ -27,9 +31,9 @@ class OrderRow:
         Cycles per output turn.
     retained : bool
     verdict : str
-        ``"retained"``, ``"noise"``, ``"no held-out gain"``, ``"negligible"``,
-        ``"too steep"``, ``"alias"``, ``"reference"``, ``"weak"``, ``"rounding"``,
-        ``"too long"``; with method ``"paper"`` also ``"small"`` and ``"phase varies"``.
+        ``"retained"``, ``"noise"``, ``"negligible"``, ``"too steep"``, ``"alias"``,
+        ``"reference"``, ``"rounding"``, ``"shared"``, ``"too long"``; with method
+        ``"paper"`` also ``"small"`` and ``"phase varies"``.
     cosine, sine : float
         Coefficients A and B beside all retained orders.
     standard_error : float
@@ -57,6 +61,8 @@ class OrderRow:
     needed : float
         Amplitude from which it would be significant in the whole search, at the phase that it has;
         NaN where the readings do not tell it.
+    probability : float
+        That the order is in the error, given the readings; NaN where sums alone are known.
     """
 
     order: float
@@ -75,6 +81,7 @@ class OrderRow:
     doubtful: bool = False
     phase_std: float = math.nan
     needed: float = math.nan
+    probability: float = math.nan
 
     @property
     def amplitude(self) -> float:
@@ -114,6 +121,7 @@ class OrderTable(PlainResult):
     notes: tuple[str, ...] = ()
     argument: Argument = "reference"
     shafts: Mapping[str, float] = field(default_factory=dict)
+    estimate: EvidenceEstimate | None = field(default=None, compare=False)
 
     @property
     def by_shaft(self) -> Mapping[str, tuple[int, ...]]:
@@ -139,6 +147,11 @@ class OrderTable(PlainResult):
                     break
         return {shaft: tuple(orders) for shaft, orders in found.items()}
 
+    @property
+    def is_of_all_readings(self) -> bool:
+        """Whether the estimate took every reading, and its coefficients are the best."""
+        return self.estimate is not None and self.estimate.readings == self.samples
+
     def with_notes(self, notes: tuple[str, ...]) -> Self:
         """The same selection with these notes."""
         return replace(self, notes=notes)
@@ -158,7 +171,7 @@ class OrderTable(PlainResult):
         rows = []
         for row in self.table:
             n = next((n for n, m in enumerate(found) if math.isclose(m, row.order)), None)
-            if row.retained and n is not None:
+            if row.verdict in IN_MODEL and n is not None:
                 cosine, sine = lines[found[n]]
                 row = replace(row, cosine=float(cosine), sine=float(sine))
                 if errors is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -25,6 +26,7 @@ from ...runs.aliasing import (
 )
 from ...runs.run import CalibrationRun, as_runs
 from ...support.angles import arcsec
+from ...support.display_units import brief_number
 from .candidates import Candidates, choose_candidates
 from .result import OrderSelection
 from .table import OrderRow
@@ -37,13 +39,13 @@ _TELLING_FACTOR: Final = 5.0
 
 _VERDICTS: Final = {
     "noise": "does not stand out of the noise",
-    "weak": "significant by itself, but taken up by the retained orders",
-    "no held-out gain": "does not lower the error of readings held out of the fit",
     "negligible": "significant, but too small to change any reading",
     "too steep": "with it an indicated angle would stand for several true ones: "
     "it can be corrected with argument='indicated' only",
     "rounding": "may be made by the sensor's rounding to whole steps, which at evenly spaced "
     "positions is the same each time: read at other positions, too",
+    "shared": "over this travel orders stand for each other: with the others it holds the "
+    "curve, and may not be there itself",
     "small": "has no prominent amplitude",
     "phase varies": "its phase varies from run to run",
     "too long": "over so short a travel, passed once, it cannot be distinguished from drift in "
@@ -76,7 +78,9 @@ def row_with_verdict(
         *explain_by_shafts(row.order, candidates.shafts),
         *explain_as_harmonic(row.order, retained),
     )
-    reason = "significant, and lowers the error of readings held out of the fit"
+    reason = "repeats its phase, with a prominent amplitude"
+    if math.isfinite(row.probability):
+        reason = f"is there with a probability of {brief_number(100.0 * row.probability)} %"
     rivals = [str(e) for e in explanations if e.order != row.order]
     named = {e.order for e in explanations}
     low = _seen_at(row.order, candidates)

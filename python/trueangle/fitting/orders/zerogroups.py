@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -20,13 +19,12 @@ from ...support.arrays import Array
 _FOLDS: Final = 6
 _BLOCKS: Final = 24
 
-#: Passes of a run: whole turns of its way, the last of half a turn at least; most steps are shorter
-#: than this part of a turn, or the readings are not in the order of the places.
-_HALF: Final = 0.5
-_STEP: Final = 0.125
+#: Readings in a row that are kept together of many, and the turn by which they are chosen evenly.
+_TOGETHER: Final = 256
+_GOLDEN: Final = 0.5 * (math.sqrt(5.0) - 1.0)
 
-#: Passes of a run, at most about.
-_PASSES: Final = 32
+#: Angles that tell the travel.
+_TOLD: Final = 2000
 
 #: Readings a run up to which the call of a function costs more than what it computes.
 _SHORT: Final = 1000
@@ -44,16 +42,21 @@ class ZeroGroupReadings(NamedTuple):
     weights : ndarray, shape (n,)
         Positive.
     label : str
+    time : ndarray, shape (n,), or None
     """
 
     turns: Array
     error: Array
     weights: Array
     label: str
+    time: Array | None = None
 
     def part(self, mask: NDArray[np.bool_] | slice, label: str) -> ZeroGroupReadings:
         """The readings where ``mask`` is true, or of a slice."""
-        return ZeroGroupReadings(self.turns[mask], self.error[mask], self.weights[mask], label)
+        time = None if self.time is None else self.time[mask]
+        return ZeroGroupReadings(
+            self.turns[mask], self.error[mask], self.weights[mask], label, time
+        )
 
 
 def zero_groups(
@@ -69,7 +72,7 @@ def zero_groups(
         label = run.label or str(number + 1)
         angle = (run if whole else over_turns(run)).reference
         weights = np.ones(len(run)) if run.weights is None else run.weights
-        everything = ZeroGroupReadings(angle / run.period, error, weights, label)
+        everything = ZeroGroupReadings(angle / run.period, error, weights, label, run.time)
         place = np.arange(start, start + len(run))
         if run.mount is not None and np.unique(run.mount).size > 1:
             for mount in np.unique(run.mount):
@@ -81,6 +84,30 @@ def zero_groups(
             places.append(place)
         start += len(run)
     return units, np.concatenate(places)
+
+
+def some_angles(units: Sequence[ZeroGroupReadings]) -> Array:
+    """Angles of the readings in radians, some thousand of them."""
+    turns = np.concatenate([unit.turns for unit in units])
+    return np.asarray(2.0 * math.pi * np.sort(turns)[:: 1 + turns.size // _TOLD])
+
+
+def some_readings(units: Sequence[ZeroGroupReadings], most: int) -> list[ZeroGroupReadings]:
+    """About so many of the readings, in blocks that follow each other in time and lie anywhere."""
+    total = sum(unit.turns.size for unit in units)
+    if total <= most:
+        return list(units)
+    found, block = [], 0
+    for unit in units:
+        size = unit.turns.size
+        blocks = math.ceil(size / _TOGETHER)
+        keep = (np.arange(block, block + blocks) * _GOLDEN) % 1.0 < most / total
+        block += blocks
+        mask = np.repeat(keep, _TOGETHER)[:size]
+        if mask.any():
+            time = np.arange(size, dtype=float) if unit.time is None else unit.time
+            found.append(unit._replace(time=time).part(mask, unit.label))
+    return found
 
 
 def _centred(runs: Sequence[CalibrationRun]) -> Iterator[NDArray[np.float64]]:
@@ -106,31 +133,3 @@ def folds_of_run(unit: ZeroGroupReadings, positions: Positions) -> list[ZeroGrou
         return []
     fold = (positions.index * blocks // len(positions)) % folds
     return [unit.part(fold == f, f"block {f + 1}") for f in range(folds)]
-
-
-def passes_of_run(unit: ZeroGroupReadings, path: Array) -> list[ZeroGroupReadings]:
-    """Whole turns that a run took one after the other, to and fro too; none where it took one.
-
-    Of more than 32 as many are taken together.
-
-    ``path`` are the angles of its readings in turns, in the order they were read. Where readings
-    are left out between them a new pass begins.
-    """
-    if path.size < 3:
-        return []
-    steps = np.abs(np.diff(path))
-    far = steps > _STEP
-    if far.mean() > _STEP:
-        return []
-    way = np.concatenate([[0.0], np.cumsum(steps)])
-    part = np.concatenate([[0], np.cumsum(far)])
-    starts = way[np.searchsorted(part, np.arange(part[-1] + 1))]
-    # Of many turns several are taken together.
-    turns = max(1.0, math.ceil(way[-1] / _PASSES))
-    number = np.floor((way - starts[part] + _HALF / path.size) / turns)
-    first = np.flatnonzero(np.concatenate([[True], (np.diff(number) != 0.0) | far]))
-    found: list[ZeroGroupReadings] = []
-    for begin, end in pairwise([*first.tolist(), path.size]):
-        if way[end - 1] - way[begin] >= _HALF:
-            found.append(unit.part(slice(begin, end), f"pass {len(found) + 1}"))
-    return found if len(found) > 1 else []

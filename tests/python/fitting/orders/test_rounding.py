@@ -47,9 +47,9 @@ def test_orders_always_in_the_model_are_not_told_of():
     x = 2.0 * np.pi * np.arange(72) / 72
     truth = 2.0 * np.cos(2.0 * x) + 1.5 * np.sin(5.0 * x)
     reading = np.round(7.3 * x + truth) - 7.3 * x
-    limits = [math.log(0.005 / 17)] * 3
-    assert orders_beyond_rounding(units(reading), 1.0, [2, 5, 9], limits) == [0, 1]
-    assert orders_beyond_rounding(units(reading), 1.0, [2, 5, 9], limits, forced=1) == [1]
+    limit = math.log(0.005 / 17)
+    assert orders_beyond_rounding(units(reading), 1.0, [2, 5, 9], limit) == [0, 1]
+    assert orders_beyond_rounding(units(reading), 1.0, [2, 5, 9], limit, forced=1) == [1]
 
 
 def test_fine_steps_and_steps_that_are_none_leave_the_orders():
@@ -57,4 +57,4 @@ def test_fine_steps_and_steps_that_are_none_leave_the_orders():
     x = 2.0 * np.pi * np.arange(72) / 72
     reading = 0.3 * np.cos(2.0 * x) + rng.normal(0.0, 0.3, 72)
     for step in (0.1, 100.0):
-        assert orders_beyond_rounding(units(reading), step, [2, 7], [-9.0, -9.0]) == [0, 1]
+        assert orders_beyond_rounding(units(reading), step, [2, 7], -9.0) == [0, 1]

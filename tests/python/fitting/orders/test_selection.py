@@ -44,7 +44,7 @@ def test_each_zero_and_coefficient_costs_a_degree_of_freedom(
     found = ta.select_orders(runs_of(count, mounts, period), candidates=range(1, 9))
     assert (found.orders, found.holdout) == ((3,), holdout)
     assert (found.samples, found.runs, found.period) == (60 * count, count, period)
-    assert found.noise.degrees_of_freedom == 60 * count - zeros - 2 * 8
+    assert found.noise.degrees_of_freedom == 60 * count - zeros - 2
     assert math.sqrt(found.noise.variance) == pytest.approx(3e-5 * period, rel=0.3)
 
 
@@ -71,7 +71,7 @@ def test_the_error_held_out_is_that_of_each_run_under_the_others() -> None:
 
 
 @pytest.mark.parametrize("true", [8, 28])
-def test_of_two_that_are_alike_the_lower_stands_where_it_costs_less_than_the_noise(
+def test_two_that_are_alike_share_their_probability(
     true: int,
 ) -> None:
     """Grids of 36 positions 0.3 deg apart turn 28 against 8 by 11 deg: either may explain best."""
@@ -101,12 +101,15 @@ def test_of_two_that_are_alike_the_lower_stands_where_it_costs_less_than_the_noi
         found = ta.select_orders(runs, candidates=range(1, 36))
         if len(found.orders) != 1:
             continue
-        lowers = left(8) - left(28) < found.noise.variance
-        assert found.orders == ((8,) if lowers else (28,))
-        told.add(found.orders[0])
+        (order,) = found.orders
+        # They share their probability as their residuals say, the noise being what it is.
+        chance = {k: found.row(k).probability for k in (8, 28)}
+        assert chance[order] > 0.5
+        assert 0.8 < sum(chance.values()) < 1.1
+        assert left(order) < left(36 - order)
+        told.add(order)
         (row,) = [row for row in found.table if row.retained]
         other = 36 - row.order
         cost = left(other) - left(row.order)
         assert (other in row.aliases) == (cost < 10.0 * found.noise.variance)
-    assert 8 in told
     assert true in told

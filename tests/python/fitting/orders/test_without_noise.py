@@ -32,3 +32,14 @@ def test_every_command_answers(tmp_path, capsys):
             status = main(command)
             assert "unexpected" not in capsys.readouterr().err
             assert status == 0, command
+
+
+@pytest.mark.parametrize("period", [360.0, 2.0 * np.pi, 1.0, 4096.0])
+@pytest.mark.parametrize(("part", "orders"), [(0.9e-12, ()), (1.1e-12, (3,))])
+def test_less_than_a_millionth_of_a_millionth_of_a_turn_is_rounding(
+    part: float, orders: tuple[int, ...], period: float
+) -> None:
+    turns = np.arange(120) / 60.0
+    wave = part * np.sin(2.0 * np.pi * 3.0 * turns)
+    run = ta.CalibrationRun(turns * period, (turns + wave) * period, period)
+    assert ta.select_orders(run).orders == orders

@@ -1,62 +1,36 @@
-"""Passes of one run: whole turns of its way, however it went."""
+"""Some of many readings: blocks in their order, from everywhere, and none where there are few."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from trueangle.fitting.orders.zerogroups import ZeroGroupReadings, passes_of_run
-
-TURN = np.arange(40) / 40.0
-#: To the end of a turn and back, each end read twice.
-THERE_AND_BACK = np.concatenate([TURN, TURN[::-1]])
+from trueangle.fitting.orders.zerogroups import ZeroGroupReadings, some_readings
 
 
-def passes(path: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Places in the run of the readings of each pass."""
-    number = np.arange(path.size, dtype=float)
-    unit = ZeroGroupReadings(path % 1.0, number, np.ones(path.size), "")
-    return [part.error for part in passes_of_run(unit, path)]
+def unit(size: int, time: bool) -> ZeroGroupReadings:
+    number = np.arange(size, dtype=float)
+    return ZeroGroupReadings(number, number, np.ones(size), "a", 0.5 * number if time else None)
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("start", [0.0, 0.37, -5.2])
-def test_each_turn_is_a_pass(start: float, sign: float) -> None:
-    path = start + sign * np.arange(120) / 40.0
-    found = passes(path)
-    assert [part.size for part in found] == [40, 40, 40]
-    np.testing.assert_array_equal(np.concatenate(found), np.arange(120))
+@pytest.mark.parametrize("time", [False, True])
+def test_of_many_readings_as_many_are_kept_in_blocks_of_all_runs(time: bool) -> None:
+    units = [unit(size, time) for size in (40_000, 3000, 17_000)]
+    found = some_readings(units, 6000)
+    kept = sum(part.turns.size for part in found)
+    assert 4000 < kept < 8000
+    for part, whole in zip(found, units, strict=True):
+        share = part.turns.size / whole.turns.size
+        assert 0.0 < share < 0.3
+        # A gap between blocks is one in time, too.
+        assert part.time is not None
+        np.testing.assert_array_equal(part.time, part.turns * (0.5 if time else 1.0))
+        assert np.mean(np.diff(part.turns) == 1.0) > 0.98
+        # From everywhere: no quarter of the run is left out of long ones.
+        if whole.turns.size > 16_000:
+            assert np.unique(part.turns * 4 // whole.turns.size).size == 4
 
 
-def test_there_and_back_are_two() -> None:
-    found = passes(THERE_AND_BACK)
-    assert len(found) == 2
-    assert [abs(part.size - 40) <= 1 for part in found] == [True, True]
-
-
-@pytest.mark.parametrize(("readings", "sizes"), [(59, []), (61, [40, 21]), (99, [40, 40])])
-def test_half_a_turn_at_the_end_is_a_pass_and_less_is_none(readings: int, sizes: list[int]) -> None:
-    assert [part.size for part in passes(np.arange(readings) / 40.0)] == sizes
-
-
-@pytest.mark.parametrize(("turns", "each"), [(32, 1), (33, 2), (65, 3), (640, 20)])
-def test_of_many_turns_as_many_are_taken_together(turns: int, each: int) -> None:
-    found = passes(np.arange(40 * turns) / 40.0)
-    assert {part.size for part in found[:-1]} == {40 * each}
-    assert sum(part.size for part in found) == 40 * turns
-
-
-def test_places_in_any_order_are_no_passes() -> None:
-    rng = np.random.default_rng(3)
-    assert passes(rng.permutation(np.tile(TURN, 5))) == []
-    assert passes(np.zeros(0)) == []
-    assert passes(np.array([0.0, 1.0])) == []
-
-
-def test_a_new_pass_begins_where_readings_are_left_out() -> None:
-    """Blocks of a long run, far apart: of each its whole turns, and what is half of one or more."""
-    blocks = [np.arange(60) / 40.0, 10.3 + np.arange(90) / 40.0, 30.8 + np.arange(30) / 40.0]
-    found = passes(np.concatenate(blocks))
-    assert [part.size for part in found] == [40, 40, 40, 30]
-    assert [part[0] for part in found] == [0, 60, 100, 150]
+def test_few_readings_stay_as_they_are() -> None:
+    units = [unit(40, False), unit(60, False)]
+    assert some_readings(units, 100) == units

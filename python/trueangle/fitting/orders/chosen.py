@@ -1,118 +1,19 @@
-"""Evidence for orders: log chances with a bound for the search, forward choice, held-out gain.
-
-All of it works on the normal equations of `HarmonicSums`; the readings are not touched
-again. An order has two coefficients, so that with noise variance s^2 known from v
-degrees of freedom the statistic ``T = gain / s^2`` of a line that is not there follows
-``2 F(2, v)``, whose tail is ``(1 + T / v)^(-v / 2)``.
-"""
+"""Chosen orders fitted to normal equations, and what they are worth in units held out."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...estimation.linear import pseudo_inverse
 from ...support.arrays import Array
 from .harmonicsums import HarmonicSums
-from .noisespectrum import NoiseSpectrum, log_chance
-
-Index = NDArray[np.intp]
 
 #: A candidate whose columns keep less than this of their energy beside those already
 #: chosen is an alias of them.
 COLLINEAR: Final = 1e-8
-
-#: Least degrees of freedom that a residual must keep.
-_LEAST_DOF: Final = 3
-
-
-def log_chi_squared_tail(x: Array, dof: int) -> Array:
-    """Log of the upper tail of chi-square with an even number of degrees of freedom."""
-    half = 0.5 * np.asarray(x, dtype=np.float64)[..., None]
-    i = np.arange(dof // 2)
-    terms = i * np.log(np.maximum(half, 1e-300)) - np.array([math.lgamma(j + 1.0) for j in i])
-    top = terms.max(axis=-1, keepdims=True)
-    return np.asarray(-half[..., 0] + top[..., 0] + np.log(np.exp(terms - top).sum(axis=-1)))
-
-
-def _pairs(matrix: Array, n: int) -> tuple[Array, Array, Array]:
-    """Entries aa, ab, bb of the 2x2 diagonal blocks of orders."""
-    i = np.arange(n)
-    return matrix[i, i], matrix[i, i + n], matrix[i + n, i + n]
-
-
-def choose_forward(
-    sums: HarmonicSums,
-    log_limits: Array,
-    readings: int,
-    noise: NoiseSpectrum | None,
-    forced: Sequence[int] = (),
-    barred: Sequence[int] = (),
-) -> list[int]:
-    """Indices of orders, taken one by one while the best of the rest is significant.
-
-    ``log_limits`` is the log of the false-alarm probability that each order may use up,
-    ``readings`` their number less that of the zeros, ``noise`` that of every order (None: the
-    residual of the orders chosen so far, the one on trial included). ``forced`` orders are taken
-    first, whatever they bring, ``barred`` ones never; among aliases the lowest of the likeliest is
-    taken.
-    """
-    gram, rhs, rest = sums.total()
-    rhs, n = rhs.copy(), sums.orders.size
-    # Rows and factors of the chosen orders: of what these leave of the matrix only each order's own
-    # block and the rows of the next one are asked for.
-    rows = factors = np.empty((0, 2 * n))
-    aa, ab, bb = (part.copy() for part in _pairs(gram, n))
-    # Scale free: energy of both columns, the smaller direction counts.
-    energy = 0.5 * (aa + bb)
-    alive = energy > 0.0
-    alive[list(barred)] = False
-    chosen: list[int] = []
-    queue = list(forced)
-    while alive.any():
-        dof = readings - 2 * len(chosen) - 2
-        if dof < _LEAST_DOF:
-            break
-        det = aa * bb - ab * ab
-        alive &= det > (COLLINEAR * energy) ** 2
-        alive &= np.minimum(aa, bb) > COLLINEAR * energy
-        safe = np.where(alive, det, 1.0)
-        a, b = rhs[:n], rhs[n:]
-        gain = np.where(alive, (bb * a * a - 2.0 * ab * a * b + aa * b * b) / safe, 0.0)
-        if queue:
-            best = queue.pop(0)
-            if not alive[best]:
-                continue
-        else:
-            if noise is None:
-                # Of collinear columns rounding makes a gain beyond all there is.
-                left = np.maximum(rest - gain, 1e-200)
-                score = log_chance(gain * dof / left, dof) - log_limits
-            else:
-                score = noise.log_chance(gain) - log_limits
-            score = np.where(alive, score, math.inf)
-            top = int(np.argmin(score))
-            if not score[top] <= 0.0:
-                break
-            # Aliases explain equally much: keep one that was asked for, and the lowest.
-            same = np.flatnonzero(alive & (gain >= gain[top] * (1.0 - 1e-9)))
-            best = int(same[np.lexsort((sums.orders[same], -log_limits[same]))[0]])
-        chosen.append(best)
-        pivot = sums.columns([best])
-        row = gram[pivot] - rows[:, pivot].T @ factors
-        factor = np.linalg.solve(row[:, pivot], row)
-        rows, factors = np.vstack([rows, row]), np.vstack([factors, factor])
-        aa -= (row[:, :n] * factor[:, :n]).sum(axis=0)
-        ab -= (row[:, :n] * factor[:, n:]).sum(axis=0)
-        bb -= (row[:, n:] * factor[:, n:]).sum(axis=0)
-        rest -= float(gain[best])
-        rhs -= factor.T @ rhs[pivot]
-        alive[best] = False
-    return chosen
 
 
 def fit_chosen_orders(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array, Array, float]:

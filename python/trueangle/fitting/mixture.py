@@ -1,0 +1,154 @@
+"""The fit of orders that were chosen by evidence: the mixture over models and noises.
+
+Outliers are readings more than 8 robust standard deviations off its curve. They are set aside,
+and orders and coefficients are estimated anew, until the same readings are set aside twice.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from ..errors import NoOrderError
+from ..joint.shafts import ShaftOrders
+from ..runs.outliers import WILD, WILD_SHARE, robust_scale
+from ..runs.run import CalibrationRun
+from ..support.angles import circular_mean, wrap
+from ..support.arrays import Array
+from .orders.result import OrderSelection
+from .problem import PlainSolution, Problem, SolvedProblem
+from .robust import FAR, RobustFit, without_spikes
+from .uncertainty import Uncertainty
+
+#: Rounds of setting outliers aside.
+_ROUNDS: Final = 6
+
+#: Angles that tell the travel.
+_TRAVEL: Final = 2000
+
+
+class MixtureFit(NamedTuple):
+    """Orders, coefficients and covariance of a problem."""
+
+    selection: OrderSelection
+    problem: Problem
+    weighted: RobustFit
+    uncertainty: Uncertainty
+
+
+def fit_mixture(
+    runs: Sequence[CalibrationRun],
+    selection: OrderSelection,
+    choose: Callable[[Sequence[CalibrationRun]], OrderSelection],
+    resolve: Callable[[OrderSelection], list[ShaftOrders]],
+    robust: bool,
+    floor: float,
+) -> MixtureFit:
+    """Fit the orders of a selection, which ``choose`` made of the runs without spikes.
+
+    Deviations below ``floor`` are rounding, never outliers.
+
+    Raises
+    ------
+    NoOrderError
+        Without the outliers the readings support no order.
+    """
+    given = [_weights(run) for run in runs]
+    weights = [_weights(without_spikes(run)) for run in runs] if robust else given
+    rounds, far = _ROUNDS if robust else 0, 0.0
+    while True:
+        problem = Problem(runs, resolve(selection), selection.argument)
+        fitted, uncertainty = _fitted(problem, selection, weights)
+        if not robust:
+            return MixtureFit(selection, problem, RobustFit(fitted, None, 0), uncertainty)
+        after, far = _inliers(problem, fitted, given, floor)
+        same = all(((a > 0.0) == (w > 0.0)).all() for a, w in zip(after, weights, strict=True))
+        if same or rounds == 0:
+            break
+        rounds -= 1
+        weights = after
+        selection = choose([replace(r, weights=w) for r, w in zip(runs, weights, strict=True)])
+        if not selection.orders:
+            raise NoOrderError(f"no order is supported by the data: {selection.reason}")
+    wild = sum(
+        int(np.count_nonzero((w == 0.0) & (g > 0.0))) for w, g in zip(weights, given, strict=True)
+    )
+    unsettled = 0 if same else _ROUNDS
+    weighted = RobustFit(fitted, weights if wild else None, wild, far, unsettled)
+    return MixtureFit(selection, problem, weighted, uncertainty)
+
+
+def _weights(run: CalibrationRun) -> Array:
+    return np.ones(len(run)) if run.weights is None else run.weights
+
+
+def _inliers(
+    problem: Problem, fitted: SolvedProblem, given: Sequence[Array], floor: float
+) -> tuple[list[Array], float]:
+    """Weights without the outliers, unless they are too many to be some, and the share far off."""
+    residuals = problem.residuals(fitted)
+    counted = np.abs(np.concatenate([r[g > 0.0] for r, g in zip(residuals, given, strict=True)]))
+    scale = robust_scale(counted)
+    limit = max(WILD * scale, floor)
+    far = float(np.mean(counted > FAR * scale))
+    if np.mean(counted > limit) > WILD_SHARE:
+        return list(given), far
+    each = zip(residuals, given, strict=True)
+    return [np.where(np.abs(r) > limit, 0.0, g) for r, g in each], far
+
+
+def _fitted(
+    problem: Problem, selection: OrderSelection, weights: Sequence[Array]
+) -> tuple[SolvedProblem, Uncertainty]:
+    """Coefficients and covariance of the orders; zeros are means of what they leave."""
+    estimate = selection.estimate
+    assert estimate is not None
+    told = np.array(estimate.told)
+    wanted = [k * shaft.cycles_per_turn for shaft in problem.shafts for k in shaft.orders]
+    named = [float(told[np.argmin(np.abs(told - k))]) for k in wanted] if told.size else wanted
+    named = [n if math.isclose(n, k) else k for n, k in zip(named, wanted, strict=True)]
+    angles = np.sort(np.concatenate(problem.angles))[:: 1 + problem.readings // _TRAVEL]
+    beside = [row.order for row in selection.table if row.verdict == "reference"]
+    mean, covariance = estimate.among(named, 2.0 * math.pi / problem.period * angles, beside)
+    offsets, means, squares = [], [], 0.0
+    for index, (run, weight) in enumerate(zip(problem.runs, weights, strict=True)):
+        columns, shares = problem.columns(index), weight / weight.sum()
+        error = run.indicated - run.reference
+        zero = circular_mean(error, problem.period)
+        left = wrap(error - zero - columns @ mean, problem.period)
+        own = float(shares @ left)
+        offsets.append(float(wrap(zero + own, problem.period)))
+        means.append(shares @ columns)
+        squares += float(weight @ (left - own) ** 2)
+    used = sum(int(np.count_nonzero(weight)) for weight in weights)
+    freedom = max(float(used - len(offsets) - mean.size), 1.0)
+    zeros = float(np.mean([1.0 / zero.information for zero in estimate.zeros]))
+    parts = np.array(means)
+    common = parts.mean(axis=0)
+    whole = np.empty((mean.size + 1, mean.size + 1))
+    whole[1:, 1:] = covariance
+    whole[0, 1:] = whole[1:, 0] = -covariance @ common
+    whole[0, 0] = zeros / len(offsets) + common @ covariance @ common
+    pairs = np.split(
+        mean.reshape(-1, 2), np.cumsum([len(shaft.orders) for shaft in problem.shafts])[:-1]
+    )
+    scales = np.sqrt(np.diag(covariance))
+    solution = PlainSolution(
+        np.array(offsets),
+        np.sqrt(zeros + np.einsum("ri,ij,rj->r", parts, covariance, parts)),
+        float(circular_mean(np.array(offsets), problem.period)),
+        [part[:, 0].tolist() for part in pairs],
+        [part[:, 1].tolist() for part in pairs],
+        whole,
+        squares / freedom,
+        freedom,
+        mean.size + len(offsets),
+        math.sqrt(float(np.linalg.cond(covariance / np.outer(scales, scales)))),
+        "evidence",
+    )
+    found = SolvedProblem(solution, solution.offsets, problem.shafts, problem.period)
+    return found, Uncertainty("evidence", whole, np.full(len(whole), freedom))
