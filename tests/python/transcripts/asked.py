@@ -11,12 +11,14 @@ import argparse
 import contextlib
 import importlib
 import inspect
+import pkgutil
 import re
 import shlex
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import trueangle
 from trueangle.cli import build_parser
 from trueangle.runs.run import CalibrationRun
 
@@ -131,6 +133,11 @@ class Asked:
 
     @contextlib.contextmanager
     def _watched(self) -> Iterator[None]:
+        # What a module imports of a door while it is watched, it would keep.
+        for module in pkgutil.walk_packages(trueangle.__path__, "trueangle."):
+            with contextlib.suppress(ImportError):  # of an extra that is not here
+                if module.name.rpartition(".")[2] != "__main__":
+                    importlib.import_module(module.name)
         kept = []
         for door in DOORS:
             module, _, name = f"trueangle.{door}".rpartition(".")
