@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from .reports import report as report
     from .runs.checks.check import check as check
     from .runs.files import read_runs as read_runs
-    from .runs.joining import join as join
+    from .runs.joining.join import join as join
     from .runs.run import CalibrationRun as CalibrationRun
     from .runs.writing import write_runs as write_runs
     from .selfcalibration.calibrate import selfcal as selfcal

@@ -108,7 +108,7 @@ def copy(task: CopyTask) -> Contents:
     before = contents(task.source)  # an earlier correction, of another joint
     rows, done = before.rows, 0
     sums: dict[str, Checksum] = {}
-    with _Output(task.target, "r+b") as output, _opened(task.target, output) as file:
+    with _WrittenFile(task.target, "r+b") as output, _opened(task.target, output) as file:
         for channel in channels:
             indicated = cached(file, channel.column)
             used = {signal: cached(file, name) for signal, name in channel.signals.items()}
@@ -164,7 +164,7 @@ def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[s
 
 
 @contextmanager
-def _opened(path: Path, output: _Output | None = None) -> Iterator[h5py.File]:
+def _opened(path: Path, output: _WrittenFile | None = None) -> Iterator[h5py.File]:
     """The file, to be read or written, its errors told with its name."""
     hint = "; MATLAB saves HDF5 with -v7.3 only" if path.suffix == ".mat" else ""
     with damage_told(path, "HDF5", hint):
@@ -177,7 +177,7 @@ def _opened(path: Path, output: _Output | None = None) -> Iterator[h5py.File]:
             raise
 
 
-class _Output(io.FileIO):
+class _WrittenFile(io.FileIO):
     """A file that HDF5 can always close: over one that it cannot it ends the process.
 
     The first failure to write is kept, and what comes after it goes nowhere.

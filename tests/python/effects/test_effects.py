@@ -19,6 +19,7 @@ PACKAGE = Path(trueangle.__file__).parent
 WORDS = {
     ("outliers", "certificate/document.py"),
     ("outliers", "runs/checks/outliers.py"),
+    ("missed_counts", "runs/checks/jumps.py"),
     ("wrong_gear_ratio", "runs/checks/angles.py"),
     ("wrong_gear_ratio", "runs/checks/fault.py"),
 }

@@ -152,7 +152,7 @@ def test_epics_that_is_damaged_or_to_be_corrected(tmp_path, capsys):
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.0])], period=360.0)
     model.save(tmp_path / "model.json")
     command = ["correct", str(path), "-m", str(tmp_path / "model.json"), "--column", "PV"]
-    assert main([*command, "--unit", "deg", "-o", str(tmp_path / "out.txt")]) == 1
+    assert main([*command, "--unit", "deg", "-o", str(tmp_path / "out.camonitor")]) == 1
     printed = capsys.readouterr()
     assert "no room for corrected angles" in printed.out + printed.err
     assert not (tmp_path / "out.txt").exists()

@@ -25,6 +25,9 @@ _FEW: Final = 4
 #: Steps of the reference, in usual ones, up to which a change of the error is no gap.
 _USUAL: Final = 3.0
 
+#: Jumps up to this are rounding of angles, degrees.
+_ROUNDING: Final = 1e-9
+
 #: Of more readings every second, third ... is looked at.
 _LOOKED_AT: Final = 8192
 
@@ -86,7 +89,7 @@ def _jumps(reference: Array, indicated: Array, error: Array) -> Iterator[tuple[i
     usual = median(np.lib.stride_tricks.sliding_window_view(around, _BESIDE), axis=1)
     off = changes - usual
     size = np.abs(off)
-    limit = WILD * max(robust_scale(off), float(quantile(size, 0.8)))
+    limit = max(WILD * max(robust_scale(off), float(quantile(size, 0.8))), _ROUNDING)
     # What rounds jumps from count to count: a few jumps are larger than all others.
     limit = max(limit, 2.0 * float(np.partition(size, -_FEW - 1)[-_FEW - 1]))
     far = np.flatnonzero(size > limit)

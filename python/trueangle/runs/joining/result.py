@@ -96,8 +96,8 @@ class Joined(PlainResult):
         if self.left_out:
             lines.append(
                 f"{self.left_out} of {self.left_out + found['readings']} readings discarded: at "
-                "their time the reference pauses, has not begun or has ended; give --max-gap or "
-                "--offset where more is known"
+                "their time the reference pauses, has not begun or has ended; give "
+                "`max_gap_s=` or `offset_s=` where more is known"
             )
         lines += [
             f"{found['readings']} readings joined in {counted(self.runs, 'run')}",
