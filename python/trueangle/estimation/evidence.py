@@ -158,6 +158,22 @@ class EvidenceEstimate:
                 onto[:, own] = np.linalg.lstsq(columns, other, rcond=_ALIKE)[0]
         return onto @ self.mean, onto @ self.covariance @ onto.T
 
+    def gain_of_a_run(self, theta: Array) -> tuple[float, float]:
+        """Mean and standard deviation of what the mean curve takes off a further run's mean square.
+
+        ::
+
+            g = 2 (b + d)' G m - m' G m,    E g = m' G m,    var g = 4 m' G Ω G m
+
+        with the Gram matrix G of the columns at these angles over their number, and the variances
+        Ω of what differs from run to run.
+        """
+        columns = _columns(theta, self.told)
+        reach = columns.T @ (columns @ self.mean) / len(columns)
+        omega = np.sum([m.weight * m.omega for m in self.models], axis=0)
+        spread = float(np.repeat(omega, 2) @ reach**2)
+        return float(self.mean @ reach), 2.0 * float(np.sqrt(spread))
+
     def _curve(self, theta: Array, beside: Sequence[float]) -> tuple[Array, Array]:
         columns = _columns(theta, self.told)
         columns[:, np.repeat(np.isin(self.told, list(beside)), 2)] = 0.0

@@ -264,7 +264,7 @@ def fitted_to(
         choice = choose_argument(found, argument, wanted)
     known = None
     usual = covariance == "auto" and ridge is None and method is None and taken is None
-    usual &= loss in ("auto", "linear")
+    usual &= loss in ("auto", "linear") and summed is None
     if usual and selection is not None and selection.is_of_all_readings:
         from .mixture import fit_mixture
 

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ..errors import NoOrderError
+from ..errors import NoModelError, NoOrderError
 from ..joint.shafts import ShaftOrders
 from ..runs.outliers import WILD, WILD_SHARE, robust_scale
 from ..runs.run import CalibrationRun
@@ -26,6 +26,9 @@ from .uncertainty import Uncertainty
 
 #: Rounds of setting outliers aside.
 _ROUNDS: Final = 6
+
+#: Standard deviations between runs by which the gain of a further one must exceed nothing.
+_SURE: Final = 2.0
 
 #: Angles that tell the travel.
 _TRAVEL: Final = 2000
@@ -54,6 +57,8 @@ def fit_mixture(
 
     Raises
     ------
+    NoModelError
+        The runs differ by so much that a further one may be made worse.
     NoOrderError
         Without the outliers the readings support no order.
     """
@@ -62,6 +67,7 @@ def fit_mixture(
     rounds, far = _ROUNDS if robust else 0, 0.0
     while True:
         problem = Problem(runs, resolve(selection), selection.argument)
+        _check_new_run(problem, selection)
         fitted, uncertainty = _fitted(problem, selection, weights)
         if not robust:
             return MixtureFit(selection, problem, RobustFit(fitted, None, 0), uncertainty)
@@ -80,6 +86,22 @@ def fit_mixture(
     unsettled = 0 if same else _ROUNDS
     weighted = RobustFit(fitted, weights if wild else None, wild, far, unsettled)
     return MixtureFit(selection, problem, weighted, uncertainty)
+
+
+def _check_new_run(problem: Problem, selection: OrderSelection) -> None:
+    """Raise where what differs from run to run makes the gain of a further one doubtful."""
+    estimate = selection.estimate
+    if len(problem.runs) < 2 or estimate is None:
+        return
+    angles = np.sort(np.concatenate(problem.angles))[:: 1 + problem.readings // _TRAVEL]
+    gain, spread = estimate.gain_of_a_run(2.0 * math.pi / problem.period * angles)
+    if gain <= _SURE * spread:
+        listed = ", ".join(f"{order:g}" for order in selection.orders[:6])
+        raise NoModelError(
+            f"no correction can be given: of order {listed} the runs differ by so much that a "
+            "further run may be made worse; they seem to be of different joints: fit each by "
+            "itself, or declare the `orders=`"
+        )
 
 
 def _weights(run: CalibrationRun) -> Array:

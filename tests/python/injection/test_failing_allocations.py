@@ -8,17 +8,20 @@ import pytest
 
 from .shim import NO_MEMORY
 
-START = "import numpy as np, trueangle as ta\nx = np.linspace(0.0, 360.0, 9000, endpoint=False)\n"
+START = (
+    "import numpy as np, trueangle as ta\nfrom trueangle import _core\n"
+    "x = np.linspace(0.0, 360.0, 9000, endpoint=False)\n"
+)
 MODEL = "ta.HarmonicModel([ta.Shaft('output', 1, [1, 20], [1e-3] * 2, [0.0] * 2)], period=360.0"
 
 #: What is computed, and printed to be compared with the same without a failure.
 WORK = {
     "series": f"m = {MODEL})\nprint(m.error(x).sum(), m.correct(x).sum(), m.compensator()(3.0))",
     "terms": f"m = {MODEL}, terms=[ta.Backlash(0.1)])\nprint(m.correct(x).sum())",
-    "fit": "s = ta._core.fit([(x, x + np.sin(x), None)], 360.0, [1.0], [list(range(1, 30))])\n"
+    "fit": "s = _core.fit([(x, x + np.sin(x), None)], 360.0, [1.0], [list(range(1, 30))])\n"
     "print(s.cosine, s.residual_variance)",
     "qr": "y = np.ascontiguousarray(x[::10])\n"
-    "s = ta._core.fit([(y, y + np.sin(y), None)], 360.0, [1.0], "
+    "s = _core.fit([(y, y + np.sin(y), None)], 360.0, [1.0], "
     "[list(range(1, 20))], method='qr')\nprint(s.cosine, s.residual_variance)",
     "moments": "m = ta.Moments(range(1, 20), period=360.0)\nm.update(x, np.sin(x))\n"
     "m.merge(m.copy())\nprint(m.count, m.solve().cosine.tolist())",
@@ -90,7 +93,7 @@ def test_a_process_that_gets_no_more_memory_goes_on_or_says_so(what, extra):
 
 def test_a_thread_that_does_not_start_is_done_without(driver, desk):
     code = (
-        "import numpy as np, trueangle as ta\n"
+        "import numpy as np, trueangle as ta, trueangle._core as _core\n"
         "x = np.linspace(0.0, 3600.0, 400_000)\n"
         f"m = {MODEL})\n"
         "print(m.correct(x, threads=4).tobytes() == m.correct(x, threads=1).tobytes())"

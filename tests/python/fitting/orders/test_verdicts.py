@@ -100,9 +100,9 @@ def test_what_is_held_out_is_a_mean_by_weight() -> None:
     before = [np.average((e - np.average(e, weights=weight)) ** 2, weights=weight) for e in errors]
     assert one.holdout_rms[0] == pytest.approx(math.sqrt(np.mean(before)), rel=1e-9)
     for row, other in zip(one.table, four.table, strict=True):
-        assert other.standard_error == pytest.approx(row.standard_error, rel=1e-9)
-        assert other.holdout_gain == pytest.approx(row.holdout_gain, rel=1e-9, abs=1e-12)
-        assert other.log10_false_alarm == pytest.approx(row.log10_false_alarm, rel=1e-6, abs=1e-9)
+        assert other.standard_error == pytest.approx(row.standard_error, rel=1e-6)
+        assert other.holdout_gain == pytest.approx(row.holdout_gain, rel=1e-6, abs=1e-9)
+        assert other.log10_false_alarm == pytest.approx(row.log10_false_alarm, rel=1e-4, abs=1e-6)
 
 
 def test_the_summary_lists_the_strongest_of_those_rejected() -> None:
@@ -118,14 +118,14 @@ def test_the_summary_lists_the_strongest_of_those_rejected() -> None:
 
 @pytest.mark.parametrize("seed", range(1, 13))
 def test_a_refusal_tells_the_chance_of_its_strongest_order(seed: int) -> None:
-    """In percent of the whole search, to the digits that are shown, and how many were searched."""
+    """In percent, to the digits that are shown, and how many were searched."""
     print("seed", seed)
     found = ta.select_orders(runs_of(noise(seed, 6, THETA.size)))
-    best = min(found.table, key=lambda row: row.log10_false_alarm)
-    said = re.search(r"of (\d+) orders searched, (\d+), .* in ([\d.]+) % of such", found.reason)
+    best = max(found.table, key=lambda row: row.probability)
+    said = re.search(r"of (\d+) orders searched, (\d+), .* probability of (\S+) %", found.reason)
     assert said is not None
     assert (int(said[1]), int(said[2])) == (len(found.table), best.order)
-    assert float(said[3]) == float(f"{100.0 * 10.0**best.log10_false_alarm:.2g}")
+    assert float(said[3]) == float(f"{100.0 * best.probability:.2g}")
 
 
 def test_the_paper_tells_what_is_needed_by_the_scatter_of_its_runs() -> None:
