@@ -20,8 +20,9 @@ from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
 from ..support.arrays import Array
 from .orders.result import OrderSelection
+from .orders.zerogroups import some_angles
 from .problem import PlainSolution, Problem, SolvedProblem
-from .robust import FAR, RobustFit, without_spikes
+from .robust import FAR, RobustFit, given_weights, without_spikes
 from .uncertainty import Uncertainty
 
 #: Rounds of setting outliers aside.
@@ -29,9 +30,6 @@ _ROUNDS: Final = 6
 
 #: Standard deviations between runs by which the gain of a further one must exceed nothing.
 _SURE: Final = 2.0
-
-#: Angles that tell the travel.
-_TRAVEL: Final = 2000
 
 
 class MixtureFit(NamedTuple):
@@ -62,13 +60,16 @@ def fit_mixture(
     NoOrderError
         Without the outliers the readings support no order.
     """
-    given = [_weights(run) for run in runs]
-    weights = [_weights(without_spikes(run)) for run in runs] if robust else given
+    given = [given_weights(run.weights, len(run)) for run in runs]
+    weights = given
+    if robust:
+        weights = [given_weights(without_spikes(run).weights, len(run)) for run in runs]
     rounds, far = _ROUNDS if robust else 0, 0.0
     while True:
         problem = Problem(runs, resolve(selection), selection.argument)
-        _check_new_run(problem, selection)
-        fitted, uncertainty = _fitted(problem, selection, weights)
+        travel = some_angles(problem.angles, problem.period)
+        _check_new_run(problem, selection, travel)
+        fitted, uncertainty = _fitted(problem, selection, weights, travel)
         if not robust:
             return MixtureFit(selection, problem, RobustFit(fitted, None, 0), uncertainty)
         after, far = _inliers(problem, fitted, given, floor)
@@ -88,13 +89,12 @@ def fit_mixture(
     return MixtureFit(selection, problem, weighted, uncertainty)
 
 
-def _check_new_run(problem: Problem, selection: OrderSelection) -> None:
+def _check_new_run(problem: Problem, selection: OrderSelection, travel: Array) -> None:
     """Raise where what differs from run to run makes the gain of a further one doubtful."""
     estimate = selection.estimate
     if len(problem.runs) < 2 or estimate is None:
         return
-    angles = np.sort(np.concatenate(problem.angles))[:: 1 + problem.readings // _TRAVEL]
-    gain, spread = estimate.gain_of_a_run(2.0 * math.pi / problem.period * angles)
+    gain, spread = estimate.gain_of_a_run(travel)
     if gain <= _SURE * spread:
         listed = ", ".join(f"{order:g}" for order in selection.orders[:6])
         raise NoModelError(
@@ -102,10 +102,6 @@ def _check_new_run(problem: Problem, selection: OrderSelection) -> None:
             "further run may be made worse; they seem to be of different joints: fit each by "
             "itself, or declare the `orders=`"
         )
-
-
-def _weights(run: CalibrationRun) -> Array:
-    return np.ones(len(run)) if run.weights is None else run.weights
 
 
 def _inliers(
@@ -124,18 +120,16 @@ def _inliers(
 
 
 def _fitted(
-    problem: Problem, selection: OrderSelection, weights: Sequence[Array]
+    problem: Problem, selection: OrderSelection, weights: Sequence[Array], travel: Array
 ) -> tuple[SolvedProblem, Uncertainty]:
     """Coefficients and covariance of the orders; zeros are means of what they leave."""
     estimate = selection.estimate
     assert estimate is not None
-    told = np.array(estimate.told)
     wanted = [k * shaft.cycles_per_turn for shaft in problem.shafts for k in shaft.orders]
-    named = [float(told[np.argmin(np.abs(told - k))]) for k in wanted] if told.size else wanted
-    named = [n if math.isclose(n, k) else k for n, k in zip(named, wanted, strict=True)]
-    angles = np.sort(np.concatenate(problem.angles))[:: 1 + problem.readings // _TRAVEL]
+    # Orders of shafts and of the estimate differ by rounding.
+    named = [next((k for k in estimate.told if math.isclose(k, m)), m) for m in wanted]
     beside = [row.order for row in selection.table if row.verdict == "reference"]
-    mean, covariance = estimate.among(named, 2.0 * math.pi / problem.period * angles, beside)
+    mean, covariance = estimate.among(named, travel, beside)
     offsets, means, squares = [], [], 0.0
     for index, (run, weight) in enumerate(zip(problem.runs, weights, strict=True)):
         columns, shares = problem.columns(index), weight / weight.sum()

@@ -98,7 +98,7 @@ def fit_robustly(problem: Problem, loss: Loss, floor: float) -> RobustFit:
     if loss == "tukey":
         weights, unsettled = _iterate(problem, _tukey, weights, floor)
     wild = sum(
-        int(np.count_nonzero((w == 0.0) & (_given(b, w.size) > 0.0)))
+        int(np.count_nonzero((w == 0.0) & (given_weights(b, w.size) > 0.0)))
         for w, b in zip(weights, problem.base, strict=True)
     )
     fitted = problem.solve(weights)
@@ -160,7 +160,7 @@ def _set_aside(problem: Problem, floor: float) -> RobustFit:
             return plain
         edges = np.cumsum([len(run) for run in problem.runs])[:-1]
         weights = [
-            np.where(far, 0.0, _given(b, far.size))
+            np.where(far, 0.0, given_weights(b, far.size))
             for far, b in zip(np.split(wild, edges), problem.base, strict=True)
         ]
         found = RobustFit(problem.solve(weights), weights, int(np.count_nonzero(wild)), share)
@@ -180,7 +180,7 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
 
     For choosing orders (`trueangle.runs.outliers`); `fit_robustly` looks again with the model.
     """
-    given = _given(run.weights, len(run))
+    given = given_weights(run.weights, len(run))
     used = slice(None) if run.weights is None else given > 0.0
     error, reference = run.centred_error[used], run.reference[used]
     wild, distance = spikes(error, reference, run.period)
@@ -198,7 +198,7 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
 def _wild(problem: Problem, fitted: SolvedProblem, floor: float) -> NDArray[np.bool_]:
     """Which of all readings, run after run, are wild; those of weight 0 never are."""
     residuals = problem.residuals(fitted)
-    given = [_given(b, r.size) for b, r in zip(problem.base, residuals, strict=True)]
+    given = [given_weights(b, r.size) for b, r in zip(problem.base, residuals, strict=True)]
     limit = max(WILD * robust_scale(_counted(problem, residuals)), floor)
     return np.asarray((np.abs(np.concatenate(residuals)) > limit) & (np.concatenate(given) > 0.0))
 
@@ -224,11 +224,11 @@ def _iterate(
         residuals = problem.residuals(problem.solve(current))
         scale = max(robust_scale(_counted(problem, residuals)), floor)
         weights = [
-            _given(b, r.size) * weight(np.abs(r) / scale)
+            given_weights(b, r.size) * weight(np.abs(r) / scale)
             for b, r in zip(problem.base, residuals, strict=True)
         ]
         moved = max(
-            float(np.abs(w - _given(c, w.size)).max())
+            float(np.abs(w - given_weights(c, w.size)).max())
             for w, c in zip(weights, current, strict=True)
         )
         current = weights
@@ -237,7 +237,8 @@ def _iterate(
     return weights, rounds
 
 
-def _given(weights: Array | None, size: int) -> Array:
+def given_weights(weights: Array | None, size: int) -> Array:
+    """Weights as numbers: ones where none were given."""
     return np.ones(size) if weights is None else weights
 
 

@@ -72,7 +72,7 @@ class EvidenceSelection:
         )
         self.step = rounding_step(runs, self.positions)
         #: Angles of the readings in radians, as many as tell the travel.
-        self.travel = some_angles(units)
+        self.travel = some_angles([unit.turns for unit in units], 1.0)
         self.units = some_readings(units, MOST_READINGS)
         self.orders = list(candidates.orders)
         reference = set(candidates.reference)

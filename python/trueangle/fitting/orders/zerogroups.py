@@ -86,10 +86,10 @@ def zero_groups(
     return units, np.concatenate(places)
 
 
-def some_angles(units: Sequence[ZeroGroupReadings]) -> Array:
+def some_angles(angles: Sequence[Array], period: float) -> Array:
     """Angles of the readings in radians, some thousand of them."""
-    turns = np.concatenate([unit.turns for unit in units])
-    return np.asarray(2.0 * math.pi * np.sort(turns)[:: 1 + turns.size // _TOLD])
+    every = np.concatenate(angles)
+    return np.asarray(2.0 * math.pi / period * np.sort(every)[:: 1 + every.size // _TOLD])
 
 
 def some_readings(units: Sequence[ZeroGroupReadings], most: int) -> list[ZeroGroupReadings]:
