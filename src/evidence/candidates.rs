@@ -7,7 +7,12 @@
 //! q = X_k' C^-1 r,    s = X_k' C^-1 X_k - X_k' C^-1 X S X' C^-1 X_k
 //! ```
 //!
-//! with the zero of each run taken out. Effects of runs are left out of account.
+//! with the zero of each run taken out. Effects of runs are left out of account. For an order that is
+//! in, with prior variance `tau`, the same without it follows from its own posterior:
+//!
+//! ```text
+//! s = S_kk^-1 - I / tau,    q = S_kk^-1 b_k
+//! ```
 
 use nalgebra::{DMatrix, DVector};
 
@@ -22,8 +27,21 @@ const CELLS: usize = 1 << 15;
 /// The columns that are in, as places of orders, with their posterior.
 pub(super) struct Inside<'a> {
     pub places: &'a [usize],
+    pub tau: &'a [f64],
     pub mean: &'a [f64],
     pub covariance: &'a DMatrix<f64>,
+}
+
+impl Inside<'_> {
+    /// The order at a place that is in, beside the others.
+    fn without(&self, place: usize) -> Option<Candidate> {
+        let at = self.places.iter().position(|&own| own == place)?;
+        let precision = self.covariance.view((2 * at, 2 * at), (2, 2)).into_owned();
+        let precision = precision.try_inverse()?;
+        let prior = DMatrix::from_diagonal_element(2, 2, 1.0 / self.tau[at]);
+        let mean = DVector::from_row_slice(&self.mean[2 * at..][..2]);
+        Some(Candidate::new(&precision - prior, &precision * mean))
+    }
 }
 
 /// Sums of a run: products of its columns with the zero, the residual and the columns that are in,
@@ -36,7 +54,7 @@ struct Part {
 }
 
 impl Readings {
-    /// Of all orders, beside those that are in; an order that is in stands as if it were not.
+    /// Of all orders, beside those that are in; of an order that is in, beside the others.
     pub(super) fn candidates(&self, noise: Noise, inside: &Inside) -> Vec<Candidate> {
         let columns = self.columns();
         let pair = |&place: &usize| [2 * place + 1, 2 * place + 2];
@@ -70,6 +88,9 @@ impl Readings {
             }
         }
         let each = (0..orders).map(|k| {
+            if let Some(own) = inside.without(k) {
+                return own;
+            }
             let [a, b, c] = squares[k];
             let reach = cross.columns(2 * k, 2);
             let s = DMatrix::from_row_slice(2, 2, &[a, b, b, c]);

@@ -22,6 +22,9 @@ use crate::threads;
 /// Log probability ratio to the best model up to which a model counts.
 const WINDOW: f64 = 6.0;
 
+/// Models that count at most, the best.
+const MODELS: usize = 64;
+
 /// Rounds of noise and search at most.
 const ROUNDS: usize = 5;
 
@@ -134,6 +137,11 @@ impl Readings {
             let shared: Vec<usize> = best.active().iter().map(|&k| looked[k]).collect();
             let inside = Inside {
                 places: &shared,
+                tau: &best
+                    .active()
+                    .iter()
+                    .map(|&k| best.tau[k])
+                    .collect::<Vec<_>>(),
                 mean: posterior.mean.as_slice(),
                 covariance: &posterior.covariance(),
             };
@@ -165,6 +173,7 @@ impl Readings {
         let white = Noise::of([total, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let inside = Inside {
             places: &[],
+            tau: &[],
             mean: &[],
             covariance: &DMatrix::zeros(0, 0),
         };
@@ -239,7 +248,10 @@ impl Readings {
 
     /// Over models and points of the noise's posterior.
     fn mixture(&self, modes: &[Mode], prior: &Prior, noise_prior: NoisePrior) -> Option<Estimate> {
-        let has = |mode: &Mode, k: usize| mode.models.iter().any(|found| found.model.has(k));
+        let has = |mode: &Mode, k: usize| {
+            let mut counted = mode.models.iter().take(MODELS);
+            counted.any(|found| found.model.has(k))
+        };
         let own = |mode: &Mode| -> Vec<usize> {
             let kept = (0..mode.looked.len()).filter(|&k| has(mode, k));
             kept.map(|k| mode.looked[k]).collect()
@@ -256,6 +268,7 @@ impl Readings {
             let models: Vec<Model> = mode
                 .models
                 .iter()
+                .take(MODELS)
                 .map(|found| found.model.among_places(&mode.looked, &places))
                 .collect();
             let part = |i: usize| {

@@ -13,7 +13,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::gram::Sums;
+use super::gram::{Gram, Sums};
 use super::model::Model;
 use super::posterior::Posterior;
 
@@ -139,6 +139,28 @@ impl Solved {
                 .into_owned(),
             q: self.moments.rows(from, to - from).into_owned(),
         }
+    }
+
+    /// What differs of each group in each run from the shared coefficients.
+    pub(super) fn differences(&self, grams: &[Gram]) -> Vec<Vec<Candidate>> {
+        let mut mean = DVector::zeros(self.outside.nrows());
+        for (k, &(from, to)) in self.bounds.iter().enumerate() {
+            if self.model.tau[k] > 0.0 {
+                let own = self.mean.rows(self.places[k], to - from);
+                mean.rows_mut(from, to - from).copy_from(&own);
+            }
+        }
+        let mut found = vec![Vec::with_capacity(grams.len()); self.bounds.len()];
+        for gram in grams {
+            let sums = self.model.sums(std::slice::from_ref(gram));
+            let left = sums.moments.column(0) - &sums.products * &mean;
+            for (own, &(from, to)) in found.iter_mut().zip(&self.bounds) {
+                let s = sums.products.view((from, from), (to - from, to - from));
+                let q = left.rows(from, to - from).into_owned();
+                own.push(Candidate::new(s.into_owned(), q));
+            }
+        }
+        found
     }
 
     /// Without a group that is in.

@@ -9,8 +9,11 @@ const SPREAD: f64 = 4.0;
 /// Share of the variance of residuals at which the white variance and each of the terms are centred.
 const SHARES: [f64; VARIANCES] = [0.5, 0.003, 0.003, 0.003, 0.003, 0.003];
 
-/// Probability that a group that is in differs from run to run.
-const EFFECT: f64 = 0.2;
+/// Of the share of groups in the model that differ from run to run: a beta distribution.
+///
+/// Where one order changes from mounting to mounting, others do; most designs have none.
+const DIFFERENT: f64 = 0.25;
+const EQUAL: f64 = 1.0;
 
 /// Shares from which a maximum is sought: white and a little of every term.
 const START: [f64; VARIANCES] = [0.5, 0.1, 0.1, 0.1, 0.1, 0.1];
@@ -57,46 +60,81 @@ impl Prior {
         }
     }
 
-    /// Logarithm of the probability that group `k` is in with one of the sizes, over that it is not.
+    /// Logarithm of the probability that group `k` is in with one of the sizes, over that it is not,
+    /// whatever differs from run to run.
     pub fn log_in(&self, k: usize) -> f64 {
         let p = self.probabilities[k];
-        (p / (1.0 - p) / self.sizes.len() as f64).ln() + self.log_effect(0.0)
+        (p / (1.0 - p) / self.sizes.len() as f64).ln()
     }
 
-    /// Logarithm of the probability of a variance from run to run of a group that is in.
-    pub fn log_effect(&self, omega: f64) -> f64 {
-        match self.effects.len() {
-            0 => 0.0,
-            _ if omega == 0.0 => (1.0 - EFFECT).ln(),
-            count => (EFFECT / count as f64).ln(),
-        }
-    }
-
-    /// Logarithm of the probability of a group with these variances over that it has none.
+    /// The same of a group with these variances, in which groups differ being known.
     ///
     /// What runs do not share alone (`tau` of 0) is as probable as that and something shared.
     pub fn log_odds_of(&self, k: usize, tau: f64, omega: f64) -> f64 {
         if tau == 0.0 && omega == 0.0 {
             return 0.0;
         }
-        let sizes = if tau == 0.0 {
-            self.sizes.len() as f64
-        } else {
-            1.0
+        let mut own = self.log_in(k);
+        if tau == 0.0 {
+            own += (self.sizes.len() as f64).ln();
+        }
+        if omega > 0.0 {
+            own -= ((2 * self.effects.len()) as f64).ln();
+        }
+        own
+    }
+
+    /// Logarithm of the probability that those of the groups in the model differ which do.
+    pub fn log_effects(&self, count: Count) -> f64 {
+        if self.effects.is_empty() {
+            return 0.0;
+        }
+        let product = |first: f64, factors: usize| -> f64 {
+            (0..factors).map(|i| (first + i as f64).ln()).sum()
         };
-        self.log_in(k) - self.log_effect(0.0) + self.log_effect(omega) + sizes.ln()
+        product(DIFFERENT, count.different) + product(EQUAL, count.groups - count.different)
+            - product(DIFFERENT + EQUAL, count.groups)
+    }
+
+    /// Logarithm of the probability that one more group does not differ.
+    pub fn log_equal(&self, count: Count) -> f64 {
+        if self.effects.is_empty() {
+            return 0.0;
+        }
+        let equal = (count.groups - count.different) as f64;
+        ((EQUAL + equal) / (DIFFERENT + EQUAL + count.groups as f64)).ln()
     }
 
     /// Logarithm of the probability of a model over that of none of the groups.
     pub fn log_odds(&self, model: &Model) -> f64 {
         let own = |k: usize| self.log_odds_of(k, model.tau[k], model.omega[k]);
-        (0..model.tau.len()).map(own).sum()
+        let each: f64 = (0..model.tau.len()).map(own).sum();
+        each + self.log_effects(Count::of(model))
     }
 
     /// Logarithm of the probability of a model.
     pub fn log_probability(&self, model: &Model) -> f64 {
         let none: f64 = self.probabilities.iter().map(|p| (1.0 - p).ln()).sum();
         none + self.log_odds(model)
+    }
+}
+
+/// Groups in a model, and those of them that differ from run to run.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Count {
+    /// Groups with any variance.
+    pub groups: usize,
+    /// Groups with a variance from run to run.
+    pub different: usize,
+}
+
+impl Count {
+    /// Of a model.
+    pub fn of(model: &Model) -> Self {
+        Self {
+            groups: (0..model.tau.len()).filter(|&k| model.has(k)).count(),
+            different: model.omega.iter().filter(|omega| **omega > 0.0).count(),
+        }
     }
 }
 

@@ -11,11 +11,14 @@ use std::collections::BTreeMap;
 use super::gains::Solved;
 use super::gram::{Gram, Sums};
 use super::model::Model;
-use super::prior::Prior;
+use super::prior::{Count, Prior};
 use crate::interrupt;
 
 /// Moves at most.
 const MOVES: usize = 200;
+
+/// Other variances from run to run that are tried before one that gains is taken.
+const PROMISING: usize = 3;
 
 /// Gain below which a move is rounding.
 const GAIN: f64 = 1e-7;
@@ -162,35 +165,77 @@ impl<'a> Search<'a> {
             self.resize(now, k, score, &mut best)?;
             if now.model.omega[k] == 0.0 {
                 self.leave(now, k, &outside, score, &mut best)?;
-            } else {
-                self.leave_with_effect(now, k, &outside, &mut best)?;
             }
         }
         best
     }
 
-    /// Evaluates another variance from run to run of each group, also of those that are out; returns
-    /// the best of these models and `other`.
+    /// Evaluates other variances from run to run; returns the best of these models and `other`.
+    ///
+    /// Those that promise most come first. Where none of them gains, all within the window follow.
     fn best_effect(&mut self, now: &Solved, other: Found) -> Option<Found> {
-        let prior = self.prior;
+        let score = self.score(now);
+        let mut promising = self.effects(now, score);
+        promising.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut best = Some(other);
-        for k in 0..now.model.tau.len() {
-            let (mut tau, own) = (now.model.tau[k], now.model.omega[k]);
-            if tau == 0.0 {
-                (tau, _) = now.outside(k).best(&prior.sizes);
+        for (i, (_, k, tau, omega)) in promising.into_iter().enumerate() {
+            if i >= PROMISING && best.as_ref().is_some_and(|b| b.score > score + GAIN) {
+                return best;
             }
-            for &omega in prior.effects.iter().chain(&[0.0]) {
-                if omega != own {
-                    self.factorised(with(&now.model, &[(k, tau, omega)]), &mut best)?;
-                }
-                // The effect alone, or nothing of what was an effect alone.
-                let is_alone = now.model.tau[k] == 0.0;
-                if (omega > 0.0 || is_alone) && !(is_alone && omega == own) {
-                    self.factorised(with(&now.model, &[(k, 0.0, omega)]), &mut best)?;
-                }
-            }
+            self.factorised(with(&now.model, &[(k, tau, omega)]), &mut best)?;
+        }
+        let (inside, outside): (Vec<usize>, Vec<usize>) =
+            (0..now.model.tau.len()).partition(|&k| now.model.tau[k] > 0.0);
+        for k in inside.into_iter().filter(|&k| now.model.omega[k] > 0.0) {
+            self.leave_with_effect(now, k, &outside, &mut best)?;
         }
         best
+    }
+
+    /// Other variances from run to run of each group, also of those that are out, with about the
+    /// score of the model: the shared coefficients stay as they are.
+    fn effects(&self, now: &Solved, score: f64) -> Vec<(f64, usize, f64, f64)> {
+        let prior = self.prior;
+        let mut found = Vec::new();
+        if prior.effects.is_empty() {
+            return found;
+        }
+        let apart = now.differences(self.grams);
+        let before = prior.log_odds(&now.model);
+        for k in 0..now.model.tau.len() {
+            let (tau, own) = (now.model.tau[k], now.model.omega[k]);
+            let mut offer = |tau: f64, omega: f64, gain: f64| {
+                let odds = prior.log_odds(&with(&now.model, &[(k, tau, omega)])) - before;
+                if score + gain + odds > self.best - self.window {
+                    found.push((score + gain + odds, k, tau, omega));
+                }
+            };
+            if own > 0.0 {
+                // Its neighbours in size, and none; how much that takes is not known.
+                let at = prior.effects.iter().position(|&omega| omega == own);
+                let next = |step: isize| prior.effects.get(at?.checked_add_signed(step)?).copied();
+                let sizes = [Some(0.0), next(-1), next(1)];
+                for omega in sizes.into_iter().flatten() {
+                    if tau > 0.0 || omega > 0.0 {
+                        offer(tau, omega, 0.0);
+                    }
+                    offer(0.0, omega, 0.0);
+                }
+                offer(0.0, own, 0.0);
+                continue;
+            }
+            let (size, comes) = if tau > 0.0 {
+                (tau, 0.0)
+            } else {
+                now.outside(k).best(&prior.sizes)
+            };
+            for &omega in &prior.effects {
+                let gain: f64 = apart[k].iter().map(|run| run.gain(omega)).sum();
+                offer(size, omega, comes + gain);
+                offer(0.0, omega, if tau > 0.0 { f64::NEG_INFINITY } else { gain });
+            }
+        }
+        found
     }
 
     fn offer(&mut self, model: impl Fn() -> Model, score: f64, best: &mut Option<Found>) {
@@ -208,14 +253,20 @@ impl<'a> Search<'a> {
     /// A group in.
     fn enter(&mut self, now: &Solved, j: usize, score: f64, best: &mut Option<Found>) {
         let (tau, gain) = now.outside(j).best(&self.prior.sizes);
-        let omega = now.model.omega[j];
-        let model = || with(&now.model, &[(j, tau, omega)]);
-        self.offer(model, score + gain + self.coming(j, tau, omega), best);
+        let model = || with(&now.model, &[(j, tau, now.model.omega[j])]);
+        let coming = self.coming(&now.model, j, tau);
+        self.offer(model, score + gain + coming, best);
     }
 
-    /// What the prior gives a group that comes in and keeps its effect of runs.
-    fn coming(&self, j: usize, tau: f64, omega: f64) -> f64 {
-        self.prior.log_odds_of(j, tau, omega) - self.prior.log_odds_of(j, 0.0, omega)
+    /// What the prior gives group `j` of a model that comes in and keeps its effect of runs.
+    fn coming(&self, now: &Model, j: usize, tau: f64) -> f64 {
+        let (prior, omega) = (self.prior, now.omega[j]);
+        let more = if omega == 0.0 {
+            prior.log_equal(Count::of(now))
+        } else {
+            0.0
+        };
+        more + prior.log_odds_of(j, tau, omega) - prior.log_odds_of(j, 0.0, omega)
     }
 
     /// Another size of a group.
@@ -245,13 +296,14 @@ impl<'a> Search<'a> {
         best: &mut Option<Found>,
     ) -> Option<()> {
         let without = now.without(k)?;
-        let left = score - without.loss - self.prior.log_in(k);
-        self.offer(|| with(&now.model, &[(k, 0.0, 0.0)]), left, best);
+        let rest = with(&now.model, &[(k, 0.0, 0.0)]);
+        let left = score - without.loss - self.coming(&rest, k, now.model.tau[k]);
+        self.offer(|| rest.clone(), left, best);
         for &j in outside {
             let (tau, gain) = without.other(j).best(&self.prior.sizes);
-            let omega = now.model.omega[j];
-            let model = || with(&now.model, &[(k, 0.0, 0.0), (j, tau, omega)]);
-            self.offer(model, left + gain + self.coming(j, tau, omega), best);
+            let model = || with(&rest, &[(j, tau, rest.omega[j])]);
+            let coming = self.coming(&rest, j, tau);
+            self.offer(model, left + gain + coming, best);
         }
         Some(())
     }

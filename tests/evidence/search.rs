@@ -153,10 +153,7 @@ fn the_search_finds_the_best_of_all_models() {
             .iter()
             .map(|model| prior.log_probability(model).exp())
             .sum();
-        // What differs from run to run alone is beside the probability of a group.
-        let beside = |p: &f64| 1.0 + p * if prior.effects.is_empty() { 0.0 } else { 0.2 };
-        let whole: f64 = prior.probabilities.iter().map(beside).product();
-        assert!((total - whole).abs() < SAME);
+        assert!((total - 1.0).abs() < SAME);
         let best = all
             .iter()
             .max_by(|a, b| score(a).total_cmp(&score(b)))

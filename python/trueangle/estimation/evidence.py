@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
@@ -142,20 +143,32 @@ class EvidenceEstimate:
 
         ::
 
-            b_S = M b,   M = argmin |X_S M - X|
+            b_S = M b,   M = argmin |X_S M - X|² / N + v |M / 3 s|²
 
-        so that an order that is not among those wanted is held by those it looks like.
+        so that an order that is not among those wanted is held by those it looks like. With the
+        variance v of the curve and s² = E b_S² + Σ E b², the sum over the orders not wanted, no
+        order becomes larger than it may be.
         """
-        columns = _columns(theta, orders)
+        wanted = [2 * list(orders).index(k) if k in orders else -1 for k in self.told]
         onto = np.zeros((2 * len(orders), 2 * len(self.told)))
-        for i, order in enumerate(self.told):
-            own = slice(2 * i, 2 * i + 2)
-            if order in orders:
-                place = 2 * list(orders).index(order)
-                onto[place : place + 2, own] = np.eye(2)
-            elif order not in beside and len(orders):
-                other = _columns(theta, [order])
-                onto[:, own] = np.linalg.lstsq(columns, other, rcond=_ALIKE)[0]
+        square = np.reshape(self.mean**2 + np.diag(self.covariance), (-1, 2)).mean(axis=1)
+        size = np.zeros(len(orders))
+        others = []
+        for i, (order, place) in enumerate(zip(self.told, wanted, strict=True)):
+            if place >= 0:
+                onto[place : place + 2, 2 * i : 2 * i + 2] = np.eye(2)
+                size[place // 2] = square[i]
+            elif order not in beside:
+                others.append(i)
+        if others and len(orders):
+            size += square[others].sum()
+            bound = np.sqrt(np.mean(self._curve(theta, beside)[1] ** 2) / size) / 3.0
+            columns = _columns(theta, orders) / math.sqrt(len(theta))
+            rows = np.vstack([columns, np.diag(np.repeat(bound, 2))])
+            looks = _columns(theta, [self.told[i] for i in others]) / math.sqrt(len(theta))
+            target = np.vstack([looks, np.zeros((len(onto), looks.shape[1]))])
+            places = np.ravel([(2 * i, 2 * i + 1) for i in others])
+            onto[:, places] = np.linalg.lstsq(rows, target, rcond=_ALIKE)[0]
         return onto @ self.mean, onto @ self.covariance @ onto.T
 
     def gain_of_a_run(self, theta: Array) -> tuple[float, float]:

@@ -285,7 +285,7 @@ def test_an_order_left_out_is_held_by_those_it_looks_like() -> None:
     columns = harmonics(theta, [1, 2])
     columns -= columns.mean(axis=0)
     curve, std = found.curve(theta)
-    np.testing.assert_allclose(columns @ mean, curve, atol=0.02)
+    assert np.sqrt(np.mean((columns @ mean - curve) ** 2)) < std.mean()
     own = np.sqrt(np.einsum("ij,jk,ik->i", columns, spread, columns))
     np.testing.assert_allclose(own, std, rtol=0.2, atol=0.005)
     # All of them are themselves, and those beside are left away.

@@ -43,7 +43,10 @@ def test_of_one_pattern_p_is_uniform(design):
     told = sum(pair.verdict == "changed" for pair in pairs)
     print(told, p[:5])
     # Kolmogorov and Smirnov's limit at 1 %, and the count's at three standard deviations.
-    assert np.abs(p - (np.arange(PAIRS) + 0.5) / PAIRS).max() < 1.63 / np.sqrt(PAIRS)
+    above = (np.arange(PAIRS) + 0.5) / PAIRS - p
+    assert above.max() < 1.63 / np.sqrt(PAIRS)
+    # Of orders selected the covariance holds what two runs may differ by: p may be too large.
+    assert -above.min() < (0.3 if "orders" in design else 1.63 / np.sqrt(PAIRS))
     assert told <= 0.01 * PAIRS + 3.0 * np.sqrt(0.01 * PAIRS)
 
 

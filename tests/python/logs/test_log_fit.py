@@ -363,7 +363,8 @@ def test_one_pass_takes_the_scatter_between_runs_under_correlated_noise(tmp_path
     assert any("One pass keeps no segments" in note for note in found.notes)
 
 
-def test_one_pass_and_memory_print_the_same_json(tmp_path, capsys):
+def test_one_pass_and_memory_print_the_same_json(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("trueangle.logs.fitting.KEPT", 6000)  # enough to cover the turn
     logs_of(tmp_path, [SAME] * 4)
     files = [str(tmp_path / f"unit{i}.parquet") for i in range(4)]
     printed = []

@@ -132,7 +132,7 @@ def test_a_head_stands_over_its_columns() -> None:
     assert "<th>amplitude</th><th>+-</th><th>phase</th><th>+-</th>" in shown
     assert "<th>arcsec</th><th>arcsec</th><th>deg</th><th>deg</th>" in shown
     shown = re.sub(r' style="[^"]*"', "", ta.select_orders(RUNS)._repr_html_())
-    assert "<th>false alarm</th><th>held out</th><th>verdict</th>" in shown
+    assert "<th>probability</th><th>held out</th><th>verdict</th>" in shown
     assert "<th></th><th>gain, %</th><th></th>" in shown
 
 

@@ -132,15 +132,18 @@ class EvidenceSelection:
         One by one that order goes which adds most slope for the energy that it explains,
         its order over its amplitude, until the greatest slope of the rest is below `STEEPEST`.
         """
-        kept, gone = list(places), list[int]()
-        while kept:
-            orders = [self.orders[i] for i in kept]
-            mean, _ = estimate.among(orders, self.travel, self.candidates.reference)
-            cosine, sine = mean.reshape(-1, 2).T
-            if greatest_slope(orders, cosine, sine, self.period) < STEEPEST:
+        gone = list[int]()
+        orders = np.array([self.orders[i] for i in places], dtype=float)
+        mean, _ = estimate.among(orders.tolist(), self.travel, self.candidates.reference)
+        pairs = mean.reshape(-1, 2)
+        price = orders / np.maximum(np.hypot(*pairs.T), 1e-300)
+        left = np.argsort(price, kind="stable")
+        while left.size:
+            cosine, sine = pairs[left].T
+            if greatest_slope(orders[left].tolist(), cosine, sine, self.period) < STEEPEST:
                 break
-            price = np.asarray(orders) / np.maximum(np.hypot(cosine, sine), 1e-300)
-            gone.append(kept.pop(int(np.argmax(price))))
+            left, last = left[:-1], int(left[-1])
+            gone.append(places[last])
         return gone
 
     def _beyond_rounding(
@@ -152,9 +155,8 @@ class EvidenceSelection:
             return chosen, dropped
         from .rounding import orders_beyond_rounding  # most readings are fine enough
 
-        mean, _ = estimate.among(
-            [self.orders[i] for i in mine], self.travel, self.candidates.reference
-        )
+        beside = [*self.candidates.reference, *(self.orders[i] for i in dropped)]
+        mean, _ = estimate.among([self.orders[i] for i in mine], self.travel, beside)
         strongest = np.argsort(-np.hypot(*mean.reshape(-1, 2).T), kind="stable")
         places = [*self.forced, *(mine[k] for k in strongest)]
         told = orders_beyond_rounding(

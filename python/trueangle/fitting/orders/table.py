@@ -18,6 +18,9 @@ from .noise import ReadingVariance
 #: Verdicts of orders that a model has.
 IN_MODEL: Final = ("retained", "shared")
 
+#: Verdicts of orders that are in the error and that no model shall have.
+LEFT_OUT: Final = ("negligible", "too steep", "rounding")
+
 
 @dataclass(frozen=True)
 class OrderRow:
