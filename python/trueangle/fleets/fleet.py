@@ -53,7 +53,7 @@ def fleet(
         What tells the units apart. Where no column ``unit`` does, the files or the labels of
         the runs, whichever are more.
     orders : iterable of int, or mapping, optional
-        Default: those above the noise of the first 32 units together, 24 at most.
+        Default: those that the first 32 units together support by evidence, and 1 and 2.
     share, confidence : float
         Of the tolerance limits.
     permitted_arcsec : float, optional

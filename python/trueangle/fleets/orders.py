@@ -1,4 +1,4 @@
-"""Orders worth keeping of a fleet: what stands above the noise of its units together."""
+"""Orders worth keeping of a fleet: those that all units together support."""
 
 from __future__ import annotations
 
@@ -8,25 +8,23 @@ from typing import Final
 import numpy as np
 
 from ..errors import NoOrderError
+from ..estimation.evidence import estimate_by_evidence
+from ..fitting.orders.candidates import prior_probabilities
+from ..fitting.orders.zerogroups import some_readings, zero_groups
 from ..joint.joint import Joint
 from ..joint.shafts import ShaftOrders, resolve_orders
 from ..runs.run import CalibrationRun
-from ..support.distributions import chi_squared_tail
-from .calibration import Calibration, CalibrationSums, normal_matrix, output_orders
+from .calibration import normal_matrix, output_orders
 
 #: Units by which orders are chosen: of the first so many.
 SAMPLE: Final = 32
 
-#: Orders of the output that are looked at, at most, readings for each, and orders kept at most.
+#: Orders of the output that are looked at, at most, and readings for each.
 _HIGHEST: Final = 110
 _READINGS_EACH: Final = 6
-MOST_KEPT: Final = 24
 
 #: Orders that stay whether they stand out or not: eccentricity and tilt, where damage shows.
 _ALWAYS: Final = (1, 2)
-
-#: Chance that an order is kept by noise alone, all candidates together.
-_LEVEL: Final = 0.01
 
 #: Least eigenvalue of the normal matrix, its columns scaled, with which orders are told apart.
 _TOLD: Final = 1e-3
@@ -65,15 +63,10 @@ def _distinct(run: CalibrationRun) -> int:
 def worth_keeping(
     units: Sequence[Sequence[CalibrationRun]], shafts: Sequence[ShaftOrders]
 ) -> list[ShaftOrders]:
-    """The candidates whose coefficients are more than the noise of all units together makes them.
+    """The candidates that units more probably share, or differ by, than not.
 
-    ::
-
-        Σ_u ν_u log(1 + b_u' S_u⁻¹ b_u / ν_u) ~ χ²_2n
-
-    for an order that no unit has, with the noise in S of each unit's own ν degrees of freedom
-    (Fisher's sum of the logarithms of F's chances); 1 % for all candidates together (Bonferroni),
-    the strongest 24.
+    The evidence of all units together decides (`trueangle.estimation.evidence`): what differs
+    from unit to unit is what differs from run to run there. Orders 1 and 2 stay in any case.
 
     Raises
     ------
@@ -82,38 +75,22 @@ def worth_keeping(
     """
     shafts = _told_apart(units, shafts)
     orders = output_orders(shafts)
-    period = units[0][0].period
-    periodic = bool((orders == np.round(orders)).all())
-    statistic, freedom = np.zeros(orders.size), 0.0
-    for runs in units:
-        sums = CalibrationSums()
-        for run in runs:
-            sums.add(run, orders, periodic)
-        found = Calibration.of("", sums, period)
-        if found is None:
-            continue
-        pairs = found.coefficients.reshape(-1, 2)
-        inverse = np.linalg.inv(found.blocks())
-        noise = max(found.squares / found.freedom, 1e-300)
-        squares = np.einsum("ki,kij,kj->k", pairs, inverse, pairs) / noise
-        statistic += found.freedom * np.log1p(squares / found.freedom)
-        freedom += 2.0
-    if freedom == 0.0:
+    if all(sum(map(len, runs)) <= len(runs) + 2 * orders.size for runs in units):
         raise NoOrderError("the readings of no unit tell orders 1 and 2 apart: read more places")
-    chance = np.array([chi_squared_tail(float(x), freedom) for x in statistic])
-    rank = np.argsort(np.argsort(-statistic))
-    kept = (chance * orders.size <= _LEVEL) & (rank < MOST_KEPT)
-    found_shafts, i = [], 0
+    runs = [run for own in units for run in own]
+    groups, _ = zero_groups(runs, whole=bool((orders == np.round(orders)).all()))
+    looked = sorted(set(orders.tolist()))
+    cycles = [shaft.cycles_per_turn for shaft in shafts]
+    readings = [group.given() for group in some_readings(groups)]
+    estimate = estimate_by_evidence(readings, looked, prior_probabilities(looked, cycles))
+    present = set(estimate.present)
+    found = []
     for shaft in shafts:
-        own = [
-            k
-            for j, k in enumerate(shaft.orders)
-            if kept[i + j] or (shaft.name == "output" and k in _ALWAYS)
-        ]
-        i += len(shaft.orders)
+        kept = {*present, *_ALWAYS} if shaft.name == "output" else present
+        own = [k for k in shaft.orders if k * shaft.cycles_per_turn in kept]
         if own:
-            found_shafts.append(shaft._replace(orders=tuple(own)))
-    return found_shafts
+            found.append(shaft._replace(orders=tuple(own)))
+    return found
 
 
 def _told_apart(

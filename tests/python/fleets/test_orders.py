@@ -1,6 +1,7 @@
 """Orders that a fleet keeps: those above noise, and of noise none."""
 
 import numpy as np
+import pytest
 
 import trueangle as ta
 from trueangle.fleets.orders import candidate_orders, worth_keeping
@@ -9,11 +10,13 @@ SEED = 52_700
 PLACES = np.arange(0.0, 360.0, 3.0)
 
 
-def kept(rng, lines=()):
-    """Orders kept of six units, each line in every unit at a phase of its own; sigma is 1."""
+def kept(rng, lines=(), count=6, correlation=0.0):
+    """Orders kept of units, each line in every unit at another phase; sigma is 1."""
     units = []
-    for _ in range(6):
+    for _ in range(count):
         error = rng.normal(0.0, 1.0, PLACES.size)
+        for i in range(1, PLACES.size):
+            error[i] = correlation * error[i - 1] + np.sqrt(1.0 - correlation**2) * error[i]
         for order, size in lines:
             error += size * np.sin(np.radians(order * PLACES) + rng.uniform(0.0, 2.0 * np.pi))
         units.append([ta.CalibrationRun(PLACES, PLACES + error / 3600.0, 360.0)])
@@ -40,3 +43,10 @@ def test_an_order_is_kept_where_all_units_together_tell_it():
     rng = np.random.default_rng(SEED + 1)
     found = [kept(rng, [(7, 0.55), (13, 0.55)]) for _ in range(12)]
     assert all({7, 13} <= orders for orders in found)
+
+
+@pytest.mark.parametrize("correlation", [0.3, 0.6, 0.9])
+def test_correlated_noise_adds_no_order(correlation):
+    rng = np.random.default_rng(SEED + 2)
+    found = [kept(rng, [(1, 20.0), (2, 6.0)], 12, correlation) for _ in range(20)]
+    assert sum(len(orders - {1, 2}) for orders in found) <= 1

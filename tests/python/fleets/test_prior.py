@@ -126,7 +126,7 @@ def test_measured_motors_from_ten_readings(data_dir):
     one = {"unit_07", "unit_08", "unit_09", "unit_11", "unit_12"}
     runs = [replace(r, unit="one" if r.label in one else r.label) for r in ta.read_runs(measured)]
     motors = list(dict.fromkeys(r.unit for r in runs))
-    wanted = {10: 0.075, 16: 0.050, 24: 0.039, 40: 0.031}
+    wanted = {10: 0.068, 16: 0.046, 24: 0.037, 40: 0.034}
     left = {count: [] for count in wanted}
     for motor in motors:
         fleet = ta.fleet([r for r in runs if r.unit != motor])

@@ -124,13 +124,18 @@ class Candidates:
         Reasons are known of 1, 2 and 4 of the output (eccentricity, tilt and the sensor's
         quadrature) and of the shafts that were declared.
         """
-        chance = min(_LIKELY, _UNKNOWN / max(1, len(self.orders)))
         cycles = declared_cycles(self.gear_ratio, self.shafts)
-        reasons = {k * f for k in _KNOWN for f in (1.0, *map(abs, cycles))}
-        fitted = set(self.reference)
-        return [
-            _CERTAIN if k in fitted else _LIKELY if k in reasons else chance for k in self.orders
-        ]
+        return prior_probabilities(self.orders, cycles, self.reference)
+
+
+def prior_probabilities(
+    orders: Sequence[float], cycles: Iterable[float], fitted: Iterable[float] = ()
+) -> list[float]:
+    """Of each order beside shafts of so many cycles per turn; those ``fitted`` are certain."""
+    chance = min(_LIKELY, _UNKNOWN / max(1, len(orders)))
+    reasons = {k * f for k in _KNOWN for f in (1.0, *map(abs, cycles))}
+    certain = set(fitted)
+    return [_CERTAIN if k in certain else _LIKELY if k in reasons else chance for k in orders]
 
 
 def _effective_positions(positions: Positions) -> Positions:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...estimation.evidence import Alone, EvidenceEstimate, RunReadings, estimate_by_evidence
+from ...estimation.evidence import Alone, EvidenceEstimate, estimate_by_evidence
 from ...model.validity import greatest_slope
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
@@ -29,9 +29,6 @@ from .zerogroups import folds_of_run, some_angles, some_readings, zero_groups
 
 if TYPE_CHECKING:
     from ..summed import SummedReadings
-
-#: Readings of which orders are told; of more, as many are looked at.
-MOST_READINGS: Final = 8000
 
 #: Chance, over the whole search, that the rounding of a coarse sensor alone makes an order.
 FALSE_ALARM: Final = 0.005
@@ -73,7 +70,7 @@ class EvidenceSelection:
         self.step = rounding_step(runs, self.positions)
         #: Angles of the readings in radians, as many as tell the travel.
         self.travel = some_angles([unit.turns for unit in units], 1.0)
-        self.units = some_readings(units, MOST_READINGS)
+        self.units = some_readings(units)
         self.orders = list(candidates.orders)
         reference = set(candidates.reference)
         self.forced = [i for i, k in enumerate(self.orders) if k in reference]
@@ -92,15 +89,7 @@ class EvidenceSelection:
 
     def result(self) -> OrderSelection:
         """The selection with its table."""
-        readings = [
-            RunReadings(
-                2.0 * math.pi * unit.turns,
-                unit.error,
-                None if unit.time is None or unit.time.size < 2 else unit.time,
-                None if (unit.weights == 1.0).all() else unit.weights,
-            )
-            for unit in self.units
-        ]
+        readings = [unit.given() for unit in self.units]
         estimate = estimate_by_evidence(readings, self.orders, self.candidates.probabilities())
         chosen, dropped = self._carriers(estimate)
         unknowns = len(self.units) + 2 * len(chosen)

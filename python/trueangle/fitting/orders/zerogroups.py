@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...estimation.evidence import RunReadings
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
 from ...runs.travel import over_turns
@@ -22,6 +23,9 @@ _BLOCKS: Final = 24
 #: Readings in a row that are kept together of many, and the turn by which they are chosen evenly.
 _TOGETHER: Final = 256
 _GOLDEN: Final = 0.5 * (math.sqrt(5.0) - 1.0)
+
+#: Readings from which orders are chosen; of more, some blocks are taken.
+MOST_READINGS: Final = 8000
 
 #: Angles that tell the travel.
 _TOLD: Final = 2000
@@ -50,6 +54,15 @@ class ZeroGroupReadings(NamedTuple):
     weights: Array
     label: str
     time: Array | None = None
+
+    def given(self) -> RunReadings:
+        """The same as the evidence takes it: angles in radians, nothing where all are alike."""
+        return RunReadings(
+            2.0 * math.pi * self.turns,
+            self.error,
+            None if self.time is None or self.time.size < 2 else self.time,
+            None if (self.weights == 1.0).all() else self.weights,
+        )
 
     def part(self, mask: NDArray[np.bool_] | slice, label: str) -> ZeroGroupReadings:
         """The readings where ``mask`` is true, or of a slice."""
@@ -92,7 +105,9 @@ def some_angles(angles: Sequence[Array], period: float) -> Array:
     return np.asarray(2.0 * math.pi / period * np.sort(every)[:: 1 + every.size // _TOLD])
 
 
-def some_readings(units: Sequence[ZeroGroupReadings], most: int) -> list[ZeroGroupReadings]:
+def some_readings(
+    units: Sequence[ZeroGroupReadings], most: int = MOST_READINGS
+) -> list[ZeroGroupReadings]:
     """About so many of the readings, in blocks that follow each other in time and lie anywhere."""
     total = sum(unit.turns.size for unit in units)
     if total <= most:
