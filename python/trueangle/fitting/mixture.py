@@ -130,7 +130,7 @@ def _fitted(
     # Orders of shafts and of the estimate differ by rounding.
     named = [next((k for k in estimate.told if math.isclose(k, m)), m) for m in wanted]
     # What is left out on purpose is left out: no other order holds it.
-    beside = [row.order for row in selection.table if row.verdict in ("reference", *LEFT_OUT)]
+    beside = [row.order for row in selection.table if row.verdict in LEFT_OUT]
     mean, covariance = estimate.among(named, travel, beside)
     offsets, means, squares = [], [], 0.0
     for index, (run, weight) in enumerate(zip(problem.runs, weights, strict=True)):

@@ -19,7 +19,7 @@ from .noise import ReadingVariance
 IN_MODEL: Final = ("retained", "shared")
 
 #: Verdicts of orders that are in the error and that no model shall have.
-LEFT_OUT: Final = ("negligible", "too steep", "rounding")
+LEFT_OUT: Final = ("reference", "too long", "negligible", "too steep", "rounding")
 
 
 @dataclass(frozen=True)
