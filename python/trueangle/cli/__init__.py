@@ -30,6 +30,7 @@ _KEPT = 50_000
 
 #: Modules of this package that each define one command of the same name.
 COMMANDS: tuple[str, ...] = (
+    "record",
     "check",
     "robot",
     "join",

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING
 
 from ..support.files import REPORT
 from .paths import Output
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from .paperstudy.study import Reduction, Study
 
 
@@ -49,6 +46,7 @@ def _corrected(seed: int) -> str:
     import numpy as np
 
     from ..fitting.fit import fit
+    from ..support.letterchart import letter_chart
     from .paperstudy.study import JOINT_A, PUBLISHED, simulated_groups
 
     *groups, unseen = simulated_groups(JOINT_A, seed=seed)
@@ -63,7 +61,7 @@ def _corrected(seed: int) -> str:
             "A joint's encoder is wrong by the same pattern in every turn. Measured once",
             "   against a reference, the pattern can be taken off from then on:",
             "",
-            *_letter_chart(place, {"o": read, "*": corrected}, "arcsec"),
+            *letter_chart(place, {"o": read, "*": corrected}, "arcsec"),
             "   o error as read, * error corrected, over one turn of the output in degrees",
             "",
             f"   peak-to-peak  {before:6.2f} -> {after:5.2f} arcsec, "
@@ -138,35 +136,3 @@ def _diagnosed(seed: int) -> str:
         "Why is a joint wrong? This one has a backlash of +-8 arcsec that its\n"
         f"   simulation does not know. What the diagnosis says of its runs:\n\n{result.summary()}"
     )
-
-
-#: Rows and columns of the picture's field.
-_ROWS: Final = 11
-_COLUMNS: Final = 61
-
-
-def _letter_chart(place: NDArray[Any], errors: Mapping[str, NDArray[Any]], unit: str) -> list[str]:
-    """Errors over a turn of 0 to 360 deg, each set by its letter; later ones lie on top.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> _letter_chart(np.array([0.0, 180.0]), {"o": np.array([9.0, -9.0])}, "arcsec")[1]
-    '      +9 |o'
-    """
-    import numpy as np
-
-    most = max(float(np.abs(error).max()) for error in errors.values()) or 1.0
-    field = [[" "] * _COLUMNS for _ in range(_ROWS)]
-    middle = _ROWS // 2
-    field[middle] = ["-"] * _COLUMNS
-    for letter, error in errors.items():
-        across = np.rint(place / 360.0 * (_COLUMNS - 1)).astype(int)
-        down = np.rint(middle * (1.0 - error / most)).astype(int)
-        for column, row in zip(across.tolist(), down.tolist(), strict=True):
-            field[row][column] = letter
-    marks = {0: f"{most:+.0f}", middle: "0", _ROWS - 1: f"{-most:+.0f}"}
-    lines = [f"{unit:>8}"]
-    lines += [f"{marks.get(row, ''):>8} |{''.join(field[row])}".rstrip() for row in range(_ROWS)]
-    ticks = "".join(f"{angle:<{_COLUMNS // 4}}" for angle in (0, 90, 180, 270)) + "360"
-    return [*lines, f"{'':>9}{ticks}"]

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from ..support.plainresult import json_text
 from .options import add_errors_in, add_runs_output, errors_in
 from .paths import Input
-from .signal_options import add_signals, signals_by_joint
+from .signal_options import add_signals, signals_of_both
 
 HELP = "join an indicated and a reference log that have clocks of their own"
 EXAMPLE = "trueangle join joint.csv laser.csv -o runs.csv --signal b.reference='angle (rad)'"
@@ -52,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         max_gap_s=args.max_gap,
         counts_per_turn=args.counts_per_turn,
         counts_per_turn_reference=args.counts_per_turn_reference,
-        signals=_signals(args.signal),
+        signals=signals_of_both(args.signal),
         topic=args.topic,
     )
     found.save(args.output)
@@ -62,10 +61,3 @@ def run(args: argparse.Namespace) -> int:
         print(found.summary(errors_in(args)))
         print(f"\nsaved {args.output}")
     return 0
-
-
-def _signals(entries: Any) -> dict[str, Any]:
-    """Columns of either log, and of ``a`` and ``b`` alone."""
-    plain = signals_by_joint([e for e in entries or () if e[0] is None]) or {}
-    own = signals_by_joint([e for e in entries or () if e[0] is not None], single=False) or {}
-    return {**plain, **own}

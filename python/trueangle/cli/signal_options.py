@@ -22,6 +22,7 @@ def add_signals(
     counts: bool = True,
     runs: bool = True,
     reference: bool = True,
+    topic: bool = True,
 ) -> None:
     """Declare ``--signal`` and what belongs to it; of ``runs``, what their reference is made of."""
     add = parser.add_argument
@@ -47,11 +48,12 @@ def add_signals(
             metavar="N",
             help="of a reference in counts",
         )
-    add(
-        "--topic",
-        metavar="NAME",
-        help="JointState topic of a ROS bag (default: the only one); join takes two, A,B",
-    )
+    if topic:
+        add(
+            "--topic",
+            metavar="NAME",
+            help="JointState topic of a ROS bag (default: the only one); join takes two, A,B",
+        )
     if runs:
         add(
             "--facets",
@@ -97,6 +99,13 @@ def signal_option(text: str) -> _Entry:
     entry = _Entry((joint or None, role, column if unit else name, unit))
     entry.text = text
     return entry
+
+
+def signals_of_both(entries: Sequence[_Entry] | None) -> dict[str, Any]:
+    """Columns of either of two logs or sources, and of ``a`` and ``b`` alone."""
+    plain = signals_by_joint([e for e in entries or () if e[0] is None]) or {}
+    own = signals_by_joint([e for e in entries or () if e[0] is not None], single=False) or {}
+    return {**plain, **own}
 
 
 def signals_by_joint(

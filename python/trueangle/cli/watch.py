@@ -17,6 +17,13 @@ from .pictures import save_picture
 from .robotmodel import joint_asked, refuse_joint
 from .robots import add_robot, joints_asked
 from .signal_options import add_signals, reading_options
+from .source_options import (
+    SOURCES,
+    add_source_options,
+    sent_text,
+    source_argument,
+    source_options,
+)
 from .values import turns
 
 if TYPE_CHECKING:
@@ -36,10 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add(
         "log",
-        type=_log,
-        metavar="LOG",
-        help="log with a reference and an indicated angle, or with the error; - reads lines of a "
-        "table from standard input as they arrive",
+        type=source_argument,
+        metavar="SOURCE",
+        help="log with a reference and an indicated angle, or with the error; or lines as they "
+        f"arrive, from {SOURCES}",
     )
     add(
         "-m",
@@ -70,6 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="windows until a false alarm, on average (default: %(default)g)",
     )
+    add_source_options(parser)
     add_signals(parser)
     add_robot(parser)
     add_errors_in(parser)
@@ -86,10 +94,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write a page with the alarms and charts of all windows, at the end",
     )
     add("--json", action="store_true", help="print one object per window and line")
-
-
-def _log(text: str) -> str:
-    return text if text == "-" else Input(text)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -138,13 +142,15 @@ def _of_joint(args: argparse.Namespace) -> tuple[str | None, argparse.Namespace]
 def _batches(
     args: argparse.Namespace, model: HarmonicModel, columns: Mapping[str, Any]
 ) -> Iterator[ReadingBatch]:
-    from ..model.batches import read_batches, read_lines
+    from ..model.batches import read_batches
+    from ..recording.watched import watched_batches
 
     options: Any = reading_options(args)
     options["signals"] = {**columns, **(options["signals"] or {})} or None
-    if args.log == "-":
-        return read_lines(sys.stdin, model, options)
-    return read_batches(Path(args.log), model, options)
+    if isinstance(args.log, Input):
+        return read_batches(Path(args.log), model, options)
+    source = source_options(args)
+    return watched_batches(args.log, model, options, source, args.pattern, sent_text(args))
 
 
 def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace) -> str:

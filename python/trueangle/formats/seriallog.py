@@ -21,9 +21,12 @@ from .textfile import TextFile, create_text, open_text
 
 # Each has one way to match, and a name begins where a word does: a long line of rubbish costs its
 # length, not the square of it.
-_NUMBER = rb"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf)"
+#: A number as firmware prints it.
+NUMBER = rb"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_VALUE = NUMBER + rb"|[+-]?(?:nan|inf)"
 _NAME = rb"(?<![\w.\[\]/-])[A-Za-z_][\w.\[\]/-]*(?: [\w.\[\]/-]+){0,4}"
-_PAIR = re.compile(rb"(%s)[ \t]*[:=][ \t]*(%s)(?![\w.])" % (_NAME, _NUMBER), re.IGNORECASE)
+#: A pair of a name and a number.
+PAIR = re.compile(rb"(%s)[ \t]*[:=][ \t]*(%s)(?![\w.])" % (_NAME, _VALUE), re.IGNORECASE)
 _CLOCK = re.compile(rb"(\d\d):(\d\d):(\d\d(?:\.\d+)?)\s*->\s*")
 _BETWEEN = b" \t,;"
 _TIME = "time_s"
@@ -147,7 +150,7 @@ def _clocked(names: Sequence[str]) -> Callable[[list[_Row]], Batch]:
 
 def _style(raw: bytes) -> tuple[bytes, bytes]:
     """What stands between the pairs of a line, and within one."""
-    pairs = list(_PAIR.finditer(raw))
+    pairs = list(PAIR.finditer(raw))
     between = raw[pairs[0].end() : pairs[1].start()] if len(pairs) > 1 else b","
     return between, raw[pairs[0].end(1) : pairs[0].start(2)]
 
@@ -178,9 +181,9 @@ def _lines(path: Path, opened: TextFile | None = None) -> Iterator[tuple[bytes, 
             number += 1
             clock = _CLOCK.match(raw)
             text = raw[clock.end() :] if clock else raw
-            pairs = _PAIR.findall(text)
+            pairs = PAIR.findall(text)
             row = None
-            if pairs and not _PAIR.sub(b"", text).strip(_BETWEEN + b"\r\n"):
+            if pairs and not PAIR.sub(b"", text).strip(_BETWEEN + b"\r\n"):
                 values = {name.decode("utf-8", "replace"): float(x) for name, x in pairs}
                 row = _Row(values, _seconds(clock), number)
                 first = first or pairs[0][0]

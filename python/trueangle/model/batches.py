@@ -1,11 +1,10 @@
-"""Readings of a log in the order they were taken, batch by batch: a file, or lines that arrive."""
+"""Readings of a log in the order they were taken, batch by batch."""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,7 +43,7 @@ def read_batches(
     topic = reading.get("topic")
     with kind.at_header(path):
         header = kind.module.columns(path, topic)
-        columns = _WatchedColumns.of(path, header, reading, given, kind.unit)
+        columns = WatchedColumns.of(path, header, reading, given, kind.unit)
     for stretch in kind.stretches(path):
         for batch in kind.module.read(path, Selection(columns.names, topic, stretch)):
             yield columns.batch(lambda name, b=batch: _numbers(path, name, b[name]), model)
@@ -56,57 +55,7 @@ def _numbers(path: Path, name: str, values: Array | Labels) -> Array:
     return np.asarray(values, dtype=float)
 
 
-def read_lines(
-    lines: IO[str], model: HarmonicModel, reading: ReadingOptions, most: int = 256
-) -> Iterator[ReadingBatch]:
-    """Batches of a table of text that arrives line by line, the first line naming its columns.
-
-    A batch is what has arrived, ``most`` lines at most; lines of other lengths are left out.
-
-    Raises
-    ------
-    FileError
-        There is no line, a column is missing, or a cell is not a number.
-    """
-    path = Path("standard input")
-    first = lines.readline()
-    if not first.strip():
-        raise FileError(path, "has no lines: the first one names the columns")
-    delimiter = next((mark for mark in ",;\t" if mark in first), ",")
-    header = next(csv.reader([first], delimiter=delimiter))
-    columns = _WatchedColumns.of(
-        path, header, reading, Conversion.of(checked_reading_options(reading)), None
-    )
-    waiting: dict[int, list[str]] = {}
-    for number, line in enumerate(lines, 2):
-        cells = next(csv.reader([line], delimiter=delimiter), [])
-        if len(cells) == len(header):
-            waiting[number] = cells
-        if len(waiting) >= most:
-            yield columns.batch(_cells(path, header, waiting), model)
-            waiting = {}
-    if waiting:
-        yield columns.batch(_cells(path, header, waiting), model)
-
-
-def _cells(path: Path, header: list[str], rows: dict[int, list[str]]) -> Any:
-    """What gives a column of rows, which stand at the numbers of their lines."""
-
-    def get(name: str) -> Array:
-        place = header.index(name)
-        found = []
-        for line, row in rows.items():
-            try:
-                found.append(float(row[place] or "nan"))
-            except ValueError as cause:
-                problem = f"a number is needed: {cause}"
-                raise FileError(path, problem, line=line, column=name) from None
-        return np.array(found)
-
-    return get
-
-
-class _WatchedColumns(NamedTuple):
+class WatchedColumns(NamedTuple):
     """Where a log has its angles and times."""
 
     angles: RunAngles
@@ -115,12 +64,19 @@ class _WatchedColumns(NamedTuple):
     @classmethod
     def of(
         cls,
-        path: Path,
-        header: list[str],
+        path: object,
+        header: Sequence[str],
         reading: ReadingOptions,
         given: Conversion,
         unit: str | None,
-    ) -> _WatchedColumns:
+    ) -> WatchedColumns:
+        """Columns of a header; ``unit`` is that of angles whose columns state none.
+
+        Raises
+        ------
+        FileError
+            A column is missing, or its unit is not known.
+        """
         roles = find_columns(path, header, wanted_columns(reading.get("signals")))
         angles = find_run_angles(
             path,

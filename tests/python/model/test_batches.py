@@ -1,13 +1,10 @@
 """Readings of a log as a watched model takes them: its angle, its unit, seconds."""
 
-import io
-
 import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.errors import FileError
-from trueangle.model.batches import read_batches, read_lines
+from trueangle.model.batches import read_batches
 from trueangle.runs.source import ReadingOptions
 
 TURN = np.array([0.05, 0.3, 0.55, 0.8, 1.05])
@@ -35,23 +32,8 @@ def test_angle_and_error_are_in_the_unit_of_the_model(unit, clock, period, argum
     (tmp_path / "log.csv").write_text(text(unit, clock))
     watched, reading = model(period, argument), ReadingOptions()
     (whole,) = read_batches(tmp_path / "log.csv", watched, reading)
-    parts = list(read_lines(io.StringIO(text(unit, clock)), watched, reading, most=2))
-    assert [part.error.size for part in parts] == [2, 2, 1]
-    joined = [np.concatenate(columns) for columns in zip(*parts, strict=True)]
     angle = TURN if argument == "reference" else TURN + ERROR
     for found, wanted in zip(
-        (*whole, *joined), 2 * (angle * period, ERROR * period, 0.5 * np.arange(5)), strict=True
+        whole, (angle * period, ERROR * period, 0.5 * np.arange(5)), strict=True
     ):
         np.testing.assert_allclose(found, wanted, atol=1e-12 * period)
-
-
-def test_a_line_that_holds_no_number_is_named_wherever_it_stands():
-    lines = text("deg", "s").splitlines(keepends=True)
-    lines.insert(2, "Ready.\n")  # a word of a firmware is no reading
-    lines[5] = lines[5].replace(",", ",x", 1)
-    with pytest.raises(FileError, match=r"line 6, column 'reference_deg': a number is needed"):
-        list(
-            read_lines(
-                io.StringIO("".join(lines)), model(360.0, "reference"), ReadingOptions(), most=3
-            )
-        )

@@ -1,0 +1,1 @@
+"""Readings recorded as they arrive: from ports, sockets, buses and growing files to whole files."""

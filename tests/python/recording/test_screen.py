@@ -1,0 +1,92 @@
+"""What is shown while it is recorded."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+
+from trueangle.recording.columns import Counts
+from trueangle.recording.screen import Screen
+
+from .wires import joint_lines, recorded
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_the_screen_is_drawn_anew_and_holds_everything(tmp_path):
+    recording = recorded(tmp_path / "runs.csv", ["Ready", *joint_lines(3.2)])
+    stream = Terminal()
+    screen = Screen("auto", "deg", stream)
+    screen.show(recording, 0.3)
+    screen.show(recording, 0.31)
+    first = stream.getvalue()
+    for part in (
+        "run 1  0.3 s  1600 readings", "1 lines rejected", "CSV: reference_deg, indicated_deg",
+        "forwards  [" + 72 * "#" + "] 360 deg", "backwards [" + 72 * "." + "] 0 deg",
+        "order   1 0.50", "order   2 0.20", "peak-to-peak", "missing   turn it backwards as well",
+    ):  # fmt: skip
+        assert part in first
+    assert "\x1b" not in first
+    screen.show(recording, 0.6)
+    again = stream.getvalue()[len(first) :]
+    assert again.startswith(f"\x1b[{first.count(chr(10))}F\x1b[J")
+
+
+def test_what_is_missing_ends_with_nothing(tmp_path):
+    lines = joint_lines(0.4)
+    assert "of 360 deg are read" in recorded(tmp_path / "a.csv", lines).missing
+    assert "no column reference_deg" in recorded(tmp_path / "b.csv", ["a:1", "a:2", "a:3"]).missing
+    still = [lines[0], *(200 * [lines[5]])]
+    assert recorded(tmp_path / "c.csv", still).missing == "motion: turn it slowly"
+    both = joint_lines(8.0, back=True)
+    timed = [f"{t:.4f},{line}" for t, line in zip(np.arange(8000) * 0.01, both[1:], strict=True)]
+    known = recorded(tmp_path / "d.csv", [f"time_s,{both[0]}", *timed])
+    assert known.missing in ("", "turn it at another speed as well")
+    assert known.estimate.is_settled
+
+
+@pytest.mark.parametrize(
+    ("fault", "change"),
+    [
+        ("wrong_sign", lambda a, b: (a, -b)),
+        ("stuck", lambda a, b: (a, np.where(a < 600.0, b, 600.0))),
+        ("stuck", lambda a, b: (np.full(a.size, 7.0), b)),
+        ("wrong_gear_ratio", lambda a, b: (a, 10.0 * b)),
+    ],
+)
+def test_faults_are_shown_at_once(tmp_path, fault, change):
+    angle = np.arange(0.0, 700.0, 0.7)
+    reference, indicated = change(angle, angle + 0.3 * np.sin(np.radians(angle)))
+    rows = zip(reference % 360.0, indicated % 360.0, strict=True)
+    lines = ["reference_deg,indicated_deg", *(f"{a:.4f},{b:.4f}" for a, b in rows)]
+    recording = recorded(tmp_path / "a.csv", lines)
+    stream = io.StringIO()
+    Screen("none", "auto", stream).show(recording, 2.5)
+    assert f"warning: {fault}: " in stream.getvalue()
+    stream = io.StringIO()
+    Screen("json", "auto", stream).show(recording, 5.0)
+    state = json.loads(stream.getvalue())
+    assert fault in [row["fault"] for row in state["faults"]]
+
+
+def test_lost_bytes_and_silence_are_faults(tmp_path):
+    lines = joint_lines(1.0)
+    lines[50:60] = ["1.2.3"] * 10
+    recording = recorded(tmp_path / "a.csv", lines)
+    found = recording.new_faults(10.0)
+    assert "10 of 500 lines are no rows" in found["rejected_lines"]
+    assert "does the device send?" in found["silent"]
+    assert recording.new_faults(20.0) == {}
+
+
+def test_a_shaft_without_a_reference_is_recorded_for_selfcal(tmp_path):
+    lines = [f"{i % 4096}" for i in range(0, 20_000, 37)]
+    signals = {"indicated": ("column1", "count")}
+    recording = recorded(tmp_path / "a.csv", lines, signals, Counts(4096.0))
+    assert recording.travel.is_covered
+    assert (tmp_path / "a.csv").read_text().startswith("run,time_s,indicated_deg\n")
+    assert recording.estimate is None
