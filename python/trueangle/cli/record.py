@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import TYPE_CHECKING
 
-from ..support.layout import counted
 from .ending import put_off_ending
 from .options import add_errors_in, add_runs_output, errors_in
 from .signal_options import add_signals, signals_of_both
@@ -18,9 +16,6 @@ from .source_options import (
     source_options,
 )
 from .values import seconds
-
-if TYPE_CHECKING:
-    from ..recording.record import Recorded
 
 HELP = "record readings as they arrive, and report when there are enough"
 EXAMPLE = (
@@ -89,37 +84,5 @@ def run(args: argparse.Namespace) -> int:
     screen = Screen(args.progress, errors_in(args))
     with put_off_ending() as stopped:
         found = record(args.sources, args.output, choices, screen, stopped)
-        print(_told(found, args), flush=True)
+        print("\n".join(screen.summary(found.recording)), flush=True)
     return ENDED if found.ended == "source" else 0
-
-
-def _told(found: Recorded, args: argparse.Namespace) -> str:
-    """What was recorded, in a few lines."""
-    from ..support.angles import arcsec
-    from ..support.display_units import error_unit
-
-    recording, file = found.recording, found.recording.file
-    rejected = file.rejected.lines
-    kept = f" ({file.rejected.path})" if rejected else ""
-    lines = [
-        f"{args.output}: {counted(recording.rows, 'reading')} in run {file.label}, "
-        f"{counted(rejected, 'line')} rejected{kept}"
-    ]
-    if recording.unpaired:
-        lines.append(f"{counted(recording.unpaired, 'reading')} without a reference at their time")
-    for address, arrival in zip(args.sources, recording.arrivals, strict=True):
-        if arrival.layout is not None:
-            lines.append(
-                f"{address}: {arrival.layout.kind}, columns {', '.join(arrival.layout.names)}"
-            )
-        if arrival.problem is not None:
-            lines.append(f"{address}: ended by a fault: {arrival.problem}")
-    if recording.is_stamped and recording.rows > 1:
-        lines.append(f"times are those of arrival, jitter {1e3 * recording.jitter:.2g} ms")
-    scale = arcsec(1.0, recording.period)
-    for order in recording.estimate.orders[:8] if recording.estimate else ():
-        size, std = scale * order.amplitude, scale * order.std
-        lines.append(f"order {order.order:3d}  {error_unit(errors_in(args), size).text(size, std)}")
-    lines += [f"{name}: {says}" for name, says in recording.faults.items()]
-    lines.append(f"missing: {recording.missing or 'nothing'}")
-    return "\n".join(lines)

@@ -28,7 +28,7 @@ def source_argument(text: str) -> str:
 def add_source_options(parser: argparse.ArgumentParser) -> None:
     """Declare what sources are opened with, and how their lines are read."""
     add = parser.add_argument
-    add("--baud", type=int, default=115200, metavar="N", help="of a serial port (%(default)s)")
+    add("--baud", type=int, metavar="N", help="of a serial port (default: 115200)")
     add(
         "--dbc",
         type=Input,
@@ -55,7 +55,7 @@ def source_options(args: argparse.Namespace) -> SourceOptions:
     from ..recording.sources import SourceOptions
 
     fields = tuple(name.lstrip("-") for _joint, _role, name, _unit in args.signal or ())
-    return SourceOptions(args.baud, args.dbc, fields)
+    return SourceOptions(args.baud or 115200, args.dbc, fields)
 
 
 def sent_text(args: argparse.Namespace) -> str | None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ArgumentError
 from ..support.files import PAGE, PICTURE
 from ..support.plainresult import json_text
-from .options import add_errors_in, errors_in
+from .options import add_errors_in, errors_in, refuse_given
 from .paths import Input, Output
 from .pictures import save_picture
 from .robotmodel import joint_asked, refuse_joint
@@ -148,6 +148,9 @@ def _batches(
     options: Any = reading_options(args)
     options["signals"] = {**columns, **(options["signals"] or {})} or None
     if isinstance(args.log, Input):
+        refuse_given(
+            args, ("baud", "dbc", "pattern", "send"), "is for lines that arrive: SOURCE is a file"
+        )
         return read_batches(Path(args.log), model, options)
     source = source_options(args)
     return watched_batches(args.log, model, options, source, args.pattern, sent_text(args))

@@ -16,7 +16,7 @@ _ENOUGH: Final = 3
 _VALUE: Final = rb"(%s)" % NUMBER
 
 #: A name of a column, which no sentence is.
-_NAME: Final = re.compile(r"-?[A-Za-z_].*(?<![.:!?])")
+_NAME: Final = re.compile(r"-?[A-Za-z_][^,;\t]*(?<![.:!?])")
 
 #: Cells of a line, or None where it is no row.
 Cells = Callable[[bytes], Sequence[bytes] | None]
@@ -116,10 +116,10 @@ def layout_of_pattern(pattern: str) -> Layout:
     try:
         found = re.compile(pattern.encode())
     except re.error as error:
-        raise ArgumentError(f"--pattern {pattern!r} is no regular expression: {error}") from None
+        raise ArgumentError(f"pattern {pattern!r} is no regular expression: {error}") from None
     if not found.groupindex:
         raise ArgumentError(
-            f"--pattern {pattern!r} names no group; name columns as in 'S(?P<step>\\d+) "
+            f"pattern {pattern!r} names no group; name columns as in 'S(?P<step>\\d+) "
             "R(?P<raw>\\d+)'"
         )
     groups = list(found.groupindex.values())

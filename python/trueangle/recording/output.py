@@ -135,7 +135,7 @@ class RunsFile:
         there = [p for p in (path, rejected) if p.is_file() and p.stat().st_size]
         if there and not append:
             raise FileError(
-                there[0], "is there already: name another file, or add a run to it with --append"
+                there[0], "is there already: name another file, or add a run to it (`append=True`)"
             )
         if path in there:
             self._continue(path)
@@ -155,12 +155,12 @@ class RunsFile:
                 return
             if "run" not in self._header:
                 raise FileError(
-                    path, "has no column run: --append continues what record wrote", line=1
+                    path, "has no column run: only what was recorded is continued", line=1
                 )
             place = self._header.index("run")
             labels = {row[place] for row in rows if len(row) > place}
         if self._given in labels:
-            raise ArgumentError(f"--label: {path} has a run {self._given!r}; give another label")
+            raise ArgumentError(f"label: {path} has a run {self._given!r}; give another label")
         number = len(labels) + 1
         while self._given is None and str(number) in labels:
             number += 1

@@ -61,6 +61,8 @@ class Recording:
         Why there is no estimate.
     is_stamped : bool
         Times are those of arrival: the device gives none.
+    main : int
+        Which of the sources has the indicated angle.
     """
 
     def __init__(
@@ -73,7 +75,7 @@ class Recording:
         rate: float | None = None,
         needs: str | None = None,
     ) -> None:
-        self._addresses, self.arrivals, self.file = addresses, arrivals, file
+        self.addresses, self.arrivals, self.file = addresses, arrivals, file
         self._signals, self._counts = signals, counts
         self._rate, self._needs = rate, needs
         self._columns: list[Column] | None = None
@@ -83,7 +85,7 @@ class Recording:
         self._pairs: PairedSources | None = None
         self._angles: RunAngles | None = None
         self._slot = -math.inf
-        self._main, self._last = 0, -math.inf
+        self.main, self._last = 0, -math.inf
         self._looked = 0.0
         self._latest: LatestReadings | None = None
         self._told: dict[str, str] = {}
@@ -109,10 +111,10 @@ class Recording:
             if self._columns is None:
                 self._begin()
             parts = [arrival.take() for arrival in self.arrivals]
-            rows: Rows | None = parts[self._main]
+            rows: Rows | None = parts[self.main]
             reference = None
             if self._pairs is not None:
-                self._pairs.know(parts[1 - self._main])
+                self._pairs.know(parts[1 - self.main])
                 paired = self._pairs.pair(rows, now)
                 rows, reference = (paired.rows, paired.reference) if paired else (None, None)
                 self.unpaired += paired.lost if paired else 0
@@ -127,14 +129,14 @@ class Recording:
         names = [a.layout.names for a in self.arrivals if a.layout is not None]
         found = [
             written_columns(address, names[i], self._signals_of(i, names), self._counts)
-            for i, address in enumerate(self._addresses)
+            for i, address in enumerate(self.addresses)
         ]
         if len(found) == 2:
             from .joined import PairedSources
 
-            self._main = int(not any("indicated_" in column.name for column in found[0]))
-            self._pairs = PairedSources(found[1 - self._main])
-        self._columns = found[self._main]
+            self.main = int(not any("indicated_" in column.name for column in found[0]))
+            self._pairs = PairedSources(found[1 - self.main])
+        self._columns = found[self.main]
         kept = [column.name for column in self._columns]
         self.is_stamped = "time_s" not in kept
         self._names = ["time_s"] * self.is_stamped + kept + ["reference_deg"] * (len(found) == 2)
@@ -222,18 +224,13 @@ class Recording:
             what = self.file.rejected.path
             found["rejected_lines"] = (
                 f"{rejected} of {self.rows + rejected} lines are no rows ({what}): bytes are lost, "
-                "--baud is another, or --pattern is needed"
+                "the baud rate is another, or lines have another layout"
             )
         if now - max(self._last, 0.0) > _SILENT:
             found["silent"] = f"no reading for {_SILENT:g} s: does the device send?"
         new = {name: text for name, text in found.items() if name not in self._told}
         self._told |= new
         return new
-
-    @property
-    def jitter(self) -> float:
-        """Standard deviation of a time of arrival, seconds."""
-        return self.arrivals[self._main].jitter
 
     @property
     def faults(self) -> dict[str, str]:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import sys
 from collections import deque
-from typing import Any, Final, TextIO
-
-import numpy as np
+from typing import Final, TextIO
 
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
+from ..support.layout import counted
 from ..support.letterchart import letter_chart
 from .recording import Recording
 
@@ -34,9 +33,7 @@ class Screen:
     """
 
     def __init__(self, style: str, errors_in: ErrorsIn, stream: TextIO | None = None) -> None:
-        found = sys.stderr if stream is None else stream
-        # What redraws itself steers the terminal, which printed text must not.
-        self._stream: TextIO = getattr(found, "steering", found)
+        self._stream: TextIO = sys.stderr if stream is None else stream
         is_terminal = self._stream.isatty()
         self.style = style if style != "auto" else "text" if is_terminal else "none"
         self._redraws = self.style == "text" and is_terminal
@@ -71,20 +68,17 @@ class Screen:
         self._stream.flush()
 
     def _draw(self, lines: list[str]) -> None:
-        above = f"\x1b[{self._lines}F\x1b[J" if self._redraws and self._lines else ""
-        self._stream.write(above + "".join(f"{line}\n" for line in lines))
+        if self._redraws and self._lines:
+            # What redraws itself steers the terminal, which printed text must not.
+            steering = getattr(self._stream, "steering", self._stream)
+            steering.write(f"\x1b[{self._lines}F\x1b[J")
+        self._stream.write("".join(f"{line}\n" for line in lines))
         self._lines = len(lines)
 
     def lines(self, recording: Recording, now: float, rate: float) -> list[str]:
         """The screen."""
-        rejected = recording.file.rejected.lines
-        layouts = [arrival.layout for arrival in recording.arrivals]
-        kinds = "; ".join(f"{x.kind}: {', '.join(x.names)}" for x in layouts if x is not None)
-        lines = [
-            f"{recording.file.rows.path}  run {recording.file.label}  {now:.1f} s  "
-            f"{recording.rows} readings  {rate:.1f}/s  {rejected} lines rejected",
-            f"lines     {kinds or 'waiting for three that agree'}",
-        ]
+        head, *told = self.summary(recording)
+        lines = [f"{now:.1f} s  {rate:.1f}/s  {head}"]
         travel = recording.travel
         if travel is not None and recording.rows:
             for row, mark in enumerate(_MARKS):
@@ -93,28 +87,37 @@ class Screen:
             slow, fast = (360.0 * speed for speed in travel.speeds)
             speeds = f"{slow:.3g} to {fast:.3g} deg/s" if fast else "none yet"
             lines.append(f"travelled {travel.turns:.2f} turns  speed {speeds}")
-        lines += self._estimate(recording)
-        lines.append(f"missing   {recording.missing or 'nothing: end with Ctrl-C'}")
-        lines += [f"FAULT     {name}: {says}" for name, says in recording.faults.items()]
-        return [line[:200] for line in lines]
+        if recording.estimate is not None:
+            places, error = recording.estimate.curve
+            if error.size > 1:
+                size = arcsec(error, recording.period)
+                lines += letter_chart(360.0 * places, {"o": size}, "arcsec")
+        return [line[:200] for line in (*lines, *told)]
 
-    def _estimate(self, recording: Recording) -> list[str]:
-        estimate, lines = recording.estimate, []
-        if estimate is None:
-            return []
-        scale = arcsec(1.0, recording.period)
-        places, error = estimate.curve
-        if error.size > 1:
-            shown = error_unit(self._errors_in, scale * float(np.ptp(error)))
-            curve: Any = {"o": scale * error}
-            lines = letter_chart(360.0 * places, curve, "arcsec")
-            lines.append(f"error     {shown.text(scale * float(np.ptp(error)))} peak-to-peak")
-        for order in estimate.orders[:_SHOWN]:
-            size, std = scale * order.amplitude, scale * order.std
-            lines.append(
-                f"order {order.order:3d} {error_unit(self._errors_in, size).text(size, std)} at "
-                f"{order.phase_deg:.0f} deg"
-            )
-        if estimate.turns and not estimate.orders:
-            lines.append("orders    none above the noise")
-        return lines
+    def summary(self, recording: Recording) -> list[str]:
+        """What was recorded, and what it tells."""
+        file, estimate = recording.file, recording.estimate
+        kept = f" ({file.rejected.path})" if file.rejected.lines else ""
+        lines = [
+            f"{file.rows.path}: {counted(recording.rows, 'reading')} in run {file.label}, "
+            f"{counted(file.rejected.lines, 'line')} rejected{kept}"
+        ]
+        for address, arrival in zip(recording.addresses, recording.arrivals, strict=True):
+            if arrival.layout is not None:
+                names = ", ".join(arrival.layout.names)
+                lines.append(f"{address}: {arrival.layout.kind}, columns {names}")
+            if arrival.problem is not None:
+                lines.append(f"{address}: ended by a fault: {arrival.problem}")
+        if recording.unpaired:
+            lines.append(f"{counted(recording.unpaired, 'reading')} without a reference")
+        if recording.is_stamped and recording.rows > 1:
+            jitter = 1e3 * recording.arrivals[recording.main].jitter
+            lines.append(f"times are those of arrival, jitter {jitter:.2g} ms")
+        for order in estimate.orders[:_SHOWN] if estimate else ():
+            size, std = (arcsec(x, recording.period) for x in (order.amplitude, order.std))
+            shown = error_unit(self._errors_in, size).text(size, std)
+            lines.append(f"order {order.order:3d}  {shown} at {order.phase_deg:.0f} deg")
+        if estimate is not None and estimate.turns and not estimate.orders:
+            lines.append("no order above the noise")
+        lines += [f"fault {name}: {says}" for name, says in recording.faults.items()]
+        return [*lines, f"missing: {recording.missing or 'nothing'}"]

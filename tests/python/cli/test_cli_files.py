@@ -121,6 +121,7 @@ WRITING = {
         ["b.toml"],
     ),
     "report": (["report", "r.csv", "--simulation", "b.toml", "-o", "OUT"], ["r.csv", "b.toml"]),
+    "record": (["record", "r.csv", "--for", "0.1", "-o", "OUT"], ["r.csv"]),
     "join": (["join", "r.csv", "t.csv", "-o", "OUT"], ["r.csv", "t.csv"]),
     "selfcal": (["selfcal", "r.csv", "-o", "OUT"], ["r.csv"]),
     "export": (["export", "m.json", "--to", "csv", "-o", "OUT"], ["m.json"]),

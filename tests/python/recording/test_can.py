@@ -96,5 +96,10 @@ def test_what_is_no_bus_and_no_signal_is_named(capsys, tmp_path):
     assert main(["record", "can:nosuch:x", *output, *field]) == 1
     assert main(["record", "can:virtual:x", *output, "--dbc", str(tmp_path / "a.dbc")]) == 1
     told = capsys.readouterr().err
-    for part in ("needs its signals: --dbc", "cannot be opened", "is no description of a CAN bus"):
+    for part in (
+        "needs its signals: their description (--dbc)",
+        "--signal indicated=0x101:0:2:0.02197:deg",
+        "cannot be opened",
+        "is no description of a CAN bus",
+    ):
         assert part in told

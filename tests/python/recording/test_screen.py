@@ -25,9 +25,10 @@ def test_the_screen_is_drawn_anew_and_holds_everything(tmp_path):
     screen.show(recording, 0.31)
     first = stream.getvalue()
     for part in (
-        "run 1  0.3 s  1600 readings", "1 lines rejected", "CSV: reference_deg, indicated_deg",
+        "1600 readings in run 1, 1 line rejected", "0.3 s  ",
+        "given: CSV, columns reference_deg, indicated_deg",
         "forwards  [" + 72 * "#" + "] 360 deg", "backwards [" + 72 * "." + "] 0 deg",
-        "order   1 0.50", "order   2 0.20", "peak-to-peak", "missing   turn it backwards as well",
+        "order   1  0.50", "order   2  0.20", "  arcsec", "missing: turn it backwards as well",
     ):  # fmt: skip
         assert part in first
     assert "\x1b" not in first

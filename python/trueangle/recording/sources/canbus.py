@@ -96,7 +96,7 @@ class CanBus:
 
         found = _FRAME.fullmatch(data)
         if found is None:
-            raise ArgumentError(f"--send: a frame as 123#0102FF is needed, got {data.decode()!r}")
+            raise ArgumentError(f"send: a frame as 123#0102FF is needed, got {data.decode()!r}")
         number = int(found[1], 16)
         self._bus.send(
             can.Message(
@@ -125,8 +125,8 @@ def _fields(options: SourceOptions) -> list[_Field]:
         found += _described(options.dbc, [n for n in options.fields if not _FIELD.fullmatch(n)])
     if not found:
         raise ArgumentError(
-            "a CAN bus needs its signals: --dbc FILE, or fields ID:byte:length:scale as in "
-            "--signal indicated=0x101:0:2:0.02197:deg"
+            "a CAN bus needs its signals: their description (`dbc=`), or ID:byte:length:scale "
+            "as in `signals={'indicated': ('0x101:0:2:0.02197', 'deg')}`"
         )
     return found
 

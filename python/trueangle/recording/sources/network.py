@@ -80,7 +80,7 @@ class UdpPort:
         ------
         ArgumentError
         """
-        raise ArgumentError("--send: a UDP port only listens")
+        raise ArgumentError("send: a UDP port only listens")
 
     def close(self) -> None:
         """See `Source.close`."""

@@ -44,7 +44,7 @@ class Stream:
         ------
         ArgumentError
         """
-        raise ArgumentError("--send: lines are only read here")
+        raise ArgumentError("send: lines are only read here")
 
     def close(self) -> None:
         """See `Source.close`."""
