@@ -80,9 +80,10 @@ struct Mode {
 impl Readings {
     /// The estimate under prior probabilities of each order.
     ///
-    /// Noise and orders are sought from both sides: with the strongest orders in, so that none passes
-    /// for slow noise, and with none, so that slow noise passes for no order. Where these end apart,
-    /// the mixture has both. None where no evidence can be computed: a covariance is not positive by
+    /// Noise and orders are sought from all sides: with the strongest orders in, so that none passes
+    /// for slow noise, with none, so that slow noise passes for no order, and with orders that differ
+    /// from run to run, so that no difference passes for slow noise. Where these end apart, the
+    /// mixture has all. None where no evidence can be computed: a covariance is not positive by
     /// rounding.
     pub fn estimate(&self, probabilities: &[f64]) -> Option<Estimate> {
         let total = self.variance();
@@ -91,12 +92,25 @@ impl Readings {
         let noise_prior = NoisePrior {
             scale: self.among(&looked).left(total)?,
         };
-        let every = (looked.clone(), Model::of_orders(looked.len(), total));
-        let none = (Vec::new(), Model::of_orders(0, 0.0));
-        let mut modes = vec![self.settled(&prior, noise_prior, (&looked, total), every)?];
-        let other = self.settled(&prior, noise_prior, (&looked, total), none)?;
-        if modes[0].fit.is_far_from(&other.fit.position) {
-            modes.push(other);
+        let every = Model::of_orders(looked.len(), total);
+        let mut starts = vec![
+            (looked.clone(), every.clone()),
+            (Vec::new(), Model::of_orders(0, 0.0)),
+        ];
+        if self.runs().len() > 1 {
+            let fewest = self.runs().iter().map(super::Run::len).min().unwrap_or(0);
+            let mut different = every;
+            for omega in different.omega.iter_mut().take(fewest / READINGS) {
+                *omega = total;
+            }
+            starts.push((looked.clone(), different));
+        }
+        let mut modes: Vec<Mode> = Vec::new();
+        for start in starts {
+            let mode = self.settled(&prior, noise_prior, (&looked, total), start)?;
+            if modes.iter().all(|m| m.fit.is_far_from(&mode.fit.position)) {
+                modes.push(mode);
+            }
         }
         self.mixture(&modes, &prior, noise_prior)
     }
@@ -307,8 +321,8 @@ impl Readings {
             models.push((weight, model.clone()));
         }
         let (mean, covariance) = mixed(2 * places.len(), &heavy);
-        let first = usize::from(of_modes.len() > 1 && of_modes[1] > of_modes[0]);
-        let mode = &modes[first];
+        let heaviest = (0..modes.len()).max_by(|&a, &b| of_modes[a].total_cmp(&of_modes[b]));
+        let mode = &modes[heaviest?];
         let outside = |k: usize| mode.scores[k].min(-WINDOW).exp();
         let mut probabilities: Vec<f64> = (0..self.orders().len()).map(outside).collect();
         for (k, &place) in places.iter().enumerate() {

@@ -116,3 +116,27 @@ def test_runs_of_nothing_have_no_order() -> None:
             runs.append(ta.CalibrationRun(x, shown, 360.0))
         found += bool(ta.select_orders(runs).orders)
     assert found == 0
+
+
+@pytest.mark.parametrize("count", [3, 6])
+def test_intervals_hold_what_runs_differ_by(count):
+    """Orders 1 and 2 differ from run to run by 7 and 3 arcsec: no slow noise is it."""
+    rng = np.random.default_rng([SEED, count])
+    held, size = [], np.array([[100.0, 30.0], [20.0, -30.0]])
+    for _ in range(30):
+        runs = []
+        for _ in range(count):
+            x = np.sort(rng.uniform(0.0, 360.0, 120))
+            own = size + rng.normal(size=(2, 2)) * [[7.0], [3.0]]
+            error = 4.0 * rng.normal(size=120)
+            for k in (1, 2):
+                turn = np.radians(k * x)
+                error += own[k - 1, 0] * np.cos(turn) + own[k - 1, 1] * np.sin(turn)
+            runs.append(ta.CalibrationRun(x, x + error / 3600.0, 360.0))
+        found = ta.fit(runs)
+        assert {1, 2} <= set(found.orders)
+        at = 1 + 2 * found.orders.index(1)
+        low, high = 3600.0 * found.interval()[at : at + 4].T
+        held.append((low < size.ravel()) & (size.ravel() < high))
+    print(np.mean(held))
+    assert 0.86 <= np.mean(held) <= 0.99
