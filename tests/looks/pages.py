@@ -46,7 +46,7 @@ def pages(folder, desk, docs):
                     )
                     page.goto(file.as_uri())
                     if name == "report":
-                        page.wait_for_selector("html[data-drawn]", timeout=60_000)
+                        page.wait_for_selector("html[data-ready]", timeout=60_000)
                     page.screenshot(path=folder / f"{name}-{width}-{scheme}.png", full_page=True)
                     if page.evaluate(_TOO_WIDE) > 0:
                         wide.append(f"{name} at {width} pixels")

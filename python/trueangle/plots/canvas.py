@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -17,11 +18,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
+    from matplotlib.lines import Line2D
 
 #: A small picture as part of the usual one, its dots per inch, and those that a page shows.
 _SMALL: float = 0.8
 _DOTS_PER_INCH: float = 120.0
 _ON_PAGE: float = 80.0
+#: Dots per inch of a page that draws vectors: those of CSS.
+ON_PAGE: float = 96.0
 _SMALLER: ContextVar[bool] = ContextVar("smaller", default=False)
 
 #: Entries of a legend beyond which it stands beside the picture, not inside.
@@ -31,6 +35,9 @@ _MANY: int = 5
 #: as part of the axes'.
 _COLUMNS: int = 4
 _ROW: float = 0.09
+#: Steps of ticks on an axis of angles in degrees, and about how many there are to an inch.
+_ANGLES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 1800.0)
+_TICKS_PER_INCH: float = 1.2
 #: Width of axes that are alone in a figure, as part of it.
 _ALONE: float = 0.9
 #: Letters of an entry, of which longer ones lose the middle.
@@ -112,22 +119,54 @@ def _subplots(rows: int, columns: int, width: float, height: float, **how: Any) 
     return figure, figure.subplots(rows, columns, squeeze=False, **how)
 
 
+def marked(line: Line2D, **marks: Any) -> Line2D:
+    """A line with what a page knows of it: ``run``, ``titles`` of its points, ``ring``."""
+    line.on_page = marks  # type: ignore[attr-defined]
+    return line
+
+
+def page_marks(artist: object) -> dict[str, Any]:
+    """What `marked` said of it."""
+    found: dict[str, Any] = getattr(artist, "on_page", {})
+    return found
+
+
+def plain_logarithms(ax: Axes, which: Literal["x", "y"], most: int = 7) -> None:
+    """Ticks at 1, 2 and 5 of every decade, or at fewer, with plain numbers."""
+    low, high = sorted(getattr(ax, f"get_{which}lim")())
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for marks in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
+        ticks = [m * 10.0**d for d in decades for m in marks if low <= m * 10.0**d <= high]
+        if len(ticks) <= most:
+            break
+    ticks = ticks[:: -(-len(ticks) // most)] if ticks else [math.sqrt(low * high)]
+    axis = getattr(ax, f"{which}axis")
+    axis.set_ticks(ticks, [f"{tick:.3g}" if tick < 1e3 else f"{tick:.0f}" for tick in ticks])
+    axis.set_ticks([], minor=True)
+
+
 def turn_axis(ax: Axes, low: float, high: float) -> None:
     """Angle axis in degrees, with whole parts of a turn as ticks."""
     from matplotlib.ticker import MultipleLocator
 
     ax.set_xlim(low, high)
-    span = high - low
-    for step in (5.0, 15.0, 30.0, 45.0, 90.0, 360.0, 1800.0):
-        if span / step <= 9.0:
+    span, most = high - low, _TICKS_PER_INCH * ax.get_figure(root=True).get_figwidth()  # type: ignore[union-attr]
+    for step in _ANGLES:
+        if span / step <= most:
             ax.xaxis.set_major_locator(MultipleLocator(step))
             break
     grid(ax)
 
 
-def described(ax: Axes, text: str) -> Axes:
-    """The axes with a text for who does not see them: see `text_alternative`."""
+def described(ax: Axes, text: str, title: str = "") -> Axes:
+    """The axes with a text for who does not see them: see `text_alternative`.
+
+    A title stands over axes that are alone in their figure: others have captions of theirs.
+    """
     ax.set_label(text)
+    figure = ax.get_figure(root=True)
+    if title and figure is not None and len(figure.axes) == 1:
+        ax.set_title(title, fontsize="medium")
     return ax
 
 

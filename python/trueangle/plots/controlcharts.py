@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..support.angles import arcsec
+from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, error_unit
 from ..support.layout import counted
 from ..support.suggestions import check_choice
@@ -27,6 +28,24 @@ _FAR: Final = 10.0
 
 #: Orders of a watched joint that are drawn at most: those whose sums rose highest.
 _MOST: Final = 6
+
+
+def draw_sums(
+    ax: Axes, x: Sequence[Any] | Array, sums: Array, limit: float, names: Sequence[str] = ()
+) -> None:
+    """Control charts side by side: statistics of several orders (columns) under their limit."""
+    for k, values in enumerate(np.asarray(sums).T):
+        over = not names and float(values[-1]) > limit
+        ax.plot(
+            x, values, color=palette.WARNING if over else palette.run_colour(k if names else 0),
+            marker=palette.run_marker(k) if names else "o", markersize=4.0, linewidth=1.2,
+            label=names[k] if names else None,
+        )  # fmt: skip
+    ax.axhline(limit, color=palette.ink(ax), linestyle="--", linewidth=1.0, label="limit")
+    if float(np.max(sums)) > _FAR * limit:
+        ax.set_yscale("symlog", linthresh=limit)
+    ax.set_ylim(0.0, 1.1 * max(limit, float(np.max(sums))))
+    grid(ax)
 
 
 def fleet_history(fleet: Fleet, unit: str, errors_in: ErrorsIn = "auto") -> Axes:
@@ -63,18 +82,10 @@ def fleet_history(fleet: Fleet, unit: str, errors_in: ErrorsIn = "auto") -> Axes
             [one.cusum for one in row.orders] for row in rows
         ]),
     ):  # fmt: skip
-        for k, one in enumerate(rows[0].orders):
-            ax.plot(
-                when, [row[k] for row in values], color=palette.run_colour(k),
-                marker=palette.run_marker(k), label=f"order {one.order:g}",
-            )  # fmt: skip
-        ax.axhline(limit, color=palette.ink(ax), linestyle="--", linewidth=1.0, label="limit")
-        if max(map(max, values)) > _FAR * limit:
-            ax.set_yscale("symlog", linthresh=limit)
-        ax.set_ylim(bottom=0.0)
+        draw_sums(ax, when, np.array(values), limit, [f"order {r.order:g}" for r in rows[0].orders])
         ax.set_ylabel(name)
-        grid(ax)
     legend(upper)
+    upper.set_title(f"Control charts of {unit}", fontsize="medium")
     figure.autofmt_xdate()
     return described(
         upper,
@@ -139,6 +150,7 @@ def watched_windows(
         ax.set_ylim(bottom=0.0)
         grid(ax)
     legend(upper)
+    upper.set_title("Charts of a watched joint", fontsize="medium")
     figure.align_ylabels()
     told = f"; the first in window {alarms[0].window}: " if alarms else ""
     first = told + shown.spoken(alarms[0].because) if alarms else ""

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ArgumentError
-from ..support.display_units import ErrorsIn, error_unit
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from . import palette
-from .canvas import described, new_axes
-from .simulatedcurves import error_left_of, gain_bars
+from .canvas import described, grid, legend, marked, new_axes, plain_logarithms
+from .simulatedcurves import ErrorLeft, error_left_of, gain_bars
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +56,11 @@ def gains(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
     ax.set_xlim(min(0.0, float((share - below).min())), max(105.0, float((share + above).max())))
     ax.set_xlabel("share of the reducible error taken away on held-out runs / %")
     told = ", ".join(f"{b.cause} {b.share:.0f} % ({b.low:.0f} to {b.high:.0f})" for b in bars)
-    return described(ax, f"Share of the reducible error that each cause takes away: {told}.")
+    return described(
+        ax,
+        f"Share of the reducible error that each cause takes away: {told}.",
+        "Gain of each cause",
+    )
 
 
 def error_left(diagnosis: Diagnosis, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
@@ -83,30 +87,34 @@ def error_left(diagnosis: Diagnosis, ax: Axes | None = None, errors_in: ErrorsIn
     left = error_left_of(diagnosis)
     if left is None:
         raise ArgumentError(_NO_GAIN)
-    names, sizes = zip(*left.rows, strict=True)
-    unit = error_unit(errors_in, max(left.noise, *sizes))
+    unit = error_unit(errors_in, max(left.noise, *(rms for _, rms in left.rows)))
+    ax = new_axes(ax, height=1.4 + 0.4 * len(left.rows))
+    draw_error_left(ax, left, unit)
+    legend(ax)
+    return described(ax, left.told(unit), "Held-out error with all causes, and without each")
+
+
+def draw_error_left(ax: Axes, left: ErrorLeft, unit: ErrorUnit) -> None:
+    """On a logarithmic axis: one cause may leave a hundred times what another does."""
+    sizes = unit.per_arcsec * np.array([rms for _, rms in left.rows])
     noise = unit.per_arcsec * left.noise
-    ax = new_axes(ax, height=1.4 + 0.4 * len(sizes))
-    place = list(range(len(sizes)))
-    bars = ax.barh(
-        place,
-        [unit.per_arcsec * rms for rms in sizes],
-        height=0.6,
-        color=[palette.AFTER] + [palette.BEFORE] * (len(sizes) - 1),
-    )
-    ax.bar_label(bars, [unit.number(rms) for rms in sizes], padding=3, fontsize="small")
-    ax.axvline(noise, color=palette.ink(ax), linestyle="--", linewidth=1.0)
-    ax.annotate(
-        f"noise {unit.number(left.noise)}",
-        (noise, 1.0),
-        xycoords=("data", "axes fraction"),
-        xytext=(0, 3),
-        textcoords="offset points",
-        ha="center",
-        fontsize="small",
-    )
-    ax.set_yticks(place, names)
-    ax.invert_yaxis()
-    ax.margins(x=0.12)
+    place = np.arange(len(sizes))
+    for chosen, colour in ((slice(0, 1), palette.AFTER), (slice(1, None), palette.BEFORE)):
+        (dots,) = ax.plot(
+            sizes[chosen], place[chosen], linestyle="none", marker="o", markersize=8.0, color=colour
+        )
+        marked(dots, titles=[f"{name}: {unit.text(rms)} rms" for name, rms in left.rows[chosen]])
+    for (_, rms), size, level in zip(left.rows, sizes, place, strict=True):
+        ax.annotate(
+            unit.number(rms), (size, level), xytext=(0, 6), textcoords="offset points",
+            ha="center", fontsize="small",
+        )  # fmt: skip
+    label = f"noise of one reading, {unit.text(left.noise)}"
+    ax.axvline(noise, color=palette.ink(ax), linestyle="--", linewidth=1.0, label=label)
+    ax.set_xscale("log")
+    ax.set_xlim(0.6 * min(sizes.min(), noise), 1.5 * max(sizes.max(), noise))
+    plain_logarithms(ax, "x")
+    ax.set_yticks(place, [name for name, _ in left.rows])
+    ax.set_ylim(len(sizes) - 0.4, -0.6)
     ax.set_xlabel(left.axis(unit))
-    return described(ax, left.told(unit))
+    grid(ax)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from . import palette
-from .canvas import grid, turn_axis
+from .canvas import grid, marked, turn_axis
 from .curves import CONFIDENCE, Curve, curve_envelope, thinned_points
 from .panel import Cloud, Panel
 
@@ -15,13 +15,17 @@ if TYPE_CHECKING:
 
 #: Readings drawn in one picture: more do not show.
 _MOST: Final = 24_000
+#: Readings drawn of each run at least.
+_FEWEST: Final = 6
 #: Readings from which on dots are small and faint.
 _DENSE: Final = 2_000
 
 
-def draw_panel(ax: Axes, panel: Panel) -> None:
-    """Readings, model and medians, with titles of the axes."""
-    draw_clouds(ax, panel.clouds)
+def draw_panel(ax: Axes, panel: Panel, most: int = _MOST) -> None:
+    """Readings, at most ``most``, model and medians, with titles of the axes."""
+    draw_clouds(ax, panel.clouds, most)
+    if panel.zero:
+        ax.axhline(0.0, color=palette.MUTED, linewidth=0.8, zorder=0)
     if panel.model is not None:
         draw_panel_curve(ax, panel.model, panel.dense)
     if panel.medians is not None:
@@ -30,26 +34,29 @@ def draw_panel(ax: Axes, panel: Panel) -> None:
         ax.plot(x, y, color=ink, linewidth=1.4, marker=".", label="median")
     if panel.angles and panel.span is not None:
         turn_axis(ax, *panel.span)
-    elif panel.span is not None:
+    elif panel.span is not None:  # directions
         ax.set_xlim(*panel.span)
+        ax.set_xticks([-1.0, 0.0, 1.0], ["backward", "at rest", "forward"])
     grid(ax)
     ax.set_xlabel(panel.x)
     ax.set_ylabel(panel.y)
 
 
-def draw_clouds(ax: Axes, clouds: Sequence[Cloud]) -> None:
+def draw_clouds(ax: Axes, clouds: Sequence[Cloud], most: int = _MOST) -> None:
     """Dots of every cloud; each name once for the legend."""
-    dense = sum(cloud.points.y.size for cloud in clouds) > _DENSE
+    share = max(_FEWEST, most // len(clouds))
+    dense = sum(min(cloud.points.y.size, share) for cloud in clouds) > _DENSE
     named: set[str] = set()
     for cloud in clouds:
-        part = thinned_points(cloud.points, max(1, _MOST // len(clouds)), cloud.run)
-        ax.plot(
+        part = thinned_points(cloud.points, share, cloud.run)
+        (line,) = ax.plot(
             part.x,
             part.y,
             linestyle="none",
             label=None if cloud.name in named else cloud.name,
             **_style(ax, cloud, dense),
         )
+        marked(line, run=cloud.run, ring=cloud.role == "measured")
         named.add(cloud.name)
 
 

@@ -57,7 +57,7 @@ def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "
     picture = errors_picture(fit.runs, fit, fit_error_unit(fit, errors_in))
     ax = new_axes(ax)
     draw_panel(ax, picture.panels[0])
-    return _finished(ax, picture)
+    return _finished(ax, picture, "Measured error of every run, and the model")
 
 
 def before_after(
@@ -90,8 +90,7 @@ def before_after(
     picture = before_after_picture(numbered, fitted_degrees(model), unit)
     ax = new_axes(ax)
     draw_panel(ax, picture.panels[0])
-    _zero_line(ax)
-    return _finished(ax, picture)
+    return _finished(ax, picture, "Held-out runs before and after correction")
 
 
 def residuals(
@@ -125,10 +124,7 @@ def residuals(
     picture = residual_picture(fit, against, fit_error_unit(fit, errors_in))
     ax = new_axes(ax, height=3.4)
     draw_panel(ax, picture.panels[0])
-    _zero_line(ax)
-    if against == "direction":
-        ax.set_xticks([-1.0, 0.0, 1.0], ["backward", "at rest", "forward"])
-    return _finished(ax, picture)
+    return _finished(ax, picture, f"Residual against {against}")
 
 
 def measured_and_simulated(
@@ -174,19 +170,15 @@ def measured_and_simulated(
         for cloud in apart.clouds
     ]
     draw_clouds(ax, moved)
-    _zero_line(ax, down)
+    ax.axhline(down, color=palette.MUTED, linewidth=0.8, zorder=0)
     # Numbers of the axis belong to the two above; below them stands the difference's zero.
     ticks = [float(tick) for tick in ax.get_yticks() if lowest <= tick <= top]
     texts = [f"{tick:g}".replace("-", "\N{MINUS SIGN}") for tick in ticks]
     ax.set_yticks([down, *ticks], ["0", *texts])
-    return _finished(ax, picture)
+    return _finished(ax, picture, "Measured and simulated error")
 
 
-def _finished(ax: Axes, picture: PanelPicture) -> Axes:
-    """With the legend and the sentence of a picture."""
+def _finished(ax: Axes, picture: PanelPicture, title: str) -> Axes:
+    """With the legend, the sentence and the title of a picture."""
     legend(ax)
-    return described(ax, picture.told)
-
-
-def _zero_line(ax: Axes, height: float = 0.0) -> None:
-    ax.axhline(height, color=palette.MUTED, linewidth=0.8, zorder=0)
+    return described(ax, picture.told, title)

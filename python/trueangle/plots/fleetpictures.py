@@ -15,7 +15,7 @@ from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.layout import counted
 from ..support.suggestions import check_choice
 from . import palette
-from .canvas import described, grid, legend, new_axes, new_figure, turn_axis
+from .canvas import described, grid, legend, marked, new_axes, new_figure, turn_axis
 from .controlcharts import fleet_history
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ def fleet_sizes(fleet: Fleet, ax: Axes | None = None, errors_in: ErrorsIn = "aut
     grid(ax, "y")
     legend(ax)
     band = " and the band that holds the fleet" if math.isfinite(bound.peak_to_peak) else ""
-    return described(ax, f"Peak-to-peak of {counted(ranked, 'unit')}{band}.")
+    return described(ax, f"Peak-to-peak of {counted(ranked, 'unit')}{band}.", "Size of every unit")
 
 
 def fleet_patterns(fleet: Fleet, errors_in: ErrorsIn = "auto", most: int = _PATTERNS) -> Axes:
@@ -180,22 +180,16 @@ def fleet_patterns(fleet: Fleet, errors_in: ErrorsIn = "auto", most: int = _PATT
     rows = -(-len(units) // _IN_A_ROW)
     columns = min(len(units), _IN_A_ROW)
     figure, axes = new_figure(rows, columns, 2.1 * columns + 0.6, 1.6 * rows + 0.6)
-    highest = max(fleet.orders, default=1.0)
-    angle = np.linspace(0.0, 360.0, max(361, math.ceil(8.0 * highest) + 1))
-    common = turn_pattern(fleet.common, angle)
     for i, ax in enumerate(axes):
         if i >= len(units):
             ax.set_visible(False)
             continue
         unit = units[i]
-        own = turn_pattern(unit.orders, angle)
-        fine = unit.verdict == "fine"
-        ax.plot(angle, size * common, color=palette.MUTED, linewidth=0.9)
-        ax.plot(angle, size * own, color=palette.AFTER if fine else palette.WARNING)
-        turn_axis(ax, 0.0, 360.0)
+        draw_pattern(ax, fleet, unit, size)
         ax.set_xticks([0.0, 180.0, 360.0], ["", "", ""])
         if i + columns >= len(units):
             ax.set_xticks([0.0, 180.0, 360.0], ["0", "180", "360"])
+        fine = unit.verdict == "fine"
         title = unit.unit if fine else f"{unit.unit}: {unit.verdict.replace('_', ' ')}"
         ax.set_title(title, fontsize="small")
     figure.supxlabel("true angle / deg", fontsize="medium")
@@ -205,6 +199,46 @@ def fleet_patterns(fleet: Fleet, errors_in: ErrorsIn = "auto", most: int = _PATT
         f"Error over a turn of {len(units)} of {len(fleet.units)} units, those that need attention "
         "first, and the pattern that all share.",
     )
+
+
+def draw_pattern(ax: Axes, fleet: Fleet, unit: FleetUnit, size: float) -> None:
+    """The error of a unit over a turn, and behind it what all share."""
+    highest = max(fleet.orders, default=1.0)
+    angle = np.linspace(0.0, 360.0, max(361, math.ceil(8.0 * highest) + 1))
+    fine = unit.verdict == "fine"
+    ax.plot(angle, size * turn_pattern(fleet.common, angle), color=palette.MUTED, linewidth=0.9)
+    ax.plot(
+        angle,
+        size * turn_pattern(unit.orders, angle),
+        color=palette.AFTER if fine else palette.WARNING,
+    )
+    turn_axis(ax, 0.0, 360.0)
+
+
+def draw_phasor_plane(ax: Axes, fleet: Fleet, at: int, size: float) -> None:
+    """Cosine and sine of one order of every unit, and the circle that holds 95 % of them."""
+    common, between = fleet.common[at], fleet.between[at]
+    turn = np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 91))
+    circle = size * (common.cosine + 1j * common.sine + RADIUS_OF_95 * between.std * turn)
+    ax.plot(
+        circle.real, circle.imag, color=palette.MUTED, linestyle="--", label="95 % of units"
+    )  # fmt: skip
+    reach = float(np.abs([circle.real, circle.imag]).max())
+    for kind, colour, marker in _VERDICTS:
+        units = _of_kind(fleet, kind)
+        phase = np.radians([unit.orders[at].phase_deg for unit in units])
+        amplitude = size * np.array([unit.orders[at].amplitude for unit in units])
+        if units:
+            (dots,) = ax.plot(
+                amplitude * np.sin(phase), amplitude * np.cos(phase), linestyle="none",
+                marker=marker, markersize=5.0, color=colour, label=kind,
+            )  # fmt: skip
+            marked(dots, titles=[unit.unit for unit in units])
+            reach = max(reach, float(amplitude.max()))
+    reach = 1.1 * reach or 1.0
+    ax.set_xlim(-reach, reach)
+    ax.set_ylim(-reach, reach)
+    grid(ax)
 
 
 def fleet_overview(fleet: Fleet, errors_in: ErrorsIn = "auto") -> Axes:

@@ -66,4 +66,5 @@ def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsI
         f"{unit.name} peak-to-peak in {counted(len(model.orders), 'order')}"
         + (f"; not drawn: {terms}" if terms else "")
         + ".",
+        "Error of the model",
     )

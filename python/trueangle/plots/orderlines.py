@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 #: Orders told in words.
 _TOLD: Final = 6
 #: Least amplitude of the logarithmic axis, as part of the smallest that has to be seen.
-_FLOOR: Final = 0.2
+_FLOOR: Final = 0.4
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,11 @@ def order_lines(result: OrderSelection | FitResult) -> list[OrderLine]:
         limits = np.nan_to_num(factor * needed, posinf=0.0)
         return [
             OrderLine(
-                float(row.order), factor * row.amplitude, 0.0, float(limit), row.retained, row
+                float(row.order),
+                factor * row.amplitude,
+                limit=float(limit),
+                kept=row.retained,
+                row=row,
             )
             for row, limit in zip(selection.table, limits, strict=True)
             if math.isfinite(row.amplitude)

@@ -24,6 +24,16 @@ RUNS: Final = ("#0072B2", "#C77800", "#009E73", "#CC79A7", "#7A68C8", "#D55E00")
 #: With the colours they make runs distinct beyond the first six.
 MARKERS: Final = ("o", "s", "^", "D", "v", "P")
 
+#: Names of the colours in the style of a page, which has lighter ones on dark paper.
+ON_PAGE: Final = {
+    "#000000": "model",
+    **{colour.upper(): f"run-{number}" for number, colour in enumerate(RUNS)},
+    AFTER: "after",
+    BEFORE: "before",
+    MUTED: "muted",
+    WARNING: "warning",
+}
+
 #: Mean of red, green and blue below which paper is dark.
 _DARK: Final = 0.5
 

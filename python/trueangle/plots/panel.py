@@ -1,7 +1,6 @@
 """Panels of a picture of readings: clouds of dots, medians, a magnified segment; draws nothing.
 
-A picture is described once: matplotlib (`trueangle.plots.drawnpanel`) and the report
-(`trueangle.reports.panelcharts`) both draw what stands here, each in its own sizes and colours.
+A picture is described once and drawn by `trueangle.plots.drawnpanel`, for a figure and for a page.
 """
 
 from __future__ import annotations
@@ -65,6 +64,8 @@ class Panel:
         In the unit of the picture; ``dense`` where only its envelope can be drawn.
     medians : (ndarray, ndarray), optional
         Places and medians of the readings about them.
+    zero : bool
+        A line marks no error.
     title : str
         Of a segment that is shown larger.
     """
@@ -77,12 +78,8 @@ class Panel:
     model: Curve | None = None
     dense: bool = False
     medians: tuple[Array, Array] | None = None
+    zero: bool = False
     title: str = ""
-
-    @property
-    def readings(self) -> int:
-        """How many readings its clouds hold."""
-        return sum(cloud.points.y.size for cloud in self.clouds)
 
 
 @dataclass(frozen=True)

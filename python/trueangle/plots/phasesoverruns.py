@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..fitting.phases import run_phases
+from ..fitting.phases import Phases, run_phases
 from ..fitting.summary import fit_error_unit
-from ..support.display_units import ErrorsIn
+from ..support.display_units import ErrorsIn, ErrorUnit
 from . import palette
-from .canvas import described, grid, new_axes
+from .canvas import described, grid, marked, new_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 #: Orders drawn by default, the largest first: beyond that colours repeat too often.
 _MOST_ORDERS = 12
+_TITLE = "Phase and amplitude of every order, run by run"
+#: Half of what a chart of one order shows, degrees, at least: nothing is made to look like scatter.
+_LEAST_HALF = 15.0
 
 
 def phases_over_runs(
@@ -91,4 +94,26 @@ def phases_over_runs(
         polar.legend(loc="center left", bbox_to_anchor=(1.08, 0.5), frameon=False, fontsize="small")
     drawn: Axes = polar
     told = ", ".join(f"order {p.order:g}" for p in sorted(found, key=lambda p: p.order))
-    return described(drawn, f"Phase and amplitude of {told} in every run, on polar axes.")
+    return described(drawn, f"Phase and amplitude of {told} in every run, on polar axes.", _TITLE)
+
+
+def draw_phase_of_order(ax: Axes, order: Phases, numbers: dict[str, int], unit: ErrorUnit) -> None:
+    """Phase of one order in every run: a level line of dots is a systematic error."""
+    mean = np.angle(np.mean(order.amplitude * np.exp(1j * order.phase)))
+    around = np.degrees(np.angle(np.exp(1j * (order.phase - mean))))
+    middle = float(np.degrees(mean)) % 360.0
+    half = min(max(1.3 * float(np.abs(around).max()), _LEAST_HALF), 190.0)
+    for place, label in enumerate(order.labels):
+        number = numbers[label]
+        phase = middle + around[place]
+        (dot,) = ax.plot(
+            [place + 1.0], [phase], linestyle="none", markersize=6.0,
+            color=palette.run_colour(number), marker=palette.run_marker(number),
+        )  # fmt: skip
+        size = unit.text(float(order.amplitude[place]))
+        marked(dot, run=number, titles=[f"run {label}: {size} at {phase:.1f}°"])
+    ax.set_xlim(0.3, len(order.labels) + 0.7)
+    ax.set_ylim(middle - half, middle + half)
+    ax.xaxis.get_major_locator().set_params(integer=True)
+    ax.set_xlabel("run")
+    ax.set_ylabel("phase / deg")

@@ -56,7 +56,9 @@ def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     grid(ax, "x")
     offsets = ", ".join(f"{offset:+.4g}" for offset in plan.mount_offsets_deg)
     return described(
-        ax, f"{what.capitalize()}s of a plan of {plan.positions} positions: {offsets} deg."
+        ax,
+        f"{what.capitalize()}s of a plan of {plan.positions} positions: {offsets} deg.",
+        f"Positions of every {what} within the first pitch",
     )
 
 
@@ -99,4 +101,5 @@ def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     told = f"worst {float(factors[seen].max(initial=0.0)):.3g}" + (
         f"; not seen: {', '.join(blind)}" if blind else ""
     )
-    return described(ax, f"Noise factor of {len(orders)} wanted orders: {told}.")
+    text = f"Noise factor of {len(orders)} wanted orders: {told}."
+    return described(ax, text, "Noise factor of every wanted order")

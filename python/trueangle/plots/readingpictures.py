@@ -99,7 +99,8 @@ def before_after_picture(
         name = f"{role}: rms {rms}, peak-to-peak {ptp} {unit.name}"
         clouds += [Cloud(part, number, role, name) for number, part in parts]  # type: ignore[arg-type]
         told.append(f"{role} correction rms {rms}, peak-to-peak {ptp} {unit.name}")
-    panel = Panel(ANGLE, f"error of held-out runs / {unit.name}", tuple(clouds), span)
+    y = f"error of held-out runs / {unit.name}"
+    panel = Panel(ANGLE, y, tuple(clouds), span, zero=True)
     return PanelPicture((panel,), f"Error of {counted(pairs, 'held-out run')}: {'; '.join(told)}.")
 
 
@@ -126,6 +127,7 @@ def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> PanelP
         span,
         angles=against == "angle",
         medians=binned_medians(scaled),
+        zero=True,
     )
     rest = np.concatenate([part.y for part in scaled])
     told = (
@@ -160,7 +162,7 @@ def comparison_picture(
     panels = [whole]
     if known is not None and (strong := _gear_order(known, span[1] - span[0])) is not None:
         panels.append(magnified_segment(whole, strong))
-    panels.append(Panel(ANGLE, f"difference / {unit.name}", tuple(rest), span))
+    panels.append(Panel(ANGLE, f"difference / {unit.name}", tuple(rest), span, zero=True))
     deviation = float(np.concatenate([cloud.points.y for cloud in rest]).std())
     told = (
         f"Measured and simulated error of {counted(expected, 'run')} over the angle; they differ "

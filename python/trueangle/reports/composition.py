@@ -60,7 +60,8 @@ class Report(Page):
     content : dict
         Every number of the page, plain values: what the page carries as JSON.
     figures : dict of str to dict
-        Interactive figures by name: an ``alt`` text and their charts as Bokeh documents.
+        Figures by name: an ``alt`` text, their ``charts`` (`trueangle.plots`) and how these are
+        arranged.
     """
 
     title: str
@@ -197,7 +198,7 @@ def report(
     Raises
     ------
     MissingExtraError
-        jinja2 or bokeh is not installed (``pip install trueangle[report]``).
+        jinja2 or matplotlib is not installed (``pip install trueangle[report]``).
 
     Examples
     --------
@@ -241,9 +242,7 @@ def report(
     if positions is not None:
         raise ArgumentError("positions are those of a certificate: give certificate too")
     sizes = measured_content(found)
-    scale = error_scale(
-        errors_in, sizes["error"]["rms_arcsec"], sizes["error"]["max_abs_arcsec"], found
-    )
+    scale = error_scale(errors_in, sizes["error"]["rms_arcsec"], found)
     at = current_deadline()
     at.at("fitting", 0, _STAGES)
     fit, selection, why_not = fit_or_reason(found, orders, joint)

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
 from ..errors import RankError
-from ..fitting.phases import Phases, run_phases
+from ..fitting.phases import run_phases
 from ..plots import curves
+from ..plots.amplitudespectrum import draw_spectrum, spectrum_text
 from ..plots.curves import Points
+from ..plots.diagnosispictures import draw_error_left
+from ..plots.drawnpanel import draw_panel
 from ..plots.orderlines import order_lines
+from ..plots.pagechart import page_axes, page_chart
+from ..plots.panel import PanelPicture
+from ..plots.phasesoverruns import draw_phase_of_order
 from ..plots.readingpictures import (
     before_after_picture,
     comparison_picture,
     errors_picture,
     residual_picture,
 )
-from ..plots.simulatedcurves import ErrorLeft, error_left_of, simulated_points
+from ..plots.simulatedcurves import error_left_of, simulated_points
 from ..support.arrays import Array
 from ..support.display_units import significant_digits
 from ..support.layout import counted
-from .charts import Chart, Figure, chart_figure, chart_run_marker, css_run_colour
 from .linenames import LineNames
-from .panelcharts import panel_figure
 from .scale import ErrorScale
-from .spectrum import spectrum_figure
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -35,6 +39,20 @@ if TYPE_CHECKING:
     from ..fitting.result import FitResult
     from ..runs.run import CalibrationRun
     from ..simulation import Simulation
+
+#: A figure of the report: its alternative text, its charts, and how these are arranged.
+Figure: TypeAlias = dict[str, Any]
+
+#: Readings drawn in one chart at most: more do not show, and make the page heavy and slow.
+_MOST_POINTS: Final = 3_000
+#: Runs up to which as many are drawn; of more, whose tables are long, fewer: a page weighs 1 MB.
+_MOST_RUNS: Final = 12
+#: Width of a chart that has the page, and of one next to another, inches.
+_WIDE, _NARROW = 7.5, 3.4
+#: Orders whose phases are shown, the largest.
+_MOST_PHASES: Final = 12
+#: Part of the measured error that a simulation must expect to be drawn with it.
+_FLAT: Final = 1e-3
 
 
 def figures_of_runs(
@@ -46,7 +64,7 @@ def figures_of_runs(
     scale: ErrorScale,
 ) -> dict[str, Figure]:
     """Figures of a report on runs: those that the fit, the selection and the gain allow."""
-    made = {"errors": panel_figure(errors_picture(runs, fit, scale.unit), scale)}
+    made = {"errors": panel_figure(errors_picture(runs, fit, scale.unit))}
     # At one place no order can be looked for.
     if fit is not None or (selection is not None and order_lines(selection)):
         made["spectrum"] = spectrum_figure(fit, selection, name, scale)
@@ -58,8 +76,94 @@ def figures_of_runs(
             made["phases"] = multiples
         for signal in _signals_present(fit):
             picture = residual_picture(fit, signal, scale.unit)
-            made[f"residual-{signal}"] = panel_figure(picture, scale)
+            made[f"residual-{signal}"] = panel_figure(picture, height="height:16rem")
     return made
+
+
+def figures_of_diagnosis(
+    diagnosis: Diagnosis,
+    runs: Sequence[CalibrationRun],
+    sim: Simulation,
+    scale: ErrorScale,
+) -> dict[str, Figure]:
+    """Measured against simulated; what is left without each of several causes.
+
+    A chart of one dot says less than the sentence next to it: it is omitted; so is a simulation
+    that expects no error, with which the measured one would be drawn once more.
+    """
+    pairs = simulated_points(runs, sim)
+    expected = max(float(np.ptp(simulated.y)) for _, simulated in pairs)
+    found = {}
+    if expected > _FLAT * diagnosis.discrepancy.peak_to_peak:
+        picture = comparison_picture(pairs, scale.unit, diagnosis.extended)
+        arrangement = "stacked" if len(picture.panels) == 2 else "above"
+        found["measured-simulated"] = panel_figure(picture, arrangement, "height:16rem")
+    left = error_left_of(diagnosis)
+    if left is not None and len(left.rows) > 2:
+        ax = page_axes(5.0, 1.0 + 0.3 * len(left.rows))
+        # The title says "without each cause".
+        rows = tuple((name.removeprefix("without "), rms) for name, rms in left.rows)
+        draw_error_left(ax, replace(left, rows=rows), scale.unit)
+        chart = page_chart(ax, height=f"height:{3 + 2.2 * len(left.rows):.3g}rem")
+        found["error-left"] = {
+            "alt": left.told(scale.unit), "charts": [chart], "arrangement": "row",
+        }  # fmt: skip
+    return found
+
+
+def panel_figure(
+    picture: PanelPicture, arrangement: str = "row", height: str = "height:22rem"
+) -> Figure:
+    """All panels of a picture; the main one is twice as wide as its segment."""
+    charts = []
+    for number, panel in enumerate(picture.panels):
+        grow = 2.0 if number == 0 else 1.0
+        ax = page_axes(_NARROW if panel.title and arrangement == "row" else _WIDE)
+        runs = len({cloud.run for cloud in panel.clouds})
+        most = sum(cloud.points.y.size for cloud in panel.clouds)
+        if not panel.title:
+            most = min(most, int(_MOST_POINTS * min(1.0, _MOST_RUNS / runs)))
+        draw_panel(ax, panel, most)
+        charts.append(page_chart(ax, title=panel.title, grow=grow, height=height))
+    more = "".join(f" {panel.title} is shown next to it." for panel in picture.panels[1:]
+                   if panel.title)  # fmt: skip
+    return {"alt": picture.told + more, "charts": charts, "arrangement": arrangement}
+
+
+def spectrum_figure(
+    fit: FitResult | None, selection: OrderSelection | None, name: LineNames, scale: ErrorScale
+) -> Figure:
+    """Amplitude of every order: candidates of a selection, or the orders of a fit."""
+    result = fit if selection is None else selection
+    assert result is not None
+    lines = order_lines(result)
+    ax = page_axes(_WIDE)
+    draw_spectrum(ax, lines, scale.unit, fitted=selection is None, name=name)
+    alt = spectrum_text(lines, scale.unit, fitted=selection is None)
+    return {"alt": alt, "charts": [page_chart(ax)], "arrangement": "row"}
+
+
+def phase_figure(fit: FitResult, name: LineNames, scale: ErrorScale) -> Figure | None:
+    """Phase of every order in every run; None where no run holds them, or there is one."""
+    try:
+        found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST_PHASES]
+    except RankError:
+        return None
+    if not found or len(found[0].labels) < 2:
+        return None
+    numbers = {(run.label or str(i + 1)): i for i, run in enumerate(fit.runs)}
+    charts = []
+    for order in sorted(found, key=lambda p: p.order):
+        ax = page_axes(_NARROW, 2.0)
+        draw_phase_of_order(ax, order, numbers, scale.unit)
+        size = significant_digits(scale.factor * float(order.amplitude.mean()), 3)
+        title = f"{name(order.order).capitalize()}: {size} {scale.name}"
+        charts.append(page_chart(ax, title=title, height="height:11rem"))
+    alt = (
+        f"Phases of {counted(charts, 'order')}, a chart for each, one dot per run. Dots of one "
+        "order on a level line are a systematic error."
+    )
+    return {"alt": alt, "charts": charts, "arrangement": "multiples"}
 
 
 def _before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: ErrorScale) -> Figure:
@@ -69,7 +173,7 @@ def _before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: ErrorSca
         x = curves.reference_degrees(run.run, span[0])
         number = next(i for i, known in enumerate(runs) if known is run.run)
         pairs.append((number, Points(run.label, x, run.before), Points(run.label, x, run.after)))
-    return panel_figure(before_after_picture(pairs, span, scale.unit), scale)
+    return panel_figure(before_after_picture(pairs, span, scale.unit))
 
 
 def _signals_present(fit: FitResult) -> list[curves.Signal]:
@@ -85,115 +189,3 @@ def _signals_present(fit: FitResult) -> list[curves.Signal]:
 def _signal(run: CalibrationRun, name: str) -> Array | None:
     value: Array | None = run.reference if name == "angle" else getattr(run, name)
     return value
-
-
-#: Part of the measured error that a simulation must expect to be drawn beside it.
-_FLAT = 1e-3
-#: Height of one of the charts that stand above each other.
-_HEIGHT_REM = 16.0
-
-
-def figures_of_diagnosis(
-    diagnosis: Diagnosis,
-    runs: Sequence[CalibrationRun],
-    sim: Simulation,
-    scale: ErrorScale,
-) -> dict[str, Figure]:
-    """Measured against simulated; what is left without each of several causes.
-
-    A chart of one dot says less than the sentence beside it: it is left out; so is a simulation
-    that expects no error, beside which the measured one would be drawn once more.
-    """
-    pairs = simulated_points(runs, sim)
-    expected = max(float(np.ptp(simulated.y)) for _, simulated in pairs)
-    found = {}
-    if expected > _FLAT * diagnosis.discrepancy.peak_to_peak:
-        picture = comparison_picture(pairs, scale.unit, diagnosis.extended)
-        arrangement = "stacked" if len(picture.panels) == 2 else "above"
-        found["measured-simulated"] = panel_figure(
-            picture, scale, arrangement, height_rem=_HEIGHT_REM
-        )
-    left = error_left_of(diagnosis)
-    if left is not None and len(left.rows) > 2:
-        found["error-left"] = _left(left, scale)
-    return found
-
-
-def _left(left: ErrorLeft, scale: ErrorScale) -> Figure:
-    """On a logarithmic axis: one cause may leave a hundred times what another does."""
-    # The title says "without each cause".
-    names = [name.removeprefix("without ") for name, _ in left.rows]
-    sizes = scale.of(np.array([rms for _, rms in left.rows]))
-    noise = float(scale.of(np.array([left.noise]))[0])
-    low, high = 0.6 * min(float(sizes.min()), noise), 1.5 * max(float(sizes.max()), noise)
-    chart = Chart(
-        left.axis(scale.unit),
-        "",
-        x_range=(low, high),
-        log_x=True,
-        categories=names,
-        height_rem=7.0 + 2.0 * len(names),
-    )
-    hover = f"@y: @x{{{scale.finest}}} {scale.name} rms"
-    chart.level_dots(names[:1], sizes[:1], colour="after", hover=hover)
-    chart.level_dots(names[1:], sizes[1:], colour="before", hover=hover)
-    chart.upright(noise, label=f"noise of one reading, {scale.unit.text(left.noise)}")
-    return chart_figure(left.told(scale.unit), [chart])
-
-
-#: Orders shown, the largest.
-_MOST: Final = 12
-#: Half height of a chart in degrees at least: nothing is made to look like scatter.
-_LEAST: Final = 15.0
-
-
-def phase_figure(fit: FitResult, name: LineNames, scale: ErrorScale) -> Figure | None:
-    """Phase of every order in every run; None where no run holds them, or there is one."""
-    try:
-        found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST]
-    except RankError:
-        return None
-    if not found or len(found[0].labels) < 2:
-        return None
-    numbers = {(run.label or str(i + 1)): i for i, run in enumerate(fit.runs)}
-    charts = [
-        _of_order(order, numbers, name(order.order), scale)
-        for order in sorted(found, key=lambda p: p.order)
-    ]
-    alt = (
-        f"Phases of {counted(charts, 'order')}, a chart for each, one dot per run. Dots of one "
-        "order on a level line are a systematic error."
-    )
-    return chart_figure(alt, charts, "multiples")
-
-
-def _of_order(order: Phases, numbers: dict[str, int], name: str, scale: ErrorScale) -> Chart:
-    mean = np.angle(np.mean(order.amplitude * np.exp(1j * order.phase)))
-    around = np.angle(np.exp(1j * (order.phase - mean)))
-    degrees = np.degrees(mean + around)
-    middle = float(np.degrees(mean))
-    if middle < 0.0:
-        degrees, middle = degrees + 360.0, middle + 360.0
-    half = min(max(1.3 * float(np.abs(np.degrees(around)).max()), _LEAST), 190.0)
-    size = significant_digits(scale.factor * float(order.amplitude.mean()), 3)
-    chart = Chart(
-        "run",
-        "phase / deg",
-        x_range=(0.3, len(order.labels) + 0.7),
-        y_range=(middle - half, middle + half),
-        title=f"{name.capitalize()}: {size} {scale.name}",
-        height_rem=11.0,
-    )
-    chart.whole_axis(1.0, float(len(order.labels)), 7)
-    for place, label in enumerate(order.labels):
-        number = numbers[label]
-        chart.dots(
-            np.array([place + 1.0]),
-            degrees[place : place + 1],
-            colour=css_run_colour(number),
-            marker=chart_run_marker(number),
-            run=number,
-            size=8.0,
-            hover=f"run {label}: {scale.unit.text(float(order.amplitude[place]))} at @y{{0.0}}°",
-        )
-    return chart

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
@@ -10,23 +9,22 @@ from typing import Any, Final
 import numpy as np
 
 from ..fleets.history import HistoryRow
-from ..fleets.result import BetweenOrder, CommonOrder, Fleet
+from ..fleets.result import CommonOrder, Fleet
 from ..fleets.unit import FleetUnit
-from ..plots.fleetpictures import RADIUS_OF_95, turn_pattern
+from ..plots.controlcharts import draw_sums
+from ..plots.fleetpictures import draw_pattern, draw_phasor_plane, turn_pattern
+from ..plots.pagechart import page_axes, page_chart
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
-from .chartaxes import ChartAxis
 from .page import Page, filled_template
-from .stills import StillMark, StillPicture, still_picture
 
 #: Units whose patterns are drawn at most, those that need something first.
 _DRAWN: Final = 24
 #: Orders whose phasors are drawn: those in which units differ most.
 _PHASORS: Final = 3
-#: Angles of a pattern at least, and to a period of its highest order.
-_ANGLES: Final = (361, 8)
-#: Height, rem, at which a picture of a third of the page is as wide as high between its axes.
-_SQUARE: Final = 14.6
+#: Width of a chart, inches, and its height on the page.
+_WIDTH: Final = 2.8
+_LOW: Final = "height:11rem"
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +56,6 @@ class FleetReport(Page):
         return arcsec(1.0, self.fleet.period)
 
     def _written(self) -> str:
-        from markupsafe import Markup
-
         odd = [unit for unit in self.fleet.units if unit.verdict != "fine"]
         drawn = self.fleet.units[:_DRAWN]
         return filled_template(
@@ -75,7 +71,6 @@ class FleetReport(Page):
             patterns=[self._pattern(unit) for unit in drawn],
             phasors=[self._phasor(at) for at in self._spread_most()],
             orders=list(zip(self.fleet.common, self.fleet.between, strict=True)),
-            svg=Markup,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -101,71 +96,50 @@ class FleetReport(Page):
     def _dates(self, unit: str) -> int:
         return sum(row.unit == unit for row in self.fleet.history)
 
-    def _chart(self, unit: str) -> StillPicture:
+    @property
+    def _size(self) -> float:
+        return self._scale * self.unit.per_arcsec
+
+    @cached_property
+    def _highest(self) -> float:
+        """What the axes of all patterns reach to."""
+        angle = np.linspace(0.0, 360.0, 361)
+        patterns = [turn_pattern(unit.orders, angle) for unit in self.fleet.units[:_DRAWN]]
+        return 1.1 * self._size * float(np.abs(patterns).max(initial=0.0)) or 1.0
+
+    def _chart(self, unit: str) -> dict[str, Any]:
         """The cumulative sums of a unit's orders over its dates, and their limit."""
         rows = [row for row in self.fleet.history if row.unit == unit]
-        date = np.arange(2.0, len(rows) + 2.0)
-        limit = rows[-1].cusum_limit
+        ax = page_axes(_WIDTH, 2.0)
         sums = np.array([[one.cusum for one in row.orders] for row in rows])
-        most = 1.1 * max(limit, float(sums.max()))
-        across = ChartAxis("date", (1.5, len(rows) + 1.5))
-        across.at_whole(2.0, len(rows) + 1.0, 6)
-        up = ChartAxis("cumulative sum", (0.0, most))
-        marks = [StillMark("line", (across.limits, (limit, limit)), "muted")]
-        for values in sums.T:
-            colour = "warning" if float(values[-1]) > limit else "after"
-            marks.append(StillMark("line", (date, values), colour))
+        draw_sums(ax, np.arange(2.0, len(rows) + 2.0), sums, rows[-1].cusum_limit)
+        ax.set_xlim(1.5, len(rows) + 1.5)
+        ax.xaxis.get_major_locator().set_params(integer=True)
+        ax.set_xlabel("date")
+        ax.set_ylabel("cumulative sum")
         title = f"{unit}: cumulative sums of its orders"
-        alt = f"{title} on {len(rows)} further dates, limit {limit:.3g}"
-        return StillPicture(title, alt, still_picture(marks, across, up, 9.0, 1.0 / 3.0))
+        alt = f"{title} on {len(rows)} further dates, limit {rows[-1].cusum_limit:.3g}"
+        return page_chart(ax, title=title, height=_LOW) | {"alt": alt}
 
-    def _pattern(self, unit: FleetUnit) -> StillPicture:
+    def _pattern(self, unit: FleetUnit) -> dict[str, Any]:
         """The error of a unit over a turn; the same axis for all, so that sizes compare."""
-        size = self._scale * self.unit.per_arcsec
-        highest = max((row.order for row in unit.orders), default=1.0)
-        angle = np.linspace(0.0, 360.0, max(_ANGLES[0], math.ceil(_ANGLES[1] * highest) + 1))
-        most = 0.5 * size * max(one.peak_to_peak for one in self.fleet.units[:_DRAWN]) * 1.1
-        across = ChartAxis("true angle / deg", (0.0, 360.0))
-        across.at_angles(0.0, 360.0, 4)
-        up = ChartAxis(f"error / {self.unit.name}", (-most or -1.0, most or 1.0))
-        colour = "after" if unit.verdict == "fine" else "warning"
-        marks = [StillMark("line", (angle, size * turn_pattern(unit.orders, angle)), colour)]
-        said = f"{unit.unit}: {unit.verdict.replace('_', ' ')}"
+        ax = page_axes(_WIDTH, 2.0)
+        draw_pattern(ax, self.fleet, unit, self._size)
+        ax.set_ylim(-self._highest, self._highest)
+        ax.set_xlabel("true angle / deg")
+        ax.set_ylabel(f"error / {self.unit.name}")
+        title = f"{unit.unit}: {unit.verdict.replace('_', ' ')}"
         ptp = self.unit.text(self._scale * unit.peak_to_peak)
-        return StillPicture(
-            said,
-            f"error of {said}, {ptp} peak-to-peak",
-            still_picture(marks, across, up, 9.0, 1.0 / 3.0),
-        )
+        chart = page_chart(ax, title=title, height=_LOW)
+        return chart | {"alt": f"error of {title}, {ptp} peak-to-peak"}
 
-    def _phasor(self, at: int) -> StillPicture:
+    def _phasor(self, at: int) -> dict[str, Any]:
         """Cosine and sine of one order of every unit, and the circle that holds 95 % of them."""
-        size = self._scale * self.unit.per_arcsec
         common: CommonOrder = self.fleet.common[at]
-        between: BetweenOrder = self.fleet.between[at]
-        turn = np.linspace(0.0, 2.0 * math.pi, 91)
-        circle = RADIUS_OF_95 * between.std
-        marks = [
-            StillMark(
-                "line",
-                (
-                    size * (common.cosine + circle * np.cos(turn)),
-                    size * (common.sine + circle * np.sin(turn)),
-                ),
-                "muted",
-            )
-        ]
-        for fine, colour in ((True, "after"), (False, "warning")):
-            rows = [u.orders[at] for u in self.fleet.units if (u.verdict == "fine") == fine]
-            if rows:
-                phase = np.radians([row.phase_deg for row in rows])
-                amplitude = size * np.array([row.amplitude for row in rows])
-                places = (amplitude * np.sin(phase), amplitude * np.cos(phase))
-                marks.append(StillMark("dots", places, colour, 8.0))
-        reach = 1.1 * max(np.abs(part).max() for mark in marks for part in mark.arrays) or 1.0
-        name = self.unit.name
-        across = ChartAxis(f"cosine / {name}", (-reach, reach))
-        up = ChartAxis(f"sine / {name}", (-reach, reach))
+        ax = page_axes(_WIDTH, _WIDTH)
+        draw_phasor_plane(ax, self.fleet, at, self._size)
+        ax.set_xlabel(f"cosine / {self.unit.name}")
+        ax.set_ylabel(f"sine / {self.unit.name}")
         title = f"order {common.order:g} of the {common.shaft}"
         alt = f"cosine and sine of {title} of every unit, and the circle that holds 95 % of them"
-        return StillPicture(title, alt, still_picture(marks, across, up, _SQUARE, 1.0 / 3.0))
+        return page_chart(ax, title=title, height="aspect-ratio:0.98") | {"alt": alt}

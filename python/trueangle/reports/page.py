@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
 import os
 import shutil
 import subprocess
-from functools import cached_property, lru_cache
-from importlib.util import find_spec
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from ..errors import ArgumentError, MissingExtraError
+from ..plots.pagechart import run_swatch
 from ..support.files import PAGE, PDF, FileKind, check_output, external_output, written_atomically
 from ..support.plainresult import ShownResult
-from . import charts, wording
+from . import wording
 from .numbers import Numbers
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 _TEMPLATES = Path(__file__).parent / "templates"
-
-#: Signs of the code that end or escape something in HTML, and those that stand for them.
-_SIGNS = str.maketrans("<>&", "[]:")
 
 #: Names that browsers with Chromium's printing go by.
 _BROWSERS: Final = (
@@ -43,37 +38,19 @@ _TIMEOUT_S: Final = 120
 _OPTIONS = ("headless", "disable-gpu", "no-pdf-header-footer", "virtual-time-budget=20000")
 
 
-def rendered_report(
-    content: dict[str, Any], figures: dict[str, dict[str, Any]], framed: bool = False
-) -> str:
-    """A report as HTML: style, scripts, plotting library, content and figures inside.
-
-    ``framed`` in a page that holds the library, it takes that one.
-    """
+def rendered_report(content: dict[str, Any], figures: dict[str, dict[str, Any]]) -> str:
+    """A report as HTML: style, script, content and figures inside."""
     made = _template_environment()
     from markupsafe import Markup
 
-    numbers = Numbers(content)
-    made.globals |= {"show": numbers, "wording": wording, "swatch": charts.run_swatch}
+    made.globals |= {"show": Numbers(content), "wording": wording, "swatch": run_swatch}
     return made.get_template("report.html.j2").render(
         c=content,
         figures=figures,
         result_json=Markup(_embedded(content)),
-        figures_packed=Markup(_packed(json.dumps(_live(figures), separators=(",", ":")))),
-        still=Markup,
         style=Markup((_TEMPLATES / "report.css").read_text("utf-8")),
         script=Markup((_TEMPLATES / "report.js").read_text("utf-8")),
-        library=Markup("" if framed else bokeh_library()),
     )
-
-
-def _live(figures: dict[str, Any]) -> dict[str, Any]:
-    """What the script draws: all but the stills, which the page holds itself."""
-    return {
-        name: figure
-        | {"charts": [{k: v for k, v in c.items() if k != "still"} for c in figure["charts"]]}
-        for name, figure in figures.items()
-    }
 
 
 def _template_environment() -> Environment:
@@ -88,7 +65,7 @@ def _template_environment() -> Environment:
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
     except ModuleNotFoundError:
         raise MissingExtraError(
-            "reports need bokeh and jinja2: pip install 'trueangle[report]'"
+            "reports need matplotlib and jinja2: pip install 'trueangle[report]'"
         ) from None
     return Environment(
         loader=FileSystemLoader(_TEMPLATES),
@@ -122,7 +99,7 @@ class Page(ShownResult):
         Raises
         ------
         MissingExtraError
-            jinja2 or bokeh is not installed.
+            jinja2 or matplotlib is not installed.
         """
         # Names of files may hold bytes that are no text.
         return self._written().encode("utf-8", "replace").decode("utf-8")
@@ -155,23 +132,6 @@ def _embedded(value: Any) -> str:
     """JSON that cannot end the script element it stands in."""
     text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
-
-
-@lru_cache(maxsize=1)
-def bokeh_library() -> str:
-    """The charting library, compressed; without its widgets, tables and typesetting."""
-    found = find_spec("bokeh")  # Its Python takes half a second to import, and is not needed.
-    if found is None or found.origin is None:
-        raise MissingExtraError("reports need bokeh and jinja2: pip install 'trueangle[report]'")
-    script = Path(found.origin).parent / "server" / "static" / "js" / "bokeh.min.js"
-    return _packed(script.read_text("utf-8"))
-
-
-def _packed(text: str) -> str:
-    """Text as the page's script unpacks it: length and gzip, in base 85 without signs of HTML."""
-    packed = gzip.compress(text.encode("utf-8"), 9, mtime=0)
-    whole = len(packed).to_bytes(4, "big") + packed
-    return base64.b85encode(whole, pad=True).decode("ascii").translate(_SIGNS)
 
 
 def find_browser() -> str | None:

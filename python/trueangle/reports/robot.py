@@ -16,7 +16,7 @@ from ..support.layout import counted, laid_out
 from . import wording
 from .composition import Report
 from .measured import measured_content
-from .page import Page, bokeh_library, filled_template, rendered_report
+from .page import Page, filled_template, rendered_report
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
@@ -176,11 +176,10 @@ class RobotReport(Page):
             title=self.title,
             ranking=self.ranking,
             pages={
-                row.joint: rendered_report(made.content, made.figures, True)
+                row.joint: rendered_report(made.content, made.figures)
                 for row in self.ranking
                 for made in [self.reports[row.joint]]
             },
-            library=bokeh_library(),
             unit=error_unit(self.errors_in, largest),
         )
 

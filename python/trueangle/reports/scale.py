@@ -4,16 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from ..runs.run import CalibrationRun
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
-
-#: Part of the largest error that hovering over a point still shows.
-_FINEST: Final = 3e-4
 
 
 @dataclass(frozen=True)
@@ -23,14 +17,11 @@ class ErrorScale:
     Attributes
     ----------
     unit : ErrorUnit
-    largest : float
-        Largest absolute error of the page, arcsec.
     turn : float or None
         Counts of a turn where the unit is a count.
     """
 
     unit: ErrorUnit
-    largest: float
     turn: float | None = None
 
     @property
@@ -44,17 +35,6 @@ class ErrorScale:
         return self.unit.per_arcsec
 
     @property
-    def finest(self) -> str:
-        """Format of a number that is read off a figure, as Bokeh writes it."""
-        decimals = self.unit.decimals(_FINEST * self.largest, 1)
-        return f"0.{'0' * decimals}" if decimals else "0"
-
-    @property
-    def read(self) -> str:
-        """An error that is read off a figure by hovering, with its unit."""
-        return f"@y{{{self.finest}}} {self.name}"
-
-    @property
     def defined(self) -> str:
         """What the unit is, for those who do not know it."""
         return {
@@ -64,18 +44,12 @@ class ErrorScale:
             "count": f"in counts of {self.turn:g} to a turn" if self.turn else "in counts",
         }[self.name]
 
-    def of(self, arcsec: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Errors in the unit."""
-        return arcsec * self.factor
-
     def to_dict(self) -> dict[str, Any]:
         """For the content: the unit of the page, beside numbers that stay in arcsec."""
         return {"unit": self.name, "per_arcsec": self.factor, "defined": self.defined}
 
 
-def error_scale(
-    asked: ErrorsIn, rms: float, largest: float, runs: Sequence[CalibrationRun]
-) -> ErrorScale:
+def error_scale(asked: ErrorsIn, rms: float, runs: Sequence[CalibrationRun]) -> ErrorScale:
     """The scale asked for; counts are those of the runs where no number says otherwise.
 
     Raises
@@ -86,4 +60,4 @@ def error_scale(
     period = runs[0].period
     unit = error_unit(asked, sine_of_rms(rms), period)
     turn = None if unit.name != "count" else period if isinstance(asked, str) else float(asked)
-    return ErrorScale(unit, largest, turn)
+    return ErrorScale(unit, turn)

@@ -4,22 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from ..errors import ArgumentError
 from ..model.alarm import WatchedWindow
+from ..plots import palette
+from ..plots.controlcharts import draw_sums
+from ..plots.pagechart import page_axes, page_chart
 from ..support.angles import arcsec
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.layout import counted
-from .chartaxes import ChartAxis
 from .page import Page, filled_template
-from .stills import StillMark, StillPicture, still_picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: Orders whose windows are drawn at most: those whose sums rose highest.
 _DRAWN: Final = 12
+#: Widths of charts, inches, and the height of the smaller ones on the page.
+_WIDE, _HALF = 7.5, 3.7
+_LOW: Final = "height:11rem"
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +81,6 @@ class WatchReport(Page):
         return error_unit(self.errors_in, self._scale * float(self._sizes.max()), self.period)
 
     def _written(self) -> str:
-        from markupsafe import Markup
-
         highest = np.argsort(-self._sums.max(axis=0), kind="stable")
         drawn = np.sort(highest[:_DRAWN]).tolist()
         return filled_template(
@@ -88,7 +93,6 @@ class WatchReport(Page):
             chart=self._chart(),
             orders=[pair for k in drawn for pair in self._order(k)],
             drawn=len(drawn),
-            svg=Markup,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -125,44 +129,41 @@ class WatchReport(Page):
     def _sizes(self) -> Array:
         return np.array([[row.amplitude for row in one.orders] for one in self.windows])
 
-    def _across(self) -> ChartAxis:
+    def _axes(self, width: float, title: str) -> Axes:
+        """Axes over the windows."""
+        ax = page_axes(width, 0.35 * width)
         first, last = float(self._number[0]), float(self._number[-1])
-        axis = ChartAxis("window", (first - 0.5, last + 0.5))
-        axis.at_whole(first, last, 8)
-        return axis
+        ax.set_xlim(first - 0.5, last + 0.5)
+        ax.xaxis.get_major_locator().set_params(integer=True)
+        ax.set_xlabel("window")
+        ax.set_ylabel(title)
+        return ax
 
-    def _limited(self, values: Array) -> tuple[list[StillMark], ChartAxis]:
-        """Sums over the windows under their limit."""
-        limit = self.windows[-1].limit
-        across = self._across()
-        up = ChartAxis("cumulative sum", (0.0, 1.1 * max(limit, float(values.max()))))
-        marks = [StillMark("line", (across.limits, (limit, limit)), "muted")]
-        return [*marks, StillMark("line", (self._number, values), "after")], up
-
-    def _chart(self) -> StillPicture:
+    def _chart(self) -> dict[str, Any]:
         """The largest sum of all charts, those of the zero with them, and the alarms."""
-        largest = np.array([window.statistic for window in self.windows])
-        marks, up = self._limited(largest)
+        largest = np.array([[window.statistic] for window in self.windows])
+        ax = self._axes(_WIDE, "cumulative sum")
+        draw_sums(ax, self._number, largest, self.windows[-1].limit)
         if self.alarms:
-            places = [(one.window, one.statistic) for one in self.alarms]
-            marks.append(
-                StillMark("dots", tuple(np.array(places, dtype=np.float64).T), "warning", 8.0)
-            )
+            x, y = zip(*((one.window, one.statistic) for one in self.alarms), strict=True)
+            ax.plot(x, y, linestyle="none", marker="D", color=palette.WARNING, label="alarm")
         title = "largest cumulative sum of all charts"
         alt = f"{title} over {counted(self.windows, 'window')} with its limit, {self._told()}"
-        return StillPicture(title, alt, still_picture(marks, self._across(), up, 14.0, 1.0))
+        return page_chart(ax, title=title, height="height:14rem") | {"alt": alt}
 
-    def _order(self, k: int) -> tuple[StillPicture, StillPicture]:
+    def _order(self, k: int) -> tuple[dict[str, Any], dict[str, Any]]:
         """The sums of one order, and what it is off the model by."""
         order = f"order {self.windows[0].orders[k].order:g}"
-        marks, up = self._limited(self._sums[:, k])
+        ax = self._axes(_HALF, "cumulative sum")
+        draw_sums(ax, self._number, self._sums[:, k : k + 1], self.windows[-1].limit)
         title = f"{order}: cumulative sum"
         alt = f"{title}, {float(self._sums[:, k].max()):.3g} at most"
-        sums = StillPicture(title, alt, still_picture(marks, self._across(), up, 9.0, 0.5))
+        sums = page_chart(ax, title=title, height=_LOW) | {"alt": alt}
         size = self._scale * self._sizes[:, k]
+        shown = self.unit.per_arcsec * size
+        ax = self._axes(_HALF, f"size / {self.unit.name}")
+        ax.plot(self._number, shown, color=palette.AFTER)
+        ax.set_ylim(0.0, 1.1 * float(shown.max()) or 1.0)
         title = f"{order}: less the model"
         alt = f"{title}, {self.unit.text(float(size.max()))} at most"
-        shown = self.unit.per_arcsec * size
-        up = ChartAxis(f"size / {self.unit.name}", (0.0, 1.1 * float(shown.max()) or 1.0))
-        marks = [StillMark("line", (self._number, shown), "after")]
-        return sums, StillPicture(title, alt, still_picture(marks, self._across(), up, 9.0, 0.5))
+        return sums, page_chart(ax, title=title, height=_LOW) | {"alt": alt}

@@ -274,7 +274,7 @@ def test_another_broken_pipe_is_told(desk, capsys, monkeypatch):
 # -- no room, no permission
 
 #: Commands that need a library to draw.
-DRAWN = {"report": "bokeh", "plot": "matplotlib"}
+DRAWN = {"report": "jinja2", "plot": "matplotlib"}
 
 #: Commands and the files they write. The limit on the size of files is below each.
 WRITES = {
@@ -447,7 +447,7 @@ def test_progress_may_rewrite_its_own_line():
 
 
 def test_a_report_shows_labels_as_text(desk):
-    pytest.importorskip("bokeh")
+    pytest.importorskip("matplotlib")
     label = "<script>alert(1)</script>"
     (desk / "evil.csv").write_text(runs_text(label))
     assert main(["report", "evil.csv", "--orders", "1", "-o", "x.html", "--title", label]) == 0

@@ -288,7 +288,7 @@ def test_the_null_device_takes_the_output_and_stays(command, desk):
     except PermissionError:
         pytest.skip("devices cannot be made here")
     if command.startswith("report"):
-        pytest.importorskip("bokeh")
+        pytest.importorskip("matplotlib")
     assert main(named(WRITING[command][0], "node")) == 0
     assert stat.S_ISCHR(os.stat("node").st_mode)
 
@@ -361,7 +361,7 @@ def test_endless_devices_are_refused_as_inputs(arguments, device, desk, capsys):
 def test_runs_may_come_through_a_pipe(command, desk):
     """As ``trueangle orders <(zcat a.csv.gz)`` does, and ``... | trueangle fit /dev/stdin``."""
     if command == "report":
-        pytest.importorskip("bokeh")
+        pytest.importorskip("matplotlib")
     arguments = {
         "fit": ["fit", "/dev/stdin", "--orders", "1", "-o", "x.json"],
         "orders": ["orders", "/dev/stdin"],
@@ -462,7 +462,7 @@ def test_an_ending_of_another_format_is_refused(arguments, advice, desk, capsys)
 
 
 def test_a_report_named_pdf_is_one(desk, monkeypatch):
-    pytest.importorskip("bokeh")
+    pytest.importorskip("matplotlib")
     from trueangle.reports import composition
 
     def printed(html, path, browser=None):
@@ -476,7 +476,7 @@ def test_a_report_named_pdf_is_one(desk, monkeypatch):
 
 
 def test_a_report_named_pdf_without_a_browser_is_refused(desk, monkeypatch, capsys):
-    pytest.importorskip("bokeh")
+    pytest.importorskip("matplotlib")
     monkeypatch.setenv("PATH", "/nowhere")
     assert main(["report", "r.csv", "--orders", "1", "-o", "x.pdf"]) == 1
     assert "needs an installed browser" in one_line(capsys)

@@ -451,7 +451,7 @@ def test_the_name_that_an_unknown_ending_should_have_is_taken(
     ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.0])], period=360.0).save("m.json")
     words = [{"R": "runs.csv", "M": "m.json"}.get(word, word) for word in command.split()]
     if words[0] == "report":
-        pytest.importorskip("bokeh")
+        pytest.importorskip("matplotlib")
     assert main([*words, name]) == 1
     said = capsys.readouterr().err
     assert said.count("\n") == 1

@@ -298,7 +298,7 @@ def test_columns_that_tell_of_no_joint_are_left_to_the_error(tmp_path, capsys):
 
 
 def test_the_pages_of_all_joints_share_one_library(arm, tmp_path):
-    pytest.importorskip("bokeh")
+    pytest.importorskip("matplotlib")
     page = tmp_path / "arm.html"
     command = ["report", str(arm / "arm.csv"), "--robot", str(arm / "robot.toml")]
     assert main([*command, "-o", str(page)]) == 0

@@ -38,7 +38,7 @@ def commands():
     """Names of the commands whose libraries are there."""
     from importlib.util import find_spec
 
-    return [name for name in COMMANDS if name != "report" or find_spec("bokeh")]
+    return [name for name in COMMANDS if name != "report" or find_spec("matplotlib")]
 
 
 def furnish(folder):

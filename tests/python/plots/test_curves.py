@@ -146,9 +146,10 @@ def test_what_is_left_with_all_causes_and_without_each(errors_in, per):
     ax = error_left(SimpleNamespace(findings=found, noise=3.0), errors_in=errors_in)
     names = [mark.get_text() for mark in ax.get_yticklabels()]
     assert names == ["with all causes", "without backlash", "without lag"]
-    drawn = [bar.get_width() for bar in ax.patches]
+    assert ax.yaxis_inverted()  # as a list, from the top down
+    *dots, noise = ax.lines
+    drawn = np.concatenate([line.get_xdata() for line in dots])
     assert drawn == pytest.approx([4.0 * per, 30.0 * per, 7.0 * per])
-    (noise,) = ax.lines
     assert noise.get_xdata()[0] == pytest.approx(3.0 * per)
 
 

@@ -87,7 +87,7 @@ def test_what_a_diagnosis_leaves_is_drawn_in_its_unit() -> None:
     for unit, turn in (("auto", 1_296_000.0), ("deg", 360.0), (65536, 65536.0)):
         factor = turn / 1_296_000.0
         ax = plots.error_left(diagnosis, errors_in=unit)
-        drawn = [bar.get_width() for bar in ax.patches]
+        drawn = [float(line.get_xdata()[0]) for line in ax.lines[:2]]
         assert drawn == pytest.approx([factor * gain.after[0], factor * gain.before[0]])
         assert {1.0: "/ arcsec", 1.0 / 3600.0: "/ deg"}.get(factor, "/ count") in ax.get_xlabel()
         written = [float(text.get_text()) for text in ax.texts[:2]]

@@ -17,7 +17,7 @@ PAGES = [page for page in PAGES if "_build" not in page.parts and "_generated" n
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_every_block_runs(page, tmp_path):
     if page.stem == "report" or page.stem == "tutorial":
-        pytest.importorskip("bokeh")
+        pytest.importorskip("matplotlib")
         pytest.importorskip("jinja2")
     run_page(page, tmp_path)
 

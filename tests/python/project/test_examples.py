@@ -41,7 +41,7 @@ def test_long_log_comes_back_to_the_truth(kind):
 
 
 def test_rig_report_of_a_simulated_encoder(tmp_path):
-    pytest.importorskip("bokeh")
+    pytest.importorskip("matplotlib")
     pytest.importorskip("jinja2")
     out = run("rig_report.py", "-o", str(tmp_path / "rig"), TRUEANGLE_DATA=str(tmp_path))
     before, after = map(float, re.search(r"rms ([\d.]+) -> ([\d.]+)", out).groups())
@@ -53,7 +53,7 @@ def test_rig_report_of_a_simulated_encoder(tmp_path):
 
 
 def test_rig_report_of_the_measured_encoder(tmp_path, data_dir):
-    pytest.importorskip("bokeh")
+    pytest.importorskip("matplotlib")
     pytest.importorskip("jinja2")
     out = run("rig_report.py", str(data_dir / "rm44_repeat.csv"), "-o", str(tmp_path / "rig"))
     before, after = map(float, re.search(r"rms ([\d.]+) -> ([\d.]+)", out).groups())

@@ -24,7 +24,7 @@ def runs() -> list[ta.CalibrationRun]:
 def large():
     """One run over a part of a turn, degrees of error, several causes of one kind."""
     pytest.importorskip("jinja2")
-    pytest.importorskip("bokeh")
+    pytest.importorskip("matplotlib")
     believed = ta.Simulation(
         Joint(declared=(DeclaredShaft("stepper", cycles_per_turn=50.0),)),
         sigma_arcsec=10.0,
@@ -42,5 +42,5 @@ def large():
 @pytest.fixture(scope="session")
 def made(runs: list[ta.CalibrationRun]):
     pytest.importorskip("jinja2")
-    pytest.importorskip("bokeh")
+    pytest.importorskip("matplotlib")
     return ta.report(runs, orders=ORDERS, gear_ratio=100.0, title="A <joint> & its error")

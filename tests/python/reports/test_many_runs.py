@@ -3,18 +3,27 @@
 import numpy as np
 
 import trueangle as ta
+from plots.strokes import strokes
 from trueangle.plots.curves import Points, thinned_points
-from trueangle.reports.panelcharts import dots_of_run
+from trueangle.plots.panel import ANGLE, Cloud, Panel, PanelPicture
+from trueangle.reports.figures import panel_figure
 
 #: Bytes of a page at most.
 LARGEST = 1_000_000
 
 
 def test_few_runs_are_drawn_whole_and_many_in_part():
-    assert dots_of_run(1) == 2000
-    assert dots_of_run(12) == 166
-    totals = [runs * dots_of_run(runs) for runs in (12, 24, 48, 79)]
-    assert totals == sorted(totals, reverse=True)
+    totals = []
+    for runs in (1, 12, 24, 48, 79):
+        angle = np.linspace(0.0, 360.0, 2990 // min(runs, 12))
+        clouds = tuple(Cloud(Points(f"{k}", angle, angle), k) for k in range(runs))
+        picture = PanelPicture((Panel(ANGLE, "error / deg", clouds, (0.0, 360.0)),), "")
+        (chart,) = panel_figure(picture)["charts"]
+        drawn = strokes(chart)
+        assert {one.run for one in drawn} == set(range(runs))
+        totals.append(sum(len(one.points) for one in drawn))
+    assert totals[:2] == [2990, 12 * 249]
+    assert totals[1:] == sorted(totals[1:], reverse=True)
     assert totals[-1] > 400
 
 

@@ -1,4 +1,4 @@
-"""Coefficients, correlations, phases and axes of a page against the fit they come from."""
+"""Coefficients, correlations and phases of a page against the fit they come from."""
 
 import math
 
@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from plots.strokes import strokes
 from trueangle.fitting.orders.select import select_orders
 from trueangle.fitting.phases import run_phases
 from trueangle.plots.curves import Curve, Points
-from trueangle.reports import figures as page_figures
-from trueangle.reports.chartaxes import ChartAxis
+from trueangle.plots.pagechart import page_axes, page_chart
+from trueangle.plots.phasesoverruns import draw_phase_of_order
 from trueangle.reports.linenames import line_names
 from trueangle.reports.modelled import model_content, order_content
 from trueangle.reports.numbers import shortened_list
 from trueangle.reports.scale import error_scale
-from trueangle.reports.stills import StillMark, _Placement
+from trueangle.support.display_units import error_unit
 
 SEED = 56_100
 NAMES = line_names(None)
@@ -92,38 +93,19 @@ def test_the_evidence_of_orders_is_that_of_the_selection(period):
             assert told[key] == (pytest.approx(value) if math.isfinite(value) else None), key
 
 
-def test_phases_of_runs_stand_where_the_runs_have_them(fit, monkeypatch):
+def test_phases_of_runs_stand_where_the_runs_have_them(fit):
     """Each within half a turn of the mean, which lies in a turn from zero."""
-    drawn = []
-
-    class Chart(page_figures.Chart):
-        def dots(self, x, y, **more):
-            drawn.append((float(x[0]), float(y[0]), more["run"]))
-
-    monkeypatch.setattr(page_figures, "Chart", Chart)
-    scale = error_scale("arcsec", 50.0, 100.0, fit.runs)
     for order in run_phases(fit):
-        drawn.clear()
-        page_figures._of_order(order, {"r0": 0, "r1": 1, "r2": 2}, "output 1", scale)
-        assert [(x, run) for x, _, run in drawn] == [(1.0, 0), (2.0, 1), (3.0, 2)]
-        shown = np.array([y for _, y, _ in drawn])
+        ax = page_axes()
+        draw_phase_of_order(ax, order, {"r0": 0, "r1": 1, "r2": 2}, error_unit("arcsec"))
+        found = strokes(page_chart(ax))
+        assert [one.run for one in found] == [0, 1, 2]
+        places, shown = np.vstack([one.points for one in found]).T
+        np.testing.assert_allclose(places, [1.0, 2.0, 3.0], atol=1e-3)
         apart = np.exp(1j * np.radians(shown)) - np.exp(1j * order.phase)
-        np.testing.assert_allclose(apart, 0.0, atol=1e-12)
+        np.testing.assert_allclose(apart, 0.0, atol=1e-3)
         assert 0.0 <= shown.mean() < 360.0
         assert np.ptp(shown) > 1e-3
-
-
-@pytest.mark.parametrize("log", [False, True])
-def test_a_still_picture_places_numbers_along_its_axes(log):
-    """Equal steps, or equal factors, are equally far apart, and the ends are the axis's."""
-    limits = (1.0, 1000.0) if log else (-3.0, 12.0)
-    across, up = ChartAxis("x", limits, log), ChartAxis("y", limits, log)
-    place = _Placement(
-        [StillMark("dots", ([1.0], [1.0]), "fore")], across, up, (60.0, 660.0), (300.0, 0.0)
-    )
-    values = [1.0, 10.0, 100.0, 1000.0] if log else [-3.0, 2.0, 7.0, 12.0]
-    np.testing.assert_allclose(place.of(values, 0), [60.0, 260.0, 460.0, 660.0])
-    np.testing.assert_allclose(place.of(values, 1), [300.0, 200.0, 100.0, 0.0])
 
 
 @pytest.mark.parametrize(
@@ -132,11 +114,11 @@ def test_a_still_picture_places_numbers_along_its_axes(log):
 )
 def test_every_error_of_a_page_is_in_its_unit(asked, turn, fit):
     """A whole turn is what a turn has, in arrays, readings and curves alike."""
-    scale = error_scale(asked, 50.0, 100.0, fit.runs)
+    scale = error_scale(asked, 50.0, fit.runs)
     whole = np.array([1_296_000.0, -648_000.0])
     curve = Curve(np.zeros(2), whole, np.abs(whole)).scaled(scale.factor)
     readings = Points("a", np.zeros(2), whole).scaled(scale.factor)
-    for values in (scale.of(whole), readings.y, curve.error):
+    for values in (readings.y, curve.error):
         np.testing.assert_allclose(values, [turn, -turn / 2.0])
     np.testing.assert_allclose(curve.std, [turn, turn / 2.0])
 

@@ -26,9 +26,7 @@ def fit_of(runs, orders=(1, 3)):
 
 @pytest.mark.parametrize(("runs", "orders"), [(3, (1, 3)), (2, (1,)), (1, (1, 3))])
 def test_every_order_of_several_runs_has_a_chart(runs, orders):
-    figure = phase_figure(
-        fit_of(runs, orders), line_names(None), ErrorScale(error_unit("arcsec"), 100.0)
-    )
+    figure = phase_figure(fit_of(runs, orders), line_names(None), ErrorScale(error_unit("arcsec")))
     if runs == 1:
         assert figure is None
     else:

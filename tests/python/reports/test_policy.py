@@ -7,7 +7,7 @@ NEEDED = {
     "default-src": {"'none'"},
     "script-src": {"'unsafe-inline'"},
     "style-src": {"'unsafe-inline'"},
-    "img-src": {"data:", "blob:"},
+    "img-src": {"data:"},
 }
 
 

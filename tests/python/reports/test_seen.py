@@ -56,7 +56,7 @@ def test_it_stands_in_the_first_lines_of_the_summary(at_one_speed):
 
 def test_it_stands_in_the_first_lines_of_the_report(at_one_speed):
     pytest.importorskip("jinja2")
-    pytest.importorskip("bokeh")
+    pytest.importorskip("matplotlib")
     runs, simulation = at_one_speed
     page = ta.report(runs, simulation=simulation, orders=[1]).html
     body = page[page.index("<body") :]

@@ -78,7 +78,7 @@ def test_a_watched_joint_is_shown_alike_whatever_the_unit_of_its_readings(readin
     sizes = [row["amplitude_arcsec"] for row in page.to_dict()["windows"][0]["orders"]]
     np.testing.assert_allclose(sizes, [0.5 * arcsec, arcsec])
     _, size = page._order(1)
-    assert page.unit.text(arcsec) in size.alt
+    assert page.unit.text(arcsec) in size["alt"]
     asked = WatchReport(windows(turn, arcsec), turn, errors_in=4096.0)
     assert asked.unit.text(ARCSEC / 4096.0) == "1.000 count"
 
@@ -88,14 +88,14 @@ def test_counts_are_of_the_turn_that_is_asked_for(turn):
     """A number is the counts of a turn; the word means those of the readings."""
     x = np.arange(8) / 8.0 * turn
     runs = [ta.CalibrationRun(x, x, turn)]
-    asked = error_scale(4096.0, 10.0, 20.0, runs)
+    asked = error_scale(4096.0, 10.0, runs)
     assert (asked.name, asked.turn) == ("count", 4096.0)
     assert asked.factor == pytest.approx(4096.0 / ARCSEC)
     assert asked.defined == "in counts of 4096 to a turn"
     if turn == 8192.0:
-        own = error_scale("count", 10.0, 20.0, runs)
+        own = error_scale("count", 10.0, runs)
         assert (own.turn, own.factor) == (8192.0, pytest.approx(8192.0 / ARCSEC))
-    assert error_scale("arcsec", 10.0, 20.0, runs).turn is None
+    assert error_scale("arcsec", 10.0, runs).turn is None
 
 
 def opened(*conditions, turn=360.0):

@@ -315,7 +315,7 @@ def test_quoted_patterns_are_expanded_by_every_command(command, tmp_path, capsys
     more = {"fit": ["-o", "m.json"], "report": ["-o", "r.html"]}.get(command, [])
     more = ["-m", "joint.json", "-o", "out"] if command == "correct" else more
     if command == "report":
-        pytest.importorskip("bokeh")
+        pytest.importorskip("matplotlib")
     assert main([command, "log*.csv", *more]) == 0
     assert main([command, "nothing*.csv", *more]) == 1
     assert "nothing*.csv: no file matches this pattern" in capsys.readouterr().err

@@ -1,98 +1,54 @@
-"""Interactive charts and still pictures of a page, as lines to be compared."""
+"""Charts of a page, as lines to be compared: titles, axes, legends, names, what is drawn."""
 
 from __future__ import annotations
 
-import base64
-import gzip
-import json
 import re
 from collections.abc import Iterator
-from typing import Any
+from html import unescape
 
-import numpy as np
+from .views import few_numbers
 
-from .views import few_numbers, shown
-
-#: The page's signs of HTML back to those of base 85.
-_SIGNS = str.maketrans("[]:", "<>&")
-
-#: Digits of a number that is drawn: charts hold some four.
+#: Digits of a place in a box.
 DRAWN = 4
-
-#: What a model says of how it looks.
-_LOOKS = (
-    "marker", "size", "fill_alpha", "line_alpha", "line_width", "line_dash", "text_align",
-    "text_baseline", "y_offset",
-)  # fmt: skip
 
 
 def chart_lines(page: str) -> Iterator[str]:
-    """Every chart of a page, or where it has none every still picture."""
-    packed = re.search(r'<script[^>]*id="figures">([^<]*)</script>', page)
-    if packed is None:
-        yield from still_lines(page)
-        return
-    whole = base64.b85decode(packed[1].translate(_SIGNS))
-    length = int.from_bytes(whole[:4], "big")
-    figures = json.loads(gzip.decompress(whole[4 : 4 + length]))
-    for name, figure in figures.items():
-        yield f"figure {name}, {figure['arrangement']}: {figure['alt']}"
-        for chart in figure["charts"]:
-            size = f"{shown(chart['grow'])} wide, {chart['height_rem']} high"
-            yield f"  chart {chart['title']!r}, {size}"
-            for entry in chart["legend"]:
-                yield f"    legend: {entry['sign']} {entry['label']} {entry['colour']}"
-            yield from _figure_lines(chart["document"]["doc"]["roots"][0]["attributes"])
+    """Every chart of a page, with the figure that it is of."""
+    for part in re.split(r'(?=<div class="plot |<figure role="img")', page)[1:]:
+        alt = re.search(r'aria-label="([^"]*)"', part)
+        name = re.search(r'id="figure-([^"]*)"', part)
+        yield f"figure {name[1] if name else ''}: {unescape(alt[1]) if alt else ''}"
+        for chart in re.split(r'(?=<div class="chart")', part.split("</figure>")[0])[1:]:
+            yield from _chart_lines(chart)
 
 
-def _figure_lines(figure: dict[str, Any]) -> Iterator[str]:
-    for name, place in (("x", "below"), ("y", "left")):
-        (axis,) = figure[place]
-        told, span = axis["attributes"], figure[f"{name}_range"]["attributes"]
-        ends = [shown(span[key]) for key in ("start", "end") if key in span]
-        ticks = told.get("ticker", {}).get("attributes", {}).get("ticks", [])
-        line = f"    {name}: {told['axis_label']} {axis['name']} {' to '.join(ends)}"
-        line += f" {', '.join(span['factors'])}" if "factors" in span else ""
-        line += f", ticks {', '.join(map(shown, ticks))}" if ticks else ""
-        yield line + ("" if told["visible"] else ", not shown")
-    hovers = {
-        entry["id"]: tool["attributes"]["tooltips"]
-        for tool in figure["toolbar"]["attributes"]["tools"]
-        for entry in tool["attributes"].get("renderers", [])
-    }
-    for drawn in figure["renderers"]:
-        held = drawn["attributes"]
-        glyph = held["glyph"]["attributes"]
-        looks = [f"{key} {_value(glyph[key])}" for key in _LOOKS if key in glyph]
-        yield f"    {held['glyph']['name']} {' '.join([*held['tags'], *looks])}"
-        for column, values in held["data_source"]["attributes"]["data"]["entries"]:
-            yield f"      {column}: {_column(values)}"
-        if drawn["id"] in hovers:
-            yield f"      over it: {hovers[drawn['id']]}"
-    for span in figure["center"]:
-        if span["name"] == "Span":
-            told = span["attributes"]
-            yield f"    upright at {shown(told['location'])} {told['line_dash']} {told['tags'][0]}"
+def _chart_lines(chart: str) -> Iterator[str]:
+    title = re.search(r'class="chart-title">(.*?)</p>', chart)
+    style = re.search(r'class="chart" style="([^"]*)"', chart)
+    yield f"  chart {_text(title[1]) if title else ''!r}, {style[1] if style else ''}"
+    for entry in re.findall(r'<span><span style="color:([^"]*)".*?>(.)</span> (.*?)</span>', chart):
+        yield f"    legend: {entry[1]} {_text(entry[2])} {entry[0]}"
+    for which, name in (("x", "along"), ("y", "up")):
+        told = re.search(rf'<span class="{name}">(.*?)</span>', chart)
+        ends = re.search(rf'data-{which}="([^"]*)"', chart)
+        block = re.search(rf'<div class="{which}">(.*?)</div>', chart)
+        ticks = re.findall(r"<span[^>]*>(.*?)</span>", block[1]) if block else []
+        line = f"    {which}: {_text(told[1]) if told else ''} {_ends(ends[1]) if ends else ''}"
+        yield f"{line}, ticks {', '.join(map(_text, ticks))}"
+    for place, text in re.findall(r'<span class="name ([^>]*)>(.*?)</span>', chart):
+        side, *at = re.findall(r"[a-z]+(?=\")|[0-9.]+%", place)
+        yield f"    name: {_text(text)} {side} {' '.join(at)}"
+    path = r'<path((?: data-run="\d+")?) style="([^"]*)" d="([^"]*)"(?:/>|><title>(.*?)</title>)'
+    for run, looks, d, over in re.findall(path, chart):
+        numbers = [float(n) for n in re.findall(r"-?\d+", d)]
+        yield f"   {run} {looks}: {few_numbers(numbers, DRAWN)}"
+        if over:
+            yield f"      over it: {_text(over)}"
 
 
-def _value(held: Any) -> str:
-    return str(held.get("value", held.get("field")) if isinstance(held, dict) else held)
+def _ends(text: str) -> str:
+    return " to ".join(f"{float(end):.6g}" for end in text.split())
 
 
-def _column(values: Any) -> str:
-    if isinstance(values, list):
-        return "; ".join(map(str, values))
-    packed = base64.b64decode(values["array"]["data"])
-    return few_numbers(np.frombuffer(gzip.decompress(packed), dtype=values["dtype"]), DRAWN)
-
-
-def still_lines(page: str) -> Iterator[str]:
-    """Every still picture of a page."""
-    for picture in re.findall(r"<svg.*?</svg>", page, re.S):
-        yield "still picture " + re.search(r'viewBox="([^"]*)"', picture)[1]  # type: ignore[index]
-        for path in re.findall(r"<path ([^>]*)/>", picture):
-            places = re.search(r'\bd="([^"]*)"', path)
-            assert places is not None
-            numbers = [float(text) for text in re.findall(r"-?\d+\.?\d*", places[1])]
-            look = " ".join(path.replace(places[0], "").split())
-            yield f"  {look or 'frame and grid'}: {few_numbers(numbers, DRAWN)}"
+def _text(html: str) -> str:
+    return unescape(re.sub(r"<[^>]+>", "", html))

@@ -23,7 +23,7 @@ from trueangle.export import TARGETS
 from . import groups, specimens
 from .arguments import argument_lines
 from .asked import Asked
-from .charts import chart_lines, still_lines
+from .charts import chart_lines
 from .figures import figure_lines
 from .views import file_lines, markup_lines, pdf_lines
 
@@ -82,10 +82,10 @@ class Terminal:
     ``trueangle ...`` is the command itself, in this process, and ``python ...`` a line of Python:
     what it gives, draws, warns of or raises. ``show FILE [PATTERN]`` shows what a file holds
     (`views`), or what of it matches, ``markup FILE [PATTERN]`` what its tags say beside its words,
-    ``charts FILE`` what a page draws (`charts`), ``stills FILE`` what it draws on paper,
-    ``figures`` what the pictures drawn since show (`figures`), ``targets`` what an export can be
-    asked for. ``write FILE LINE ...`` writes a small file (``\\t`` and ``\\xff`` are what they are
-    in Python), and ``hide KEY=VALUE ...`` ``hidden.toml``: what ``believed.toml`` believes, and
+    ``charts FILE`` what a page draws (`charts`), ``figures`` what the pictures drawn since show
+    (`figures`), ``targets`` what an export can be asked for. ``write FILE LINE ...`` writes a
+    small file (``\\t`` and ``\\xff`` are what they are in Python), and ``hide KEY=VALUE ...``
+    ``hidden.toml``: what ``believed.toml`` believes, and
     one effect beside it. ``options`` tells every argument of every command, ``asked ...`` what
     each further option changes (`asked`). `specimens` and `groups` are what pages are shown of.
     Further commands follow after ``&&``.
@@ -107,7 +107,7 @@ class Terminal:
         run = {
             "asked": self._asked, "charts": self._charts, "figures": self._drawn,
             "hide": self._hide, "markup": self._markup, "options": self._options,
-            "show": self._show, "stills": self._stills,
+            "show": self._show,
             "targets": self._targets, "trueangle": self._trueangle, "write": self._write,
         }  # fmt: skip
         found: list[str] = []
@@ -147,9 +147,6 @@ class Terminal:
 
     def _charts(self, arguments: list[str]) -> str:
         return "\n".join(chart_lines((self.folder / arguments[0]).read_text(encoding="utf-8")))
-
-    def _stills(self, arguments: list[str]) -> str:
-        return "\n".join(still_lines((self.folder / arguments[0]).read_text(encoding="utf-8")))
 
     def _markup(self, arguments: list[str]) -> str:
         path, wanted = self.folder / arguments[0], " ".join(arguments[1:])
