@@ -90,7 +90,7 @@ class Screen:
         if recording.estimate is not None:
             places, error = recording.estimate.curve
             if error.size > 1:
-                size = arcsec(error, recording.period)
+                size = arcsec(1.0, recording.period) * error
                 lines += letter_chart(360.0 * places, {"o": size}, "arcsec")
         return [line[:200] for line in (*lines, *told)]
 

@@ -27,7 +27,8 @@ def _place(address: str) -> tuple[str, int]:
 class TcpStream:
     """A connection to a server that sends lines."""
 
-    midway, names = False, ()
+    midway = False
+    names: tuple[str, ...] = ()
 
     def __init__(self, address: str, options: SourceOptions) -> None:
         try:
@@ -53,7 +54,8 @@ class TcpStream:
 class UdpPort:
     """Datagrams that arrive at a port; each ends a line."""
 
-    midway, names = False, ()
+    midway = False
+    names: tuple[str, ...] = ()
 
     def __init__(self, address: str, options: SourceOptions) -> None:
         host, port = _place(address)

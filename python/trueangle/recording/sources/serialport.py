@@ -11,7 +11,8 @@ from .source import MOST, SourceOptions
 class SerialPort:
     """A port opened exclusively; nothing is sent at the opening."""
 
-    midway, names = True, ()
+    midway = True
+    names: tuple[str, ...] = ()
 
     def __init__(self, address: str, options: SourceOptions) -> None:
         try:
@@ -20,7 +21,7 @@ class SerialPort:
             raise MissingExtraError(
                 "serial ports need pyserial: pip install 'trueangle[record]'"
             ) from None
-        taken = {} if "://" in address else {"exclusive": True}
+        taken: dict[str, Any] = {} if "://" in address else {"exclusive": True}
         self._port: Any = serial.serial_for_url(address, options.baud, timeout=0.0, **taken)
 
     def read(self, timeout: float) -> bytes | None:

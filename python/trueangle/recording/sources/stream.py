@@ -18,7 +18,8 @@ _LOOK = 0.02
 class Stream:
     """Standard input (``-``) or a pipe: it ends where its writer closes it."""
 
-    midway, names = False, ()
+    midway = False
+    names: tuple[str, ...] = ()
 
     def __init__(self, address: str, options: SourceOptions) -> None:
         self._file: Any = sys.stdin if address == "-" else open(address, "rb", buffering=0)  # noqa: SIM115
