@@ -32,6 +32,96 @@ pub fn residuals(
     }
 }
 
+/// How two angles go together, reading after reading: what bounds any test of them. Lengths are
+/// in turns.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Following {
+    /// The longest step between readings of `reference`, the shorter way around.
+    pub step: f64,
+    /// How many are longer than the length asked for.
+    pub long_steps: usize,
+    /// The most by which `indicated - reference` changes between two readings.
+    pub slip: f64,
+    /// From the least to the greatest of these differences, followed over the turns.
+    pub spread: f64,
+    /// From the least to the greatest reference, followed likewise.
+    pub travel: f64,
+    /// No shorter stretch of that travel holds half of the readings.
+    pub half: f64,
+    /// The greatest reference, its sign left away.
+    pub largest: f64,
+    /// The least of the greatest references of the blocks.
+    pub least_block: f64,
+}
+
+/// Bins of the travel in which its densest half is sought.
+const TRAVEL_BINS: usize = 64;
+
+/// Compares every `stride`-th reading of two angles, steps with the length `long` (in turns), and
+/// the references of so many `blocks` of readings.
+pub fn following(
+    indicated: &[f64],
+    reference: &[f64],
+    period: f64,
+    stride: usize,
+    long: f64,
+    blocks: usize,
+) -> Following {
+    let mut found = Following::default();
+    let per_turn = 1.0 / period;
+    let part = |angle: f64| angle * per_turn - whole_number(angle * per_turn);
+    let stride = stride.max(1);
+    let count = reference.len().div_ceil(stride);
+    let readings = || {
+        let pairs = reference.iter().zip(indicated).step_by(stride);
+        let mut before = None;
+        // Place and difference, followed from reading to reading.
+        let (mut place, mut apart) = (0.0, 0.0);
+        pairs.map(move |(&y, &x)| {
+            let (last_y, last_x) = before.replace((y, x)).unwrap_or((y, x));
+            let step = part(y - last_y);
+            let slip = part((x - last_x) - (y - last_y));
+            place += step;
+            apart += slip;
+            (y, step.abs(), slip.abs(), place, apart)
+        })
+    };
+    let (mut low, mut high, mut least, mut most) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+    let mut tops = vec![0.0f64; blocks];
+    for (i, (y, step, slip, place, apart)) in readings().enumerate() {
+        found.step = found.step.max(step);
+        found.long_steps += usize::from(step > long);
+        found.slip = found.slip.max(slip);
+        (low, high) = (low.min(place), high.max(place));
+        (least, most) = (least.min(apart), most.max(apart));
+        // Blocks begin at i * count / blocks, rounded down.
+        let top = &mut tops[((i + 1) * blocks - 1) / count];
+        *top = top.max(y.abs() * per_turn);
+    }
+    found.spread = most - least;
+    found.travel = high - low;
+    found.largest = tops.iter().copied().fold(0.0, f64::max);
+    found.least_block = tops.iter().copied().fold(f64::INFINITY, f64::min);
+    let mut bins = [0; TRAVEL_BINS];
+    let width = found.travel / TRAVEL_BINS as f64;
+    for (.., place, _) in readings() {
+        bins[(((place - low) / width) as usize).min(TRAVEL_BINS - 1)] += 1;
+    }
+    // What holds half of the readings touches as many bins in a row as do so; its ends may lie just
+    // within the outer two.
+    let (mut first, mut held, mut fewest) = (0, 0, TRAVEL_BINS);
+    for (last, &bin) in bins.iter().enumerate() {
+        held += bin;
+        while held >= count / 2 && first <= last {
+            fewest = fewest.min(last + 1 - first);
+            held -= bins[first];
+            first += 1;
+        }
+    }
+    found.half = fewest.saturating_sub(2) as f64 * width;
+    found
+}
+
 /// Stretch of the turn that was travelled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
@@ -147,6 +237,75 @@ mod tests {
         assert!((resultant(&indicated, &reference, 360.0) - 1.0).abs() < 1e-12);
         let spread = [10.0, 440.0, 905.0, 190.0];
         assert!(resultant(&spread, &reference, 360.0) < 1e-12);
+    }
+
+    /// Against the slow form of every number, of paths drawn at random.
+    #[test]
+    fn what_two_angles_do_together_is_measured_or_bounded() {
+        let mut state = 7u64;
+        let mut draw = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        for case in 0..200 {
+            let (stride, blocks) = (1 + case % 3, 8);
+            let pace = 0.3 * draw();
+            let (mut place, mut all, mut off) = (5.0 * draw(), Vec::new(), Vec::new());
+            for _ in 0..60 + case {
+                all.push(place);
+                off.push(0.2 * draw());
+                // Some rest at one place for a while.
+                place += if draw() < 0.3 {
+                    0.0
+                } else {
+                    pace * (draw() - 0.3)
+                };
+            }
+            let (y, e): (Vec<f64>, Vec<f64>) = all.iter().copied().zip(off).step_by(stride).unzip();
+            let reference: Vec<f64> = all.iter().map(|x| 360.0 * x).collect();
+            let mut indicated = reference.clone();
+            for (i, e) in e.iter().enumerate() {
+                indicated[i * stride] += 360.0 * (e + f64::from(i as u32 % 3));
+            }
+            let found = following(&indicated, &reference, 360.0, stride, 0.1, blocks);
+            let steps: Vec<f64> = y.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+            let slips = e.windows(2).map(|w| (w[1] - w[0]).abs());
+            let range = |v: &[f64]| {
+                let (low, high) = v
+                    .iter()
+                    .fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
+                high - low
+            };
+            let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} is not {b}");
+            near(found.step, steps.iter().copied().fold(0.0, f64::max));
+            near(found.slip, slips.fold(0.0, f64::max));
+            near(found.spread, range(&e));
+            near(found.travel, range(&y));
+            assert_eq!(found.long_steps, steps.iter().filter(|&&s| s > 0.1).count());
+            let top = |v: &[f64]| v.iter().fold(0.0f64, |a, x| a.max(x.abs()));
+            near(found.largest, top(&y));
+            let n = y.len();
+            let tops = (0..blocks).map(|b| top(&y[b * n / blocks..(b + 1) * n / blocks]));
+            near(found.least_block, tops.fold(f64::INFINITY, f64::min));
+            let mut sorted = y.clone();
+            sorted.sort_by(f64::total_cmp);
+            let held = n / 2;
+            let shortest = (0..=n - held)
+                .map(|i| sorted[i + held - 1] - sorted[i])
+                .fold(f64::INFINITY, f64::min);
+            assert!(
+                found.half <= shortest + 1e-9,
+                "{} of {shortest}",
+                found.half
+            );
+            assert!(
+                found.half >= shortest - 3.0 * found.travel / 64.0,
+                "{}",
+                found.half
+            );
+        }
     }
 
     #[test]

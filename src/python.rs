@@ -54,7 +54,7 @@ mod _core {
     use super::beside::PyBeside;
 
     #[pymodule_export]
-    use super::circle::{covered_span, residuals, resultant};
+    use super::circle::{covered_span, following, residuals, resultant};
 
     #[pymodule_export]
     use super::alike::PyAlike;

@@ -308,6 +308,7 @@ impl Evaluator {
     }
 
     /// The correction of one sample without a table, as a batch has it to the last bit.
+    #[inline(never)]
     pub fn correct_one(&self, indicated: f64) -> f64 {
         let mut theta = [0.0];
         self.correct_block(self.best, &[indicated], &mut theta);

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 
 use super::array::slice;
-use super::release::detached;
+use super::release::{detached, look};
 use crate::check::same_length;
 use crate::circle;
 
@@ -19,6 +19,37 @@ pub fn resultant(
     let (indicated, reference) = (indicated.as_slice()?, reference.as_slice()?);
     same_length("reference", reference.len(), "indicated", indicated.len())?;
     detached(py, || circle::resultant(indicated, reference, period))
+}
+
+/// The fields of `circle::Following`, in order.
+type Followed = (f64, usize, f64, f64, f64, f64, f64, f64);
+
+/// How two angles go together.
+#[pyfunction]
+pub fn following(
+    py: Python<'_>,
+    indicated: &Bound<'_, PyArray1<f64>>,
+    reference: &Bound<'_, PyArray1<f64>>,
+    period: f64,
+    stride: usize,
+    long: f64,
+    blocks: usize,
+) -> PyResult<Followed> {
+    let (indicated, reference) = (slice(indicated)?, slice(reference)?);
+    same_length("reference", reference.len(), "indicated", indicated.len())?;
+    let found = look(py, reference.len() / stride.max(1), || {
+        circle::following(indicated, reference, period, stride, long, blocks)
+    })?;
+    Ok((
+        found.step,
+        found.long_steps,
+        found.slip,
+        found.spread,
+        found.travel,
+        found.half,
+        found.largest,
+        found.least_block,
+    ))
 }
 
 /// Turns fitted errors into residuals, in place.
@@ -49,6 +80,7 @@ pub fn covered_span(
     most: usize,
 ) -> PyResult<(f64, f64, bool)> {
     let slices = angles.iter().map(slice).collect::<PyResult<Vec<_>>>()?;
-    let span = detached(py, || circle::covered_span(&slices, period, most))?;
+    let readings = slices.iter().map(|angles| angles.len()).sum();
+    let span = look(py, readings, || circle::covered_span(&slices, period, most))?;
     Ok((span.start, span.stop, span.full))
 }

@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyTuple};
 
 use super::array::{as_array, data, shown};
 use super::failure::{argument_error, kind_error};
-use super::release::attached;
+use super::release::{HAS_LOCK, attached};
 use super::robotparts::{couplings, fresh, joint, named};
 use super::signals::{as_signal, in_order};
 use super::step::Definition;
@@ -32,8 +32,6 @@ pub struct PyRobotStep {
     doubles: Py<PyArrayDescr>,
     /// The last two results: who has let go of one gets it again.
     results: [Option<Py<PyUntypedArray>>; 2],
-    /// References are counted under the interpreter's lock: a count of one is one.
-    has_lock: bool,
 }
 
 #[pymethods]
@@ -54,7 +52,6 @@ impl PyRobotStep {
             parts: parts.into_iter().map(Bound::unbind).collect(),
             doubles: dtype::<f64>(py).unbind(),
             results: [None, None],
-            has_lock: has_lock(py)?,
         })
     }
 
@@ -192,15 +189,6 @@ impl PyRobotStep {
 /// What pickle makes a robot's step of: its class, arguments and state.
 type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyTuple>, Vec<Vec<f64>>);
 
-/// Whether the interpreter runs one thread at a time.
-fn has_lock(py: Python<'_>) -> PyResult<bool> {
-    let sys = py.import("sys")?;
-    if !sys.hasattr("_is_gil_enabled")? {
-        return Ok(true);
-    }
-    sys.call_method0("_is_gil_enabled")?.extract()
-}
-
 /// Flags of numpy: elements one after the other, aligned, to be written to.
 const PLAIN: i32 = NPY_ARRAY_C_CONTIGUOUS | NPY_ARRAY_ALIGNED;
 
@@ -223,8 +211,8 @@ impl PyRobotStep {
     fn result<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyUntypedArray>> {
         for kept in self.results.iter().flatten() {
             let array = kept.bind(py);
-            // SAFETY: an object that is there.
-            let is_free = self.has_lock && unsafe { ffi::Py_REFCNT(array.as_ptr()) } == 1;
+            // SAFETY: an object that is there. Under the lock a count of one is one.
+            let is_free = HAS_LOCK && unsafe { ffi::Py_REFCNT(array.as_ptr()) } == 1;
             if is_free && self.is_plain(array, PLAIN | NPY_ARRAY_WRITEABLE | NPY_ARRAY_OWNDATA) {
                 return Ok(array.clone());
             }
@@ -276,7 +264,7 @@ const DOCUMENTATION: &CStr = c"step(positions, /, out=None, *, velocity=None, te
 torque=None, direction=None, current=None)\n--\n\nThe true angles of all joints, of their indicated \
 ones. Signals are one value per joint, or one for all.";
 
-static STEP: Definition = Definition(ffi::PyMethodDef {
+static STEP: Definition<ffi::PyMethodDef> = Definition(ffi::PyMethodDef {
     ml_name: c"step".as_ptr(),
     ml_meth: ffi::PyMethodDefPointer {
         PyCFunctionFastWithKeywords: step,

@@ -11,7 +11,7 @@ from ..effects.drift_within_run import DriftWithinRun
 from ..effects.local_defect import LocalDefect
 from ..effects.non_integer_order import NonIntegerOrder
 from ..estimation.regression import Regression
-from ..joint.pattern import line_columns
+from ..joint.lines import line_columns
 from ..support.arrays import Array
 from ..support.display_units import brief_number
 from ..support.quantiles import quantile

@@ -24,7 +24,8 @@ from ..estimation.factor import least_squares, orthonormal_basis
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.earlier import earlier_signals
-from ..joint.pattern import ARCSEC_PER_RAD, Pattern, lines_columns
+from ..joint.lines import lines_columns
+from ..joint.pattern import ARCSEC_PER_RAD, Pattern
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_TURN

@@ -20,7 +20,8 @@ from functools import cached_property
 import numpy as np
 
 from ..effects.search import golden_maximum
-from ..joint.pattern import Harmonic, Pattern, line_columns
+from ..joint.lines import line_columns
+from ..joint.pattern import Harmonic, Pattern
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array

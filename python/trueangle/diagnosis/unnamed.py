@@ -16,7 +16,8 @@ from ..effects import EFFECTS, Effect
 from ..effects.time_periodic import FREQUENCY_DRIFT, TimePeriodic
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import JointPattern, line_columns
+from ..joint.lines import line_columns
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from .goodness.periodogram import periodogram

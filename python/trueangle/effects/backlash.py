@@ -11,7 +11,8 @@ import numpy as np
 from ..estimation.extension import Extension
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import JointPattern, line_sum
+from ..joint.lines import line_sum
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.travel import BacklashTerm

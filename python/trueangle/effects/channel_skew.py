@@ -12,7 +12,8 @@ from ..estimation.extension import Extension
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.joint import Joint
-from ..joint.pattern import JointPattern, line_columns
+from ..joint.lines import line_columns
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import ChannelSkewTerm

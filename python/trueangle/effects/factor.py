@@ -9,7 +9,8 @@ import numpy as np
 
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.pattern import JointPattern, line_columns
+from ..joint.lines import line_columns
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .effect import Effect
 from .search import Array, Fitted, line_parameters

@@ -12,7 +12,8 @@ from ..estimation.extension import Extension
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.grid import aliases_of
-from ..joint.pattern import JointPattern, line_columns, lines_columns
+from ..joint.lines import line_columns, lines_columns
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.deadline import current_deadline
 from .ambiguity import (

@@ -12,7 +12,8 @@ from ..errors import ArgumentError
 from ..estimation.extension import Extension
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import JointPattern, line_columns, line_sum
+from ..joint.lines import line_columns, line_sum
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .ambiguity import Ambiguity
 from .drawing import drawn_phase

@@ -15,7 +15,8 @@ import trueangle._core as _core
 from ..estimation.extension import Extension
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import JointPattern, line_columns
+from ..joint.lines import line_columns
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.quantiles import quantile
 from .ambiguity import Ambiguity

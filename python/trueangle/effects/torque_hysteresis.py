@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..estimation.extension import Extension
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.pattern import JointPattern, line_columns
+from ..joint.lines import line_columns
+from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .backlash import Backlash

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..joint.pattern import VANISHES
+from ..joint.lines import VANISHES
 from ..support.arrays import Array
 from .blocks import BlockProducts, Blocks
 from .whitening import Whitener

@@ -353,6 +353,8 @@ _NOTHING = _Beside((), ())
 
 
 def _beside(nuisance: str | Iterable[str], reference_orders: Iterable[float]) -> _Beside:
+    if nuisance == "none" and reference_orders == ():
+        return _NOTHING
     lines = tuple(map(float, limited_orders(reference_orders, "reference_orders")))
     if nuisance == "none":
         return _Beside((), lines) if lines else _NOTHING

@@ -15,7 +15,6 @@ from ..runs.travel import Span
 from ..support.arrays import Array
 from ..support.plainresult import PlainResult
 from .problem import Problem, SolvedProblem
-from .repeated import covariance_with_repeats
 from .robust import RobustFit
 from .uncertainty import CovarianceKind, Uncertainty, coefficient_uncertainty
 
@@ -139,6 +138,8 @@ class FitData(PlainResult):
             return Uncertainty(
                 "white", covariance, np.full(len(covariance), self.posterior.freedom)
             )
+        from .repeated import covariance_with_repeats
+
         weights = self.weights or self.problem.base
         found = coefficient_uncertainty(
             self.problem,

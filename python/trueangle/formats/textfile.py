@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import io
 import os
 import sys
@@ -142,9 +141,10 @@ def create_text(path: Path) -> Any:
     if ending in (".xlsx", ".xlsm"):
         raise FileError(path.name, "no Excel file is written; name a CSV file with -o")
     if ending == ".gz":
-        return gzip.GzipFile(
-            path, "wb", 6, mtime=0
-        )  # as gzip does; the same log gives the same bytes
+        import gzip
+
+        # As gzip does; the same log gives the same bytes.
+        return gzip.GzipFile(path, "wb", 6, mtime=0)
     if ending == ".zst":
         return _opener("zstd")(path, "wb")
     return path.open("wb")
@@ -175,6 +175,8 @@ def text_extent(path: Path) -> FileExtent:
 
 def _opener(kind: str) -> Callable[..., Any]:
     if kind == "gzip":
+        import gzip
+
         return gzip.open
     try:
         if sys.version_info >= (3, 14):

@@ -154,13 +154,12 @@ def resolve_orders(
     if shafts:
         cycles |= shafts
     by_shaft = orders if isinstance(orders, Mapping) else {"output": orders}
+    wanted = []
     for name, asked in by_shaft.items():
         if not isinstance(asked, Iterable):
             raise ArgumentError(
                 f"orders of shaft {name!r} must be a list such as range(1, 18), got {asked!r}"
             )
-    wanted = []
-    for name, asked in by_shaft.items():
         if name not in cycles:
             raise ArgumentError(
                 f"how fast shaft {name!r} turns is not known: give `gear_ratio=`, or its "
@@ -173,6 +172,8 @@ def resolve_orders(
 
 
 def _order(order: object, shaft: str) -> int:
+    if type(order) is int and 1 <= order < 2**31:
+        return order
     try:
         whole = int(order)  # type: ignore[call-overload]
         if whole == order and 1 <= whole < 2**31:

@@ -28,17 +28,25 @@ def robot_of_urdf(path: str | PathLike[str]) -> RobotDescription:
     ------
     FileError
         No XML, an entity or document type of its own, no ``<robot>``, no joint that turns, a
-        reduction that is not a number, two joints of one name, more joints than a robot file has.
+        reduction that is not a number, two reductions of one joint, two joints of one name, more
+        joints than a robot file has.
     """
     root = _root(path)
-    ratios: dict[str, float | None] = {}
+    ratios: dict[str, float] = {}
     for transmission in root.iter("transmission"):
-        joint = transmission.find("joint")
-        if joint is None:
-            continue
-        name = joint.get("name") or (joint.text or "").strip()
-        for reduction in transmission.iter("mechanicalReduction"):
-            ratios[name] = _ratio(path, name, reduction.text or "")
+        driven = transmission.findall("joint")
+        for joint in driven:
+            name = joint.get("name") or (joint.text or "").strip()
+            # The reduction of an actuator is that of the joint, where there is one joint.
+            part = transmission if len(driven) == 1 else joint
+            for reduction in part.iter("mechanicalReduction"):
+                ratio = _ratio(path, name, reduction.text or "")
+                if ratios.setdefault(name, ratio) != ratio:
+                    raise FileError(
+                        path,
+                        f"joint {name!r} has two reductions, {ratios[name]:g} and {ratio:g}: keep "
+                        "the one between its motor and its output",
+                    )
     joints = []
     for element in root.findall("joint"):
         name, kind = element.get("name", ""), element.get("type", "")
@@ -76,7 +84,7 @@ def _root(path: str | PathLike[str]) -> ElementTree.Element:
     return root
 
 
-def _ratio(path: str | PathLike[str], name: str, text: str) -> float | None:
+def _ratio(path: str | PathLike[str], name: str, text: str) -> float:
     try:
         ratio = float(text)
     except ValueError:

@@ -98,7 +98,7 @@ class HarmonicModel(ErrorModel):
     def compensator(self) -> ExchangeableStep[HarmonicModel]:
         """``step(indicated) -> corrected`` for one sample at a time.
 
-        The cheapest call there is: a bound method of the compiled core, no allocation
+        The cheapest call there is: an object of the compiled core, no allocation
         but the result, the same number as `correct` of a float or an array of doubles or
         integers, to the last bit. It does not warn about the span.
 
@@ -124,8 +124,9 @@ class HarmonicModel(ErrorModel):
         90.0
         """
         core = self._prepared()
-        step: ExchangeableStep[HarmonicModel] = exchangeable_step(
-            core.step, partial(_swap, core, self)
+        swap = partial(_swap, core, self)
+        step: ExchangeableStep[HarmonicModel] = (
+            exchangeable_step(core.step, swap) if self.terms else core.step_with(swap)
         )
         return step
 

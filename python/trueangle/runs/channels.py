@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -26,6 +25,8 @@ def two_channels(
     roles = table.roles
     if both.any() or not {"reference", "indicated", "time"} <= roles.keys():
         return ""
+    import shlex
+
     words = ["trueangle", "join", str(table.path), str(table.path), "-o", "joined.csv"]
     for role, log in (("indicated", "a."), ("reference", "b."), ("time", "")):
         if log or roles[role].is_asked:

@@ -17,7 +17,6 @@ from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, u
 from ..support.signals import FIELDS
 from ..support.times import local_day
 from .angles import find_run_angles
-from .channels import two_channels
 from .facets import Facets, read_facets
 from .readings import FileReadings
 from .run import CalibrationRun, as_runs, runs_or_data
@@ -114,11 +113,11 @@ def runs_of(
     FileError
         As `read_runs`.
     """
-    asked = checked_reading_options(reading)
     runs, data = runs_or_data(data)
-    if runs is not None:
-        return as_runs(runs)
-    return _read(data, asked, name, table)
+    if runs is not None and not reading:
+        return runs if len(runs) == 1 else as_runs(runs)
+    asked = checked_reading_options(reading)
+    return _read(data, asked, name, table) if runs is None else as_runs(runs)
 
 
 def each_runs(
@@ -244,6 +243,8 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
                 "--counts-per-turn": given.counts,
                 "--counts-per-turn-reference": given.reference_counts,
             }
+            from .channels import two_channels
+
             raise FileError(path, problem + two_channels(table, counts, reference, indicated))
         groups.append((found, present))
         left_out.append(rows.size - present.size)

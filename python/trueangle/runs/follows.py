@@ -15,15 +15,23 @@ from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.quantiles import quantile
 from ..support.roles import role_code
-from .checks.angles import UNUSABLE_ANGLES, angle_ratio, ratio_suggestion
+from .checks.angles import (
+    BLOCKS,
+    COARSE,
+    LEAST_JUMP,
+    LOOKED_AT,
+    OTHER_UNIT,
+    STRAIGHT,
+    UNUSABLE_ANGLES,
+    angle_ratio,
+    bending,
+    ratio_suggestion,
+)
 from .checks.record import records_of
 from .run import CalibrationRun
 
 #: Readings looked at; a mistake of unit shows in any few.
 _SAMPLE = 1000
-
-#: Readings of a run that are tested for faults.
-_LOOKED_AT = 4096
 
 #: Resultant length (1 = all differences equal, 0 = spread over the turn). Errors of a
 #: whole 60 deg standard deviation still give 0.58.
@@ -39,7 +47,14 @@ _NEAR = 0.01
 _FAST = 120.0
 
 #: Radians beyond which a reference may as well be degrees: ten turns.
-_MANY = 20.0 * math.pi
+_MANY_TURNS = 10.0
+_MANY = 2.0 * math.pi * _MANY_TURNS
+
+#: Turns up to which a place within one is known to far more than is looked at.
+_RESOLVED = 2.0**30
+
+#: How far beyond the spread of the errors a line may go that half of them are near.
+_LINE = 1.0 + 2.0 * STRAIGHT
 
 #: Highest order, and the share of the error's power left by it, by which degrees are told.
 _HIGHEST, _LEFT = 3, 0.25
@@ -103,16 +118,47 @@ def check_usable(runs: Sequence[CalibrationRun]) -> None:
     UnitWarning
         As `check_follows`.
     """
+    strides = [1 + (run.reference.size - 1) // LOOKED_AT for run in runs]
+    if _are_plain(runs, strides):
+        return
     for run in runs:
         check_follows(run)
-    records = records_of(map(_thinned, runs))
+    records = records_of(map(_thinned, runs, strides))
     for test in UNUSABLE_ANGLES:
         for fault in test(records):
             raise ArgumentError(f"the data must not be used as they are: {fault}")
 
 
-def _thinned(run: CalibrationRun) -> CalibrationRun:
-    stride = 1 + len(run) // _LOOKED_AT
+def _are_plain(runs: Sequence[CalibrationRun], strides: Sequence[int]) -> bool:
+    """Whether bounds of the angles alone leave nothing to find to the tests of `check_usable`.
+
+    Every ``stride``-th reading of a run is looked at. Never true of what a test would refuse. The
+    test of the ratio needs a line of slope ``b`` that half of the errors are at most 3 % of their
+    spread ``p`` off. Where no segment of the travel shorter than ``h`` holds half of the readings,
+    ``|b| h <= 1.06 p``.
+    """
+    sizes = []
+    for run, stride in zip(runs, strides, strict=True):
+        step, long_steps, slip, spread, travel, half, size, least = _core.following(
+            run.indicated, run.reference, run.period, stride, COARSE / 360.0, BLOCKS
+        )
+        # Errors within a third of a turn have a resultant of at least `_FOLLOWS`.
+        if slip > LEAST_JUMP / 360.0 or spread > 1.0 / 3.0:
+            return False
+        steps = -(-run.reference.size // stride) - 1
+        bent = step + slip < 0.5 and _LINE * spread < half * bending(travel)
+        # Where as many steps are coarse, the test of the ratio knows no travel.
+        if not bent and long_steps < steps - int(0.9 * (steps - 1)):
+            return False
+        if least <= size * OTHER_UNIT and steps >= 4 * BLOCKS - 1:
+            return False
+        if size > (_MANY_TURNS if run.period == _TURNS["radians"] else _RESOLVED):
+            return False
+        sizes.append(size)
+    return len(sizes) == 1 or min(sizes) > max(sizes) * OTHER_UNIT
+
+
+def _thinned(run: CalibrationRun, stride: int) -> CalibrationRun:
     return CalibrationRun(
         run.reference[::stride], run.indicated[::stride], run.period, label=run.label
     )

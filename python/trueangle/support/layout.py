@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
-import shutil
+import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Sized
 from contextlib import contextmanager
@@ -57,8 +58,17 @@ def text_columns() -> int:
     """
     if _UNFOLDED.get():
         return _ENDLESS
-    found = shutil.get_terminal_size((_USUAL, 24)).columns
-    return min(max(found, _NARROWEST), _WIDEST)
+    # As `shutil.get_terminal_size` has it, whose import costs more than a small fit.
+    try:
+        found = int(os.environ.get("COLUMNS", 0))
+    except ValueError:
+        found = 0
+    if found <= 0:
+        try:
+            found = os.get_terminal_size(sys.__stdout__.fileno()).columns  # type: ignore[union-attr]
+        except (AttributeError, ValueError, OSError):
+            found = 0
+    return min(max(found or _USUAL, _NARROWEST), _WIDEST)
 
 
 def wrapped_lines(text: str, indent: int = 0, first: int = 0) -> list[str]:

@@ -58,7 +58,7 @@ def check_choice(name: str, got: object, known: Iterable[str]) -> str:
     ...
     trueangle.errors.ArgumentError: loop must be one of open, closed, got 'opne'; did you mean open?
     """
-    words = list(known)
+    words = known if isinstance(known, tuple) else tuple(known)
     if isinstance(got, str) and got in words:
         return got
     kind = ArgumentError if isinstance(got, str) else KindError

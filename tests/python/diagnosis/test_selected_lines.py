@@ -13,7 +13,7 @@ from trueangle.effects import LocalDefect, MissingOrder
 from trueangle.estimation.extension import Extension
 from trueangle.estimation.regression import Regression
 from trueangle.joint.declared import DeclaredShaft
-from trueangle.joint.pattern import line_sum
+from trueangle.joint.lines import line_sum
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Joint, Simulation
 

@@ -44,6 +44,24 @@ def test_joints_that_turn_and_their_ratios(tmp_path: Path) -> None:
     assert _load(tmp_path, FILE.replace(' name="arm"', "")).name == ""
 
 
+def test_a_joint_has_one_reduction_and_those_of_a_differential_have_each_their_own(
+    tmp_path: Path,
+) -> None:
+    again = (
+        "<transmission><joint name='wrist'/><actuator>"
+        "<mechanicalReduction>{}</mechanicalReduction></actuator></transmission>"
+    )
+    same = FILE.replace('<transmission name="c"/>', again.format("-50.5"))
+    assert _load(tmp_path, same).joints == _load(tmp_path, FILE).joints
+    other = FILE.replace('<transmission name="c"/>', again.format("24"))
+    with pytest.raises(FileError, match=r"joint 'wrist' has two reductions, -50\.5 and 24: keep"):
+        _load(tmp_path, other)
+    own = "<joint name='{}'><mechanicalReduction>{}</mechanicalReduction></joint>"
+    both = f"<transmission>{own.format('base', 20)}{own.format('tool', 30)}</transmission>"
+    found = _load(tmp_path, f"{FILE[: FILE.index('  <transmission')]}{both}</robot>")
+    assert [joint.gear_ratio for joint in found.joints] == [20.0, None, 30.0]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [

@@ -10,7 +10,9 @@ import pytest
 
 from trueangle import CalibrationRun
 from trueangle.errors import ArgumentError, UnitWarning
-from trueangle.runs.follows import check_follows
+from trueangle.runs.checks.angles import UNUSABLE_ANGLES
+from trueangle.runs.checks.record import records_of
+from trueangle.runs.follows import _are_plain, check_follows
 
 UNITS = {"degrees": 360.0, "radians": 2.0 * math.pi, "turns": 1.0}
 
@@ -187,3 +189,55 @@ def test_degrees_must_leave_a_quarter_of_what_radians_leave(
         warnings.simplefilter("always")
         check_follows(CalibrationRun(degrees, degrees + error))
     assert [warning.category for warning in told] == [UnitWarning] * warned
+
+
+def drawn_pair(rng: np.random.Generator) -> CalibrationRun:
+    """A run of any travel, order of places, error, unit and one fault in two of three."""
+    period = UNITS[rng.choice([*UNITS])]
+    size = int(rng.integers(4, 200))
+    turns = np.sort(rng.uniform(0.0, rng.choice([0.02, 0.3, 1.0, 3.0, 12.0]), size))
+    if rng.random() < 0.5:  # at rest for a while, or there and back
+        half = turns[: size // 2]
+        half[:] = turns[size // 2] if rng.random() < 0.5 else half[::-1].copy()
+    if rng.random() < 0.3:
+        rng.shuffle(turns)
+    error = 10.0 ** rng.uniform(-5, -0.7) * np.sin(2.0 * np.pi * turns * rng.integers(1, 5))
+    error += rng.normal(0.0, 10.0 ** rng.uniform(-6, -2), size)
+    reference = turns + rng.integers(-2, 3)
+    factor = rng.choice([1.0, 1.0, 1.0 + 10.0 ** rng.uniform(-3, 0), -1.0, 0.0175, 57.3])
+    indicated = factor * turns + error
+    fault = rng.integers(6)
+    if fault == 0:  # a part in radians
+        reference[size // 4 : size // 2] /= 57.3
+    elif fault == 1:  # a reference that wraps at less than a turn
+        reference = np.mod(reference, rng.uniform(0.2, 0.95))
+    elif fault == 2:
+        indicated[rng.integers(size)] += rng.uniform(-0.5, 0.5)
+    return CalibrationRun(reference * period, indicated * period, period)
+
+
+def test_what_bounds_call_plain_no_test_refuses() -> None:
+    """The quick look of a fit never passes over a fault, and does take most sound runs."""
+    seed = 90_417
+    print("seed", seed)
+    rng = np.random.default_rng(seed)
+    taken = plain = 0
+    for _ in range(400):
+        runs = [drawn_pair(rng) for _ in range(int(rng.choice([1, 1, 2])))]
+        runs = [given for given in runs if given.period == runs[0].period]
+        are_plain = _are_plain(runs, [1] * len(runs))
+        records = records_of(runs)
+        faults = [fault for test in UNUSABLE_ANGLES for fault in test(records)]
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            try:
+                for given in runs:
+                    check_follows(given)
+            except (ArgumentError, UnitWarning) as refusal:
+                faults.append(refusal)
+        assert not (are_plain and faults), faults
+        taken += not faults
+        plain += are_plain
+    assert 0.1 * taken < plain < taken
+    for size in (5, 36, 37, 4095, 4096, 8191):
+        assert _are_plain([run(360.0, 1.0, size)], [1 + (size - 1) // 4096])

@@ -38,6 +38,8 @@ TOOTH = 0.01
 
 #: Share by which a part's values and steps are those of another unit.
 UNIT_SPREAD = 0.35
+#: Part of the greatest angle up to which others may be in radians among degrees.
+OTHER_UNIT = math.pi / 180.0 * (1.0 + UNIT_SPREAD)
 
 #: Noise of the reference against that of the joint from which on the two may be swapped.
 NOISIER = 10.0
@@ -48,6 +50,9 @@ EVEN = 1e-3
 #: Roughness of steps, in shares of a step, that is none.
 EXACT = 1e-6
 
+#: Degrees of a jump of the reference against the joint, at least.
+LEAST_JUMP = 20.0
+
 #: Part of a jump by which the angles may close up again: their error, and none of the jump.
 STAYS = 0.3
 
@@ -55,7 +60,7 @@ STAYS = 0.3
 STRAIGHT = 0.03
 
 #: Readings that a line is laid through, and its rounds.
-_LOOKED_AT, _ROUNDS = 4096, 20
+LOOKED_AT, _ROUNDS = 4096, 20
 
 #: Blocks of a run that are compared.
 BLOCKS = 8
@@ -123,7 +128,7 @@ def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
     code = role_code("indicated", name[1:] if name.startswith("-") else f"-{name}", unit)
     for record in records:
         slope = _straight(record)
-        if slope is None or abs(slope - 1.0) < _bending(record):
+        if slope is None or abs(slope - 1.0) < bending(_turns(record)):
             continue
         kind = "wrong_sign" if abs(slope + 1.0) < AGREES else "wrong_gear_ratio"
         turned.setdefault(kind, []).append((record.label, slope))
@@ -159,7 +164,7 @@ def mixed_units(records: list[Record]) -> Iterator[DataFault]:
         k
         for k in range(len(records))
         if whole > 30.0
-        and sizes[k] <= largest * np.pi / 180.0 * (1.0 + UNIT_SPREAD)
+        and sizes[k] <= largest * OTHER_UNIT
         and len(records[k]) >= BLOCKS
         and abs(travel[k] * 180.0 / np.pi / whole - 1.0) < UNIT_SPREAD
     ]
@@ -188,7 +193,7 @@ def _parts_in_other_units(record: Record) -> Iterator[DataFault]:
     large = float(median(typical[typical > 0.3 * typical.max()])) if typical.max() > 0 else 0.0
     if large == 0.0 or top.max() < 30.0:
         return
-    other = (top <= top.max() * np.pi / 180.0 * (1.0 + UNIT_SPREAD)) & (
+    other = (top <= top.max() * OTHER_UNIT) & (
         np.abs(typical * 180.0 / np.pi / large - 1.0) < UNIT_SPREAD
     )
     if other.any() and not other.all():
@@ -215,7 +220,7 @@ def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:
         slip -= 360.0 * np.round(slip / 360.0)
         spread = 1.4826 * float(median(np.abs(slip - median(slip))))
         typical = float(median(np.abs(ahead)))
-        jumps = np.flatnonzero(np.abs(slip) > max(20.0 * spread, 10.0 * typical, 20.0))
+        jumps = np.flatnonzero(np.abs(slip) > max(20.0 * spread, 10.0 * typical, LEAST_JUMP))
         if jumps.size == 0:
             continue
         # A wrap falls from one end of the range to the other.
@@ -304,7 +309,7 @@ def _straight(record: Record) -> float | None:
     slope = _slope(record)
     if slope is None:
         return None
-    apart = 1 + len(record) // _LOOKED_AT
+    apart = 1 + (len(record) - 1) // LOOKED_AT
     x, y = (angle[::apart] - float(median(angle)) for angle in record.unwrapped)
     basis = np.column_stack([np.ones_like(x), x])
     line, rest = np.array([0.0, slope]), y - slope * x
@@ -317,9 +322,12 @@ def _straight(record: Record) -> float | None:
     return float(line[1]) if float(median(np.abs(rest))) < STRAIGHT * size else None
 
 
-def _bending(record: Record) -> float:
-    """How far from 1 an error of the joint may bring the slope over the travel of a run."""
-    turns = float(np.ptp(record.unwrapped[0])) / 360.0
+def _turns(record: Record) -> float:
+    return float(np.ptp(record.unwrapped[0])) / 360.0
+
+
+def bending(turns: float) -> float:
+    """How far from 1 an error of the joint may bring the slope over so many turns."""
     return max(AGREES / max(turns, 1.0) ** 2, DRIFTS)
 
 

@@ -91,7 +91,7 @@ class Check(PlainResult):
             lines.append("The data must not be used as they are.")
         if self.columns:
             told = [
-                f"{role} is '{name}'" + (f" in {unit}" if unit else "")
+                f"{role} is '{name}'" + (f" in {unit}" if unit else "") + _reversed(role, name)
                 for role, (name, unit) in self.columns.items()
             ]
             lines += ["", *wrapped_lines(f"Understood: {'; '.join(told)}.", 2)]
@@ -114,6 +114,12 @@ class Check(PlainResult):
                 2,
             )
         return laid_out(lines)
+
+
+def _reversed(role: str, name: str) -> str:
+    """What a minus before the joint's own column means."""
+    is_reversed = role == "indicated" and name.startswith("-")
+    return " (a reversed sensor: models keep indicated_sign -1)" if is_reversed else ""
 
 
 def _levels(values: tuple[float, ...] | tuple[int, ...], unit: str = "") -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -219,6 +218,10 @@ def _remove(place: Path, targets: Iterable[Path]) -> None:
     with contextlib.suppress(OSError):  # not made, or named already
         os.unlink(place)
         return
+    if not place.is_dir():
+        return
+    import shutil  # with every library that packs: for folders only
+
     for target in targets:
         replaced = place / f"{target.name}{_REPLACED}"
         if replaced.exists() and not target.exists():
