@@ -35,15 +35,14 @@ ALLOWED_OF_STEP = 12.0
 #: Samples of the long run and the short one; their difference leaves out the set-up.
 LONG, SHORT = 40_000, 8_000
 
-#: Calls of a function of one float.
+#: Calls of a function of one float; without numpy, whose import takes long to emulate.
 CALLS = """
 import collections, math, sys
-import trueangle as ta
+from trueangle._core import Compensator, Series
 k = [*range(1, 18)]
-sizes = [[1e-5 * f(i) for i in k] for f in (math.cos, math.sin)]
-step = ta.HarmonicModel([ta.Shaft("output", 1, k, *sizes)]).compensator()
-angles = [0.01 * i for i in range(int(sys.argv[1]))]
-collections.deque(map({function}, angles), maxlen=0)
+sizes = [[[1e-5 * f(i) for i in k]] for f in (math.cos, math.sin)]
+step = Compensator(Series(2.0 * math.pi, 0.0, [1.0], [k], *sizes)).step
+collections.deque(map({function}, [0.7] * int(sys.argv[1])), maxlen=0)
 """
 
 
