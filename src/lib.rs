@@ -3,6 +3,7 @@
 pub mod error;
 
 pub mod angle;
+pub mod channels;
 pub mod chebyshev;
 pub mod check;
 pub mod circle;

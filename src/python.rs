@@ -7,6 +7,7 @@ mod alike;
 mod angles;
 mod array;
 mod beside;
+mod channels;
 mod circle;
 mod corrector;
 mod door;
@@ -52,6 +53,9 @@ mod _core {
 
     #[pymodule_export]
     use super::beside::PyBeside;
+
+    #[pymodule_export]
+    use super::channels::{PyDecoder, curve_slopes, fit_curve};
 
     #[pymodule_export]
     use super::circle::{covered_span, following, residuals, resultant};

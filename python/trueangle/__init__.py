@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from .runs.checks.check import check as check
     from .runs.files import read_runs as read_runs
     from .runs.joining.join import join as join
+    from .runs.rawchannels import Channels as Channels
     from .runs.run import CalibrationRun as CalibrationRun
     from .runs.writing import write_runs as write_runs
     from .selfcalibration.calibrate import selfcal as selfcal
@@ -68,6 +69,7 @@ _PUBLIC = {
     "TrueAngleError": "errors",
     "wrap": "support.angles",
     "CalibrationRun": "runs.run",
+    "Channels": "runs.rawchannels",
     "Diagnosis": "diagnosis",
     "OrderSelection": "fitting.orders.result",
     "plan_after": "rehearsal",

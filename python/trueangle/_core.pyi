@@ -254,6 +254,27 @@ class LinearModel:
     def inverse(self) -> _Array: ...
 
 @final
+class Decoder:
+    def __new__(
+        cls,
+        constants: Sequence[float],
+        series: Series | None = None,
+    ) -> Decoder: ...
+    def angles(self, sine: _Array, cosine: _Array) -> _Array: ...
+    @property
+    def step(self) -> Callable[..., float]: ...
+
+def fit_curve(
+    sine: _Array,
+    cosine: _Array,
+    weights: _Array,
+    variances: Sequence[float],
+    orders: Sequence[int],
+    start: tuple[list[int], list[float]] | None = None,
+) -> tuple[_Array, _Array, _Array, _Array, _Array] | None: ...
+def curve_slopes(orders: Sequence[int], parameters: Sequence[float], phases: _Array) -> _Array: ...
+
+@final
 class RunEffect:
     """An error whose size is drawn anew in every run (random effect).
 

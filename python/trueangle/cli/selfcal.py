@@ -32,7 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         choices=("auto", *METHODS),
         default="auto",
-        help="auto (default) looks at the columns: time_s, head1_deg, shift_deg, motor_deg",
+        help="auto (default) looks at the columns: time_s, head1_deg, shift_deg, motor_deg, sine "
+        "and cosine",
     )
     add("--orders", default="auto", help="auto (default: those that stand out), 1-24 or 1,4,8")
     add(
@@ -72,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
         return _robot(*asked, args)
     result = _calibrated(args)
     result.model.save(args.output)
-    if not result.model.shafts:
+    if not result.model.shafts and result.channels is None:
         print(
             "trueangle: warning: no order can be given as the encoder's: the model corrects "
             "nothing",

@@ -13,7 +13,8 @@ from .paths import Input
 #: The roles, as every help names them.
 ROLES = (
     "reference, indicated, error, reference_offset, time, velocity, direction, temperature, "
-    "torque, current, mount, run, unit, when, motor, head1, head2 ..., shift, coupled_JOINT"
+    "torque, current, mount, run, unit, when, motor, head1, head2 ..., shift, sine, cosine, "
+    "sine2, cosine2, coupled_JOINT"
 )
 
 
@@ -49,6 +50,12 @@ def add_signals(
             help="of a reference in counts",
         )
     if topic:
+        add(
+            "--periods-per-turn",
+            type=int,
+            metavar="P",
+            help="periods in a turn of the channels sine and cosine, of which the angle is made",
+        )
         add(
             "--topic",
             metavar="NAME",
@@ -154,5 +161,6 @@ def reading_options(args: argparse.Namespace) -> dict[str, Any]:
         "counts_per_turn_reference": args.counts_per_turn_reference,
         "signals": signals_by_joint(args.signal),
         "topic": args.topic,
+        "periods_per_turn": args.periods_per_turn,
         **({"facets": args.facets, "unit_from": args.unit_from} if "facets" in args else {}),
     }

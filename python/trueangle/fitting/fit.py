@@ -18,6 +18,7 @@ from ..runs.travel import CONDITION, travelled_span, without_drift
 from ..support.argumentkinds import told_kinds
 from ..support.suggestions import check_choice
 from .argument import ARGUMENTS, AnyArgument, ArgumentChoice, choose_argument
+from .decoded import decoded
 from .problem import Problem
 from .result import FitResult
 from .robust import (
@@ -158,7 +159,7 @@ def fit(
 
         asked = {"nuisance": nuisance, "covariance": covariance, "ridge": ridge, "method": method}
         problem, weighted, posterior = fitted_with_prior(
-            runs_of(runs, reading),
+            decoded(runs_of(runs, reading)),
             prior,
             None
             if orders is None or isinstance(orders, str)
@@ -180,7 +181,7 @@ def fit(
             posterior=posterior,
         )
     result = fitted_to(
-        runs_of(runs, reading),
+        decoded(runs_of(runs, reading)),
         orders,
         gear_ratio=gear_ratio,
         fixed_member=fixed_member,
@@ -246,6 +247,8 @@ def fitted_to(
             )
         sought["reference_orders"] = beside.reference
         selection, orders = _selected(found, orders, loss, sought, summed)
+        if not selection.orders:
+            selection, orders = None, ()
     wanted = resolve_orders(orders, gear_ratio, fixed_member, shafts)
     taken = None
     if beside.wanted:
@@ -380,7 +383,8 @@ def _selected(
     if loss != "linear":
         runs = [without_spikes(run) for run in runs]
     selection = _choice(runs, {**sought, "summed": summed})
-    if not selection.orders:
+    # Constants of channels are a model of themselves: nothing need be left of the angle.
+    if not selection.orders and any(run.channels is None for run in runs):
         raise NoOrderError(
             f"no order is supported by the data: {selection.reason}", sum(map(len, runs))
         )

@@ -14,6 +14,7 @@ from ..errors import ArgumentError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
+from ..runs.channelangle import common_channels
 from ..runs.checks.copies import duplicate_rows, duplicate_runs
 from ..runs.checks.jumps import missed_counts
 from ..runs.checks.record import records_of
@@ -38,6 +39,7 @@ def _build_model(fit: FittedCoefficients) -> HarmonicModel:
         fit=_record(fit),
         provenance=Provenance(tuple(sources), f"trueangle {__version__}"),
         indicated_sign=fit.problem.indicated_sign,
+        channels=common_channels(fit.problem.runs),
     )
 
 

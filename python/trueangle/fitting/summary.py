@@ -144,6 +144,7 @@ def plain_fit(found: FittedCoefficients) -> dict[str, Any]:
             )
         ],
         "evidence": _evidence(found),
+        **({} if found.model.channels is None else {"channels": found.model.channels.to_dict()}),
         "notes": list(found.notes),
     }
 

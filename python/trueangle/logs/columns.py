@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from ..errors import FileError
 from ..formats.columns import find_columns, listed_columns, signed_name
+from ..model.model import HarmonicModel
 from ..support.angles import UNIT_PERIODS, unit_name
-from ..support.roles import ANGLE_UNITS, RoleColumn, unit_in_name
+from ..support.roles import ANGLE_UNITS, RoleColumn, role_code, unit_in_name
 from ..support.signals import SIGNALS
 from ..support.suggestions import check_choice, did_you_mean
 
@@ -129,6 +130,41 @@ def find_joint_signal(
             if pattern.format(ending) in header:
                 return RoleColumn(signal, pattern.format(ending), unit_in_name(ending, signal))
     return find_columns(path, header, {}).get(signal) if joint is None else None
+
+
+def find_channel_columns(
+    path: object,
+    header: Sequence[str],
+    model: HarmonicModel,
+    joint: str | None,
+    wanted: Mapping[str, tuple[str, str | None]],
+) -> tuple[AngleColumn, dict[str, RoleColumn]]:
+    """The sine column in place of an angle's, and the cosine among the signals.
+
+    Raises
+    ------
+    FileError
+        A channel is missing; a column of the result's name is there already.
+    """
+    found = {}
+    for role in ("sine", "cosine"):
+        column = find_joint_signal(path, header, role, joint, wanted.get(role))
+        if column is None:
+            raise FileError(
+                path,
+                f"no column {role}, and the model decodes a sine and a cosine channel: name it "
+                f"with {role_code(role, unit=None)}; {listed_columns(header)}",
+                line=1,
+            )
+        found[role] = column
+    unit = unit_name(model.period)
+    corrected = _corrected_name("", unit, joint)
+    if corrected in header:
+        raise FileError(
+            path, "is there already: this log was corrected before", line=1, column=corrected
+        )
+    sine = found.pop("sine").name
+    return AngleColumn(sine, unit, model.period, corrected), found
 
 
 def _search(path: object, header: Sequence[str], joint: str | None) -> str:

@@ -312,6 +312,11 @@ def _array_channel(settings: LogSettings, state: Any = None) -> JointChannel:
     if len(settings.joints) > 1:
         raise ArgumentError("an array holds one joint: give one model")
     (joint,) = settings.joints
+    if joint.model.channels is not None:
+        raise ArgumentError(
+            "the model decodes a sine and a cosine channel: give a table with both columns, or "
+            "take `model.channels.angle(sine, cosine)` and `model.correct`"
+        )
     turn = joint.model.indicated_sign * joint.model.period
     angle = AngleColumn("", unit_name(joint.model.period), turn, "")
     return JointChannel(joint, angle, {}, JointState(state) if state else JointState(), settings)

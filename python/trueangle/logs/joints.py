@@ -23,7 +23,13 @@ from ..model.robot import Robot
 from ..model.robotfile import is_robot_file, load_robot
 from ..support.files import sha256_of
 from ..support.roles import RoleColumn, role_code, wanted_columns
-from .columns import SIGNAL_COLUMNS, AngleColumn, find_angle_column, find_joint_signal
+from .columns import (
+    SIGNAL_COLUMNS,
+    AngleColumn,
+    find_angle_column,
+    find_channel_columns,
+    find_joint_signal,
+)
 from .statistics import CorrectionStatistics
 from .turns import TurnCounter, TurnState
 from .unitevidence import UnitEvidence
@@ -119,6 +125,15 @@ class LogSettings:
         found: list[JointChannel] = []
         taken = list(header)
         for joint in self.joints:
+            if joint.model.channels is not None:
+                angle, signals = find_channel_columns(
+                    path, taken, joint.model, joint.name, joint.signals
+                )
+                signals |= _signal_columns(path, header, joint)
+                taken.append(angle.corrected)
+                state = (before or {}).get(joint.name or "", JointState())
+                found.append(JointChannel(joint, angle, signals, state, self))
+                continue
             angle = find_angle_column(
                 path,
                 joint.model.period,
@@ -232,6 +247,7 @@ class JointChannel:
         self._threads = settings.threads
         model = joint.model
         self._scale = model.period / angle.period
+        self._channels = model.channels
         self._corrector = model.corrector() if model.terms else None
         self._signal_columns = {s: _with_unit(c, angle.unit) for s, c in signals.items()}
         self._counts = settings.counts_per_turn
@@ -286,6 +302,9 @@ class JointChannel:
         float32 gives float32, integers and float64 give float64; NaN stays NaN; the turn of
         a reading is kept.
         """
+        if self._channels is not None:
+            signals = dict(signals or {})
+            indicated = self._channels.angle(indicated, signals.pop("cosine"))
         kept = indicated.dtype if indicated.dtype == np.float32 else np.dtype(np.float64)
         if self._counter is None:
             corrected = self._apply(indicated, signals)

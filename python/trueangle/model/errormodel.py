@@ -14,6 +14,7 @@ import trueangle._core as _core
 
 from ..errors import ArgumentError
 from ..joint.shafts import Shaft
+from ..runs.rawchannels import Channels
 from ..support.angles import check_period, checked_sign
 from ..support.argumentkinds import all_of_type
 from ..support.arrays import Array
@@ -42,6 +43,7 @@ class ErrorModel(Evaluation):
     provenance: Provenance = field(default_factory=Provenance)
     terms: tuple[Term, ...] = ()
     indicated_sign: int = 1
+    channels: Channels | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -64,6 +66,11 @@ class ErrorModel(Evaluation):
             check_fit(self.fit, self.period)
         if self.terms != ():
             self._check_terms()
+        if self.channels is not None and self.channels.period != self.period:
+            raise ArgumentError(
+                f"channels give angles of period {self.channels.period:g}, and the model takes "
+                f"those of period {self.period:g}"
+            )
 
     def _check_terms(self) -> None:
         from .terms import TERMS, Term  # most models have none

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import ArgumentError, FileError, ModelFileError, OutsideSpanWarning
 from ..joint.shafts import Shaft
+from ..runs.rawchannels import CONSTANTS, Channels
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.decoding import (
@@ -46,6 +47,7 @@ _KEYS = {
     "period": True,
     "argument": True,
     "indicated": False,
+    "channels": False,
     "shafts": True,
     "constant": True,
     "terms": False,
@@ -54,6 +56,7 @@ _KEYS = {
     "fit": False,
     "provenance": False,
 }
+_CHANNEL_KEYS = (*CONSTANTS, "direction", "periods_per_turn", "harmonics", "covariance")
 #: Lines of one term, at most.
 MAX_TERM_LINES = 4096
 #: Smallest turn in the unit of angles, and the inverse of the largest.
@@ -175,6 +178,7 @@ class _ModelReader(RecordReader):
                 provenance=self.provenance(content.get("provenance")),
                 terms=self.terms(content.get("terms")),
                 indicated_sign=self.sign(content.get("indicated", {"sign": 1})),
+                channels=self.channels(content.get("channels"), period),
             )
             if model.terms:
                 self.check_finite(model)
@@ -235,6 +239,40 @@ class _ModelReader(RecordReader):
         if isinstance(sign, bool) or sign not in (1, -1):
             raise self.error(f"must be 1 or -1, got {shown_value(sign)}", "indicated.sign")
         return int(sign)
+
+    def channels(self, value: Any, period: float) -> Channels | None:
+        """Constants of a sine and a cosine channel."""
+        if value is None:
+            return None
+        table = self.table(value, {name: name in CONSTANTS for name in _CHANNEL_KEYS}, "channels")
+        checked: dict[str, Any] = {
+            name: self.number(table[name], f"channels.{name}") for name in CONSTANTS
+        }
+        for name in ("direction", "periods_per_turn"):
+            if name in table:
+                checked[name] = self.number(table[name], f"channels.{name}")
+        harmonics = self.items(
+            table.get("harmonics", []), "channels.harmonics", "harmonics", MAX_TERM_LINES
+        )
+        entries = []
+        for i, entry in enumerate(harmonics):
+            where = f"channels.harmonics[{i}]"
+            found = self.table(entry, {"order": True, "re": True, "im": True, "std": False}, where)
+            numbers = {name: self.number(v, f"{where}.{name}") for name, v in found.items()}
+            if not numbers["order"].is_integer() or abs(numbers["order"]) > MAX_ORDER:
+                raise self.error("a whole number is needed", f"{where}.order")
+            entries.append({**numbers, "order": int(numbers["order"])})
+        checked["harmonics"] = entries
+        rows = table.get("covariance")
+        if rows is not None:
+            listed = self.items(rows, "channels.covariance", "rows", len(CONSTANTS))
+            checked["covariance"] = tuple(
+                self.numbers(row, f"channels.covariance[{i}]") for i, row in enumerate(listed)
+            )
+        try:
+            return Channels.from_table(checked, period)
+        except ValueError as cause:
+            raise self.error(str(cause), "channels") from None
 
     def covariance(self, value: Any, shafts: tuple[Shaft, ...]) -> Array | None:
         if value is None:

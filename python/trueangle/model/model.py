@@ -16,6 +16,7 @@ from ..support.argumentkinds import of_type, told_kinds
 from ..support.display_units import error_unit, sine_of_rms
 from ..support.layout import counted, laid_out, wrapped_lines
 from ..support.plainresult import result_picture
+from .channelstep import channel_step
 from .corrector import Corrector
 from .errormodel import Argument, ErrorModel
 from .step import ExchangeableStep, Step, exchangeable_step
@@ -67,6 +68,9 @@ class HarmonicModel(ErrorModel):
         -1 where the sensor counts the other way: the indicated angle is minus what it reads.
         `error`, `correct`, `corrector` and `compensator` take and give indicated angles all the
         same; `trueangle.correct` and `trueangle.export_model` take what the sensor reads.
+    channels : Channels, optional
+        By which the indicated angle is made of a sine and a cosine channel: `compensator` then
+        takes both.
 
     Raises
     ------
@@ -106,6 +110,10 @@ class HarmonicModel(ErrorModel):
         and keeps the state of travel; `corrector` gives the same step and a ``reset``. Signals
         that the model does not need are ignored, as by `correct`. A step can be pickled.
 
+        With `channels` it is ``step(sine, cosine)``, the arc tangent and its correction in one
+        call; the angle lies within half a period of the channels about zero. Such a step has no
+        ``swap``.
+
         ``step.swap(model)`` corrects by another model from the next step on, in every thread that
         holds the step: a step in another thread ends with the model it began with. Both have the
         same period and ``indicated_sign``, and terms or none. What is known of the travel stays
@@ -123,6 +131,9 @@ class HarmonicModel(ErrorModel):
         >>> round(step(90.75), 9)
         90.0
         """
+        if self.channels is not None:
+            decoded: ExchangeableStep[HarmonicModel] = channel_step(self)
+            return decoded
         core = self._prepared()
         swap = partial(_swap, core, self)
         step: ExchangeableStep[HarmonicModel] = (

@@ -35,6 +35,7 @@ def plain_model(model: ErrorModel) -> dict[str, Any]:
         "period": model.period,
         "argument": model.argument,
         "indicated": {"sign": model.indicated_sign},
+        **({} if model.channels is None else {"channels": model.channels.to_table()}),
         "shafts": [asdict(shaft) for shaft in model.shafts],
         "constant": model.constant,
         "terms": [term.to_table() for term in model.terms],

@@ -17,7 +17,9 @@ from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, u
 from ..support.signals import FIELDS
 from ..support.times import local_day
 from .angles import find_run_angles
+from .channelangle import with_channel_angle
 from .facets import Facets, read_facets
+from .rawchannels import Channels
 from .readings import FileReadings
 from .run import CalibrationRun, as_runs, runs_or_data
 from .source import ReadingOptions, checked_reading_options, each_table
@@ -65,7 +67,9 @@ def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationR
         what it finds in the name of a file is the unit of its runs. ``period``: one turn in the
         unit of angles whose columns name none; these may then be called ``reference`` and
         ``indicated``. ``by``: the column that tells the runs apart (default: ``run``).
-        ``topic``: JointState topic of a ROS bag (default: the only one).
+        ``topic``: JointState topic of a ROS bag (default: the only one). ``periods_per_turn``:
+        periods in a turn of the columns ``sine`` and ``cosine``, of which the indicated angle is
+        then made, as it is where no column has it.
 
     Returns
     -------
@@ -165,6 +169,7 @@ class Conversion(NamedTuple):
     counts: float | None = None
     reference_counts: float | None = None
     facets: Facets | None = None
+    periods: int | None = None
 
     @classmethod
     def of(cls, reading: ReadingOptions) -> Conversion:
@@ -174,6 +179,7 @@ class Conversion(NamedTuple):
             checked_count_turn(reading["counts_per_turn"], "counts_per_turn"),
             checked_count_turn(reading["counts_per_turn_reference"], "counts_per_turn_reference"),
             facets if facets is None or isinstance(facets, Facets) else read_facets(facets),
+            reading["periods_per_turn"],
         )
 
 
@@ -193,6 +199,7 @@ class _RunColumns(NamedTuple):
     left_out: list[int]
     source: InputFile
     indicated_sign: int
+    channels: Channels | None = None
 
 
 def read_columns(data: Any, reading: ReadingOptions) -> list[_RunColumns]:
@@ -207,6 +214,7 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
     # A log of an angle called indicated_deg is no table.
     if len(table.columns) == 1 and filled and table.roles.keys() <= asked & {"indicated"}:
         return _entries(table, given.counts)
+    table, channels = with_channel_angle(table, given.periods, given.reference_counts)
     roles, path = table.roles, table.path
     angles = find_run_angles(
         path,
@@ -259,6 +267,7 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
         left_out,
         table.source,
         angles.indicated_sign,
+        channels,
     )
 
 
@@ -290,7 +299,7 @@ def _entries(table: FileReadings, counts: float | None) -> _RunColumns:
 def _runs_of_readings(table: FileReadings, given: Conversion) -> list[CalibrationRun]:
     """Runs of the rows of a table; raises as `read_runs`."""
     found = _columns(table, given)
-    signals = found.signals
+    signals, table = found.signals, found.table
     used = {c.name for role, c in table.roles.items() if c.is_asked or role in _USED}
     others = {name: values for name, values in table.columns.items() if name not in used}
     runs = []
@@ -312,6 +321,7 @@ def _runs_of_readings(table: FileReadings, given: Conversion) -> list[Calibratio
                 columns={name: values[rows] for name, values in others.items()},
                 source=found.source,
                 indicated_sign=found.indicated_sign,
+                channels=found.channels,
             )
         )
     return runs

@@ -19,6 +19,7 @@ from ..support.arrays import Array
 from ..support.files import InputFile
 from ..support.layout import counted
 from ..support.signals import FIELDS, find_signal, signal_column, signal_columns
+from .rawchannels import Channels
 
 
 @told_kinds
@@ -64,6 +65,8 @@ class CalibrationRun:
     indicated_sign : {1, -1}
         -1 of a sensor that counts the other way: ``indicated`` is minus what it reads. Models of
         the run keep it, for `trueangle.correct` and `trueangle.export_model`.
+    channels : Channels, optional
+        By which ``indicated`` was made of the signals ``sine`` and ``cosine``.
 
     Raises
     ------
@@ -95,6 +98,7 @@ class CalibrationRun:
     columns: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
     source: InputFile | None = field(default=None, kw_only=True)
     indicated_sign: int = field(default=1, kw_only=True)
+    channels: Channels | None = field(default=None, kw_only=True)
 
     if TYPE_CHECKING:  # what is taken is more than what is kept
 
@@ -118,6 +122,7 @@ class CalibrationRun:
             columns: Mapping[str, Any] = ...,
             source: InputFile | None = None,
             indicated_sign: int = 1,
+            channels: Channels | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:

@@ -16,6 +16,7 @@ from ..support.angles import check_period, unit_name
 from ..support.roles import RoleColumn, wanted_columns
 from ..support.suggestions import did_you_mean
 from .paths import find_logs, unit_of_path
+from .rawchannels import checked_periods
 from .readings import FileReadings, named_source, readings_of
 from .tables import table_readings
 
@@ -40,6 +41,8 @@ class OtherReadingOptions(TypedDict, total=False):
         of its runs.
     facets
         File of calibrated deviations of a polygon's facets.
+    periods_per_turn
+        Periods of a sine and a cosine channel in a turn; the indicated angle is made of these.
     """
 
     signals: Mapping[str, Any] | None
@@ -49,6 +52,7 @@ class OtherReadingOptions(TypedDict, total=False):
     topic: str | None
     unit_from: str | None
     facets: Any
+    periods_per_turn: int | None
 
 
 class ReadingOptions(OtherReadingOptions, total=False):
@@ -96,7 +100,10 @@ def checked_reading_options(given: Mapping[str, Any]) -> ReadingOptions:
         topic=given.get("topic"),
         unit_from=given.get("unit_from"),
         facets=given.get("facets"),
+        periods_per_turn=given.get("periods_per_turn"),
     )
+    if found["periods_per_turn"] is not None:
+        found["periods_per_turn"] = checked_periods(found["periods_per_turn"])
     if found["unit_from"] is not None:
         try:
             re.compile(found["unit_from"])

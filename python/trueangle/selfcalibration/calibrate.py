@@ -12,6 +12,7 @@ from ..support.angles import check_period
 from ..support.argumentkinds import told_kinds
 from ..support.blas import one_blas_thread
 from ..support.suggestions import check_choice
+from .channels import channel_patterns
 from .dual import dual
 from .heads import head_patterns
 from .loop import check_loop
@@ -50,8 +51,8 @@ def selfcal(
     logs : path, table, CalibrationRun, or iterable of them
         Files, folders, patterns and tables in memory as `trueangle.read_runs` takes them, or
         runs. Columns ``time_s``, ``indicated_deg`` (or ``_rad``, ``_turn``, ``_count``), ``run``,
-        ``head1_deg`` ..., ``shift_deg``, ``motor_deg``, ``current_A``.
-    method : {"auto", "spin-down", "heads", "shifts", "dual"}
+        ``head1_deg`` ..., ``shift_deg``, ``motor_deg``, ``current_A``, ``sine``, ``cosine``.
+    method : {"auto", "spin-down", "heads", "shifts", "dual", "channels"}
         ``"auto"`` looks at the columns.
     orders : "auto" or sequence of int
         By default those that stand out of the noise.
@@ -73,8 +74,8 @@ def selfcal(
     period : float, optional
         One turn in the unit of the model (360), and of angles whose columns name none.
     **reading
-        ``signals``, ``by``, ``counts_per_turn``, ``counts_per_turn_reference``, ``topic``, as in
-        `trueangle.read_runs`.
+        ``signals``, ``by``, ``counts_per_turn``, ``counts_per_turn_reference``, ``topic``,
+        ``periods_per_turn``, as in `trueangle.read_runs`.
 
     Returns
     -------
@@ -116,6 +117,10 @@ def selfcal(
     chosen = _method(recordings) if method == "auto" else method
     if fit_ratio and chosen != "dual":
         raise ArgumentError(f"fit_ratio needs the motor's angle (method 'dual'), not {chosen!r}")
+    if chosen == "channels":
+        return channel_patterns(
+            recordings, wanted, loop=loop, bandwidth=loop_bandwidth, period=turn
+        )
     if chosen == "heads":
         return head_patterns(recordings, wanted, angles=head_angles, period=turn)
     if chosen == "shifts":
@@ -143,6 +148,8 @@ def _method(recordings: Sequence[Recording]) -> str:
         return "shifts"
     if first.indicated is not None and first.time is not None:
         return "spin-down"
+    if first.sine is not None and first.cosine is not None:
+        return "channels"
     raise NoModelError(
         f"{first.named}: nothing here calibrates without a reference; record time_s with every "
         "reading of a turning shaft, or several heads (head1_deg, head2_deg), or the motor's "

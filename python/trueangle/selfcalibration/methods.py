@@ -4,5 +4,5 @@ from __future__ import annotations
 
 from typing import Final
 
-METHODS: Final = ("spin-down", "heads", "shifts", "dual")
+METHODS: Final = ("spin-down", "heads", "shifts", "dual", "channels")
 LOOPS: Final = ("open", "closed", "unknown")

@@ -12,6 +12,7 @@ from ..errors import NotInvertibleError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
+from ..runs.rawchannels import Channels
 from ..support.angles import common_sign
 from .recording import Recording
 from .result import ARCSEC, OrderEstimate
@@ -29,6 +30,7 @@ def reference_free_model(
     period: float,
     motor: tuple[float, Sequence[OrderEstimate]] | None = None,
     span: tuple[float, float] | None = None,
+    channels: Channels | None = None,
 ) -> HarmonicModel:
     """Whole orders of the output, and of a motor that turns ``motor[0]`` times as fast.
 
@@ -79,7 +81,10 @@ def reference_free_model(
             covariance=np.diag(variances),
             fit=fit,
             provenance=made_by,
-            indicated_sign=common_sign(r.indicated_sign for r in recordings),
+            indicated_sign=common_sign(r.indicated_sign for r in recordings)
+            if channels is None
+            else 1,
+            channels=channels,
         )
     except NotInvertibleError as error:
         raise NotInvertibleError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -21,7 +21,17 @@ from ..support.roles import LABELS, RoleColumn, role_kind
 _LABELS = ("unit", "run")
 
 #: Roles of columns that a recording keeps, besides the heads.
-_CHANNELS = ("time", "indicated", "reference", "motor", "shift", "mount", "current")
+_CHANNELS = (
+    "time",
+    "indicated",
+    "reference",
+    "motor",
+    "shift",
+    "mount",
+    "current",
+    "sine",
+    "cosine",
+)
 
 
 @dataclass(frozen=True)
@@ -37,12 +47,21 @@ class Recording:
     mount: Array | None = None
     heads: Mapping[int, Array] = field(default_factory=dict)
     current: Array | None = None
+    sine: Array | None = None
+    cosine: Array | None = None
+    periods: int = 1
     file: str = ""
     source: InputFile | None = None
     indicated_sign: int = 1
 
     def __len__(self) -> int:
-        for channel in (self.indicated, self.motor, self.reference, *self.heads.values()):
+        for channel in (
+            self.indicated,
+            self.motor,
+            self.reference,
+            self.sine,
+            *self.heads.values(),
+        ):
             if channel is not None:
                 return int(channel.size)
         return 0
@@ -89,6 +108,9 @@ def _of_run(run: CalibrationRun) -> Recording:
         mount=angle("mount"),
         heads={int(name[4:]): values * turn for name, values in run.heads.items()},
         current=run.signal("current"),
+        sine=run.signal("sine"),
+        cosine=run.signal("cosine"),
+        periods=1 if run.channels is None else run.channels.periods_per_turn,
         file=run.source.file if run.source else "",
         source=run.source,
         indicated_sign=run.indicated_sign,
@@ -107,18 +129,23 @@ def _of_table(table: FileReadings, reading: ReadingOptions) -> list[Recording]:
         for role, column in table.roles.items()
         if role not in LABELS
     }
-    if not any(role in channels for role in ("indicated", "motor", "head1")):
+    if not (
+        any(role in channels for role in ("indicated", "motor", "head1"))
+        or {"sine", "cosine"} <= channels.keys()
+    ):
         raise FileError(
             table.path,
-            "no column indicated_deg (or _rad, _turn, _count), head1_deg or motor_deg; its "
-            f"columns are {', '.join(list(table.columns)[:12])}",
+            "no column indicated_deg (or _rad, _turn, _count), head1_deg, motor_deg, or sine and "
+            f"cosine; its columns are {', '.join(list(table.columns)[:12])}",
             line=1,
         )
     labels = [table.columns[table.roles[role].name] for role in _LABELS if role in table.roles]
     file = str(table.path) if table.format.module_name else ""  # none of a table in memory
     read = (table.roles[role] for role in ("indicated", "head1") if role in table.roles)
     sign = next((column.sign for column in read), 1)
-    return _split(channels, labels, file, table.source, sign)
+    found = _split(channels, labels, file, table.source, sign)
+    periods = reading["periods_per_turn"] or 1
+    return [replace(recording, periods=periods) for recording in found]
 
 
 def _in_radians(column: RoleColumn, table: FileReadings, reading: ReadingOptions) -> Array:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..model.model import HarmonicModel
+from ..runs.rawchannels import Channels
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
@@ -112,7 +113,7 @@ class SelfCalibration(PlainResult):
     Attributes
     ----------
     method : str
-        ``"spin-down"``, ``"heads"``, ``"shifts"`` or ``"dual"``.
+        ``"spin-down"``, ``"heads"``, ``"shifts"``, ``"dual"`` or ``"channels"``.
     model : HarmonicModel
         Of what may be corrected; its record says that there was no reference.
     orders : tuple of OrderEstimate
@@ -129,6 +130,10 @@ class SelfCalibration(PlainResult):
     turns : float
     beside : dict
         What was fitted beside: ripple, reversal error, head angles, facets ...
+    coverage_deg : float, optional
+        Of channels: how much of their period the readings cover.
+    limit_arcsec : float, optional
+        Of channels: standard deviation of the angle by that of their constants (Cramer-Rao).
     """
 
     method: str
@@ -142,6 +147,8 @@ class SelfCalibration(PlainResult):
     readings: int
     turns: float
     beside: Mapping[str, Any] = field(default_factory=dict)
+    coverage_deg: float | None = None
+    limit_arcsec: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The result as plain values, angles in arcsec."""
@@ -156,7 +163,22 @@ class SelfCalibration(PlainResult):
             "readings": self.readings,
             "turns": self.turns,
             "beside": dict(self.beside),
+            **self._plain_channels(),
             "notes": list(self.notes),
+        }
+
+    @property
+    def channels(self) -> Channels | None:
+        """Constants of a sine and a cosine channel, by which the model decodes."""
+        return self.model.channels
+
+    def _plain_channels(self) -> dict[str, Any]:
+        if self.channels is None:
+            return {}
+        return {
+            "channels": self.channels.to_dict(),
+            "coverage_deg": self.coverage_deg,
+            "limit_arcsec": self.limit_arcsec,
         }
 
     def _brief(self) -> str:
@@ -227,6 +249,8 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
         f"calibrated without a reference ({result.method}): {result.readings} readings, "
         f"{result.turns:.1f} turns, noise {unit.text(result.noise_arcsec)}",
     ]
+    if result.channels is not None:
+        lines += ["", *_constants(result, unit)]
     if result.orders:
         lines += ["", *_table(result.orders, unit)]
     if result.sums:
@@ -246,6 +270,35 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
             )
     lines += [f"note: {note}" for note in result.notes]
     return laid_out(lines)
+
+
+def _constants(result: SelfCalibration, unit: ErrorUnit) -> list[str]:
+    """Constants of the channels with their standard errors, and how well they settle the angle."""
+    assert result.channels is not None
+    rows = result.channels.to_dict()
+    names = {
+        "offset_sine": "offset of the sine",
+        "offset_cosine": "offset of the cosine",
+        "amplitude": "amplitude of the cosine",
+        "gain_ratio": "gain, sine over cosine",
+        "phase_deg": "phase error, deg",
+    }
+    lines = [f"{'channels':24s} {'value':>12s} {'+-':>10s}"]
+    lines += [
+        f"{words:24s} {rows[name]['value']:12.6g} {rows[name]['std']:10.2g}"
+        for name, words in names.items()
+    ]
+    lines += [
+        f"harmonic {h.order:<15d} {abs(complex(h.re, h.im)):12.5f} {h.std:10.2g}"
+        for h in result.channels.harmonics
+    ]
+    sense = "rises" if result.channels.direction > 0 else "falls"
+    if result.limit_arcsec is not None and result.coverage_deg is not None:
+        lines.append(
+            f"the phase {sense} with the angle; {result.coverage_deg:.0f} deg of the period are "
+            f"covered; the constants settle the angle to {unit.text(result.limit_arcsec)}"
+        )
+    return lines
 
 
 def _table(orders: tuple[OrderEstimate, ...], unit: ErrorUnit) -> list[str]:

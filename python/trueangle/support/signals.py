@@ -119,6 +119,10 @@ SIGNALS: Mapping[str, Signal] = {
         Signal("mount", "angle", "mount_{}", "how far the reference was turned on its mount"),
         Signal("shift", "angle", "shift_{}", "how far one of two encoders was turned"),
         Signal("motor", "angle", "motor_{}", "the motor's own angle, not reduced"),
+        Signal("sine", "plain", "sine", "channel of a sensor that follows the sine"),
+        Signal("cosine", "plain", "cosine", "channel of a sensor that follows the cosine"),
+        Signal("sine2", "plain", "sine2", "sine of the second track of a sensor"),
+        Signal("cosine2", "plain", "cosine2", "cosine of the second track of a sensor"),
     )
 }
 

@@ -13,6 +13,7 @@ from ...runs.run import CalibrationRun
 from ...runs.source import ReadingOptions
 from ...support.argumentkinds import told_kinds
 from ..argument import AnyArgument
+from ..decoded import decoded
 from ..fit import fitted_to
 from ..robust import without_spikes
 from ..uncertainty import CovarianceKind, check_covariance
@@ -108,7 +109,7 @@ def select_orders(
     >>> select_orders(run).orders
     (3,)
     """
-    found = runs_of(runs, reading)
+    found = decoded(runs_of(runs, reading))
     check_covariance(covariance, len(found))
     joint: dict[str, Any] = {"gear_ratio": gear_ratio, "fixed_member": fixed_member}
     joint |= {"shafts": shafts, "nuisance": nuisance}

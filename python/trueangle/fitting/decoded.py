@@ -1,0 +1,47 @@
+"""Runs whose indicated angle is made of two channels, with constants by their reference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..errors import ArgumentError
+from ..estimation.referencedchannels import referenced_channels
+from ..runs.channelangle import following
+from ..runs.run import CalibrationRun
+
+
+def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
+    """Runs as they are; those of channels with the angle of constants that all of them share.
+
+    Raises
+    ------
+    ArgumentError
+        Some runs have channels and others have none, or other senses or periods.
+    NoModelError
+        Channels that are dead or one.
+    """
+    given = [run.channels for run in runs]
+    if all(channels is None for channels in given):
+        return list(runs)
+    first = given[0]
+    kinds = {c and (c.direction, c.periods_per_turn, c.period) for c in given}
+    if first is None or len(kinds) > 1:
+        raise ArgumentError(
+            "the runs have sine and cosine channels that differ in their sense, periods per turn "
+            "or unit, or some have none: fit them apart"
+        )
+    signals = [(run.signals["sine"], run.signals["cosine"], run.reference) for run in runs]
+    channels = referenced_channels(signals, first, _named(runs[0]))
+    return [
+        replace(
+            run,
+            indicated=following(channels, sine, cosine, reference)[0],
+            channels=channels,
+        )
+        for run, (sine, cosine, reference) in zip(runs, signals, strict=True)
+    ]
+
+
+def _named(run: CalibrationRun) -> str:
+    return run.source.file if run.source is not None and run.source.file else "the channels"

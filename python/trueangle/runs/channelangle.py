@@ -1,0 +1,119 @@
+"""The indicated angle of a table that holds a sine and a cosine channel in its place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+
+from ..errors import FileError
+from ..formats.columns import listed_columns
+from ..support.angles import UNIT_PERIODS, circular_mean, wrap
+from ..support.arrays import Array
+from ..support.roles import RoleColumn, role_code
+from .rawchannels import Channels
+from .readings import FileReadings
+from .run import CalibrationRun
+
+#: The column that is made.
+_MADE: Final = "angle of sine and cosine"
+
+_PERIOD: Final = 360.0
+
+
+def with_channel_angle(
+    table: FileReadings, periods: int | None, reference_counts: float | None
+) -> tuple[FileReadings, Channels | None]:
+    """The table with the angle of its channels as the indicated one, where that is wanted.
+
+    It is where ``periods`` in a turn are given, where the channels are named, and where no column
+    holds an indicated angle. Offsets are taken out only where the curve does not go round zero
+    (an unsigned converter); the sense is that in which the channels follow the reference.
+
+    Raises
+    ------
+    FileError
+        A channel is missing or does not change.
+    """
+    roles = table.roles
+    pair = [roles.get("sine"), roles.get("cosine")]
+    asked = periods is not None or any(c is not None and c.is_asked for c in pair)
+    has_angle = bool({"indicated", "error"} & roles.keys())
+    named = "indicated" in roles and roles["indicated"].is_asked
+    if named or "reference" not in roles or (has_angle and not asked):
+        return table, None
+    if not asked and None in pair:
+        return table, None
+    for role, column in zip(("sine", "cosine"), pair, strict=True):
+        if column is None:
+            raise FileError(
+                table.path,
+                f"no column {role}: name the channel with {role_code(role, unit=None)}; "
+                f"{listed_columns(list(table.columns))}",
+                line=1,
+            )
+    reference = roles["reference"]
+    unit = reference.unit or table.format.unit or "deg"
+    period = UNIT_PERIODS.get(unit, _PERIOD)
+    true = table.values(reference._replace(unit=unit), period, reference_counts)
+    sine, cosine = (table.raw(roles[role]) for role in ("sine", "cosine"))
+    present = np.isfinite(true) & np.isfinite(sine) & np.isfinite(cosine)
+    channels = _plain(table, sine[present], cosine[present], periods or 1, period)
+    angle, channels = following(channels, sine, cosine, true)
+    made = RoleColumn("indicated", _MADE, next(u for u, p in UNIT_PERIODS.items() if p == period))
+    kept = {role: column for role, column in roles.items() if role != "error"}
+    return (
+        table._replace(roles={**kept, "indicated": made}, columns={**table.columns, _MADE: angle}),
+        channels,
+    )
+
+
+def _plain(
+    table: FileReadings, sine: Array, cosine: Array, periods: int, period: float
+) -> Channels:
+    """Channels as they are; about their middle where their curve does not go round zero."""
+    middles = {}
+    for role, values in (("sine", sine), ("cosine", cosine)):
+        low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+        if not low < high:
+            raise table.error(
+                f"the {role} channel is constant ({low:.6g}): a dead channel or a shaft at rest",
+                table.roles[role].name,
+            )
+        middles[role] = 0.0 if low < 0.0 < high else 0.5 * (low + high)
+    return Channels(
+        offset_sine=middles["sine"],
+        offset_cosine=middles["cosine"],
+        periods_per_turn=periods,
+        period=period,
+    )
+
+
+def following(
+    channels: Channels, sine: Array, cosine: Array, reference: Array
+) -> tuple[Array, Channels]:
+    """The angle of channels in the turns of a reference, and the channels in its sense."""
+    period = channels.period / channels.periods_per_turn
+    turn = 2.0 * math.pi / period
+    angle = channels.angle(sine, cosine)
+    known = np.isfinite(angle) & np.isfinite(reference)
+
+    def agreement(sign: float) -> float:
+        off = (sign * angle[known] - reference[known]) * turn
+        return abs(complex(np.exp(1j * off).mean()))
+
+    if agreement(-1.0) > agreement(1.0):
+        channels = channels.replace(direction=-channels.direction)
+        angle = -angle
+    if channels.periods_per_turn == 1:
+        return angle, channels
+    zero = circular_mean(angle[known] - reference[known], period)
+    return reference + zero + wrap(angle - reference - zero, period), channels
+
+
+def common_channels(runs: Iterable[CalibrationRun]) -> Channels | None:
+    """The channels of which the indicated angles of all runs were made; None without."""
+    found = {run.channels for run in runs}
+    return found.pop() if len(found) == 1 else None

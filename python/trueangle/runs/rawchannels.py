@@ -1,0 +1,310 @@
+"""Two channels of a sensor, sine and cosine: their constants, and the angle that these give."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _core
+from ..errors import ArgumentError
+from ..support.angles import check_period, checked_sign
+from ..support.arrays import Array
+
+#: Names of the constants, in the order of their covariance.
+CONSTANTS: Final = ("offset_cosine", "offset_sine", "amplitude", "gain_ratio", "phase_deg")
+
+#: Phases at which the error of a curve is sampled, and the highest order kept of it.
+_SAMPLES: Final = 512
+_HIGHEST: Final = 64
+#: Steps to the zero at which it has no mean; each leaves the square of a slope.
+_STEPS: Final = 8
+
+#: Amplitudes of the error, radians, that no double angle resolves.
+_NOTHING: Final = 1e-12
+
+#: Amplitudes that are not corrected, relative to the standard error of a harmonic.
+_NEGLIGIBLE: Final = 0.1
+
+#: Periods in a turn, at most, as of order numbers.
+MOST_PERIODS: Final = 1_000_000
+
+
+class ChannelHarmonic(NamedTuple):
+    """``z_k`` of the curve, relative to its fundamental: ``order`` k, real and imaginary part."""
+
+    order: int
+    re: float
+    im: float
+    std: float = 0.0
+    """Standard error of either part."""
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Constants of a sine and a cosine channel.
+
+    ::
+
+        cosine = o_c + A cos φ,    sine = o_s + A g sin(φ + δ),
+        angle = direction * φ * period / (2 pi periods_per_turn)
+
+    Parameters
+    ----------
+    offset_sine, offset_cosine : float
+        Middle of each channel, in the unit of the channels.
+    amplitude : float
+        ``A``, of the cosine.
+    gain_ratio : float
+        ``g``, amplitude of the sine over that of the cosine.
+    phase_deg : float
+        ``δ``, how far the sine leads a quarter of a period behind the cosine, degrees.
+    direction : {1, -1}
+        -1 where the phase falls as the angle rises.
+    periods_per_turn : int
+        Periods of the channels in a turn.
+    period : float
+        One turn in the unit of the angle.
+    harmonics : tuple of ChannelHarmonic
+        What the closed curve holds beyond these, relative to the fundamental.
+    covariance : array_like, shape (5, 5), optional
+        Of offset_cosine, offset_sine, amplitude, gain_ratio, phase_deg.
+
+    Raises
+    ------
+    ArgumentError
+        Numbers that are not finite, an amplitude or gain that is not positive, a phase
+        from 90 degrees on.
+
+    Examples
+    --------
+    >>> channels = Channels(offset_sine=0.1, gain_ratio=1.02, period=360.0)
+    >>> round(float(channels.correct(0.1 + 1.02 * 0.5, 3**0.5 / 2)), 9)
+    30.0
+    """
+
+    offset_sine: float = 0.0
+    offset_cosine: float = 0.0
+    amplitude: float = 1.0
+    gain_ratio: float = 1.0
+    phase_deg: float = 0.0
+    direction: int = 1
+    periods_per_turn: int = 1
+    period: float = 2.0 * math.pi
+    harmonics: tuple[ChannelHarmonic, ...] = ()
+    covariance: tuple[tuple[float, ...], ...] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "period", check_period(self.period))
+        put(self, "direction", checked_sign(self.direction))
+        put(self, "periods_per_turn", checked_periods(self.periods_per_turn))
+        for name in CONSTANTS:
+            value = float(getattr(self, name))
+            if not math.isfinite(value):
+                raise ArgumentError(f"{name} must be finite, got {value!r}")
+            put(self, name, value)
+        for name in ("amplitude", "gain_ratio"):
+            if not getattr(self, name) > 0.0:
+                raise ArgumentError(f"{name} must be positive, got {getattr(self, name)!r}")
+        if not abs(self.phase_deg) < 90.0:
+            raise ArgumentError(f"phase_deg must be between -90 and 90, got {self.phase_deg!r}")
+        put(self, "harmonics", tuple(ChannelHarmonic(*entry) for entry in self.harmonics))
+        for h in self.harmonics:
+            if h.order in (-1, 0, 1) or not all(map(math.isfinite, h[1:])):
+                raise ArgumentError(f"a harmonic has an order from 2 or to -2, got {h!r}")
+        if self.covariance is not None:
+            rows = np.asarray(self.covariance, dtype=np.float64)
+            if rows.shape != (len(CONSTANTS),) * 2 or not np.isfinite(rows).all():
+                raise ArgumentError(
+                    f"covariance must be {len(CONSTANTS)} x {len(CONSTANTS)} finite numbers, got "
+                    f"shape {rows.shape}"
+                )
+            put(self, "covariance", tuple(map(tuple, rows.tolist())))
+
+    @cached_property
+    def constants(self) -> tuple[float, float, float, float, float, float]:
+        """What the core decodes by: offsets, inverse amplitudes, slope, unit of the angle."""
+        phase = math.radians(self.phase_deg)
+        along = self.amplitude * self.gain_ratio * math.cos(phase)
+        return (
+            self.offset_cosine,
+            self.offset_sine,
+            1.0 / self.amplitude,
+            1.0 / along,
+            math.tan(phase),
+            self.direction * self.period / (2.0 * math.pi * self.periods_per_turn),
+        )
+
+    @cached_property
+    def _decoder(self) -> _core.Decoder:
+        return _core.Decoder(self.constants)
+
+    @property
+    def offset(self) -> complex:
+        """``z_0``, relative to the fundamental."""
+        return complex(self.offset_cosine, self.offset_sine) / abs(self.fundamental)
+
+    @property
+    def fundamental(self) -> complex:
+        """``z_1`` of ``cosine + i sine``."""
+        return self._first(1.0)
+
+    @property
+    def image(self) -> complex:
+        """``z_(-1)`` relative to the fundamental: what gain and phase make."""
+        z1 = self._first(1.0)
+        return self._first(-1.0) * z1 / abs(z1) ** 2
+
+    def _first(self, sign: float) -> complex:
+        sine = self.gain_ratio * cmath.exp(1j * math.radians(self.phase_deg) * sign)
+        return 0.5 * self.amplitude * (1.0 + sign * sine)
+
+    def angle(self, sine: ArrayLike, cosine: ArrayLike) -> Array:
+        """The angle by offsets, gain and phase, harmonics not yet corrected.
+
+        In ``(-period / 2, period / 2] / periods_per_turn``; NaN for what is not finite.
+        """
+        return _elementwise(self._decoder.angles, sine, cosine)
+
+    def correct(self, sine: ArrayLike, cosine: ArrayLike) -> Any:
+        """The angle by offsets, gain, phase and harmonics.
+
+        Parameters
+        ----------
+        sine, cosine : array_like
+            Readings of the channels, of one shape.
+
+        Returns
+        -------
+        float or ndarray
+            In the unit of ``period``, within half a period of the channels about zero.
+        """
+        angle = self.angle(sine, cosine)
+        series = self._series
+        corrected = angle if series is None else np.asarray(series.correct(angle, out=angle))
+        return float(corrected) if corrected.ndim == 0 else corrected
+
+    @cached_property
+    def _series(self) -> _core.Series | None:
+        orders, cosine, sine = self.error_harmonics()
+        if not orders:
+            return None
+        cycles = float(self.periods_per_turn)
+        return _core.Series(self.period, 0.0, [cycles], [orders], [cosine], [sine], "reference")
+
+    def curve(self, phase: Array) -> tuple[Array, Array]:
+        """Sine and cosine channel at phases of the fundamental, with their harmonics."""
+        z1 = self.fundamental
+        turn, size = cmath.phase(z1), abs(z1)
+        z = (
+            complex(self.offset_cosine, self.offset_sine)
+            + z1 * np.exp(1j * phase)
+            + self._first(-1.0) * np.exp(-1j * phase)
+        )
+        for k, re, im, _ in self.harmonics:
+            z = z + size * complex(re, im) * np.exp(1j * k * (phase + turn))
+        return np.asarray(z.imag), np.asarray(z.real)
+
+    def error_harmonics(self) -> tuple[list[int], list[float], list[float]]:
+        """Error that the harmonics leave in `angle`: orders of the channels' period, cosine, sine.
+
+        Of the curve itself, to all orders of the harmonics; in the unit of ``period``.
+        """
+        if not self.harmonics:
+            return [], [], []
+        phase = 2.0 * math.pi * np.arange(_SAMPLES) / _SAMPLES
+        unit = abs(self.constants[-1])
+        error, zero = phase, 0.0
+        # Counted from where the error's mean is zero: the zero of the angle is free.
+        for _ in range(_STEPS):
+            sine, cosine = self.curve(phase - zero)
+            error = self.angle(sine, cosine) / (self.direction * unit) - phase
+            error = (error + math.pi) % (2.0 * math.pi) - math.pi
+            zero += float(error.mean())
+        found = np.fft.rfft(error)[1 : _HIGHEST + 1] * 2.0 / _SAMPLES
+        # Orders far below the standard error of the harmonics cost time and correct nothing.
+        least = max(_NOTHING, _NEGLIGIBLE * max(h.std for h in self.harmonics))
+        kept = [k for k in range(_HIGHEST) if abs(found[k]) > least]
+        # As functions of the angle, which falls with the phase where the direction is -1.
+        return (
+            [k + 1 for k in kept],
+            [self.direction * unit * float(found[k].real) for k in kept],
+            [-unit * float(found[k].imag) for k in kept],
+        )
+
+    def replace(self, **changes: Any) -> Channels:
+        """A copy with some fields changed, checked anew."""
+        return replace(self, **changes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Each constant with its standard error: ``{"value", "std"}``."""
+        cov = np.zeros((5, 5)) if self.covariance is None else np.asarray(self.covariance)
+        std = dict(zip(CONSTANTS, np.sqrt(np.diag(cov)).tolist(), strict=True))
+        size = abs(self.fundamental)
+        rows: dict[str, Any] = {
+            name: {"value": getattr(self, name), "std": std[name]} for name in CONSTANTS
+        }
+        for name in ("offset_sine", "offset_cosine"):
+            rows[f"{name}_relative"] = {
+                "value": getattr(self, name) / size,
+                "std": std[name] / size,
+            }
+        rows["harmonics"] = [h._asdict() for h in self.harmonics]
+        rows["direction"] = {"value": self.direction, "std": 0.0}
+        rows["periods_per_turn"] = {"value": self.periods_per_turn, "std": 0.0}
+        return rows
+
+    def to_table(self) -> dict[str, Any]:
+        """The object that a model file holds."""
+        return {
+            **{name: getattr(self, name) for name in CONSTANTS},
+            "direction": self.direction,
+            "periods_per_turn": self.periods_per_turn,
+            "harmonics": [h._asdict() for h in self.harmonics],
+            "covariance": None if self.covariance is None else [*map(list, self.covariance)],
+        }
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any], period: float) -> Channels:
+        """From what `to_table` made."""
+        entries = dict(table)
+        entries["harmonics"] = tuple(ChannelHarmonic(**h) for h in entries.get("harmonics", ()))
+        return cls(period=period, **entries)
+
+
+def checked_periods(value: Any) -> int:
+    """A number of periods in a turn, checked.
+
+    Raises
+    ------
+    ArgumentError
+    """
+    try:
+        whole = int(value)
+    except (TypeError, ValueError, OverflowError):
+        whole = 0
+    if whole != value or not 1 <= whole <= MOST_PERIODS:
+        raise ArgumentError(
+            f"periods_per_turn must be a whole number from 1 to {MOST_PERIODS}, got {value!r}"
+        )
+    return whole
+
+
+def _elementwise(angles: Any, sine: ArrayLike, cosine: ArrayLike) -> Array:
+    pair: list[NDArray[np.float64]] = []
+    for name, values in (("sine", sine), ("cosine", cosine)):
+        try:
+            pair.append(np.asarray(values, dtype=np.float64))
+        except (TypeError, ValueError) as cause:
+            raise ArgumentError(f"{name} must be numbers: {cause}") from None
+    y, x = pair
+    if y.shape != x.shape:
+        raise ArgumentError(f"sine and cosine must have one shape, got {y.shape} and {x.shape}")
+    return np.asarray(angles(y.reshape(-1), x.reshape(-1))).reshape(y.shape)

@@ -1,0 +1,297 @@
+"""``channels``: the closed curve of a sine and a cosine channel.
+
+What it can never see: the zero; of every order the difference of the two coefficients of the curve
+that make it. An offset of the electronics and a magnet off its centre draw nearly one curve, and
+make opposite errors.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from ..errors import NoModelError, NotInvertibleError
+from ..estimation.channels import ChannelEstimate, estimate_channels
+from ..runs.rawchannels import Channels
+from ..support.arrays import Array
+from ..support.layout import counted
+from .model import reference_free_model
+from .recording import Recording
+from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, blind_words
+from .spindown import spin_down
+
+#: Offset in amplitudes from which the converter has no middle: a magnet's is far below it.
+_CENTRED: Final = 1.0
+
+#: Distance to the common curve, in distances to those of single runs, from which they differ.
+_UNLIKE: Final = 1.5
+
+#: Turns from which time stamps are asked for the orders that the curve cannot give.
+_TURNS: Final = 5.0
+
+
+def channel_patterns(
+    recordings: Sequence[Recording],
+    orders: str | Sequence[float] = "auto",
+    *,
+    loop: str = "unknown",
+    bandwidth: float | None = None,
+    period: float = 360.0,
+) -> SelfCalibration:
+    """Constants of the channels; with time stamps of several turns the pattern of the angle too."""
+    first = recordings[0]
+    pairs = [_pair(recording) for recording in recordings]
+    sine, cosine = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
+    found = estimate_channels(sine, cosine, first.named, periods=first.periods, period=period)
+    channels, sense = _in_sense(found.channels, recordings, pairs)
+    unit = abs(channels.constants[-1]) * 2.0 * math.pi / period * ARCSEC
+    angles = [_unwrapped(channels, *pair) for pair in pairs]
+    turns = sum(float(np.ptp(angle)) for angle in angles) / period
+    notes = [sense, *_notes(found), *_unlike(found, pairs, first.named)]
+    timed = _by_time(
+        [
+            replace(r, indicated=a * 2.0 * math.pi / period, indicated_sign=1)
+            for r, a in zip(recordings, angles, strict=True)
+        ],
+        orders,
+        turns,
+        loop,
+        bandwidth,
+        period,
+        notes,
+    )
+    table = _table(channels, found)
+    known = set() if timed is None else {o.order for o in timed.orders}
+    if timed is not None:
+        table = sorted(
+            [*timed.orders, *(o for o in table if o.order not in known)], key=lambda o: o.order
+        )
+    blind = [Blind.zero("no reading without a reference shows it"), *_blind(channels, unit, known)]
+    noise = math.hypot(*found.noise) / math.sqrt(2.0) * unit
+    try:
+        model = reference_free_model(
+            table,
+            "channels",
+            [f"{blind_words(b.orders)}: {b.because}" for b in blind],
+            notes,
+            recordings,
+            readings=found.readings,
+            noise=noise / ARCSEC,
+            period=period,
+            channels=channels,
+        )
+    except NotInvertibleError:
+        raise NoModelError(
+            f"{first.named}: the curve found is too far from an ellipse for one angle at each place"
+        ) from None
+    return SelfCalibration(
+        method="channels",
+        model=model,
+        orders=tuple(table),
+        sums=(),
+        blind=tuple(blind),
+        held_out={} if timed is None else timed.held_out,
+        notes=tuple(notes),
+        noise_arcsec=noise,
+        readings=found.readings,
+        turns=turns,
+        beside={
+            "noise_relative": {"cosine": found.noise[0], "sine": found.noise[1]},
+            "radius_left_relative": found.radius_left,
+            "clipped": dict(found.clipped),
+        },
+        coverage_deg=found.coverage,
+        limit_arcsec=found.limit * unit,
+    )
+
+
+def _pair(recording: Recording) -> tuple[Array, Array]:
+    if recording.sine is None or recording.cosine is None:
+        missing = "sine" if recording.sine is None else "cosine"
+        raise NoModelError(
+            f"{recording.named}: no column {missing}: name the channel with "
+            f"`signals={{'{missing}': 'NAME'}}`"
+        )
+    return recording.sine, recording.cosine
+
+
+def _in_sense(
+    channels: Channels, recordings: Sequence[Recording], pairs: Sequence[tuple[Array, Array]]
+) -> tuple[Channels, str]:
+    """The channels in the sense of another angle of the log, else of the travel."""
+    rising = travelled = 0.0
+    by = ""
+    for recording, (sine, cosine) in zip(recordings, pairs, strict=True):
+        phase = channels.angle(sine, cosine) / channels.constants[-1]
+        for name in ("reference", "indicated"):
+            other = getattr(recording, name)
+            if other is not None:
+                fine = channels.periods_per_turn * other
+                agree = [abs(np.exp(1j * (phase - s * fine)).mean()) for s in (1.0, -1.0)]
+                rising += agree[0] - agree[1]
+                by = name
+                break
+        travelled += float(np.diff(np.unwrap(phase)[[0, -1]])[0])
+    if by:
+        sense = f"the channels' phase {'rises' if rising >= 0.0 else 'falls'} with the {by} angle"
+        return channels.replace(direction=1 if rising >= 0.0 else -1), sense
+    if abs(travelled) < 0.5 * math.pi:
+        return channels, "the readings hardly travel: the angle is taken to rise with the phase"
+    word = "rises" if travelled > 0.0 else "falls"
+    return (
+        channels.replace(direction=1 if travelled > 0.0 else -1),
+        f"the channels' phase {word} through the readings, and the angle is taken to rise: where "
+        "the shaft turned backwards the sign of the angle is the other one",
+    )
+
+
+def _unwrapped(channels: Channels, sine: Array, cosine: Array) -> Array:
+    period = channels.period / channels.periods_per_turn
+    return np.unwrap(channels.angle(sine, cosine), period=period)
+
+
+def _by_time(
+    recordings: Sequence[Recording],
+    orders: str | Sequence[float],
+    turns: float,
+    loop: str,
+    bandwidth: float | None,
+    period: float,
+    notes: list[str],
+) -> SelfCalibration | None:
+    """The pattern of the decoded angle by its time stamps, which resolve what the curve cannot."""
+    if recordings[0].time is None or turns < _TURNS or recordings[0].periods > 1:
+        return None
+    try:
+        found = spin_down(recordings, orders, loop=loop, bandwidth=bandwidth, period=period)
+    except NoModelError as error:
+        notes.append(f"the time stamps add nothing: {error}")
+        return None
+    if not found.orders:
+        return None
+    notes.append(
+        f"time stamps of {turns:.0f} turns give {counted(found.orders, 'order')} of the decoded "
+        "angle"
+    )
+    return found
+
+
+def _table(channels: Channels, found: ChannelEstimate) -> list[OrderEstimate]:
+    """Orders of the angle that the harmonics of the curve make, with what these leave of them."""
+    unit = ARCSEC * 2.0 * math.pi / channels.period
+    orders, cosine, sine = channels.error_harmonics()
+    variances = np.zeros(len(orders))
+    for i, h in enumerate(channels.harmonics):
+        for part in ({"re": h.re + h.std}, {"im": h.im + h.std}):
+            moved = [*channels.harmonics]
+            moved[i] = h._replace(**part)
+            other = channels.replace(harmonics=tuple(moved)).error_harmonics()
+            rows = {k: complex(a, b) for k, a, b in zip(*other, strict=True)}
+            variances += [
+                0.5 * abs(rows.get(k, 0.0) - complex(a, b)) ** 2
+                for k, a, b in zip(orders, cosine, sine, strict=True)
+            ]
+    least = math.hypot(*found.noise) / math.sqrt(found.readings) * abs(channels.constants[-1])
+    return [
+        OrderEstimate(
+            order=float(k * channels.periods_per_turn),
+            cosine=a * unit,
+            sine=b * unit,
+            std=std * unit,
+            retained=1.0,
+            std_factor=std / least if least > 0.0 else math.inf,
+            of="the channels",
+        )
+        for k, a, b, std in zip(orders, cosine, sine, np.sqrt(variances).tolist(), strict=True)
+    ]
+
+
+def _blind(channels: Channels, unit: float, known: set[float]) -> list[Blind]:
+    """Orders whose sign the curve does not show: offset against an eccentric magnet, and so on."""
+    p = float(channels.periods_per_turn)
+    measure = "`fit` with a reference, or record time_s over five turns and more of smooth motion"
+    rows = [
+        (
+            1.0,
+            abs(channels.offset),
+            "an offset of {share} of the amplitude is corrected as one of the electronics; a "
+            "magnet or disc that is off its centre draws the same curve",
+        ),
+        (
+            2.0,
+            abs(channels.image),
+            "gain and phase ({share} of the amplitude) are corrected as those of the channels; a "
+            "third harmonic of the field draws the same curve",
+        ),
+    ]
+    rows += [
+        (
+            1.0 - h.order,
+            abs(complex(h.re, h.im)),
+            f"harmonic {h.order} ({{share}} of the amplitude) is corrected as one of the channels; "
+            f"harmonic {2 - h.order} draws the same curve",
+        )
+        for h in channels.harmonics
+        if h.order < 0
+    ]
+    return [
+        Blind(
+            (k * p,),
+            f"{words.format(share=f'{100.0 * size:.2g} %')}, and then the correction makes this "
+            f"order larger, by up to {2.0 * size * unit:.3g} arcsec",
+            measure,
+        )
+        for k, size, words in rows
+        if k * p not in known and size < _CENTRED
+    ]
+
+
+def _unlike(found: ChannelEstimate, pairs: Sequence[tuple[Array, Array]], named: str) -> list[str]:
+    """A note where the runs' own curves are closer to their readings than the one of all."""
+    if len(pairs) < 2:
+        return []
+    own = []
+    for pair in pairs:
+        with contextlib.suppress(NoModelError):
+            own.append(estimate_channels(*pair, named))
+    if not own:
+        return []
+    left = float(np.median([estimate.radius_left for estimate in own]))
+    if found.radius_left <= _UNLIKE * left:
+        return []
+    sizes = [abs(estimate.channels.fundamental) for estimate in own]
+    return [
+        f"the runs' curves differ: {100.0 * found.radius_left:.2g} % of the radius is left by one "
+        f"curve for all and {100.0 * left:.2g} % by one of each (radius {min(sizes):.4g} to "
+        f"{max(sizes):.4g}): the gap or the place of the magnet changed; calibrate each run alone"
+    ]
+
+
+def _notes(found: ChannelEstimate) -> list[str]:
+    notes = []
+    for name, count in found.clipped:
+        notes.append(
+            f"{counted(count, 'reading')} of the {name} channel {'is' if count == 1 else 'are'} at "
+            "its rail (clipped) and omitted: lower the gain of the amplifier"
+        )
+    if found.rests:
+        notes.append(
+            f"{counted(found.rests, 'reading')} at rest {'has' if found.rests == 1 else 'have'} "
+            "less weight: a place is known by the arc, not by the time"
+        )
+    if found.coverage < 355.0:
+        notes.append(
+            f"the readings cover {found.coverage:.0f} deg of the channels' period: outside it the "
+            "correction is extrapolated, and harmonics are not estimated"
+        )
+    if found.correlated > 1.0:
+        notes.append(
+            f"residuals are autocorrelated: {found.correlated:.3g} readings carry the "
+            "information of one"
+        )
+    return notes

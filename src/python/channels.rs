@@ -1,0 +1,260 @@
+//! Two channels of a sensor: their curve, their angle, one sample of both at a time.
+
+use std::ffi::CStr;
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyUntypedArray};
+use pyo3::exceptions::PyTypeError;
+use pyo3::ffi;
+use pyo3::prelude::*;
+
+use super::array::{columns, data, empty, square, values, vector};
+use super::number::single;
+use super::release::detached;
+use super::series::PySeries;
+use super::step::Definition;
+use super::terms::OTHER;
+use crate::channels::{self, Angle, Curve, Decoder, Readings};
+use crate::check::same_length;
+use crate::compensator::Compensator;
+use crate::terms::Signal;
+
+/// Parameters, covariance, phases, residuals, and shares of the cosine's noise in them.
+type Found<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
+/// The curve of two channels, from orders and parameters of another one on; None where the
+/// readings do not settle it.
+#[pyfunction]
+#[pyo3(signature = (sine, cosine, weights, variances, orders, start=None))]
+pub fn fit_curve<'py>(
+    py: Python<'py>,
+    sine: PyReadonlyArray1<'_, f64>,
+    cosine: PyReadonlyArray1<'_, f64>,
+    weights: PyReadonlyArray1<'_, f64>,
+    variances: [f64; 2],
+    orders: Vec<u32>,
+    start: Option<(Vec<u32>, Vec<f64>)>,
+) -> PyResult<Option<Found<'py>>> {
+    let (sine, cosine, weights) = (values(&sine), values(&cosine), values(&weights));
+    let start = start.map(|(orders, parameters)| Curve { orders, parameters });
+    let readings = Readings {
+        sine: &sine,
+        cosine: &cosine,
+        weights: &weights,
+        variances,
+    };
+    let Some(found) = detached(py, || channels::fit(readings, &orders, start.as_ref()))?? else {
+        return Ok(None);
+    };
+    let parameters = found.curve.parameters;
+    Ok(Some((
+        vector(py, &parameters)?,
+        square(py, &found.covariance, parameters.len())?,
+        vector(py, &found.phases)?,
+        vector(py, &found.residuals)?,
+        vector(py, &found.shares)?,
+    )))
+}
+
+/// Derivatives of the decoded angle by the parameters of a curve, a column for each phase.
+#[pyfunction]
+pub fn curve_slopes<'py>(
+    py: Python<'py>,
+    orders: Vec<u32>,
+    parameters: Vec<f64>,
+    phases: PyReadonlyArray1<'_, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let phases = values(&phases);
+    let shape = [parameters.len(), phases.len()];
+    let curve = Curve { orders, parameters };
+    let rows = detached(py, || channels::angle_slopes(&curve, &phases))?;
+    columns(py, &rows, &shape)
+}
+
+/// The angle of two channels and its correction.
+#[pyclass(name = "Decoder", module = "trueangle._core", frozen)]
+pub struct PyDecoder {
+    inner: Decoder,
+    constants: [f64; 6],
+    series: Option<Py<PySeries>>,
+}
+
+#[pymethods]
+impl PyDecoder {
+    #[new]
+    #[pyo3(signature = (constants, series=None))]
+    fn new(constants: [f64; 6], series: Option<&Bound<'_, PySeries>>) -> PyResult<Self> {
+        let [
+            offset_cosine,
+            offset_sine,
+            per_cosine,
+            per_sine,
+            slope,
+            factor,
+        ] = constants;
+        let angle = Angle {
+            offset_cosine,
+            offset_sine,
+            per_cosine,
+            per_sine,
+            slope,
+            factor,
+        };
+        let correction = match series {
+            Some(series) => {
+                let evaluator = Arc::clone(&series.get().evaluator);
+                Some(detached(series.py(), || Compensator::new(evaluator))??)
+            }
+            None => None,
+        };
+        Ok(Self {
+            inner: Decoder { angle, correction },
+            constants,
+            series: series.map(|s| s.clone().unbind()),
+        })
+    }
+
+    /// Angles of many readings, before the correction.
+    fn angles<'py>(
+        &self,
+        py: Python<'py>,
+        sine: PyReadonlyArray1<'_, f64>,
+        cosine: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Bound<'py, PyUntypedArray>> {
+        let (sine, cosine) = (values(&sine), values(&cosine));
+        same_length("cosine", cosine.len(), "sine", sine.len())?;
+        let found = empty::<f64>(py, &[sine.len()], false)?;
+        // SAFETY: a fresh contiguous array of this length, that nobody else knows.
+        let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&found), sine.len()) };
+        detached(py, || self.inner.angle.all(&sine, &cosine, out))?;
+        Ok(found)
+    }
+
+    /// A bound function of two floats, cheaper to call than a method that PyO3 wraps.
+    #[getter]
+    fn step<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let definition = &raw const STEP.0;
+        // SAFETY: the definition is static, and the function holds a reference to `slf`.
+        unsafe {
+            let function =
+                ffi::PyCFunction_NewEx(definition.cast_mut(), slf.as_ptr(), std::ptr::null_mut());
+            Bound::from_owned_ptr_or_err(slf.py(), function)
+        }
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, Parts) {
+        let own = slf.get();
+        let series = own.series.as_ref().map(|s| s.clone_ref(slf.py()));
+        (slf.get_type().into_any(), (own.constants, series))
+    }
+}
+
+/// The constructor's arguments.
+type Parts = ([f64; 6], Option<Py<PySeries>>);
+
+const DOCUMENTATION: &CStr = c"step(sine, cosine, /, velocity=None, temperature=None, torque=None, \
+direction=None, current=None)\n--\n\nThe corrected angle of two channels. Signals are taken, as by every \
+model, and not needed.";
+
+static STEP: Definition<ffi::PyMethodDef> = Definition(ffi::PyMethodDef {
+    ml_name: c"step".as_ptr(),
+    ml_meth: ffi::PyMethodDefPointer {
+        PyCFunctionFastWithKeywords: step,
+    },
+    ml_flags: ffi::METH_FASTCALL | ffi::METH_KEYWORDS,
+    ml_doc: DOCUMENTATION.as_ptr(),
+});
+
+/// `Decoder.step`: nothing in it can panic.
+///
+/// # Safety
+/// Called by the interpreter, attached, with the decoder the function is bound to.
+unsafe extern "C" fn step(
+    decoder: *mut ffi::PyObject,
+    arguments: *const *mut ffi::PyObject,
+    given: ffi::Py_ssize_t,
+    keywords: *mut ffi::PyObject,
+) -> *mut ffi::PyObject {
+    unsafe {
+        let py = Python::assume_attached();
+        if (given != 2 || !keywords.is_null())
+            && let Err(error) = check_arguments(py, given, keywords)
+        {
+            error.restore(py);
+            return std::ptr::null_mut();
+        }
+        let (sine, cosine) = (*arguments, *arguments.add(1));
+        let are_floats = ffi::PyFloat_CheckExact(sine) != 0 && ffi::PyFloat_CheckExact(cosine) != 0;
+        let (sine, cosine) = if are_floats {
+            (ffi::PyFloat_AsDouble(sine), ffi::PyFloat_AsDouble(cosine))
+        } else {
+            match two(py, sine, cosine) {
+                Ok(channels) => channels,
+                Err(error) => {
+                    error.restore(py);
+                    return std::ptr::null_mut();
+                }
+            }
+        };
+        let decoder = Bound::from_borrowed_ptr(py, decoder);
+        let decoder = &decoder.cast_unchecked::<PyDecoder>().get().inner;
+        ffi::PyFloat_FromDouble(decoder.step(sine, cosine))
+    }
+}
+
+/// Two numbers of any kind.
+///
+/// # Safety
+/// Both are objects.
+#[cold]
+unsafe fn two(
+    py: Python<'_>,
+    sine: *mut ffi::PyObject,
+    cosine: *mut ffi::PyObject,
+) -> PyResult<(f64, f64)> {
+    let (sine, cosine) = unsafe {
+        (
+            Bound::from_borrowed_ptr(py, sine),
+            Bound::from_borrowed_ptr(py, cosine),
+        )
+    };
+    Ok((
+        single(&sine, "the sine of a step")?,
+        single(&cosine, "the cosine of a step")?,
+    ))
+}
+
+/// That there are two channels, and beside them nothing but signals.
+#[cold]
+fn check_arguments(
+    py: Python<'_>,
+    given: ffi::Py_ssize_t,
+    keywords: *mut ffi::PyObject,
+) -> PyResult<()> {
+    if !(2..=2 + Signal::NAMED.len() as isize).contains(&given) {
+        let problem = format!(
+            "step takes a sine, a cosine and up to {} signals, got {given} arguments",
+            Signal::NAMED.len()
+        );
+        return Err(PyTypeError::new_err(problem));
+    }
+    if keywords.is_null() {
+        return Ok(());
+    }
+    // SAFETY: a tuple of names, as the calling convention has it.
+    let names: Vec<String> = unsafe { Bound::from_borrowed_ptr(py, keywords) }.extract()?;
+    let is_known = |name: &str| Signal::named(name).is_some() || name.starts_with(OTHER);
+    match names.iter().find(|name| !is_known(name)) {
+        Some(name) => {
+            let problem = format!("step got an unexpected keyword argument '{name}'");
+            Err(PyTypeError::new_err(problem))
+        }
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,160 @@
+"""Constants of two channels: at the Cramer-Rao limit, with honest errors, or one clear line."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from trueangle.errors import NoModelError
+from trueangle.estimation.channels import clipped_rows, estimate_channels
+from trueangle.runs.rawchannels import Channels
+
+TRUE = Channels(
+    offset_sine=0.015, offset_cosine=0.02, gain_ratio=1.03, phase_deg=1.5, period=2.0 * math.pi
+)
+#: Arc in degrees and noise relative to the amplitude: an estimator is at its limit over these.
+DESIGNS = [(360, 2e-3), (360, 5e-4), (180, 2e-3), (180, 5e-4), (120, 2e-3), (120, 5e-4)]
+
+
+def drawn(arc, noise, seed, n=1000, channels=TRUE, ratio=1.0):
+    rng = np.random.default_rng(seed)
+    phase = np.sort(rng.uniform(0.0, math.radians(arc), n))
+    sine, cosine = channels.curve(phase)
+    return sine + ratio * noise * rng.normal(size=n), cosine + noise * rng.normal(size=n)
+
+
+def curve(p, phase):
+    return np.array([p[0] + p[2] * np.cos(phase), p[1] + p[2] * p[3] * np.sin(phase + p[4])])
+
+
+def limit(arc, noise, n=1000):
+    """Cramer-Rao limit of the angle by numerical derivatives: the mean over the arc is removed."""
+    p = np.array([0.02, 0.015, 1.0, 1.03, math.radians(1.5)])
+    phase = math.radians(arc) * (np.arange(n) + 0.5) / n
+    h = 1e-6
+    steps = h * np.eye(5)
+    slopes = np.array([(curve(p + s, phase) - curve(p - s, phase)) / (2 * h) for s in steps])
+    along = (curve(p, phase + h) - curve(p, phase - h)) / (2 * h)
+    normal = np.array([along[1], -along[0]]) / np.hypot(*along)
+    rows = np.einsum("kdn,dn->nk", slopes, normal)
+    covariance = np.linalg.inv(rows.T @ rows) * noise**2
+
+    def angle(q):
+        cosine, sine = curve(p, phase)
+        x = (cosine - q[0]) / q[2]
+        y = ((sine - q[1]) / (q[2] * q[3]) - x * math.sin(q[4])) / math.cos(q[4])
+        return np.unwrap(np.arctan2(y, x))
+
+    g = np.array([(angle(p + s) - angle(p - s)) / (2 * h) for s in steps]).T
+    g -= g.mean(axis=0)
+    return math.sqrt(np.einsum("ij,jk,ik->i", g, covariance, g).mean())
+
+
+def left(found, arc):
+    phase = np.linspace(0.0, math.radians(arc), 400)
+    off = np.radians(found.channels.angle(*TRUE.curve(phase))) - phase
+    return float(np.std(np.angle(np.exp(1j * off))))
+
+
+@pytest.mark.parametrize(("arc", "noise"), DESIGNS)
+def test_the_angle_is_at_its_limit_and_the_pulls_are_one(arc, noise):
+    errors, limits, pulls = [], [], []
+    for seed in range(25):
+        found = estimate_channels(*drawn(arc, noise, seed), "log")
+        errors.append(left(found, arc))
+        limits.append(found.limit)
+        got, std = found.channels, np.sqrt(np.diag(found.channels.covariance))
+        off = [got.offset_cosine - 0.02, got.offset_sine - 0.015, got.amplitude - 1.0]
+        off += [got.gain_ratio - 1.03, got.phase_deg - 1.5]
+        pulls.append(off / std)
+    bound = limit(arc, noise)
+    assert math.sqrt(np.mean(np.square(errors))) <= 1.15 * bound
+    # The limit that is stated is that of the design as estimated.
+    assert 0.8 < np.median(limits) / bound < 1.25
+    # Draws of five constants that hang together: the rms of about 60 numbers.
+    assert 0.75 < math.sqrt(np.mean(np.square(pulls))) < 1.25
+
+
+def test_seventy_degrees_are_fitted_with_little_noise_and_refused_with_more():
+    fitted, refused = 0, 0
+    errors = []
+    for seed in range(20):
+        try:
+            errors.append(left(estimate_channels(*drawn(70, 5e-4, seed), "log"), 70))
+            fitted += 1
+        except NoModelError:
+            pass
+        try:
+            estimate_channels(*drawn(70, 2e-3, seed), "log")
+        except NoModelError as error:
+            refused += "turn the shaft further" in str(error)
+    assert fitted >= 18
+    assert refused >= 17
+    assert math.sqrt(np.mean(np.square(errors))) <= 1.15 * limit(70, 5e-4)
+
+
+def test_unlike_noise_of_the_channels_is_found_and_weighed():
+    found = estimate_channels(*drawn(360, 1e-3, 5, n=4000, ratio=4.0), "log")
+    cosine, sine = found.noise
+    assert sine / cosine == pytest.approx(4.0, rel=0.1)
+
+
+def test_harmonics_are_those_that_the_readings_support():
+    curved = TRUE.replace(harmonics=((-3, 0.02, -0.01, 0.0),))
+    for seed in range(5):
+        found = estimate_channels(*drawn(360, 2e-3, seed, channels=curved), "log")
+        assert [h.order for h in found.channels.harmonics] == [-3]
+        (h,) = found.channels.harmonics
+        assert math.hypot(h.re - 0.02, h.im + 0.01) < 5.0 * h.std
+    plain = [estimate_channels(*drawn(360, 2e-3, seed), "log") for seed in range(20)]
+    assert sum(len(found.channels.harmonics) for found in plain) <= 1
+
+
+def test_rests_do_not_draw_the_curve_to_their_place():
+    """A field that no ellipse fits exactly, and ten times as many readings at one place."""
+    field = TRUE.replace(harmonics=((3, 0.01, 0.0, 0.0),))
+    sine, cosine = drawn(360, 1e-4, 1, channels=field)
+    rest = [np.full(10_000, channel[400]) for channel in (sine, cosine)]
+    resting = estimate_channels(
+        *(np.concatenate([c, r]) for c, r in zip((sine, cosine), rest, strict=True)), "log"
+    )
+    alone = estimate_channels(sine, cosine, "log")
+    assert resting.rests >= 10_000
+    assert abs(resting.channels.gain_ratio - alone.channels.gain_ratio) < 2e-3
+    assert abs(resting.channels.offset_sine - alone.channels.offset_sine) < 2e-3
+
+
+def test_clipped_readings_are_left_out_and_counted():
+    sine, cosine = drawn(360, 1e-3, 3)
+    clipped = estimate_channels(np.minimum(sine, 0.9), cosine, "log")
+    assert dict(clipped.clipped) == {"sine": int((sine >= 0.9).sum())}
+    assert clipped.channels.gain_ratio == pytest.approx(1.03, abs=2e-3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.3, 2.0])
+def test_codes_at_the_top_of_a_sine_are_not_clipped(noise):
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        phase = rng.uniform(0.0, 2.0 * math.pi, 3000)
+        codes = np.rint(2048.0 + 200.0 * np.sin(phase) + noise * rng.normal(size=phase.size))
+        assert not clipped_rows(codes).any()
+        assert clipped_rows(np.clip(codes, 1900.0, 2180.0)).any()
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda s, c: (np.full_like(s, 0.3), c), "the sine channel is constant"),
+        (lambda s, c: (s, np.zeros_like(c)), "the cosine channel is constant"),
+        (lambda s, c: (c * 2.0 + 1.0, c), "one signal"),
+        (lambda s, c: (s[:5], c[:5]), "5 readings"),
+        (lambda s, c: (np.clip(s, -1e-9, 1e-9), c), "constant|rail"),
+    ],
+)
+def test_bad_channels_get_one_line(make, words):
+    with pytest.raises(NoModelError, match=words) as caught:
+        estimate_channels(*make(*drawn(360, 1e-3, 1)), "log.csv")
+    assert str(caught.value).startswith("log.csv: ")
+    assert "\n" not in str(caught.value)
