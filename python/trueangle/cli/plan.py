@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
-from ..selfcalibration.methods import METHODS
+from ..selfcalibration.methods import PLANNED
 from .nextplan import add_after_arguments, refuse_without_after, run_after
 from .options import refuse_given
 from .paths import Input
@@ -97,9 +97,9 @@ def _add_self_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--self",
         dest="self_method",
-        choices=METHODS,
+        choices=PLANNED,
         metavar="METHOD",
-        help=f"plan a calibration without a reference: {', '.join(METHODS)}",
+        help=f"plan a calibration without a reference: {', '.join(PLANNED)}",
     )
     add(
         "--simulation",

@@ -161,6 +161,6 @@ def reading_options(args: argparse.Namespace) -> dict[str, Any]:
         "counts_per_turn_reference": args.counts_per_turn_reference,
         "signals": signals_by_joint(args.signal),
         "topic": args.topic,
-        "periods_per_turn": args.periods_per_turn,
+        "periods_per_turn": getattr(args, "periods_per_turn", None),
         **({"facets": args.facets, "unit_from": args.unit_from} if "facets" in args else {}),
     }

@@ -14,6 +14,7 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.files import FileKind
 from .knots import rounded_knots
+from .moteuscommon import COMMON, common_mode, read_common_mode
 from .oneturn import one_turn_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
@@ -46,9 +47,21 @@ class Moteus(Target):
     options = {
         "source": Option(int, 0, "position source 0, 1 or 2 that reads this encoder"),
         "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
+        "variant": Option(
+            ("table", COMMON), "table", "compensation table, or the offset of sine and cosine"
+        ),
+        "aux": Option(int, 1, "port 1 or 2 that reads sine and cosine"),
     }
 
+    def may_be_empty(self, options: Mapping[str, Any]) -> bool:
+        return bool(options["variant"] == COMMON)
+
+    def sign_of(self, options: Mapping[str, Any]) -> str:
+        return "absolute" if options["variant"] == COMMON else self.sign
+
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
+        if options["variant"] == COMMON:
+            return common_mode(pattern, options["aux"])
         source = options["source"]
         if source not in (0, 1, 2):
             raise ArgumentError(f"source must be 0, 1 or 2, got {source}")
@@ -80,6 +93,8 @@ class Moteus(Target):
         )
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
+        if options["variant"] == COMMON:
+            return read_common_mode(text, path, options["aux"])
         source = options["source"]
         table = np.zeros(ENTRIES)
         scale, seen = 0.0, 0

@@ -17,6 +17,7 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.files import FileKind
 from .codetext import longest_array, number_rows
 from .knots import rounded_knots
+from .linearhall import LINEAR_HALL, linear_hall, read_linear_hall
 from .oneturn import one_turn_knots, rounding_floor, without_mean
 from .pattern import TurnPattern
 from .proof import Correction, Places
@@ -58,19 +59,30 @@ class SimpleFoc(Target):
         "zero_electric_angle and sensor_direction anew with this table in place"
     )
     options = {
-        "variant": Option(tuple(VARIANTS), "minus-u16", "version of the library"),
+        "variant": Option(
+            (*VARIANTS, LINEAR_HALL),
+            "minus-u16",
+            "version of the library, or the LinearHall sensor",
+        ),
         "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
         "entries": Option(int, 200, "of the table"),
     }
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
-        return () if options["variant"] == "plus-float" else _SIZES
+        return () if options["variant"] in ("plus-float", LINEAR_HALL) else _SIZES
+
+    def may_be_empty(self, options: Mapping[str, Any]) -> bool:
+        return bool(options["variant"] == LINEAR_HALL)
 
     def sign_of(self, options: Mapping[str, Any]) -> str:
+        if options["variant"] == LINEAR_HALL:
+            return "absolute"
         return "add" if options["variant"] == "plus-float" else "subtract"
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         variant = options["variant"]
+        if variant == LINEAR_HALL:
+            return linear_hall(pattern)
         old = variant == "plus-float"
         entries = _FIXED if old else options["entries"]
         if not 4 <= entries <= _MOST:
@@ -155,6 +167,8 @@ class SimpleFoc(Target):
         return "\n".join(lines) + "\n"
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
+        if options["variant"] == LINEAR_HALL:
+            return read_linear_hall(text, path)
         said = re.search(r"variant (plus-float|minus-float|minus-u16)", text)
         variant = said[1] if said else options["variant"]
         numbers, line, decimals = longest_array(text, path, self.name)

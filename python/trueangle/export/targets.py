@@ -5,10 +5,13 @@ from __future__ import annotations
 from ..errors import ArgumentError
 from ..support.suggestions import did_you_mean
 from .admt4000 import Admt4000
+from .ax2000 import Ax2000
+from .ax5000 import Ax5000
 from .c import CHeader
 from .csvtable import CsvTable
 from .fmu import Fmu
 from .klipper import Klipper
+from .lerobot import LeRobot
 from .linuxcnc import LinuxCnc
 from .mechaduino import Mechaduino
 from .minicheetah import MiniCheetah
@@ -21,6 +24,7 @@ from .simplefoc import SimpleFoc
 from .target import Target
 from .tinymovr import Tinymovr
 from .twincat import TwinCat
+from .vesc import Vesc
 
 #: Every target by its name.
 TARGETS: dict[str, Target] = {
@@ -40,6 +44,10 @@ TARGETS: dict[str, Target] = {
         MiniCheetah(),
         Siemens840d(),
         Pmac(),
+        Vesc(),
+        LeRobot(),
+        Ax2000(),
+        Ax5000(),
         Fmu(),
         MuJoCo(),
     )

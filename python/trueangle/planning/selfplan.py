@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError
 from ..joint.shafts import limited_orders, shaft_cycles
-from ..selfcalibration.methods import METHODS
+from ..selfcalibration.methods import PLANNED
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
@@ -158,7 +158,7 @@ def plan_self(
     >>> plan.angles_deg, round(plan.worst_noise_factor, 2), plan.readings
     ((0.0, 40.0), 2.92, 1710)
     """
-    check_choice("method", method, METHODS)
+    check_choice("method", method, PLANNED)
     wanted = tuple(
         sorted({float(k) for k in limited_orders(range(1, 9) if orders is None else orders)})
     )

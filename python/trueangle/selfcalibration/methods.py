@@ -4,5 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-METHODS: Final = ("spin-down", "heads", "shifts", "dual", "channels")
+#: Those that `trueangle.planning.plan_self` plans.
+PLANNED: Final = ("spin-down", "heads", "shifts", "dual")
+METHODS: Final = (*PLANNED, "channels")
 LOOPS: Final = ("open", "closed", "unknown")

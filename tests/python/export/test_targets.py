@@ -16,7 +16,8 @@ ENDINGS = {
     "c": ".h", "rust": ".rs", "csv": ".csv", "simplefoc": ".h", "moteus": ".cfg",
     "linuxcnc": ".comp", "twincat": ".lis", "klipper": ".cfg", "admt4000": ".txt",
     "mechaduino": ".cpp", "tinymovr": ".h", "minicheetah": ".h", "siemens840d": ".ini",
-    "pmac": ".txt", "fmu": ".fmu", "mujoco": ".xml",
+    "pmac": ".txt", "fmu": ".fmu", "mujoco": ".xml", "vesc": ".xml", "lerobot": ".json",
+    "ax2000": ".txt", "ax5000": ".txt",
 }  # fmt: skip
 CASES = [
     ("c", {}), ("rust", {}), ("csv", {}),

@@ -1,0 +1,118 @@
+"""Constants of a sine and a cosine channel in forms of firmware: each against its own formula."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.errors import ArgumentError, FileError
+
+FORMS = [
+    ("vesc", {"volts_per_count": 3.3 / 4095}, ".xml"),
+    ("lerobot", {}, ".json"),
+    ("simplefoc", {"variant": "linearhall"}, ".h"),
+    ("moteus", {"variant": "common"}, ".cfg"),
+    ("ax2000", {"volts_per_count": 3.3 / 4095}, ".txt"),
+    ("ax5000", {}, ".txt"),
+]
+
+
+def drawn(seed, harmonic=0.0, **fields):
+    rng = np.random.default_rng(seed)
+    channels = ta.Channels(
+        **{
+            "offset_sine": 2048.0 + 60.0 * rng.normal(),
+            "offset_cosine": 2048.0 + 60.0 * rng.normal(),
+            "amplitude": rng.uniform(600.0, 1500.0),
+            "gain_ratio": rng.uniform(0.9, 1.1),
+            "phase_deg": rng.uniform(-5.0, 5.0),
+            "period": 360.0,
+            **fields,
+        }
+    )
+    shafts = [ta.Shaft("output", 1, [4], [harmonic], [0.0])] if harmonic else []
+    return ta.HarmonicModel(shafts, 0.0, 360.0, channels=channels)
+
+
+def decoded(name, text, sine, cosine):
+    """Phase in radians as the target's own source has it, restated from its numbers in the text."""
+    if name == "vesc":
+        value = {k: float(v) for k, v in re.findall(r"<m_encoder_(\w+)>([^<]+)<", text)}
+        volts = 3.3 / 4095
+        s = (sine * volts - value["sin_offset"]) / value["sin_amp"]
+        c = (cosine * volts - value["cos_offset"]) / value["cos_amp"]
+        turn = math.radians(value["sincos_phase_correction"])
+        return np.arctan2(s, (c + s * math.sin(turn)) / math.cos(turn))
+    if name == "lerobot":
+        (joint,) = json.loads(text)["joints"]
+        p = np.array([cosine - 4095 / 2, sine - 4095 / 2])
+        z = np.array(joint["T"]) @ (p - np.array(joint["center_fit"])[:, None])
+        return np.arctan2(z[1], z[0]) - joint["zero_offset"]
+    if name == "simplefoc":
+        a, b = map(int, re.search(r"COSINE, (-?\d+), (-?\d+), \d+\);", text).groups())
+        return np.arctan2(sine - a, cosine - b)
+    if name == "ax2000":
+        a, b = map(int, re.findall(r"OFFS (-?\d+)", text))
+        return np.arctan2(sine * 3300 / 4095 - a, cosine * 3300 / 4095 - b)
+    if name == "ax5000":
+        a, b, g, h = map(int, re.findall(r"= (-?\d+)", text))
+        return np.arctan2((sine - a) * g, (cosine - b) * h)
+    common = float(re.search(r"common (\d+)", text)[1])
+    return np.arctan2(sine - common, cosine - common)
+
+
+@pytest.mark.parametrize(("name", "options", "_ending"), FORMS)
+@pytest.mark.parametrize("direction", [1, -1])
+def test_what_is_stated_is_what_the_form_leaves(name, options, _ending, direction):
+    for seed in range(8):
+        model = drawn(seed, harmonic=0.1 * (seed % 2), direction=direction)
+        made = ta.export_model(model, name, **options)
+        phase = 2.0 * math.pi * np.arange(4096) / 4096
+        sine, cosine = model.channels.curve(phase)
+        wanted = model.correct(model.channels.angle(sine, cosine))
+        got = direction * np.degrees(decoded(name, made.text, sine, cosine)) - made.zero_deg
+        off = (got - wanted + 180.0) % 360.0 - 180.0
+        largest = np.abs(off).max() * 3600.0
+        assert largest <= made.max_difference_arcsec * (1.0 + 1e-9) + 1e-6
+        assert largest >= 0.98 * made.max_difference_arcsec - 0.1
+        rms = math.sqrt(np.mean(off**2)) * 3600.0
+        assert rms == pytest.approx(made.rms_difference_arcsec, rel=0.02, abs=0.1)
+
+
+@pytest.mark.parametrize(("name", "options", "ending"), FORMS)
+def test_forms_come_back(name, options, ending, tmp_path):
+    model = drawn(3)
+    file = tmp_path / f"out{ending}"
+    ta.export_model(model, name, file, **options)
+    back = ta.import_model(file, name, **options).channels
+    middle = 0.5 * (model.channels.offset_sine + model.channels.offset_cosine)
+    assert 0.5 * (back.offset_sine + back.offset_cosine) == pytest.approx(middle, abs=1.3)
+    if name in ("vesc", "lerobot"):
+        assert back.gain_ratio == pytest.approx(model.channels.gain_ratio, abs=2e-3)
+        assert back.phase_deg == pytest.approx(model.channels.phase_deg, abs=1e-3)
+        assert back.amplitude == pytest.approx(model.channels.amplitude, rel=1e-3)
+        assert back.offset_sine == pytest.approx(model.channels.offset_sine, abs=1.0)
+    file.write_text("nothing of it\n")
+    with pytest.raises(FileError, match=str(file)):
+        ta.import_model(file, name, **options)
+
+
+@pytest.mark.parametrize(("name", "options", "_ending"), FORMS)
+def test_a_model_without_channels_is_refused(name, options, _ending):
+    model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.1], [0.0])], 0.0, 360.0)
+    with pytest.raises(ArgumentError, match="selfcal LOG --method channels"):
+        ta.export_model(model, name, **options)
+
+
+def test_units_that_a_form_cannot_hold_are_refused():
+    with pytest.raises(ArgumentError, match="volts_per_count"):
+        ta.export_model(drawn(1), "vesc")
+    with pytest.raises(ArgumentError, match="12-bit"):
+        ta.export_model(drawn(1, offset_sine=9000.0), "moteus", variant="common")
+    with pytest.raises(ArgumentError, match="aux must be 1 or 2"):
+        ta.export_model(drawn(1), "moteus", variant="common", aux=3)
