@@ -96,6 +96,7 @@ def made_of_channels(
         floor_arcsec=float(np.std(rounding)) * ARCSEC_PER_TURN,
         zero_deg=zero * 360.0,
         lost=lost,
+        decodes=True,
         bits=_BITS,
         notes=(
             *notes,

@@ -383,6 +383,15 @@ def _notes(target: Target, pattern: TurnPattern, made: Made) -> list[str]:
                 else "; do so before the table is used, whose positions are true angles"
             )
         )
+    channels = pattern.source.channels
+    if channels is not None and not made.decodes:
+        notes.append(
+            "the reading is the angle decoded from the channels: x = (cosine - "
+            f"{channels.offset_cosine:.9g}) * {channels.constants[2]:.9g}, y = (sine - "
+            f"{channels.offset_sine:.9g}) * {channels.constants[3]:.9g} - x * "
+            f"{channels.constants[4]:.9g}, {'-' if channels.direction < 0 else ''}atan2(y, x)"
+            + (f" / {channels.periods_per_turn}" if channels.periods_per_turn > 1 else "")
+        )
     span = pattern.source.partial_span
     if span is not None:
         turn = 360.0 / pattern.period

@@ -118,6 +118,8 @@ class Made:
         Of a reading, where the target fixes them.
     packed : callable, optional
         Makes the file of the text, where it is not text itself.
+    decodes : bool
+        It decodes a sine and a cosine channel, instead of correcting an angle.
     """
 
     text: Callable[[CommentBlock], str]
@@ -131,6 +133,7 @@ class Made:
     tables: tuple[dict[str, Any], ...] = ()
     bits: int | None = None
     packed: Callable[[str], Bytes] | None = None
+    decodes: bool = False
 
 
 class Target(ABC):

@@ -37,7 +37,10 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
         head.append(("indicated", "minus what the sensor reads"))
     lines = ["Harmonic model of the angle error (error = indicated - reference)", ""]
     lines += [f"  {label:<10} {text}" for label, text in head]
-    lines += ["", *_table(fit, shown)]
+    if model.channels is not None:
+        lines += ["", *(f"  {line}" for line in model.channels.constant_lines())]
+    if model.shafts or model.channels is None:
+        lines += ["", *_table(fit, shown)]
     if fit.notes:
         lines += ["", *(f"  [{i}] {note}" for i, note in enumerate(fit.notes, 1))]
     return laid_out(lines)

@@ -42,6 +42,13 @@ def with_channel_angle(
     asked = periods is not None or any(c is not None and c.is_asked for c in pair)
     has_angle = bool({"indicated", "error"} & roles.keys())
     named = "indicated" in roles and roles["indicated"].is_asked
+    if None not in pair and not has_angle and "reference" not in roles:
+        raise FileError(
+            table.path,
+            "no column reference_deg, and channels alone are calibrated without one: run "
+            f"trueangle selfcal {table.path} --method channels -o MODEL",
+            line=1,
+        )
     if named or "reference" not in roles or (has_angle and not asked):
         return table, None
     if not asked and None in pair:

@@ -261,6 +261,27 @@ class Channels:
         rows["periods_per_turn"] = {"value": self.periods_per_turn, "std": 0.0}
         return rows
 
+    def constant_lines(self) -> list[str]:
+        """The constants with their standard errors, as lines of a summary."""
+        rows = self.to_dict()
+        names = {
+            "offset_sine": "offset of the sine",
+            "offset_cosine": "offset of the cosine",
+            "amplitude": "amplitude of the cosine",
+            "gain_ratio": "gain, sine over cosine",
+            "phase_deg": "phase error, deg",
+        }
+        lines = [f"{'channels':24s} {'value':>12s} {'+-':>10s}"]
+        lines += [
+            f"{words:24s} {rows[name]['value']:12.6g} {rows[name]['std']:10.2g}"
+            for name, words in names.items()
+        ]
+        lines += [
+            f"harmonic {h.order:<15d} {abs(complex(h.re, h.im)):12.5f} {h.std:10.2g}"
+            for h in self.harmonics
+        ]
+        return lines
+
     def to_table(self) -> dict[str, Any]:
         """The object that a model file holds."""
         return {

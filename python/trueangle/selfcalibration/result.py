@@ -275,23 +275,7 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
 def _constants(result: SelfCalibration, unit: ErrorUnit) -> list[str]:
     """Constants of the channels with their standard errors, and how well they settle the angle."""
     assert result.channels is not None
-    rows = result.channels.to_dict()
-    names = {
-        "offset_sine": "offset of the sine",
-        "offset_cosine": "offset of the cosine",
-        "amplitude": "amplitude of the cosine",
-        "gain_ratio": "gain, sine over cosine",
-        "phase_deg": "phase error, deg",
-    }
-    lines = [f"{'channels':24s} {'value':>12s} {'+-':>10s}"]
-    lines += [
-        f"{words:24s} {rows[name]['value']:12.6g} {rows[name]['std']:10.2g}"
-        for name, words in names.items()
-    ]
-    lines += [
-        f"harmonic {h.order:<15d} {abs(complex(h.re, h.im)):12.5f} {h.std:10.2g}"
-        for h in result.channels.harmonics
-    ]
+    lines = result.channels.constant_lines()
     sense = "rises" if result.channels.direction > 0 else "falls"
     if result.limit_arcsec is not None and result.coverage_deg is not None:
         lines.append(

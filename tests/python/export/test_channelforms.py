@@ -116,3 +116,14 @@ def test_units_that_a_form_cannot_hold_are_refused():
         ta.export_model(drawn(1, offset_sine=9000.0), "moteus", variant="common")
     with pytest.raises(ArgumentError, match="aux must be 1 or 2"):
         ta.export_model(drawn(1), "moteus", variant="common", aux=3)
+
+
+def test_a_table_of_the_angle_states_how_the_channels_are_decoded():
+    model = drawn(5, harmonic=0.2, direction=-1)
+    (note,) = (n for n in ta.export_model(model, "c", bits=10).notes if "decoded from" in n)
+    numbers = [float(v) for v in re.findall(r"(?<=[-*] )\d[\d.e+-]*|(?<=\* )-?\d[\d.e+-]*", note)]
+    sine, cosine = model.channels.curve(np.array([0.7]))
+    x = (cosine - numbers[0]) * numbers[1]
+    y = (sine - numbers[2]) * numbers[3] - x * numbers[4]
+    wanted = np.radians(model.channels.angle(sine, cosine))
+    assert -np.arctan2(y, x) == pytest.approx(wanted, abs=1e-7)

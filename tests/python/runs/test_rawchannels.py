@@ -132,6 +132,12 @@ def test_an_angle_of_the_file_stays_unless_the_channels_are_asked_for():
     assert run.zero == pytest.approx(0.0, abs=1e-9)
 
 
+def test_channels_without_a_reference_are_sent_to_their_method():
+    theta = np.linspace(0.0, 6.0, 50)
+    with pytest.raises(FileError, match=r"selfcal .* --method channels"):
+        read_runs({"sine": np.sin(theta), "cosine": np.cos(theta)})
+
+
 def test_a_missing_or_dead_channel_is_named():
     theta = np.linspace(0.0, 350.0, 50)
     table = {"reference_deg": theta, "sine": np.sin(np.radians(theta))}
