@@ -317,7 +317,7 @@ class _Fit:
     def limit(self) -> tuple[float, float]:
         """Standard deviation of the angle by that of the curve, and what the correction takes."""
         middles = (np.arange(CELLS * 4) + 0.5) * (2.0 * math.pi / (CELLS * 4))
-        phases = middles[np.repeat(self.cells > 0, 4)]
+        phases: Array = middles[np.repeat(self.cells > 0, 4)].astype(np.float64)
         rows = _core.curve_slopes(list(self.orders), self.parameters.tolist(), phases).T
         rows = rows - rows.mean(axis=0)
         spread = np.einsum("ij,jk,ik->i", rows, self.covariance, rows)

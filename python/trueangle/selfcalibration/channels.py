@@ -187,9 +187,9 @@ def _table(channels: Channels, found: ChannelEstimate) -> list[OrderEstimate]:
     orders, cosine, sine = channels.error_harmonics()
     variances = np.zeros(len(orders))
     for i, h in enumerate(channels.harmonics):
-        for part in ({"re": h.re + h.std}, {"im": h.im + h.std}):
+        for part in (h._replace(re=h.re + h.std), h._replace(im=h.im + h.std)):
             moved = [*channels.harmonics]
-            moved[i] = h._replace(**part)
+            moved[i] = part
             other = channels.replace(harmonics=tuple(moved)).error_harmonics()
             rows = {k: complex(a, b) for k, a, b in zip(*other, strict=True)}
             variances += [

@@ -179,7 +179,7 @@ def _split(
     found = []
     for key, places in groups.items():
         rows: Any = slice(None) if not places else np.array(places)[present[places]]
-        cut = {name: np.asarray(values[rows]) for name, values in used.items()}
+        cut: dict[str, Any] = {name: np.asarray(v[rows]) for name, v in used.items()}
         found.append(
             Recording(
                 label=" ".join(key) or None,
