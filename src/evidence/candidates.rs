@@ -18,6 +18,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::gains::Candidate;
 use super::readings::{Readings, Run};
+use super::rows::Rows;
 use super::whitening::{Factor, Noise, State};
 use crate::{interrupt, threads};
 
@@ -45,11 +46,9 @@ impl Inside<'_> {
 }
 
 /// Sums of a run: products of its columns with the zero, the residual and the columns that are in,
-/// and of each order's own two.
+/// a row each, and of each order's own two.
 struct Part {
-    zero: Vec<f64>,
-    residual: Vec<f64>,
-    inside: Vec<f64>,
+    products: Vec<f64>,
     squares: Vec<[f64; 3]>,
 }
 
@@ -59,31 +58,28 @@ impl Readings {
         let columns = self.columns();
         let pair = |&place: &usize| [2 * place + 1, 2 * place + 2];
         let own: Vec<usize> = inside.places.iter().flat_map(pair).collect();
-        let mut of_row = vec![0.0; columns];
-        for (&c, b) in own.iter().zip(inside.mean) {
-            of_row[c] = -b;
-        }
-        of_row[columns - 1] = 1.0;
-        let work = |r: usize| self.alone(&self.runs()[r], noise, &of_row, &own);
+        let stride = Rows::width(columns);
+        let work = |r: usize| self.alone(&self.runs()[r], noise, inside.mean, &own);
         let parts = threads::map_parts(self.runs().len(), self.threads(), work);
         let (m, orders) = (own.len(), self.orders().len());
         let mut squares = vec![[0.0; 3]; orders];
         let mut residual = vec![0.0; 2 * orders];
         let mut cross = DMatrix::zeros(m, 2 * orders);
         for part in parts {
-            let (n, level) = (part.zero[0], part.residual[0]);
+            let row = |i: usize| &part.products[i * stride..][..stride];
+            let (zero, left) = (row(0), row(1));
+            let (n, level) = (zero[0], left[0]);
             for (k, s) in squares.iter_mut().enumerate() {
-                let c = &part.zero[2 * k + 1..][..2];
+                let c = &zero[2 * k + 1..][..2];
                 let both = [c[0] * c[0], c[0] * c[1], c[1] * c[1]];
                 for i in 0..3 {
                     s[i] += part.squares[k][i] - both[i] / n;
                 }
             }
             for c in 0..2 * orders {
-                residual[c] += part.residual[c + 1] - part.zero[c + 1] * level / n;
+                residual[c] += left[c + 1] - zero[c + 1] * level / n;
                 for i in 0..m {
-                    let both = part.zero[own[i]] * part.zero[c + 1] / n;
-                    cross[(i, c)] += part.inside[i * columns + c + 1] - both;
+                    cross[(i, c)] += row(i + 2)[c + 1] - zero[own[i]] * zero[c + 1] / n;
                 }
             }
         }
@@ -100,14 +96,12 @@ impl Readings {
         each.collect()
     }
 
-    fn alone(&self, run: &Run, noise: Noise, of_row: &[f64], own: &[usize]) -> Part {
+    fn alone(&self, run: &Run, noise: Noise, mean: &[f64], own: &[usize]) -> Part {
         let factor = Factor::new(noise, run.decays());
         let columns = self.columns();
         let mut state = State::new(columns);
         let mut part = Part {
-            zero: vec![0.0; columns],
-            residual: vec![0.0; columns],
-            inside: vec![0.0; own.len() * columns],
+            products: vec![0.0; (own.len() + 2) * Rows::width(columns)],
             squares: vec![[0.0; 3]; self.orders().len()],
         };
         let most = (CELLS / columns).max(1);
@@ -116,24 +110,23 @@ impl Readings {
             interrupt::point();
             let mut rows = self.rows(run, start, count);
             factor.whiten(start, &mut rows, &mut state);
+            let mut beside = Rows::zeros(count, own.len() + 2);
             for i in 0..count {
-                let row = &rows.row(i)[..columns];
-                let left: f64 = row.iter().zip(of_row).map(|(x, c)| x * c).sum();
-                for c in 0..columns {
-                    part.zero[c] += row[c] * row[0];
-                    part.residual[c] += row[c] * left;
+                let row = rows.row(i);
+                let taken: f64 = own.iter().zip(mean).map(|(&c, b)| row[c] * b).sum();
+                let target = beside.row_mut(i);
+                target[0] = row[0];
+                target[1] = row[columns - 1] - taken;
+                for (x, &c) in target[2..].iter_mut().zip(own) {
+                    *x = row[c];
                 }
-                for (sums, &k) in part.inside.chunks_exact_mut(columns).zip(own) {
-                    for c in 0..columns {
-                        sums[c] += row[c] * row[k];
-                    }
-                }
-                for (own, pair) in part.squares.iter_mut().zip(row[1..].chunks_exact(2)) {
-                    own[0] += pair[0] * pair[0];
-                    own[1] += pair[0] * pair[1];
-                    own[2] += pair[1] * pair[1];
+                for (sums, pair) in part.squares.iter_mut().zip(row[1..].chunks_exact(2)) {
+                    sums[0] += pair[0] * pair[0];
+                    sums[1] += pair[0] * pair[1];
+                    sums[2] += pair[1] * pair[1];
                 }
             }
+            beside.add_products(&rows, &mut part.products);
         }
         part
     }

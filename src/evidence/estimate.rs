@@ -107,29 +107,32 @@ impl Readings {
         }
         let mut modes: Vec<Mode> = Vec::new();
         for start in starts {
-            let mode = self.settled(&prior, noise_prior, (&looked, total), start)?;
-            if modes.iter().all(|m| m.fit.is_far_from(&mode.fit.position)) {
-                modes.push(mode);
-            }
+            let mode = self.settled(&prior, noise_prior, (&looked, total), start, &modes)?;
+            modes.extend(mode);
         }
         self.mixture(&modes, &prior, noise_prior)
     }
 
     /// Noise and search in turn until the set of orders stays, from orders that the noise is first
-    /// sought beside.
+    /// sought beside; nothing as soon as the noise is one of those known.
     fn settled(
         &self,
         prior: &Prior,
         noise_prior: NoisePrior,
         (looked, total): (&[usize], f64),
         (mut set, mut model): (Vec<usize>, Model),
-    ) -> Option<Mode> {
+        known: &[Mode],
+    ) -> Option<Option<Mode>> {
         let mut looked = looked.to_vec();
         let mut start = noise_prior.start();
         let mut active = None;
         let mut round = 1;
         loop {
             let fit = self.among(&set).noise(&model, noise_prior, start)?;
+            let is_known = |mode: &Mode| !mode.fit.is_far_from(&fit.position);
+            if round > 1 && known.iter().any(is_known) {
+                return Some(None);
+            }
             start = fit.position;
             let part = self.among(&looked);
             let grams = part.grams(fit.noise);
@@ -167,13 +170,15 @@ impl Readings {
             let is_same = active.replace(set.clone()) == Some(set.clone());
             if more.is_empty() && is_same || round == ROUNDS {
                 let fit = self.among(&set).noise(&model, noise_prior, start)?;
-                return Some(Mode {
+                let is_known = |mode: &Mode| !mode.fit.is_far_from(&fit.position);
+                let is_new = !known.iter().any(is_known);
+                return Some(is_new.then_some(Mode {
                     fit,
                     looked,
                     models,
                     others,
                     scores,
-                });
+                }));
             }
             looked.extend(more);
             looked.sort_unstable();
