@@ -51,11 +51,11 @@ def robot_of_urdf(path: str | PathLike[str]) -> RobotDescription:
     for element in root.findall("joint"):
         name, kind = element.get("name", ""), element.get("type", "")
         if kind in _TURNING and name and element.find("mimic") is None:
-            ratio = ratios.get(name)
-            member = "none" if ratio is None else "circular_spline"
+            geared = ratios.get(name)
+            member = "none" if geared is None else "circular_spline"
             # A dot divides joint and role, an equals sign role and column, where one is typed.
             own = name.replace(".", "_").replace("=", "_")
-            joints.append(JointDescription(own, ratio, member, {"indicated": f"{name}:rad"}))
+            joints.append(JointDescription(own, geared, member, {"indicated": f"{name}:rad"}))
     if not joints:
         raise FileError(
             path, f"names no joint that turns (type {' or '.join(_TURNING)}, without mimic)"

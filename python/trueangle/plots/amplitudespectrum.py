@@ -116,7 +116,7 @@ def draw_spectrum(
                 capsize=2.0,
                 label=label,
             )
-            titles = [_title(lines[i], unit, name) for i in np.flatnonzero(chosen)]
+            titles = [_title(lines[i], unit, name) for i in np.flatnonzero(chosen).tolist()]
             marked(drawn.lines[0], ring=face == "none", titles=titles)
     known = limit > 0.0
     if known.any():

@@ -143,9 +143,11 @@ def _names(ax: Axes) -> list[dict[str, Any]]:
     """Texts at points, turned inwards at the borders; of those that would meet, the first."""
     found: list[dict[str, Any]] = []
     taken: list[tuple[float, float, float]] = []
+    figure = ax.get_figure(root=True)
+    assert figure is not None
     for text in ax.texts:
         across, up = _place(ax, text.xy) if hasattr(text, "xy") else (0.0, 0.0)
-        half = 0.5 * _WIDE * len(text.get_text()) * 7.5 / ax.figure.get_figwidth()
+        half = 0.5 * _WIDE * len(text.get_text()) * 7.5 / figure.get_figwidth()
         side = "start" if across < _EDGE else "end" if across > 1.0 - _EDGE else "middle"
         middle = across + {"start": half, "end": -half, "middle": 0.0}[side]
         if not text.get_text() or any(

@@ -114,6 +114,6 @@ def draw_phase_of_order(ax: Axes, order: Phases, numbers: dict[str, int], unit: 
         marked(dot, run=number, titles=[f"run {label}: {size} at {phase:.1f}°"])
     ax.set_xlim(0.3, len(order.labels) + 0.7)
     ax.set_ylim(middle - half, middle + half)
-    ax.xaxis.get_major_locator().set_params(integer=True)
+    ax.locator_params(axis="x", integer=True)
     ax.set_xlabel("run")
     ax.set_ylabel("phase / deg")

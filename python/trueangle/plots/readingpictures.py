@@ -99,8 +99,8 @@ def before_after_picture(
         name = f"{role}: rms {rms}, peak-to-peak {ptp} {unit.name}"
         clouds += [Cloud(part, number, role, name) for number, part in parts]  # type: ignore[arg-type]
         told.append(f"{role} correction rms {rms}, peak-to-peak {ptp} {unit.name}")
-    y = f"error of held-out runs / {unit.name}"
-    panel = Panel(ANGLE, y, tuple(clouds), span, zero=True)
+    label = f"error of held-out runs / {unit.name}"
+    panel = Panel(ANGLE, label, tuple(clouds), span, zero=True)
     return PanelPicture((panel,), f"Error of {counted(pairs, 'held-out run')}: {'; '.join(told)}.")
 
 

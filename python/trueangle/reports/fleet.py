@@ -114,7 +114,7 @@ class FleetReport(Page):
         sums = np.array([[one.cusum for one in row.orders] for row in rows])
         draw_sums(ax, np.arange(2.0, len(rows) + 2.0), sums, rows[-1].cusum_limit)
         ax.set_xlim(1.5, len(rows) + 1.5)
-        ax.xaxis.get_major_locator().set_params(integer=True)
+        ax.locator_params(axis="x", integer=True)
         ax.set_xlabel("date")
         ax.set_ylabel("cumulative sum")
         title = f"{unit}: cumulative sums of its orders"

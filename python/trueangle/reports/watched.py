@@ -134,7 +134,7 @@ class WatchReport(Page):
         ax = page_axes(width, 0.35 * width)
         first, last = float(self._number[0]), float(self._number[-1])
         ax.set_xlim(first - 0.5, last + 0.5)
-        ax.xaxis.get_major_locator().set_params(integer=True)
+        ax.locator_params(axis="x", integer=True)
         ax.set_xlabel("window")
         ax.set_ylabel(title)
         return ax
