@@ -96,6 +96,6 @@ def refuse_without_after(args: argparse.Namespace) -> None:
     after = [
         *("between", "limits", "seeds", "within", "output"),
         *("signal", "counts_per_turn", "counts_per_turn_reference"),
-        *("topic", "facets", "unit_from"),
+        *("topic", "facets", "unit_from", "periods_per_turn"),
     ]
     refuse_given(args, after, "is of plans after a diagnosis: add --after RUNS")

@@ -85,12 +85,18 @@ def _is_large(args: argparse.Namespace) -> bool:
 def log_options(args: argparse.Namespace) -> dict[str, Any]:
     """Keywords of `trueangle.fit_logs` from the options of a command."""
     own_interrupts()
+    reading = reading_options(args)
+    if reading.pop("periods_per_turn") is not None:
+        raise ArgumentError(
+            "--periods-per-turn is for sine and cosine channels, which need all readings: leave "
+            "--one-pass out"
+        )
     return {
         "gear_ratio": args.gear_ratio,
         "fixed_member": args.fixed_member,
         "argument": args.argument,
         "covariance": args.covariance,
-        **reading_options(args),
+        **reading,
         "shafts": declared_shafts(args.shaft),
         "scheduler": args.scheduler,
         "progress": args.progress,

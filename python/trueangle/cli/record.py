@@ -18,10 +18,7 @@ from .source_options import (
 from .values import seconds
 
 HELP = "record readings as they arrive, and report when there are enough"
-EXAMPLE = (
-    "trueangle record /dev/ttyUSB0 -o runs.csv --until orders --signal indicated=raw:count "
-    "--counts-per-turn 4096 --signal reference=step:count --counts-per-turn-reference 3200"
-)
+EXAMPLE = "trueangle record /dev/ttyUSB0 -o runs.csv --until orders"
 
 #: Exit status where the source ended before it was asked to.
 ENDED = 3

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..errors import ArgumentError
-from ..estimation.referencedchannels import referenced_channels
-from ..runs.channelangle import following
 from ..runs.run import CalibrationRun
 
 
@@ -24,6 +22,10 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
     given = [run.channels for run in runs]
     if all(channels is None for channels in given):
         return list(runs)
+    # Few runs have channels.
+    from ..estimation.referencedchannels import referenced_channels
+    from ..runs.channelangle import following
+
     first = given[0]
     kinds = {c and (c.direction, c.periods_per_turn, c.period) for c in given}
     if first is None or len(kinds) > 1:

@@ -16,7 +16,6 @@ from ..support.argumentkinds import of_type, told_kinds
 from ..support.display_units import error_unit, sine_of_rms
 from ..support.layout import counted, laid_out, wrapped_lines
 from ..support.plainresult import result_picture
-from .channelstep import channel_step
 from .corrector import Corrector
 from .errormodel import Argument, ErrorModel
 from .step import ExchangeableStep, Step, exchangeable_step
@@ -132,6 +131,8 @@ class HarmonicModel(ErrorModel):
         90.0
         """
         if self.channels is not None:
+            from .channelstep import channel_step  # few models have channels
+
             decoded: ExchangeableStep[HarmonicModel] = channel_step(self)
             return decoded
         core = self._prepared()

@@ -149,6 +149,8 @@ def turn_axis(ax: Axes, low: float, high: float) -> None:
     """Angle axis in degrees, with whole parts of a turn as ticks."""
     from matplotlib.ticker import MultipleLocator
 
+    if low == high:  # a joint at rest
+        low, high = low - 0.5, high + 0.5
     ax.set_xlim(low, high)
     span, most = high - low, _TICKS_PER_INCH * ax.get_figure(root=True).get_figwidth()  # type: ignore[union-attr]
     for step in _ANGLES:

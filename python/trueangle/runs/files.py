@@ -17,7 +17,6 @@ from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, u
 from ..support.signals import FIELDS
 from ..support.times import local_day
 from .angles import find_run_angles
-from .channelangle import with_channel_angle
 from .facets import Facets, read_facets
 from .rawchannels import Channels
 from .readings import FileReadings
@@ -214,7 +213,11 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
     # A log of an angle called indicated_deg is no table.
     if len(table.columns) == 1 and filled and table.roles.keys() <= asked & {"indicated"}:
         return _entries(table, given.counts)
-    table, channels = with_channel_angle(table, given.periods, given.reference_counts)
+    channels = None
+    if given.periods is not None or {"sine", "cosine"} & table.roles.keys():
+        from .channelangle import with_channel_angle  # few files have channels
+
+        table, channels = with_channel_angle(table, given.periods, given.reference_counts)
     roles, path = table.roles, table.path
     angles = find_run_angles(
         path,

@@ -23,7 +23,7 @@ PACKAGE = Path(ta.__file__).parent
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
 CODE = re.compile(r"`([^`\n]+)`")
 #: Options of other programs, which messages tell to run.
-OF_OTHERS = {"--calibrate", "--dump-config"}
+OF_OTHERS = {"--calibrate", "--dump-config", "--back"}
 
 THETA = np.arange(0.0, 720.0, 3.0)
 MODEL = ta.HarmonicModel([ta.Shaft("output", 1.0, [1, 3], [0.1, 0.0], [0.2, 0.05])], period=360.0)
@@ -48,7 +48,11 @@ def messages():
 
 
 #: Commands that are printed whole, to be typed.
-TYPED = [PACKAGE / "runs" / name for name in ("checks/columns.py", "channels.py", "files.py")]
+TYPED = [
+    PACKAGE / "runs" / name
+    for name in ("checks/columns.py", "channels.py", "channelangle.py", "files.py")
+]
+TYPED += [PACKAGE / "export" / "channelform.py"]
 
 
 def test_no_text_of_the_package_names_an_option():

@@ -125,7 +125,7 @@ def _fields(options: SourceOptions) -> list[_Field]:
         found += _described(options.dbc, [n for n in options.fields if not _FIELD.fullmatch(n)])
     if not found:
         raise ArgumentError(
-            "a CAN bus needs its signals: their description (`dbc=`), or ID:byte:length:scale "
+            "a CAN bus needs its signals: their description (a DBC file), or ID:byte:length:scale "
             "as in `signals={'indicated': ('0x101:0:2:0.02197', 'deg')}`"
         )
     return found
