@@ -210,25 +210,24 @@ impl<'a> Search<'a> {
                     found.push((score + gain + odds, k, tau, omega));
                 }
             };
-            if own > 0.0 {
-                // Its neighbours in size, and none; how much that takes is not known.
-                let at = prior.effects.iter().position(|&omega| omega == own);
-                let next = |step: isize| prior.effects.get(at?.checked_add_signed(step)?).copied();
-                let sizes = [Some(0.0), next(-1), next(1)];
-                for omega in sizes.into_iter().flatten() {
-                    if tau > 0.0 || omega > 0.0 {
-                        offer(tau, omega, 0.0);
-                    }
-                    offer(0.0, omega, 0.0);
-                }
-                offer(0.0, own, 0.0);
-                continue;
-            }
             let (size, comes) = if tau > 0.0 {
                 (tau, 0.0)
             } else {
                 now.outside(k).best(&prior.sizes)
             };
+            if own > 0.0 {
+                // Its neighbours in size, and none; how much that takes is not known. What runs
+                // share comes with less that differs.
+                let at = prior.effects.iter().position(|&omega| omega == own);
+                let next = |step: isize| prior.effects.get(at?.checked_add_signed(step)?).copied();
+                let sizes = [Some(0.0), next(-1), next(1)];
+                for omega in sizes.into_iter().flatten() {
+                    offer(size, omega, comes);
+                    offer(0.0, omega, 0.0);
+                }
+                offer(0.0, own, 0.0);
+                continue;
+            }
             for &omega in &prior.effects {
                 let gain: f64 = apart[k].iter().map(|run| run.gain(omega)).sum();
                 offer(size, omega, comes + gain);

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from ..support.arrays import Array
-from .lines import Layout, layout_of, layout_of_names
+from .lines import LineLayout, layout_of, layout_of_names
 from .sources import Source
 
 #: Seconds between two reads of a fast source, and seconds of silence after which a line is whole.
@@ -54,7 +54,7 @@ class Arrivals:
     ----------
     source : Source
         Opened; closed by `close`.
-    layout : Layout, optional
+    layout : LineLayout, optional
         Else it is found by the first lines.
     start : float
         Of the clock (`time.monotonic`) from which seconds count.
@@ -67,7 +67,7 @@ class Arrivals:
         What ended the source, where it did not end by itself.
     """
 
-    def __init__(self, source: Source, layout: Layout | None, start: float) -> None:
+    def __init__(self, source: Source, layout: LineLayout | None, start: float) -> None:
         self.source, self.layout = source, layout or layout_of_names(source.names)
         self.rejected: list[bytes] = []
         self.problem: OSError | None = None

@@ -22,7 +22,7 @@ _NAME: Final = re.compile(r"-?[A-Za-z_][^,;\t]*(?<![.:!?])")
 Cells = Callable[[bytes], Sequence[bytes] | None]
 
 
-class Layout(NamedTuple):
+class LineLayout(NamedTuple):
     """How lines are read.
 
     Attributes
@@ -61,7 +61,7 @@ class _Seen(NamedTuple):
     between: bytes = b""
 
 
-def layout_of(lines: Sequence[bytes], hurry: bool = False) -> Layout | None:
+def layout_of(lines: Sequence[bytes], hurry: bool = False) -> LineLayout | None:
     r"""The layout on which three lines agree; in a hurry, that of most lines.
 
     Examples
@@ -84,7 +84,7 @@ def layout_of(lines: Sequence[bytes], hurry: bool = False) -> Layout | None:
     if best is None:
         return None
     if best.kind == "JSON":
-        return Layout("JSON", best.names, _json_cells(best.names))  # type: ignore[arg-type]
+        return LineLayout("JSON", best.names, _json_cells(best.names))  # type: ignore[arg-type]
     if best.kind == "name:value pairs":
         names: Any = best.names
         pairs = [rb"%s[ \t]*[:=][ \t]*%s" % (re.escape(name.encode()), _VALUE) for name in names]
@@ -100,12 +100,12 @@ def layout_of(lines: Sequence[bytes], hurry: bool = False) -> Layout | None:
     return _matching(best.kind, given, between.join([_VALUE] * width), header)
 
 
-def layout_of_names(names: tuple[str, ...]) -> Layout | None:
+def layout_of_names(names: tuple[str, ...]) -> LineLayout | None:
     """The layout of CSV whose columns are known; None where there are none."""
     return _matching("CSV", names, b",".join([_VALUE] * len(names))) if names else None
 
 
-def layout_of_pattern(pattern: str) -> Layout:
+def layout_of_pattern(pattern: str) -> LineLayout:
     """The layout that a regular expression with named groups states; found anywhere in a line.
 
     Raises
@@ -130,7 +130,7 @@ def layout_of_pattern(pattern: str) -> Layout:
         given = match.group(0, *groups)[1:] if match else [b""]
         return given if all(cell and number.fullmatch(cell) for cell in given) else None
 
-    return Layout("pattern", tuple(found.groupindex), cells)
+    return LineLayout("pattern", tuple(found.groupindex), cells)
 
 
 def _seen(line: bytes) -> _Seen | None:
@@ -165,7 +165,7 @@ def _named(line: bytes, between: bytes, width: int) -> tuple[str, ...] | None:
 
 def _matching(
     kind: str, names: tuple[str, ...], pattern: bytes, header: bytes | None = None
-) -> Layout:
+) -> LineLayout:
     """The layout of lines that match a pattern with a group for each column."""
     # Each has one way to match: a line of blanks costs its length.
     whole = re.compile(pattern + rb"[,;]?")
@@ -174,7 +174,7 @@ def _matching(
         match = whole.fullmatch(line.strip())
         return match.groups() if match else None
 
-    return Layout(kind, names, cells, header, re.compile(rb"^%s$" % pattern, re.MULTILINE))
+    return LineLayout(kind, names, cells, header, re.compile(rb"^%s$" % pattern, re.MULTILINE))
 
 
 def _numbers(text: bytes) -> dict[str, float]:

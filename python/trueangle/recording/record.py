@@ -15,7 +15,7 @@ from .arrivals import Arrivals
 from .columns import Counts
 from .lines import layout_of_pattern
 from .output import RunsFile
-from .recording import Recording
+from .recording import LiveRecording
 from .screen import Screen
 from .sources import SourceOptions, open_source
 
@@ -55,12 +55,12 @@ class Recorded(NamedTuple):
 
     Attributes
     ----------
-    recording : Recording
+    recording : LiveRecording
     ended : str
         ``"asked"``, ``"source"`` (before it was asked to end, or by a fault) or ``"stopped"``.
     """
 
-    recording: Recording
+    recording: LiveRecording
     ended: str
 
 
@@ -108,7 +108,7 @@ def record(
             stack.callback(arrivals[-1].close)
             if choices.send is not None:
                 source.send(choices.send.encode())
-        recording = Recording(
+        recording = LiveRecording(
             addresses,
             arrivals,
             file,
@@ -136,7 +136,7 @@ def record(
 
 
 def _followed(
-    recording: Recording,
+    recording: LiveRecording,
     choices: Choices,
     screen: Screen,
     stopped: Callable[[], bool],

@@ -31,7 +31,7 @@ _LOSSES = 0.01
 _LOOK, _SILENT = 2.0, 2.0
 
 
-class Recording:
+class LiveRecording:
     """Takes what has arrived, writes it, and adds it to the estimate.
 
     Parameters

@@ -11,7 +11,7 @@ from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
 from ..support.layout import counted
 from ..support.letterchart import letter_chart
-from .recording import Recording
+from .recording import LiveRecording
 
 #: Seconds between two drawings, and over which the rate is taken.
 _DRAWN: Final = {"text": 0.25, "json": 0.5, "none": 0.5}
@@ -42,7 +42,7 @@ class Screen:
         self._counts: deque[tuple[float, int]] = deque([(0.0, 0)])
         self._began = False
 
-    def show(self, recording: Recording, now: float, ended: str | None = None) -> None:
+    def show(self, recording: LiveRecording, now: float, ended: str | None = None) -> None:
         """Draw, where it is time to, at the first reading, or where the recording has ended."""
         first = recording.rows > 0 and not self._began
         if not (first or ended) and now - self._drawn < _DRAWN[self.style]:
@@ -75,7 +75,7 @@ class Screen:
         self._stream.write("".join(f"{line}\n" for line in lines))
         self._lines = len(lines)
 
-    def lines(self, recording: Recording, now: float, rate: float) -> list[str]:
+    def lines(self, recording: LiveRecording, now: float, rate: float) -> list[str]:
         """The screen."""
         head, *told = self.summary(recording)
         lines = [f"{now:.1f} s  {rate:.1f}/s  {head}"]
@@ -94,7 +94,7 @@ class Screen:
                 lines += letter_chart(360.0 * places, {"o": size}, "arcsec")
         return [line[:200] for line in (*lines, *told)]
 
-    def summary(self, recording: Recording) -> list[str]:
+    def summary(self, recording: LiveRecording) -> list[str]:
         """What was recorded, and what it tells."""
         file, estimate = recording.file, recording.estimate
         kept = f" ({file.rejected.path})" if file.rejected.lines else ""

@@ -71,3 +71,17 @@ def test_a_pipe_is_read_once_and_into_memory(tmp_path):
         reference_orders=None, run=None,
     )  # fmt: skip
     assert not onepass.wants_one_pass(args)
+
+
+def test_values_that_a_command_cannot_take(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["record", "log.txt", "-o", "c.csv", "--rate", "0"]) == 1
+    assert "--rate must be positive, got 0.0" in capsys.readouterr().err
+    (tmp_path / "a.csv").write_text("reference_deg,indicated_deg\n0,0.1\n90,90.2\n180,180\n")
+    words = ["fit", "a.csv", "-o", "m.json", "--one-pass", "--periods-per-turn", "1"]
+    assert main(words) == 1
+    message = (
+        "--periods-per-turn is for sine and cosine channels, which need all readings: leave "
+        "--one-pass out"
+    )
+    assert message in capsys.readouterr().err

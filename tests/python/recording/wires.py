@@ -7,7 +7,7 @@ import numpy as np
 from trueangle.recording.arrivals import Arrivals
 from trueangle.recording.columns import Counts
 from trueangle.recording.output import RunsFile
-from trueangle.recording.recording import Recording
+from trueangle.recording.recording import LiveRecording
 
 
 class Given:
@@ -57,7 +57,9 @@ def recorded(path, lines, signals=None, counts=None, **options):
     while not arrivals.is_over:
         time.sleep(0.001)
     file = RunsFile(path, options.pop("label", None), options.pop("append", False))
-    recording = Recording(["given"], [arrivals], file, signals or {}, counts or Counts(), **options)
+    recording = LiveRecording(
+        ["given"], [arrivals], file, signals or {}, counts or Counts(), **options
+    )
     recording.take(0.0)
     while recording.is_behind:
         recording.take(0.0)

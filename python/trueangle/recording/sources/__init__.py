@@ -12,7 +12,7 @@ from .canbus import CanBus
 from .network import TcpStream, UdpPort
 from .serialport import SerialPort
 from .source import Source, SourceOptions
-from .stream import GrowingFile, Stream
+from .stream import GrowingFile, LineStream
 
 __all__ = ["SOURCES", "Source", "SourceOptions", "is_live", "open_source"]
 
@@ -41,7 +41,7 @@ SOURCES: Final[tuple[tuple[Callable[[str], bool], Callable[[str, SourceOptions],
     (lambda address: address.startswith("can:"), CanBus),
     (lambda address: address.startswith("tcp://"), TcpStream),
     (lambda address: address.startswith("udp://"), UdpPort),
-    (_is_pipe, Stream),
+    (_is_pipe, LineStream),
     (_is_file, GrowingFile),
     (_is_port, SerialPort),
 )

@@ -125,7 +125,7 @@ def _fields(options: SourceOptions) -> list[_Field]:
         found += _described(options.dbc, [n for n in options.fields if not _FIELD.fullmatch(n)])
     if not found:
         raise ArgumentError(
-            "a CAN bus needs its signals: their description (a DBC file), or ID:byte:length:scale "
+            "a CAN bus needs its signals: their description (`dbc=`), or ID:byte:length:scale "
             "as in `signals={'indicated': ('0x101:0:2:0.02197', 'deg')}`"
         )
     return found
@@ -145,16 +145,16 @@ def _field(name: str) -> _Field:
     return _Field(name, int(frame, 0), value)
 
 
-def _described(path: str, wanted: Sequence[str]) -> list[_Field]:
+def _described(dbc: str, wanted: Sequence[str]) -> list[_Field]:
     """Columns of signals that a DBC describes: those asked for, or all of their messages."""
     try:
         import cantools
     except ImportError:
         raise MissingExtraError("a DBC needs cantools: pip install 'trueangle[record]'") from None
     try:
-        database: Any = cantools.database.load_file(path)
+        database: Any = cantools.database.load_file(dbc)
     except (cantools.database.Error, ValueError) as error:
-        raise FileError(path, f"is no description of a CAN bus: {error}") from None
+        raise FileError(dbc, f"is no description of a CAN bus: {error}") from None
     every = {
         name: (message, signal.name)
         for message in database.messages

@@ -15,7 +15,7 @@ from .source import MOST, SourceOptions
 _LOOK = 0.02
 
 
-class Stream:
+class LineStream:
     """Standard input (``-``) or a pipe: it ends where its writer closes it."""
 
     midway = False
@@ -53,7 +53,7 @@ class Stream:
             self._file.close()
 
 
-class GrowingFile(Stream):
+class GrowingFile(LineStream):
     """A file from its beginning on, and what is added to it; it ends where it gets shorter."""
 
     def read(self, timeout: float) -> bytes | None:
