@@ -376,7 +376,11 @@ mod tests {
             parameters: vec![0.1, -0.2, 1.1, 0.9, 0.1, 0.03, -0.02, 0.01, 0.04],
         };
         let noise = 3e-3;
-        let fit = found(&readings(&curve, 6.28, noise, &mut numbers), &[2, 3]).unwrap();
+        let fit = found(
+            &readings(&curve, std::f64::consts::TAU, noise, &mut numbers),
+            &[2, 3],
+        )
+        .unwrap();
         let width = fit.curve.parameters.len();
         let sigma = noise / 3.0_f64.sqrt();
         let mut pulls = 0.0;
