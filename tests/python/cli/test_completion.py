@@ -162,9 +162,9 @@ FIT_HEAVY = HEAVY | {"trueangle.export", "trueangle.joint.pattern", "shutil", "g
         ("fit --help", HEAVY | ARRAYS, 32),
         ("plan --help", HEAVY | ARRAYS, 32),
         ("selfcal --help", HEAVY | ARRAYS, 32),
-        ("completion zsh", HEAVY, 130),
-        ("fit runs.csv -o model.json", FIT_HEAVY, 130),
-        ("fit runs.csv --orders 1-4 -o model.json", FIT_HEAVY, 122),
+        ("completion zsh", HEAVY, 137),
+        ("fit runs.csv -o model.json", FIT_HEAVY, 133),
+        ("fit runs.csv --orders 1-4 -o model.json", FIT_HEAVY, 125),
     ],
 )
 def test_small_work_starts_without_what_it_does_not_need(command, heavy, most, tmp_path):

@@ -72,8 +72,10 @@ def open_source(address: str, options: SourceOptions) -> Source:
 
     Examples
     --------
-    >>> open_source("udp://127.0.0.1:0", SourceOptions()).read(0.0)
+    >>> source = open_source("udp://127.0.0.1:0", SourceOptions())
+    >>> source.read(0.0)
     b''
+    >>> source.close()
     """
     for knows, opened in SOURCES:
         if knows(address):
