@@ -45,7 +45,7 @@ pub use information::Information;
 pub use model::Model;
 pub use noise::NoiseFit;
 pub use posterior::Posterior;
-pub use prior::{Count, NoisePrior, Prior};
+pub use prior::{NoisePrior, Prior};
 pub use readings::{Readings, Run};
 pub use rows::Rows;
 pub use search::{Found, Search};

@@ -39,9 +39,8 @@ impl Inside<'_> {
         let at = self.places.iter().position(|&own| own == place)?;
         let precision = self.covariance.view((2 * at, 2 * at), (2, 2)).into_owned();
         let precision = precision.try_inverse()?;
-        let prior = DMatrix::from_diagonal_element(2, 2, 1.0 / self.tau[at]);
-        let mean = DVector::from_row_slice(&self.mean[2 * at..][..2]);
-        Some(Candidate::new(&precision - prior, &precision * mean))
+        let mean = &self.mean[2 * at..][..2];
+        Some(Candidate::of_posterior(&precision, mean, self.tau[at]))
     }
 }
 

@@ -123,14 +123,14 @@ impl Readings {
         (mut set, mut model): (Vec<usize>, Model),
         known: &[Mode],
     ) -> Option<Option<Mode>> {
+        let is_known = |fit: &NoiseFit| known.iter().any(|m| !m.fit.is_far_from(&fit.position));
         let mut looked = looked.to_vec();
         let mut start = noise_prior.start();
         let mut active = None;
         let mut round = 1;
         loop {
             let fit = self.among(&set).noise(&model, noise_prior, start)?;
-            let is_known = |mode: &Mode| !mode.fit.is_far_from(&fit.position);
-            if round > 1 && known.iter().any(is_known) {
+            if round > 1 && is_known(&fit) {
                 return Some(None);
             }
             start = fit.position;
@@ -170,8 +170,7 @@ impl Readings {
             let is_same = active.replace(set.clone()) == Some(set.clone());
             if more.is_empty() && is_same || round == ROUNDS {
                 let fit = self.among(&set).noise(&model, noise_prior, start)?;
-                let is_known = |mode: &Mode| !mode.fit.is_far_from(&fit.position);
-                let is_new = !known.iter().any(is_known);
+                let is_new = !is_known(&fit);
                 return Some(is_new.then_some(Mode {
                     fit,
                     looked,

@@ -30,6 +30,16 @@ impl Candidate {
         Self { s, q }
     }
 
+    /// Of a group that is in, as if it were out: from the inverse of its posterior covariance.
+    pub(super) fn of_posterior(precision: &DMatrix<f64>, mean: &[f64], tau: f64) -> Self {
+        let q = precision * DVector::from_row_slice(mean);
+        let mut s = precision.clone();
+        for i in 0..mean.len() {
+            s[(i, i)] -= 1.0 / tau;
+        }
+        Self { s, q }
+    }
+
     /// Least squares of its coefficients: `s^-1 q` and `s^-1`; None where the others hold it.
     pub fn alone(&self) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let inverse = Cholesky::new(self.s.clone())?.inverse();
@@ -171,12 +181,8 @@ impl Solved {
             .view((place, place), (width, width))
             .into_owned();
         let precision = Cholesky::new(own)?.inverse();
-        let q = &precision * self.mean.rows(place, width);
-        let mut s = precision.clone();
-        for i in 0..width {
-            s[(i, i)] -= 1.0 / self.model.tau[k];
-        }
-        let own = Candidate { s, q };
+        let mean = &self.mean.as_slice()[place..place + width];
+        let own = Candidate::of_posterior(&precision, mean, self.model.tau[k]);
         let loss = own.gain(self.model.tau[k]);
         Some(Without {
             solved: self,

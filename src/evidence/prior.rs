@@ -84,32 +84,39 @@ impl Prior {
         own
     }
 
-    /// Logarithm of the probability that those of the groups in the model differ which do.
-    pub fn log_effects(&self, count: Count) -> f64 {
+    /// Logarithm of the probability that a further group of a model differs, or does not.
+    fn log_next(&self, count: Count, differs: bool) -> f64 {
         if self.effects.is_empty() {
             return 0.0;
         }
-        let product = |first: f64, factors: usize| -> f64 {
-            (0..factors).map(|i| (first + i as f64).ln()).sum()
+        let like_it = if differs {
+            DIFFERENT + count.different as f64
+        } else {
+            EQUAL + (count.groups - count.different) as f64
         };
-        product(DIFFERENT, count.different) + product(EQUAL, count.groups - count.different)
-            - product(DIFFERENT + EQUAL, count.groups)
+        (like_it / (DIFFERENT + EQUAL + count.groups as f64)).ln()
     }
 
-    /// Logarithm of the probability that one more group does not differ.
-    pub fn log_equal(&self, count: Count) -> f64 {
-        if self.effects.is_empty() {
-            return 0.0;
-        }
-        let equal = (count.groups - count.different) as f64;
-        ((EQUAL + equal) / (DIFFERENT + EQUAL + count.groups as f64)).ln()
+    /// Change of the logarithm of a model's probability by other variances of group `k`.
+    pub fn change(&self, model: &Model, k: usize, tau: f64, omega: f64) -> f64 {
+        let others = Count::of((0..model.tau.len()).filter(|&j| j != k), model);
+        let with = |tau: f64, omega: f64| match (tau, omega) {
+            (0.0, 0.0) => 0.0,
+            _ => self.log_odds_of(k, tau, omega) + self.log_next(others, omega > 0.0),
+        };
+        with(tau, omega) - with(model.tau[k], model.omega[k])
     }
 
     /// Logarithm of the probability of a model over that of none of the groups.
     pub fn log_odds(&self, model: &Model) -> f64 {
-        let own = |k: usize| self.log_odds_of(k, model.tau[k], model.omega[k]);
-        let each: f64 = (0..model.tau.len()).map(own).sum();
-        each + self.log_effects(Count::of(model))
+        let mut count = Count::default();
+        let mut total = 0.0;
+        for k in (0..model.tau.len()).filter(|&k| model.has(k)) {
+            let omega = model.omega[k];
+            total += self.log_odds_of(k, model.tau[k], omega) + self.log_next(count, omega > 0.0);
+            count.add(omega);
+        }
+        total
     }
 
     /// Logarithm of the probability of a model.
@@ -121,20 +128,24 @@ impl Prior {
 
 /// Groups in a model, and those of them that differ from run to run.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Count {
-    /// Groups with any variance.
-    pub groups: usize,
-    /// Groups with a variance from run to run.
-    pub different: usize,
+struct Count {
+    groups: usize,
+    different: usize,
 }
 
 impl Count {
-    /// Of a model.
-    pub fn of(model: &Model) -> Self {
-        Self {
-            groups: (0..model.tau.len()).filter(|&k| model.has(k)).count(),
-            different: model.omega.iter().filter(|omega| **omega > 0.0).count(),
+    /// Of some groups of a model.
+    fn of(groups: impl Iterator<Item = usize>, model: &Model) -> Self {
+        let mut count = Self::default();
+        for k in groups.filter(|&k| model.has(k)) {
+            count.add(model.omega[k]);
         }
+        count
+    }
+
+    fn add(&mut self, omega: f64) {
+        self.groups += 1;
+        self.different += usize::from(omega > 0.0);
     }
 }
 

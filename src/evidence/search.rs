@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use super::gains::Solved;
 use super::gram::{Gram, Sums};
 use super::model::Model;
-use super::prior::{Count, Prior};
+use super::prior::Prior;
 use crate::interrupt;
 
 /// Moves at most.
@@ -201,13 +201,12 @@ impl<'a> Search<'a> {
             return found;
         }
         let apart = now.differences(self.grams);
-        let before = prior.log_odds(&now.model);
         for k in 0..now.model.tau.len() {
             let (tau, own) = (now.model.tau[k], now.model.omega[k]);
             let mut offer = |tau: f64, omega: f64, gain: f64| {
-                let odds = prior.log_odds(&with(&now.model, &[(k, tau, omega)])) - before;
-                if score + gain + odds > self.best - self.window {
-                    found.push((score + gain + odds, k, tau, omega));
+                let reached = score + gain + prior.change(&now.model, k, tau, omega);
+                if reached > self.best - self.window {
+                    found.push((reached, k, tau, omega));
                 }
             };
             let (size, comes) = if tau > 0.0 {
@@ -231,7 +230,9 @@ impl<'a> Search<'a> {
             for &omega in &prior.effects {
                 let gain: f64 = apart[k].iter().map(|run| run.gain(omega)).sum();
                 offer(size, omega, comes + gain);
-                offer(0.0, omega, if tau > 0.0 { f64::NEG_INFINITY } else { gain });
+                if tau == 0.0 {
+                    offer(0.0, omega, gain);
+                }
             }
         }
         found
@@ -259,13 +260,7 @@ impl<'a> Search<'a> {
 
     /// What the prior gives group `j` of a model that comes in and keeps its effect of runs.
     fn coming(&self, now: &Model, j: usize, tau: f64) -> f64 {
-        let (prior, omega) = (self.prior, now.omega[j]);
-        let more = if omega == 0.0 {
-            prior.log_equal(Count::of(now))
-        } else {
-            0.0
-        };
-        more + prior.log_odds_of(j, tau, omega) - prior.log_odds_of(j, 0.0, omega)
+        self.prior.change(now, j, tau, now.omega[j])
     }
 
     /// Another size of a group.

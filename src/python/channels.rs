@@ -4,7 +4,6 @@ use std::ffi::CStr;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyUntypedArray};
-use pyo3::exceptions::PyTypeError;
 use pyo3::ffi;
 use pyo3::prelude::*;
 
@@ -12,12 +11,10 @@ use super::array::{columns, data, empty, square, values, vector};
 use super::number::single;
 use super::release::detached;
 use super::series::PySeries;
-use super::step::Definition;
-use super::terms::OTHER;
+use super::step::{Definition, check_arguments};
 use crate::channels::{self, Angle, Curve, Decoder, Readings};
 use crate::check::same_length;
 use crate::compensator::Compensator;
-use crate::terms::Signal;
 
 /// Parameters, covariance, phases, residuals, and shares of the cosine's noise in them.
 type Found<'py> = (
@@ -184,7 +181,8 @@ unsafe extern "C" fn step(
     unsafe {
         let py = Python::assume_attached();
         if (given != 2 || !keywords.is_null())
-            && let Err(error) = check_arguments(py, given, keywords)
+            && let Err(error) =
+                check_arguments(py, given as usize, keywords, (2, "a sine, a cosine"))
         {
             error.restore(py);
             return std::ptr::null_mut();
@@ -228,33 +226,4 @@ unsafe fn two(
         single(&sine, "the sine of a step")?,
         single(&cosine, "the cosine of a step")?,
     ))
-}
-
-/// That there are two channels, and beside them nothing but signals.
-#[cold]
-fn check_arguments(
-    py: Python<'_>,
-    given: ffi::Py_ssize_t,
-    keywords: *mut ffi::PyObject,
-) -> PyResult<()> {
-    if !(2..=2 + Signal::NAMED.len() as isize).contains(&given) {
-        let problem = format!(
-            "step takes a sine, a cosine and up to {} signals, got {given} arguments",
-            Signal::NAMED.len()
-        );
-        return Err(PyTypeError::new_err(problem));
-    }
-    if keywords.is_null() {
-        return Ok(());
-    }
-    // SAFETY: a tuple of names, as the calling convention has it.
-    let names: Vec<String> = unsafe { Bound::from_borrowed_ptr(py, keywords) }.extract()?;
-    let is_known = |name: &str| Signal::named(name).is_some() || name.starts_with(OTHER);
-    match names.iter().find(|name| !is_known(name)) {
-        Some(name) => {
-            let problem = format!("step got an unexpected keyword argument '{name}'");
-            Err(PyTypeError::new_err(problem))
-        }
-        None => Ok(()),
-    }
 }

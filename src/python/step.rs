@@ -320,7 +320,7 @@ unsafe fn in_full(
 ) -> *mut ffi::PyObject {
     unsafe {
         let py = Python::assume_attached();
-        let angle = check_arguments(py, given, keywords).and_then(|()| {
+        let angle = check_arguments(py, given, keywords, (1, "an angle")).and_then(|()| {
             single(
                 &Bound::from_borrowed_ptr(py, *arguments),
                 "the angle of a step",
@@ -433,12 +433,17 @@ unsafe extern "C" fn release(own: *mut ffi::PyObject) {
     }
 }
 
-/// That there is an angle, and beside it nothing but signals.
+/// That the first arguments are there, so many, and beside them nothing but signals.
 #[cold]
-fn check_arguments(py: Python<'_>, given: usize, keywords: *mut ffi::PyObject) -> PyResult<()> {
-    if !(1..=1 + Signal::NAMED.len()).contains(&given) {
+pub(super) fn check_arguments(
+    py: Python<'_>,
+    given: usize,
+    keywords: *mut ffi::PyObject,
+    (first, named): (usize, &str),
+) -> PyResult<()> {
+    if !(first..=first + Signal::NAMED.len()).contains(&given) {
         let problem = format!(
-            "step takes an angle and up to {} signals, got {given} arguments",
+            "step takes {named} and up to {} signals, got {given} arguments",
             Signal::NAMED.len()
         );
         return Err(PyTypeError::new_err(problem));

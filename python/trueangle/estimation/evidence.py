@@ -108,7 +108,7 @@ class EvidenceEstimate:
     def present(self) -> tuple[float, ...]:
         """Orders that runs more probably share or differ by than not."""
         some = np.sum([m.weight * ((m.tau > 0.0) | (m.omega > 0.0)) for m in self.models], axis=0)
-        return tuple(k for k, p in zip(self.told, np.atleast_1d(some), strict=False) if p > 0.5)
+        return tuple(k for k, p in zip(self.told, some, strict=True) if p > 0.5)
 
     def curve(self, theta: Array) -> tuple[Array, Array]:
         """Error curve at angles in radians, less its mean over them, and its standard deviation."""

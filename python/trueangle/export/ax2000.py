@@ -10,23 +10,22 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.files import FileKind
-from .channelform import about_offsets, channels_of, made_of_channels, model_of_channels
+from .channelform import ChannelTarget, about_offsets, made_of_channels, model_of_channels
 from .pattern import TurnPattern
 from .reading import table_error
-from .target import CommentBlock, Made, Option, Target
+from .target import CommentBlock, Made, Option
 
 #: Millivolts that a command takes, at most.
 _MOST = 10_000
 _LINE = re.compile(r"^\s*(HISOFFS|HICOFFS)\s+(-?\d+)\s*$", re.MULTILINE)
 
 
-class Ax2000(Target):
+class Ax2000(ChannelTarget):
     """Target ``ax2000``: ``HISOFFS`` and ``HICOFFS``, whole millivolts."""
 
     name = "ax2000"
     what = "offsets of a sine encoder for AX2000 (HISOFFS, HICOFFS)"
     kind: ClassVar[FileKind] = FileKind("ASCII commands of AX2000", (".txt", ".cmd"))
-    sign = "absolute"
     arithmetic_known = False
     unknown = (
         "the scale of HIFACT1 is not documented: the drive finds it (RK, CALCRK); it is omitted; "
@@ -34,11 +33,8 @@ class Ax2000(Target):
     )
     options = {"volts_per_count": Option(float, 1.0, "volts at the pin of one unit of the columns")}
 
-    def may_be_empty(self, options: Mapping[str, Any]) -> bool:
-        return True
-
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        channels, unit = channels_of(pattern, self.name), options["volts_per_count"] * 1e3
+        channels, unit = self.channels(pattern), options["volts_per_count"] * 1e3
         exact = (channels.offset_sine, channels.offset_cosine)
         sine, cosine = (round(value * unit) for value in exact)
         if not unit > 0.0 or max(abs(sine), abs(cosine)) > _MOST:

@@ -13,16 +13,16 @@ from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
 from ..support.files import FileKind
-from .channelform import Decode, channels_of, made_of_channels, model_of_channels
+from .channelform import ChannelTarget, Decode, made_of_channels, model_of_channels
 from .pattern import TurnPattern
 from .reading import table_error
-from .target import CommentBlock, Made, Option, Target
+from .target import CommentBlock, Made, Option
 
 _NAMES: Final = ("Sin offset", "Cos offset", "Sin gain", "Cos gain")
 _LINE = re.compile(r"^\s*(?:P-0-0150\.)?((?:Sin|Cos) (?:offset|gain))\s*=\s*(-?\d+)", re.MULTILINE)
 
 
-class Ax5000(Target):
+class Ax5000(ChannelTarget):
     """Target ``ax5000``: offsets in increments and gains of both channels.
 
     The gain of the weaker channel is raised: ``gain = gain_one * largest / amplitude``.
@@ -31,7 +31,6 @@ class Ax5000(Target):
     name = "ax5000"
     what = "offsets and gains of a sine encoder for AX5000 (P-0-0150)"
     kind: ClassVar[FileKind] = FileKind("parameters of AX5000", (".txt",))
-    sign = "absolute"
     arithmetic_known = False
     unknown = (
         "the number that stands for a gain of 1 is not documented, nor is the arithmetic: give "
@@ -39,11 +38,8 @@ class Ax5000(Target):
     )
     options = {"gain_one": Option(int, 65536, "value of a gain that stands for 1")}
 
-    def may_be_empty(self, options: Mapping[str, Any]) -> bool:
-        return True
-
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        channels, one = channels_of(pattern, self.name), options["gain_one"]
+        channels, one = self.channels(pattern), options["gain_one"]
         if one < 1:
             raise ArgumentError(f"gain_one must be from 1 on, got {one}")
         size = max(1.0, channels.gain_ratio)

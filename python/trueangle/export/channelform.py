@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from .pattern import TurnPattern
 from .proof import Places
-from .target import CommentBlock, Made, TablePart
+from .target import CommentBlock, Made, TablePart, Target
 
 #: Phase in radians of sine and cosine, as a firmware has it.
 Decode: TypeAlias = Callable[[Array, Array], Array]
@@ -30,6 +30,19 @@ _HIGHEST: Final = 8
 
 #: Orders below this are not listed, arcsec.
 _LISTED: Final = 0.01
+
+
+class ChannelTarget(Target):
+    """A target that takes constants of channels, whatever error of the angle is left."""
+
+    sign = "absolute"
+
+    def may_be_empty(self, options: Mapping[str, Any]) -> bool:
+        return True
+
+    def channels(self, pattern: TurnPattern) -> Channels:
+        """The constants that a model holds (`channels_of`)."""
+        return channels_of(pattern, self.name)
 
 
 def channels_of(pattern: TurnPattern, name: str) -> Channels:

@@ -11,17 +11,17 @@ from typing import Any, ClassVar, Final
 from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.files import FileKind
-from .channelform import channels_of, ellipse_of, made_of_channels, model_of_channels
+from .channelform import ChannelTarget, ellipse_of, made_of_channels, model_of_channels
 from .pattern import TurnPattern
 from .reading import table_error
-from .target import CommentBlock, Made, Option, Target
+from .target import CommentBlock, Made, Option
 
 #: Full scale of the converter, and the middle that is subtracted first.
 _FULL: Final = 4095
 _MIDDLE: Final = _FULL / 2
 
 
-class LeRobot(Target):
+class LeRobot(ChannelTarget):
     """Target ``lerobot``: ``center_fit`` and ``T`` of a joint of ``ExoskeletonCalibration``.
 
     ``z = T ((cosine, sine) - 2047.5 - center)``; the angle is ``zero_offset - atan2(z1, z0)``.
@@ -30,7 +30,6 @@ class LeRobot(Target):
     name = "lerobot"
     what = "the calibration of a joint of LeRobot's exoskeleton (JSON)"
     kind: ClassVar[FileKind] = FileKind("a calibration of LeRobot", (".json", ".txt"))
-    sign = "absolute"
     unknown = (
         "LeRobot's angle is minus the phase of the channels, about the zero pose: hold the joint "
         "there and set zero_offset"
@@ -40,11 +39,8 @@ class LeRobot(Target):
         "side": Option(str, "", "of the arm"),
     }
 
-    def may_be_empty(self, options: Mapping[str, Any]) -> bool:
-        return True
-
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        channels = channels_of(pattern, self.name)
+        channels = self.channels(pattern)
         _, _, per_cosine, per_sine, slope, _ = channels.constants
         content = {
             "version": 2,

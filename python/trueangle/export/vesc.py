@@ -14,10 +14,10 @@ from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
 from ..support.files import FileKind
-from .channelform import Decode, channels_of, decimals, made_of_channels, model_of_channels
+from .channelform import ChannelTarget, Decode, decimals, made_of_channels, model_of_channels
 from .pattern import TurnPattern
 from .reading import table_error
-from .target import CommentBlock, Made, Option, Target
+from .target import CommentBlock, Made, Option
 
 #: The configuration keeps thousandths in 16 bits.
 _DIGITS: Final = 3
@@ -33,7 +33,7 @@ _NAMES: Final = (
 _ENTRY = re.compile(r"<(m_encoder_\w+)>\s*([^<]+?)\s*</\1>")
 
 
-class Vesc(Target):
+class Vesc(ChannelTarget):
     """Target ``vesc``: entries of the motor configuration for a sine/cosine encoder.
 
     ``s = (V_s - offset) / amp``, likewise ``c``; ``c' = (c + s sin(ph)) / cos(ph)``; the angle is
@@ -43,7 +43,6 @@ class Vesc(Target):
     name = "vesc"
     what = "the sine/cosine encoder of VESC's motor configuration (XML)"
     kind: ClassVar[FileKind] = FileKind("a motor configuration of VESC", (".xml", ".txt"))
-    sign = "absolute"
     unknown = (
         "firmware 6 or later is wanted, which keeps amplitudes and a phase; the error of its fast "
         "arc tangent is not counted, and readings are rejected whose radius is not from 0.7 to 1.3 "
@@ -53,11 +52,8 @@ class Vesc(Target):
         "volts_per_count": Option(float, 1.0, "volts at the pin of one unit of the columns"),
     }
 
-    def may_be_empty(self, options: Mapping[str, Any]) -> bool:
-        return True
-
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        channels, volts = channels_of(pattern, self.name), options["volts_per_count"]
+        channels, volts = self.channels(pattern), options["volts_per_count"]
         if not volts > 0.0:
             raise ArgumentError(f"volts_per_count must be positive, got {volts:g}")
         exact = dict(
