@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of the angle (default: the ending of its name, else the model's)",
     )
     add("--counts-per-turn", type=float, metavar="N", help="of an angle in counts")
-    add_signals(parser, counts=False, runs=False, reference=False)
+    add_signals(parser, counts=False, runs=False, reference=False, channels=False)
     add(
         "--output-topic",
         metavar="NAME",

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="longest pause of the reference that is interpolated over "
         "(default: five times its typical step, and longer where it moves on a line)",
     )
-    add_signals(parser, runs=False)
+    add_signals(parser, runs=False, channels=False)
     add_errors_in(parser)
     add("--json", action="store_true", help="print the result as JSON")
 

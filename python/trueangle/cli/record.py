@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--rate", type=float, metavar="HZ", help="readings per second to keep, at most")
     add_source_options(parser)
-    add_signals(parser, runs=False, topic=False)
+    add_signals(parser, runs=False, topic=False, channels=False)
     add(
         "--progress",
         choices=("auto", "text", "json", "none"),

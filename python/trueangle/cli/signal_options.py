@@ -24,6 +24,7 @@ def add_signals(
     runs: bool = True,
     reference: bool = True,
     topic: bool = True,
+    channels: bool = True,
 ) -> None:
     """Declare ``--signal`` and what belongs to it; of ``runs``, what their reference is made of."""
     add = parser.add_argument
@@ -49,13 +50,14 @@ def add_signals(
             metavar="N",
             help="of a reference in counts",
         )
-    if topic:
+    if channels:
         add(
             "--periods-per-turn",
             type=int,
             metavar="P",
             help="periods in a turn of the channels sine and cosine, of which the angle is made",
         )
+    if topic:
         add(
             "--topic",
             metavar="NAME",

@@ -152,9 +152,9 @@ def draw_spectrum(
             color=palette.WARNING,
         )
     low, high = (unit.per_arcsec * size for size in seen_sizes(lines))
-    ax.set_yscale("log")
-    # A decade above for aliases that are written there.
+    # A decade above for aliases that are written there; limits first: amplitudes may all be nought.
     ax.set_ylim(low, (2.5 if name is not None else 1.5) * high * (10.0 if tall else 1.0))
+    ax.set_yscale("log")
     plain_logarithms(ax, "y")
     axis.draw(ax)
     ax.set_xlabel("order / cycles per output turn")

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import _core
 from ..errors import ArgumentError
 from ..support.angles import check_period, checked_sign
+from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 
 #: Names of the constants, in the order of their covariance.
@@ -46,6 +47,13 @@ class ChannelHarmonic(NamedTuple):
     """Standard error of either part."""
 
 
+def _harmonic(entry: tuple[float, ...]) -> ChannelHarmonic:
+    if not isinstance(entry, tuple) or len(entry) not in (3, 4):
+        raise ArgumentError(f"harmonics must be (order, re, im, std) each, got {entry!r:.60}")
+    return ChannelHarmonic(*entry)  # type: ignore[arg-type]  # an order is a whole number
+
+
+@told_kinds
 @dataclass(frozen=True)
 class Channels:
     """Constants of a sine and a cosine channel.
@@ -115,7 +123,7 @@ class Channels:
                 raise ArgumentError(f"{name} must be positive, got {getattr(self, name)!r}")
         if not abs(self.phase_deg) < 90.0:
             raise ArgumentError(f"phase_deg must be between -90 and 90, got {self.phase_deg!r}")
-        put(self, "harmonics", tuple(ChannelHarmonic(*entry) for entry in self.harmonics))
+        put(self, "harmonics", tuple(map(_harmonic, self.harmonics)))
         for h in self.harmonics:
             if h.order in (-1, 0, 1) or not all(map(math.isfinite, h[1:])):
                 raise ArgumentError(f"a harmonic has an order from 2 or to -2, got {h!r}")

@@ -11,6 +11,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.export import TARGETS
+from trueangle.export.channelform import ChannelTarget
 from trueangle.model.records import FitRecord, Provenance
 from trueangle.support.files import InputFile
 
@@ -18,8 +19,11 @@ from .test_bounds import existing
 
 A = 1.0 / 3600.0
 
+#: A period of 360 deg on an ellipse, for the targets that decode.
+CHANNELS = ta.Channels(0.02, -0.01, 1.1, 0.98, 1.5, period=360.0)
+
 #: Formats that no reader takes a comment in.
-NO_COMMENT = {"csv", "moteus"}
+NO_COMMENT = {"csv", "moteus", "lerobot", "ax2000", "ax5000"}
 
 
 @pytest.fixture
@@ -41,6 +45,8 @@ def export(model, target, folder, **options):
         options["existing"] = existing(folder, model.replace(terms=()))
     if target == "pmac":
         options["counts_per_turn"] = 1 << 20
+    if isinstance(TARGETS[target], ChannelTarget):
+        model = model.replace(channels=CHANNELS)
     return ta.export_model(model, target, **options)
 
 
@@ -78,7 +84,8 @@ def test_what_is_left_out_is_named_with_its_size(target, model, tmp_path):
     first = made.summary().split("\n")[0]
     for term in sizes:
         assert term in first
-    assert float(re.search(r"at most (\S+)", first)[1]) >= total
+    size, unit = re.search(r"at most (\S+) (arcsec|deg)", first).groups()
+    assert float(size) * {"arcsec": 1.0, "deg": 3600.0}[unit] >= total * 0.9999
     assert "latency" in made.to_dict()["left_out"][-1]["term"]
 
 

@@ -37,6 +37,7 @@ LINES = {"orders": [1], "cosine": [0.1], "sine": [0.0]}
 #: Arguments with which each can be called; files are those of `files`.
 CALLS = {
     ta.Backlash: {"half_width": 0.1},
+    ta.Channels: {},
     ta.CalibrationRun: {"reference": THETA, "indicated": THETA, "period": 360.0},
     ta.FilterLag: {"cutoff_hz": 10.0},
     ta.HarmonicModel: {"shafts": MODEL.shafts, "period": 360.0},
