@@ -132,13 +132,14 @@ fn arc_tangent(y: f64, x: f64) -> f64 {
         (least, most, 0.0)
     };
     let t = over / under;
+    // Estrin's scheme: a single reading waits for the longest chain of operations.
     let w = t * t;
-    let mut sum = 0.0;
-    let mut i = ARC.len();
-    while i > 0 {
-        i -= 1;
-        sum = sum * w + ARC[i];
-    }
+    let (w2, a) = (w * w, &ARC);
+    let w4 = w2 * w2;
+    let low = (a[0] + a[1] * w) + (a[2] + a[3] * w) * w2;
+    let middle = (a[4] + a[5] * w) + (a[6] + a[7] * w) * w2;
+    let high = (a[8] + a[9] * w) + a[10] * w2;
+    let sum = low + (middle + high * w4) * w4;
     let octant = sum * t + base;
     let quadrant = if is_steep { FRAC_PI_2 - octant } else { octant };
     let half = if x < 0.0 { PI - quadrant } else { quadrant };

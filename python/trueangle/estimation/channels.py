@@ -40,7 +40,7 @@ _DEAD: Final = 1e-3
 _LINEAR: Final = 0.2
 
 #: Confidence that a correction takes more than it adds.
-_CONFIDENCE: Final = 0.9
+_CONFIDENCE: Final = 0.99
 
 
 class ChannelEstimate(NamedTuple):

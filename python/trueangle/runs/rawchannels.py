@@ -218,7 +218,7 @@ class Channels:
         )
         for k, re, im, _ in self.harmonics:
             z = z + size * complex(re, im) * np.exp(1j * k * (phase + turn))
-        return np.asarray(z.imag), np.asarray(z.real)
+        return z.imag.copy(), z.real.copy()
 
     def error_harmonics(self) -> tuple[list[int], list[float], list[float]]:
         """Error that the harmonics leave in `angle`: orders of the channels' period, cosine, sine.
