@@ -38,7 +38,7 @@ mod search;
 mod slopes;
 mod whitening;
 
-pub use estimate::Estimate;
+pub use estimate::{Estimate, Mixture};
 pub use gains::{Candidate, Solved, Without};
 pub use gram::{Gram, Sums};
 pub use information::Information;

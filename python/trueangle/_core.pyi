@@ -209,6 +209,15 @@ class Evidence:
     def noise(
         self, tau: Sequence[float], omega: Sequence[float], scale: float
     ) -> NDArray[np.float64]: ...
+    def under(
+        self,
+        noise: Sequence[float],
+        probabilities: Sequence[float],
+        tau: Sequence[float],
+        omega: Sequence[float],
+    ) -> tuple[
+        list[tuple[float, list[float], list[float]]], NDArray[np.float64], NDArray[np.float64]
+    ]: ...
     def estimate(
         self, probabilities: Sequence[float]
     ) -> tuple[

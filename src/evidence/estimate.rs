@@ -68,6 +68,17 @@ pub struct Estimate {
     pub alone: Vec<Candidate>,
 }
 
+/// The mixture over models under one noise.
+#[derive(Clone, Debug)]
+pub struct Mixture {
+    /// Weight and prior variances of each model, best first.
+    pub models: Vec<(f64, Model)>,
+    /// Mean of the coefficients.
+    pub mean: DVector<f64>,
+    /// Covariance of the coefficients.
+    pub covariance: DMatrix<f64>,
+}
+
 /// What a noise and a search that agree with each other have found.
 struct Mode {
     fit: NoiseFit,
@@ -111,6 +122,32 @@ impl Readings {
             modes.extend(mode);
         }
         self.mixture(&modes, &prior, noise_prior)
+    }
+
+    /// The mixture over models under a known noise, sought from a model and from none: weights and
+    /// models, mean and covariance. None where no evidence can be computed.
+    pub fn under(&self, noise: Noise, probabilities: &[f64], start: Model) -> Option<Mixture> {
+        let prior = Prior::of(probabilities.to_vec(), self.variance(), self.runs().len());
+        let grams = self.grams(noise);
+        let mut search = Search::new(&grams, &prior, WINDOW);
+        search.from(start)?;
+        search.from(Model::of_orders(self.orders().len(), 0.0))?;
+        search.widen()?;
+        let mut found = search.models();
+        found.truncate(MODELS);
+        let best = found.first()?.score;
+        let weights: Vec<f64> = found.iter().map(|own| (own.score - best).exp()).collect();
+        let whole: f64 = weights.iter().sum();
+        let posteriors = found.iter().map(|own| own.model.posterior(&grams));
+        let posteriors = posteriors.collect::<Option<Vec<Posterior>>>()?;
+        let parts: Vec<(f64, &Posterior)> = weights.iter().copied().zip(&posteriors).collect();
+        let (mean, covariance) = mixed(2 * self.orders().len(), &parts);
+        let models = weights.iter().zip(found);
+        Some(Mixture {
+            models: models.map(|(w, own)| (w / whole, own.model)).collect(),
+            mean,
+            covariance,
+        })
     }
 
     /// Noise and search in turn until the set of orders stays, from orders that the noise is first

@@ -96,16 +96,10 @@ impl PyEvidence {
         tau: Vec<f64>,
         omega: Vec<f64>,
     ) -> PyResult<Solution<'py>> {
-        not_negative("noise", &noise)?;
-        if noise[0] == 0.0 {
-            return Err(argument_error(
-                py,
-                "noise[0], the white variance, must be above 0".into(),
-            ));
-        }
+        let noise = Self::noise_of(py, noise)?;
         let model = self.model(tau, omega)?;
         let found = detached(py, || {
-            let posterior = model.posterior(&self.0.grams(Noise::of(noise)))?;
+            let posterior = model.posterior(&self.0.grams(noise))?;
             let covariance = posterior.covariance();
             Some((posterior, covariance))
         })?;
@@ -142,18 +136,31 @@ impl PyEvidence {
         vector(py, &found.noise.variances())
     }
 
+    /// The mixture over models under a known noise, sought from a model and from none.
+    fn under<'py>(
+        &self,
+        py: Python<'py>,
+        noise: [f64; VARIANCES],
+        probabilities: Vec<f64>,
+        tau: Vec<f64>,
+        omega: Vec<f64>,
+    ) -> PyResult<(Vec<Weighted>, Vector<'py>, Matrix<'py>)> {
+        let noise = Self::noise_of(py, noise)?;
+        self.check_probabilities(py, &probabilities)?;
+        let start = self.model(tau, omega)?;
+        let found = detached(py, || self.0.under(noise, &probabilities, start))?;
+        let found = found.ok_or_else(|| argument_error(py, LOST.into()))?;
+        let n = found.mean.len();
+        Ok((
+            weighted(found.models),
+            vector(py, found.mean.as_slice())?,
+            columns(py, found.covariance.as_slice(), &[n, n])?,
+        ))
+    }
+
     /// The mixture over models and noises, from prior probabilities of the orders.
     fn estimate<'py>(&self, py: Python<'py>, probabilities: Vec<f64>) -> PyResult<Estimated<'py>> {
-        same_length(
-            "probabilities",
-            probabilities.len(),
-            "orders",
-            self.0.orders().len(),
-        )?;
-        if let Some(wrong) = probabilities.iter().find(|p| !(**p > 0.0 && **p < 1.0)) {
-            let problem = format!("probabilities must be above 0 and below 1, got {wrong}");
-            return Err(argument_error(py, problem));
-        }
+        self.check_probabilities(py, &probabilities)?;
         let found = detached(py, || self.0.estimate(&probabilities))?;
         let found = found.ok_or_else(|| argument_error(py, LOST.into()))?;
         let n = found.mean.len();
@@ -161,7 +168,6 @@ impl PyEvidence {
             let (b, variance) = own.alone()?;
             Some((b[0], b[1], variance[(0, 0)], variance[(1, 1)]))
         });
-        let models = found.models.into_iter();
         let zeros = found.grams.iter().zip(self.0.runs()).map(|(gram, run)| {
             let level = run.mean() + gram.level;
             (gram.information, gram.means.as_slice().to_vec(), level)
@@ -172,9 +178,7 @@ impl PyEvidence {
             vector(py, found.mean.as_slice())?,
             columns(py, found.covariance.as_slice(), &[n, n])?,
             vector(py, &found.noise.variances())?,
-            models
-                .map(|(weight, model)| (weight, model.tau, model.omega))
-                .collect(),
+            weighted(found.models),
             zeros.collect(),
             alone.collect(),
         ))
@@ -182,6 +186,25 @@ impl PyEvidence {
 }
 
 impl PyEvidence {
+    fn noise_of(py: Python<'_>, noise: [f64; VARIANCES]) -> PyResult<Noise> {
+        not_negative("noise", &noise)?;
+        if noise[0] == 0.0 {
+            let problem = "noise[0], the white variance, must be above 0";
+            return Err(argument_error(py, problem.into()));
+        }
+        Ok(Noise::of(noise))
+    }
+
+    fn check_probabilities(&self, py: Python<'_>, probabilities: &[f64]) -> PyResult<()> {
+        let orders = self.0.orders().len();
+        same_length("probabilities", probabilities.len(), "orders", orders)?;
+        if let Some(wrong) = probabilities.iter().find(|p| !(**p > 0.0 && **p < 1.0)) {
+            let problem = format!("probabilities must be above 0 and below 1, got {wrong}");
+            return Err(argument_error(py, problem));
+        }
+        Ok(())
+    }
+
     fn model(&self, tau: Vec<f64>, omega: Vec<f64>) -> PyResult<Model> {
         let orders = self.0.orders().len();
         for (name, variances) in [("tau", &tau), ("omega", &omega)] {
@@ -191,4 +214,11 @@ impl PyEvidence {
         let widths = vec![2; orders];
         Ok(Model { widths, tau, omega })
     }
+}
+
+fn weighted(models: Vec<(f64, Model)>) -> Vec<Weighted> {
+    let models = models.into_iter();
+    models
+        .map(|(weight, own)| (weight, own.tau, own.omega))
+        .collect()
 }

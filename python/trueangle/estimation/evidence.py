@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -86,6 +86,10 @@ class EvidenceEstimate:
     readings : int
     alone : tuple of Alone or None
         Each of ``orders`` by itself; None where the readings do not tell it from the others.
+    runs : tuple of RunReadings
+        What it is the estimate of.
+    prior : ndarray, shape (K,)
+        Prior probability of each order.
     """
 
     orders: tuple[float, ...]
@@ -98,6 +102,8 @@ class EvidenceEstimate:
     zeros: tuple[RunZero, ...]
     alone: tuple[Alone | None, ...]
     readings: int
+    runs: tuple[RunReadings, ...] = field(repr=False)
+    prior: Array = field(repr=False)
 
     @property
     def included(self) -> tuple[float, ...]:
@@ -109,6 +115,34 @@ class EvidenceEstimate:
         """Orders that runs more probably share or differ by than not."""
         some = np.sum([m.weight * ((m.tau > 0.0) | (m.omega > 0.0)) for m in self.models], axis=0)
         return tuple(k for k, p in zip(self.told, some, strict=True) if p > 0.5)
+
+    def without(self, left_out: Collection[int]) -> EvidenceEstimate:
+        """The estimate of the other runs, of the orders in ``told`` and under the same noise.
+
+        Models are sought anew from the sums of the other runs. Cost: one pass over their readings.
+        """
+        runs = tuple(run for r, run in enumerate(self.runs) if r not in left_out)
+        places = [self.orders.index(k) for k in self.told]
+        best = self.models[0]
+        omega = best.omega if len(runs) > 1 else np.zeros_like(best.omega)
+        given = [tuple(map(_column, run)) for run in runs]
+        found, mean, covariance = Evidence(given, self.told).under(
+            self.noise.tolist(), self.prior[places].tolist(), best.tau.tolist(), omega.tolist()
+        )
+        models = tuple(WeightedModel(w, np.array(tau), np.array(own)) for w, tau, own in found)
+        probability = np.zeros_like(self.probability)
+        probability[places] = np.sum([m.weight * (m.tau > 0.0) for m in models], axis=0)
+        zeros = tuple(zero for r, zero in enumerate(self.zeros) if r not in left_out)
+        return replace(
+            self,
+            probability=probability,
+            mean=mean,
+            covariance=covariance,
+            models=models,
+            zeros=zeros,
+            readings=sum(len(run.theta) for run in runs),
+            runs=runs,
+        )
 
     def curve(self, theta: Array) -> tuple[Array, Array]:
         """Error curve at angles in radians, less its mean over them, and its standard deviation."""
@@ -264,6 +298,8 @@ def estimate_by_evidence(
         tuple(RunZero(n, np.array(columns), level) for n, columns, level in zeros),
         tuple(None if own is None else Alone(*own) for own in alone),
         sum(len(run.theta) for run in runs),
+        tuple(runs),
+        np.asarray(probability, dtype=float),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
@@ -13,15 +13,20 @@ import numpy as np
 from ..errors import (
     ArgumentError,
     NoModelError,
+    NoOrderError,
     OutsideSpanWarning,
     TrueAngleError,
     UnlikeRunsWarning,
 )
+from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..support.arrays import Array
 from ..support.plainresult import ShownResult
+from .mixture import check_new_run
+from .orders.table import LEFT_OUT
+from .orders.zerogroups import some_angles
 from .robust import Loss
 
 if TYPE_CHECKING:
@@ -105,8 +110,8 @@ def hold_out(fit: FitResult) -> HeldOut:
     With many runs several are left out together (five or twelve parts, with and without
     a selection of orders).
 
-    Where the orders were selected by evidence they are selected anew without the run, so
-    that nothing of it enters the model that corrects it.
+    Where the orders were selected by evidence they are selected anew without the run, from the
+    sums of the others (`EvidenceEstimate.without`); the noise is that of all runs.
 
     Raises
     ------
@@ -130,13 +135,12 @@ def hold_out(fit: FitResult) -> HeldOut:
     found, left_in = [], []
     most = _MOST_FOLDS if fit.evidence is None else _MOST_SELECTIONS
     for fold in folds(len(runs), most):
-        train = [run for i, run in enumerate(runs) if i not in fold]
         labels = [runs[i].label or str(i + 1) for i in fold]
         try:
             with warnings.catch_warnings():
                 # Said of all runs already.
                 warnings.simplefilter("ignore", UnlikeRunsWarning)
-                model: HarmonicModel | None = _refit(fit, train)
+                model: HarmonicModel | None = _others(fit, fold)
         except NoModelError:
             model = None
         except TrueAngleError as reason:
@@ -162,19 +166,54 @@ def folds(count: int, most: int) -> list[list[int]]:
     return [list(range(start, count, folds)) for start in range(folds)]
 
 
-def _refit(fit: FitResult, train: Sequence[CalibrationRun]) -> HarmonicModel:
+def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
+    """The model of the other runs, made as the fit was.
+
+    Raises
+    ------
+    NoModelError
+        The other runs support no order.
+    """
+    train = [run for i, run in enumerate(fit.runs) if i not in fold]
+    shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.problem.shafts}
+    if fit.evidence is None:
+        orders = {shaft.name: shaft.orders for shaft in fit.problem.shafts}
+        return _refit(fit, train, orders, shafts)
+    estimate = fit.evidence.estimate
+    if estimate is None or len(estimate.runs) != len(fit.runs):
+        # Readings of one run have several zeros: which are left out with it is not known.
+        return _refit(fit, train, None, fit.evidence.shafts)
+    others = estimate.without(fold)
+    problem = fit.problem
+    kept = [angles for i, angles in enumerate(problem.angles) if i not in fold]
+    travel = some_angles(kept, problem.period)
+    beside = [row.order for row in fit.evidence.table if row.verdict in LEFT_OUT]
+    chosen = others.carriers(travel, beside)
+    if not chosen:
+        raise NoOrderError("no order is supported by the other runs")
+    if fit.known is None:
+        return _refit(fit, train, {"output": chosen}, shafts)
+    if len(train) > 1:
+        check_new_run(others, travel, chosen)
+    mean, _ = others.among(chosen, travel, beside)
+    shaft = Shaft("output", 1.0, chosen, tuple(mean[::2].tolist()), tuple(mean[1::2].tolist()))
+    constant = fit.bare_model.constant
+    return HarmonicModel((shaft,), constant, problem.period, problem.argument)
+
+
+def _refit(
+    fit: FitResult,
+    train: Sequence[CalibrationRun],
+    orders: Mapping[str, Iterable[float]] | None,
+    shafts: Mapping[str, float],
+) -> HarmonicModel:
     from .fit import fitted_to
 
     ratio, member = fit.joint
-    shafts, orders = None if fit.evidence is None else fit.evidence.shafts, None
-    if fit.evidence is None:
-        ratio = None
-        shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.problem.shafts}
-        orders = {shaft.name: shaft.orders for shaft in fit.problem.shafts}
     return fitted_to(
         train,
         orders,
-        gear_ratio=ratio,
+        gear_ratio=ratio if orders is None else None,
         fixed_member=member,
         shafts=shafts,
         argument=fit.problem.argument,

@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ..errors import NoModelError, NoOrderError
+from ..estimation.evidence import EvidenceEstimate
 from ..joint.shafts import ShaftOrders
 from ..runs.outliers import WILD, WILD_SHARE, robust_scale
 from ..runs.run import CalibrationRun
@@ -69,7 +70,9 @@ def fit_mixture(
     while True:
         problem = Problem(runs, resolve(selection), selection.argument)
         travel = some_angles(problem.angles, problem.period)
-        _check_new_run(problem, selection, travel)
+        assert selection.estimate is not None
+        if len(runs) > 1:
+            check_new_run(selection.estimate, travel, selection.orders)
         fitted, uncertainty = _fitted(problem, selection, weights, travel)
         if not robust:
             return MixtureFit(selection, problem, RobustFit(fitted, None, 0), uncertainty)
@@ -90,14 +93,11 @@ def fit_mixture(
     return MixtureFit(selection, problem, weighted, uncertainty)
 
 
-def _check_new_run(problem: Problem, selection: OrderSelection, travel: Array) -> None:
+def check_new_run(estimate: EvidenceEstimate, travel: Array, orders: Sequence[float]) -> None:
     """Raise where what differs from run to run makes the gain of a further one doubtful."""
-    estimate = selection.estimate
-    if len(problem.runs) < 2 or estimate is None:
-        return
     gain, spread = estimate.gain_of_a_run(travel)
     if gain <= _SURE * spread:
-        listed = ", ".join(f"{order:g}" for order in selection.orders[:6])
+        listed = ", ".join(f"{order:g}" for order in orders[:6])
         raise NoModelError(
             f"no correction can be given: of order {listed} the runs differ by so much that a "
             "further run may be made worse; they seem to be of different joints: fit each by "

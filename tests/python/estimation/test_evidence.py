@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -114,6 +115,35 @@ def test_effects_of_runs_are_those_of_statsmodels() -> None:
     np.testing.assert_allclose(np.sqrt(np.diag(spread)), fitted.bse_fe[names], rtol=1e-4)
     for w, o in ((1.05, 1.0), (0.95, 1.0), (1.0, 1.1), (1.0, 0.9)):
         assert at(w * white, o * omega)[0] < best
+
+
+def test_without_a_run_the_mixture_is_that_of_the_others_under_the_same_noise() -> None:
+    rng, runs = np.random.default_rng(66), []
+    for size in (3.0, 3.5, 2.0, 4.0):
+        theta, noise, time = scattered(rng, 60)
+        runs.append(RunReadings(theta, size * np.cos(2.0 * theta) + noise, time))
+    whole = estimate_by_evidence(runs, range(1, 9))
+    found = whole.without([2])
+    kept = [run for r, run in enumerate(runs) if r != 2]
+    evidence = Evidence([tuple(run) for run in kept], whole.told)
+    assert found.runs == tuple(kept)
+    assert found.readings == 180
+    assert sum(model.weight for model in found.models) == pytest.approx(1.0)
+    means, scores = [], []
+    for model in found.models:
+        score, mean, _ = evidence.posterior(whole.noise, model.tau, model.omega)
+        means.append(mean)
+        scores.append(score)
+    np.testing.assert_allclose(
+        found.mean, [m.weight for m in found.models] @ np.array(means), atol=1e-12
+    )
+    # Nothing of the run left out is in it: another one there changes no bit.
+    moved = replace(whole, runs=(*runs[:2], runs[0], runs[3])).without([2])
+    np.testing.assert_array_equal(moved.mean, found.mean)
+    alone = estimate_by_evidence(kept, range(1, 9))
+    angles = np.linspace(0.0, 2.0 * np.pi, 50)
+    (mean, _), (other, std) = found.curve(angles), alone.curve(angles)
+    assert np.abs(mean - other).max() < 0.3 * std.max()
 
 
 def correlations(kind: str, n: int) -> np.ndarray:
