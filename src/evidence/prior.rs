@@ -45,7 +45,7 @@ impl Prior {
             probabilities,
             sizes: powers(-4.0, 0.8, 7),
             effects: if runs > 1 {
-                powers(-5.0, 1.0, 6)
+                powers(-5.0, 0.5, 11)
             } else {
                 Vec::new()
             },

@@ -93,10 +93,18 @@ impl<'a> Search<'a> {
     }
 
     /// Meets the neighbours of the models that are nearly the best, so that orders which are alike
-    /// are treated alike.
+    /// are treated alike, and every size of what differs from run to run in the best: few runs tell
+    /// it roughly.
     pub fn widen(&mut self) -> Option<()> {
         let mut near: Vec<Found> = self.met.values().cloned().collect();
         near.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let best = near.first()?.model.clone();
+        for k in (0..best.omega.len()).filter(|&k| best.omega[k] > 0.0) {
+            for &omega in &self.prior.effects {
+                let model = with(&best, &[(k, best.tau[k], omega)]);
+                self.factorised(model, &mut None)?;
+            }
+        }
         for found in near.into_iter().take(WIDENED) {
             if found.score < self.best - NEAR {
                 break;

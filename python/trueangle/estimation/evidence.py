@@ -227,6 +227,23 @@ class EvidenceEstimate:
         spread = float(np.repeat(omega, 2) @ reach**2)
         return float(self.mean @ reach), 2.0 * float(np.sqrt(spread))
 
+    def freedom_of_runs(self, orders: Sequence[float], variance: Array, freedom: float) -> Array:
+        """Effective degrees of freedom of the variances of coefficients (Welch-Satterthwaite).
+
+        ::
+
+            1 / ν = p² / 2 (R - 1) + (1 - p)² / f,    p = ω / R var b
+
+        with the part p of a variance that comes from what differs between R runs, two
+        coefficients of which tell ω, and f degrees of freedom of the readings.
+        """
+        runs = len(self.runs)
+        mean = np.sum([m.weight * m.omega for m in self.models], axis=0)
+        omega = dict(zip(self.told, mean.tolist(), strict=True))
+        each = np.repeat([omega.get(k, 0.0) for k in orders], 2) / runs
+        part = np.minimum(each / np.maximum(variance, 1e-300), 1.0)
+        return 1.0 / (part**2 / max(2.0 * (runs - 1), 1.0) + (1.0 - part) ** 2 / freedom)
+
     def _curve(self, theta: Array, beside: Sequence[float]) -> tuple[Array, Array]:
         columns = _columns(theta, self.told)
         columns[:, np.repeat(np.isin(self.told, list(beside)), 2)] = 0.0

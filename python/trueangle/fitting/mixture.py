@@ -169,4 +169,7 @@ def _fitted(
         "evidence",
     )
     found = SolvedProblem(solution, solution.offsets, problem.shafts, problem.period)
-    return found, Uncertainty("evidence", whole, np.full(len(whole), freedom))
+    told = estimate.freedom_of_runs(named, np.diag(covariance), freedom)
+    return found, Uncertainty(
+        "evidence", whole, np.concatenate([[told.min(initial=freedom)], told])
+    )

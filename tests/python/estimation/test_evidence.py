@@ -146,6 +146,22 @@ def test_without_a_run_the_mixture_is_that_of_the_others_under_the_same_noise() 
     assert np.abs(mean - other).max() < 0.3 * std.max()
 
 
+def test_few_runs_tell_by_two_coefficients_each_what_they_differ_by() -> None:
+    rng, runs = np.random.default_rng(67), []
+    for _ in range(4):
+        theta, noise, time = scattered(rng, 60)
+        own = 40.0 + 20.0 * rng.normal(size=2)
+        error = harmonics(theta, [2]) @ own + 5.0 * np.cos(theta) + noise
+        runs.append(RunReadings(theta, error, time))
+    found = estimate_by_evidence(runs, range(1, 5))
+    variance = np.diag(found.among([1, 2], np.linspace(0.0, 6.28, 90))[1])
+    shared, differing = np.split(found.freedom_of_runs([1, 2], variance, 230.0), 2)
+    np.testing.assert_allclose(differing, 6.0, rtol=0.15)
+    assert (shared > 100.0).all()
+    one = estimate_by_evidence(runs[:1], range(1, 5))
+    assert (one.freedom_of_runs([1, 2], variance, 55.0) == 55.0).all()
+
+
 def correlations(kind: str, n: int) -> np.ndarray:
     """Correlations of a noise of variance 1, or 1 on average over a run."""
     i = np.arange(n)
