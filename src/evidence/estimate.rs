@@ -182,8 +182,6 @@ impl Readings {
             } else {
                 first.model
             };
-            search.widen()?;
-            let models = search.models();
             let posterior = best.posterior(&grams)?;
             let has: Vec<usize> = (0..looked.len()).filter(|&k| best.has(k)).collect();
             set = has.iter().map(|&k| looked[k]).collect();
@@ -208,6 +206,8 @@ impl Readings {
             if more.is_empty() && is_same || round == ROUNDS {
                 let fit = self.among(&set).noise(&model, noise_prior, start)?;
                 let is_new = !is_known(&fit);
+                search.widen()?;
+                let models = search.models();
                 return Some(is_new.then_some(Mode {
                     fit,
                     looked,
