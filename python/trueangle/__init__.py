@@ -57,6 +57,8 @@ if TYPE_CHECKING:
     from .runs.run import CalibrationRun as CalibrationRun
     from .runs.writing import write_runs as write_runs
     from .selfcalibration.calibrate import selfcal as selfcal
+    from .selfcalibration.channelcauses import diagnose_channels as diagnose_channels
+    from .selfcalibration.channelcheck import check_channels as check_channels
     from .selfcalibration.result import SelfCalibration as SelfCalibration
     from .simulation import Simulation as Simulation
     from .simulation import load_simulation as load_simulation
@@ -81,6 +83,7 @@ _PUBLIC = {
     "SelfCalibration": "selfcalibration.result",
     "Shaft": "joint.shafts",
     "check": "runs.checks.check",
+    "check_channels": "selfcalibration.channelcheck",
     "correct": "logs.frames",
     "correct_logs": "logs.batch",
     "compare": "export",
@@ -104,6 +107,7 @@ _PUBLIC = {
     "selfcal": "selfcalibration.calibrate",
     "Simulation": "simulation",
     "diagnose": "diagnosis",
+    "diagnose_channels": "selfcalibration.channelcauses",
     "load_simulation": "simulation",
     "simulate": "simulation",
     "write_runs": "runs.writing",

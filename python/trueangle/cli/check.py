@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from ..errors import FileError
+from ..errors import FileError, NoModelError
 from ..support.plainresult import json_text
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, robot_messages
@@ -37,8 +37,23 @@ def run(args: argparse.Namespace) -> int:
     try:
         found = check(args.files, **reading_options(args))
     except FileError as error:
+        channels = _of_channels(args)
+        if channels is not None:
+            return channels
         _tell_columns(error, args)
         raise
+    print(found.to_json() if args.json else found.summary())
+    return 0 if found.usable else 1
+
+
+def _of_channels(args: argparse.Namespace) -> int | None:
+    """The status of files of channels without a reference; None of others."""
+    from ..selfcalibration.channelcheck import check_channels
+
+    try:
+        found = check_channels(args.files, **reading_options(args))
+    except (FileError, NoModelError):
+        return None
     print(found.to_json() if args.json else found.summary())
     return 0 if found.usable else 1
 

@@ -134,6 +134,8 @@ def run(args: argparse.Namespace) -> int:
     asked = joints_asked(args)
     if asked is not None:
         return _robot(*asked, args)
+    if _of_channels(args):
+        return 0
     simulation = _believed(args)
     model = None
     if args.model is not None:
@@ -158,6 +160,25 @@ def run(args: argparse.Namespace) -> int:
         raise KeyboardInterrupt(_unwritten(args, result.complete))
     _written(result, args, model)
     return 0
+
+
+def _of_channels(args: argparse.Namespace) -> bool:
+    """Print what is wrong with channels, where nothing is believed of the joint."""
+    stated = (args.simulation, args.simulated, args.gear_ratio, args.shaft or None)
+    if any(given is not None for given in stated):
+        return False
+    from ..selfcalibration.channelcauses import channel_diagnosis
+    from ..selfcalibration.recording import as_recordings
+
+    try:
+        recordings = as_recordings(args.runs, {**reading_options(args), "period": None})
+    except FileError:
+        return False  # read as runs it is reported in their words
+    if any(r.sine is None or r.cosine is None for r in recordings):
+        return False
+    result = channel_diagnosis(recordings)
+    print(result.to_json() if args.json else result.summary(), flush=True)
+    return True
 
 
 def _minus_simulated(

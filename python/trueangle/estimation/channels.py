@@ -138,7 +138,9 @@ def check_channels(sine: Array, cosine: Array, named: str) -> None:
     NoModelError
     """
     if sine.size < 12:
-        raise NoModelError(f"{named}: {sine.size} readings of the channels, and 12 are needed")
+        raise NoModelError(
+            f"{named}: {sine.size} readings of the channels, and 12 are needed: record a turn"
+        )
     most = max(float(np.std(sine)), float(np.std(cosine)))
     for name, values in (("sine", sine), ("cosine", cosine)):
         if float(np.std(values)) <= _DEAD * most:

@@ -7,7 +7,6 @@ make opposite errors.
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,16 +19,12 @@ from ..estimation.channels import ChannelEstimate, estimate_channels
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
 from ..support.layout import counted
+from .channelcauses import CENTRED, channel_diagnosis, channel_pair
+from .channelcheck import channel_faults, sense
 from .model import reference_free_model
 from .recording import Recording
 from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, blind_words
 from .spindown import spin_down
-
-#: Offset in amplitudes from which the converter has no middle: a magnet's is far below it.
-_CENTRED: Final = 1.0
-
-#: Distance to the common curve, in distances to those of single runs, from which they differ.
-_UNLIKE: Final = 1.5
 
 #: Turns from which time stamps are asked for the orders that the curve cannot give.
 _TURNS: Final = 5.0
@@ -45,14 +40,22 @@ def channel_patterns(
 ) -> SelfCalibration:
     """Constants of the channels; with time stamps of several turns the pattern of the angle too."""
     first = recordings[0]
-    pairs = [_pair(recording) for recording in recordings]
+    pairs = [channel_pair(recording) for recording in recordings]
     sine, cosine = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
     found = estimate_channels(sine, cosine, first.named, periods=first.periods, period=period)
-    channels, sense = _in_sense(found.channels, recordings, pairs)
+    channels, followed = _in_sense(found.channels, recordings, pairs)
     unit = abs(channels.constants[-1]) * 2.0 * math.pi / period * ARCSEC
     angles = [_unwrapped(channels, *pair) for pair in pairs]
     turns = sum(float(np.ptp(angle)) for angle in angles) / period
-    notes = [sense, *_notes(found), *_unlike(found, pairs, first.named)]
+    diagnosis = channel_diagnosis(recordings, found)
+    apart = [f"{change.says}; calibrate each run alone" for change in diagnosis.changes]
+    faults = channel_faults(found, recordings, 0.0)
+    notes = [followed, *(f"{fault.says}; {fault.mend}" for fault in faults), *apart]
+    if found.correlated > 1.0:
+        notes.append(
+            f"residuals are autocorrelated: {found.correlated:.3g} readings carry the "
+            "information of one"
+        )
     timed = _by_time(
         [
             replace(r, indicated=a * 2.0 * math.pi / period, indicated_sign=1)
@@ -107,39 +110,20 @@ def channel_patterns(
         },
         coverage_deg=found.coverage,
         limit_arcsec=found.limit * unit,
+        diagnosis=diagnosis,
     )
-
-
-def _pair(recording: Recording) -> tuple[Array, Array]:
-    if recording.sine is None or recording.cosine is None:
-        missing = "sine" if recording.sine is None else "cosine"
-        raise NoModelError(
-            f"{recording.named}: no column {missing}: name the channel with "
-            f"`signals={{'{missing}': 'NAME'}}`"
-        )
-    return recording.sine, recording.cosine
 
 
 def _in_sense(
     channels: Channels, recordings: Sequence[Recording], pairs: Sequence[tuple[Array, Array]]
 ) -> tuple[Channels, str]:
     """The channels in the sense of another angle of the log, else of the travel."""
-    rising = travelled = 0.0
-    by = ""
-    for recording, (sine, cosine) in zip(recordings, pairs, strict=True):
-        phase = channels.angle(sine, cosine) / channels.constants[-1]
-        for name in ("reference", "indicated"):
-            other = getattr(recording, name)
-            if other is not None:
-                fine = channels.periods_per_turn * other
-                agree = [abs(np.exp(1j * (phase - s * fine)).mean()) for s in (1.0, -1.0)]
-                rising += agree[0] - agree[1]
-                by = name
-                break
-        travelled += float(np.diff(np.unwrap(phase)[[0, -1]])[0])
+    rising, by = sense(channels, recordings)
     if by:
-        sense = f"the channels' phase {'rises' if rising >= 0.0 else 'falls'} with the {by} angle"
-        return channels.replace(direction=1 if rising >= 0.0 else -1), sense
+        words = f"the channels' phase {'rises' if rising >= 0.0 else 'falls'} with the {by} angle"
+        return channels.replace(direction=1 if rising >= 0.0 else -1), words
+    phases = [channels.angle(*pair) / channels.constants[-1] for pair in pairs]
+    travelled = sum(float(np.diff(np.unwrap(phase)[[0, -1]])[0]) for phase in phases)
     if abs(travelled) < 0.5 * math.pi:
         return channels, "the readings hardly travel: the angle is taken to rise with the phase"
     word = "rises" if travelled > 0.0 else "falls"
@@ -247,51 +231,5 @@ def _blind(channels: Channels, unit: float, known: set[float]) -> list[Blind]:
             measure,
         )
         for k, size, words in rows
-        if k * p not in known and size < _CENTRED
+        if k * p not in known and size < CENTRED
     ]
-
-
-def _unlike(found: ChannelEstimate, pairs: Sequence[tuple[Array, Array]], named: str) -> list[str]:
-    """A note where the runs' own curves are closer to their readings than the one of all."""
-    if len(pairs) < 2:
-        return []
-    own = []
-    for pair in pairs:
-        with contextlib.suppress(NoModelError):
-            own.append(estimate_channels(*pair, named))
-    if not own:
-        return []
-    left = float(np.median([estimate.radius_left for estimate in own]))
-    if found.radius_left <= _UNLIKE * left:
-        return []
-    sizes = [abs(estimate.channels.fundamental) for estimate in own]
-    return [
-        f"the runs' curves differ: {100.0 * found.radius_left:.2g} % of the radius is left by one "
-        f"curve for all and {100.0 * left:.2g} % by one of each (radius {min(sizes):.4g} to "
-        f"{max(sizes):.4g}): the gap or the place of the magnet changed; calibrate each run alone"
-    ]
-
-
-def _notes(found: ChannelEstimate) -> list[str]:
-    notes = []
-    for name, count in found.clipped:
-        notes.append(
-            f"{counted(count, 'reading')} of the {name} channel {'is' if count == 1 else 'are'} at "
-            "its rail (clipped) and omitted: lower the gain of the amplifier"
-        )
-    if found.rests:
-        notes.append(
-            f"{counted(found.rests, 'reading')} at rest {'has' if found.rests == 1 else 'have'} "
-            "less weight: a place is known by the arc, not by the time"
-        )
-    if found.coverage < 355.0:
-        notes.append(
-            f"the readings cover {found.coverage:.0f} deg of the channels' period: outside it the "
-            "correction is extrapolated, and harmonics are not estimated"
-        )
-    if found.correlated > 1.0:
-        notes.append(
-            f"residuals are autocorrelated: {found.correlated:.3g} readings carry the "
-            "information of one"
-        )
-    return notes

@@ -29,6 +29,7 @@ _CHANNELS = (
     "shift",
     "mount",
     "current",
+    "temperature",
     "sine",
     "cosine",
 )
@@ -47,6 +48,7 @@ class Recording:
     mount: Array | None = None
     heads: Mapping[int, Array] = field(default_factory=dict)
     current: Array | None = None
+    temperature: Array | None = None
     sine: Array | None = None
     cosine: Array | None = None
     periods: int = 1
@@ -108,6 +110,7 @@ def _of_run(run: CalibrationRun) -> Recording:
         mount=angle("mount"),
         heads={int(name[4:]): values * turn for name, values in run.heads.items()},
         current=run.signal("current"),
+        temperature=run.temperature,
         sine=run.signal("sine"),
         cosine=run.signal("cosine"),
         periods=1 if run.channels is None else run.channels.periods_per_turn,
@@ -168,8 +171,8 @@ def _split(
     used = {name: values for name, values in channels.items() if name in _CHANNELS or _head(name)}
     size = next(iter(channels.values())).size
     present = np.ones(size, dtype=bool)
-    for values in used.values():
-        present &= np.isfinite(values)
+    for name, values in used.items():
+        present &= np.isfinite(values) | (name == "temperature")
     groups: dict[tuple[str, ...], list[int]] = {}
     if labels:
         for i, key in enumerate(zip(*(map(str, label) for label in labels), strict=True)):

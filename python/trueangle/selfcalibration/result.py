@@ -16,6 +16,7 @@ from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.layout import counted, laid_out, wrapped_lines
 from ..support.plainresult import PlainResult
+from .channelcauses import ChannelDiagnosis
 
 #: Seconds of arc in a radian.
 ARCSEC = ARCSEC_PER_TURN / (2.0 * math.pi)
@@ -134,6 +135,8 @@ class SelfCalibration(PlainResult):
         Of channels: how much of their period the readings cover.
     limit_arcsec : float, optional
         Of channels: standard deviation of the angle by that of their constants (Cramer-Rao).
+    diagnosis : ChannelDiagnosis, optional
+        Of channels: causes of the error of their angle.
     """
 
     method: str
@@ -149,6 +152,7 @@ class SelfCalibration(PlainResult):
     beside: Mapping[str, Any] = field(default_factory=dict)
     coverage_deg: float | None = None
     limit_arcsec: float | None = None
+    diagnosis: ChannelDiagnosis | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The result as plain values, angles in arcsec."""
@@ -179,6 +183,7 @@ class SelfCalibration(PlainResult):
             "channels": self.channels.to_dict(),
             "coverage_deg": self.coverage_deg,
             "limit_arcsec": self.limit_arcsec,
+            "diagnosis": self.diagnosis and self.diagnosis.to_dict(),
         }
 
     def _brief(self) -> str:
@@ -282,6 +287,8 @@ def _constants(result: SelfCalibration, unit: ErrorUnit) -> list[str]:
             f"the phase {sense} with the angle; {result.coverage_deg:.0f} deg of the period are "
             f"covered; the constants settle the angle to {unit.text(result.limit_arcsec)}"
         )
+    if result.diagnosis is not None:
+        lines += result.diagnosis.lines()
     return lines
 
 

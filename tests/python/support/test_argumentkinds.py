@@ -82,6 +82,8 @@ CALLS = {
     ta.report: {"runs": RUNS, "orders": [1]},
     ta.select_orders: {"runs": RUNS, "candidates": [1, 2]},
     ta.selfcal: {"logs": "r.csv"},
+    ta.check_channels: {"data": "r.csv"},
+    ta.diagnose_channels: {"data": "r.csv"},
     ta.simulate: {"sim": SIMULATION},
     ta.wrap: {"angle": 1.0},
     ta.write_runs: {"runs": RUNS, "path": "w.csv"},

@@ -12,6 +12,8 @@ UNUSABLE = (
     "wrong_sign",
     "wrong_gear_ratio",
     "wrapped_reference",
+    "dead_channel",
+    "short_arc",
 )
 
 #: Rows that are listed; more are counted.
@@ -30,7 +32,8 @@ class DataFault(NamedTuple):
     fault : str
         Of the fixed vocabulary: duplicate_runs, duplicate_rows, stale_samples,
         unsorted_time, mixed_units, wrong_sign, swapped_channels, wrong_gear_ratio,
-        saturated_travel, wrapped_reference, missed_counts, outliers.
+        saturated_travel, wrapped_reference, missed_counts, outliers; of raw channels
+        dead_channel, short_arc, partial_arc, clipping, resting, no_centre.
     runs : tuple of str
         Labels of the runs that have it.
     rows : tuple of int

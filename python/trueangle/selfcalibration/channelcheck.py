@@ -1,0 +1,200 @@
+"""Whether channels are fit to be used, before a model is written: faults in one line each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Unpack
+
+import numpy as np
+
+from ..errors import NoModelError
+from ..estimation.channels import ChannelEstimate, estimate_channels
+from ..estimation.channels import check_channels as check_curve
+from ..runs.checks.fault import DataFault
+from ..runs.rawchannels import Channels
+from ..runs.source import OtherReadingOptions
+from ..support.argumentkinds import told_kinds
+from ..support.arrays import Array
+from ..support.layout import counted, laid_out, wrapped_lines
+from ..support.plainresult import PlainResult
+from .channelcauses import CENTRED, ChannelDiagnosis, channel_diagnosis, channel_pair
+from .recording import Recording, as_recordings
+
+#: Degrees of the channels' period from which it is whole.
+_WHOLE: Final = 355.0
+
+
+@dataclass(frozen=True)
+class ChannelCheck(PlainResult):
+    """Faults of two channels, and what their readings cover.
+
+    Attributes
+    ----------
+    data_faults : tuple of DataFault
+    readings, runs : int
+    turns : float or None
+        Travel, in periods of the channels.
+    diagnosis : ChannelDiagnosis or None
+        Causes of the angle error; None where the data are not usable.
+    """
+
+    data_faults: tuple[DataFault, ...]
+    readings: int
+    runs: int
+    turns: float | None
+    diagnosis: ChannelDiagnosis | None
+
+    @property
+    def usable(self) -> bool:
+        """No fault forbids to use the data as they are."""
+        return self.diagnosis is not None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {
+            "data_faults": [fault.to_dict() for fault in self.data_faults],
+            "usable": self.usable,
+            "readings": self.readings,
+            "runs": self.runs,
+            "turns": self.turns,
+            "diagnosis": self.diagnosis and self.diagnosis.to_dict(),
+        }
+
+    def _brief(self) -> str:
+        names = ", ".join(fault.fault for fault in self.data_faults) or "no fault"
+        return f"{self.readings} readings of channels: {names}"
+
+    def summary(self) -> str:
+        """The check as text: faults first."""
+        lines = []
+        for fault in self.data_faults:
+            lines += wrapped_lines(f"{fault.fault}: {fault.says}.", 2)
+            lines += wrapped_lines(f"Remedy: {fault.mend}.", 4, 2)
+        lines += [] if lines else ["No fault found in the data."]
+        lines += ["", f"{self.readings} readings of two channels in {counted(self.runs, 'run')}"]
+        if self.diagnosis is None:
+            return laid_out([*lines, "The data must not be used as they are."])
+        lines[-1] += (
+            f", {self.turns:.3g} periods, {self.diagnosis.coverage_deg:.0f} deg of one covered."
+        )
+        return laid_out([*lines, *self.diagnosis.lines()])
+
+
+@told_kinds
+def check_channels(data: Any, **reading: Unpack[OtherReadingOptions]) -> ChannelCheck:
+    """Check a sine and a cosine channel before anything is calibrated.
+
+    Parameters
+    ----------
+    data : path, table, or iterable of them
+        With columns ``sine`` and ``cosine``.
+    **reading
+        As in `trueangle.read_runs`.
+
+    Returns
+    -------
+    ChannelCheck
+        Faults ``dead_channel`` and ``short_arc`` (not usable), ``partial_arc``, ``clipping``,
+        ``resting``, ``no_centre``, ``swapped_channels``; coverage and causes.
+
+    Raises
+    ------
+    FileError, ArgumentError
+        Files that cannot be read.
+
+    Examples
+    --------
+    >>> phase = np.linspace(0.0, 2.0 * np.pi, 500)
+    >>> log = {"sine": np.sin(phase), "cosine": np.ones(500)}
+    >>> [fault.fault for fault in ta.check_channels(log).data_faults]
+    ['dead_channel']
+    """
+    recordings = as_recordings(data, {**reading, "period": None})
+    sine, cosine = np.hstack([np.array(channel_pair(r)) for r in recordings])
+    size, named, runs = sine.size, recordings[0].named, [r.label or "" for r in recordings]
+
+    def refused(name: str, error: NoModelError) -> ChannelCheck:
+        says, _, mend = str(error).removeprefix(f"{named}: ").rpartition(": ")
+        fault = DataFault.of(name, runs, [], says, mend)
+        return ChannelCheck((fault,), size, len(runs), None, None)
+
+    try:
+        check_curve(sine, cosine, named)
+    except NoModelError as error:
+        return refused("dead_channel", error)
+    try:
+        found = estimate_channels(sine, cosine, named, periods=recordings[0].periods)
+    except NoModelError as error:
+        return refused("short_arc", error)
+    faults = channel_faults(found, recordings, sense(found.channels, recordings)[0])
+    period = found.channels.period / found.channels.periods_per_turn
+    angles = [found.channels.angle(*channel_pair(r)) for r in recordings]
+    turns = sum(float(np.ptp(np.unwrap(angle, period=period))) for angle in angles) / period
+    diagnosis = channel_diagnosis(recordings, found)
+    return ChannelCheck(tuple(faults), size, len(runs), turns, diagnosis)
+
+
+def channel_faults(
+    found: ChannelEstimate, recordings: Sequence[Recording], agreement: float
+) -> list[DataFault]:
+    """Faults that do not forbid a fit; ``agreement`` is negative where the phase falls."""
+    runs = [r.label or "" for r in recordings]
+    faults = []
+
+    def add(name: str, says: str, mend: str) -> None:
+        faults.append(DataFault.of(name, runs, [], says, mend))
+
+    for name, count in found.clipped:
+        add(
+            "clipping",
+            f"{counted(count, 'reading')} of the {name} channel {'is' if count == 1 else 'are'} at "
+            "its rail (clipped) and omitted",
+            "lower the gain of the amplifier",
+        )
+    if found.rests:
+        add(
+            "resting",
+            f"{counted(found.rests, 'reading')} at rest {'has' if found.rests == 1 else 'have'} "
+            "less weight",
+            "nothing: a place is known by the arc, not by the time",
+        )
+    if found.coverage < _WHOLE and not found.clipped:
+        add(
+            "partial_arc",
+            f"the readings cover {found.coverage:.0f} deg of the channels' period: outside it the "
+            "correction is extrapolated, and harmonics are not estimated",
+            "turn the shaft through a whole period",
+        )
+    if abs(found.channels.offset) > CENTRED:
+        x, y = found.channels.offset_cosine, found.channels.offset_sine
+        add(
+            "no_centre",
+            f"the channels do not go round zero but about {y:.6g} (sine) and {x:.6g} (cosine): "
+            "readings of a converter without a middle",
+            "nothing: the middle is estimated and subtracted",
+        )
+    if agreement < 0.0:
+        add(
+            "swapped_channels",
+            "the channels' phase falls as the recorded angle rises: sine and cosine are swapped, "
+            "or the sensor is reversed",
+            "nothing: the model keeps the direction; or swap the columns with --signal sine=NAME",
+        )
+    return faults
+
+
+def sense(channels: Channels, recordings: Sequence[Recording]) -> tuple[float, str]:
+    """How far the phase agrees with another angle of the log less with its reverse, and which."""
+    rising, by = 0.0, ""
+    for recording in recordings:
+        phase: Array = channels.angle(*channel_pair(recording)) / channels.constants[-1]
+        for name in ("reference", "indicated"):
+            other = getattr(recording, name)
+            if other is not None:
+                fine = channels.periods_per_turn * other
+                agree = [abs(np.exp(1j * (phase - s * fine)).mean()) for s in (1.0, -1.0)]
+                rising += agree[0] - agree[1]
+                by = name
+                break
+    return rising, by
