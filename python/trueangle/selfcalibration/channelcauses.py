@@ -135,7 +135,7 @@ class ChannelDiagnosis(PlainResult):
 
 
 @told_kinds
-def diagnose_channels(data: Any, **reading: Unpack[OtherReadingOptions]) -> ChannelDiagnosis:
+def diagnose_channels(logs: Any, **reading: Unpack[OtherReadingOptions]) -> ChannelDiagnosis:
     """Name what is wrong with a sine and a cosine channel.
 
     ::
@@ -146,7 +146,7 @@ def diagnose_channels(data: Any, **reading: Unpack[OtherReadingOptions]) -> Chan
 
     Parameters
     ----------
-    data : path, table, CalibrationRun, or iterable of them
+    logs : path, table, CalibrationRun, or iterable of them
         With columns ``sine``, ``cosine``; a reference, ``temperature_C`` and ``run`` where known.
     **reading
         As in `trueangle.read_runs`.
@@ -168,7 +168,7 @@ def diagnose_channels(data: Any, **reading: Unpack[OtherReadingOptions]) -> Chan
     >>> [cause.cause for cause in ta.diagnose_channels(log).causes]
     ['channel_gain']
     """
-    return channel_diagnosis(as_recordings(data, {**reading, "period": None}))
+    return channel_diagnosis(as_recordings(logs, {**reading, "period": None}))
 
 
 def channel_diagnosis(

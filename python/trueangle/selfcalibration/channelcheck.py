@@ -82,12 +82,12 @@ class ChannelCheck(PlainResult):
 
 
 @told_kinds
-def check_channels(data: Any, **reading: Unpack[OtherReadingOptions]) -> ChannelCheck:
+def check_channels(logs: Any, **reading: Unpack[OtherReadingOptions]) -> ChannelCheck:
     """Check a sine and a cosine channel before anything is calibrated.
 
     Parameters
     ----------
-    data : path, table, or iterable of them
+    logs : path, table, or iterable of them
         With columns ``sine`` and ``cosine``.
     **reading
         As in `trueangle.read_runs`.
@@ -110,7 +110,7 @@ def check_channels(data: Any, **reading: Unpack[OtherReadingOptions]) -> Channel
     >>> [fault.fault for fault in ta.check_channels(log).data_faults]
     ['dead_channel']
     """
-    recordings = as_recordings(data, {**reading, "period": None})
+    recordings = as_recordings(logs, {**reading, "period": None})
     sine, cosine = np.hstack([np.array(channel_pair(r)) for r in recordings])
     size, named, runs = sine.size, recordings[0].named, [r.label or "" for r in recordings]
 
@@ -179,7 +179,7 @@ def channel_faults(
             "swapped_channels",
             "the channels' phase falls as the recorded angle rises: sine and cosine are swapped, "
             "or the sensor is reversed",
-            "nothing: the model keeps the direction; or swap the columns with --signal sine=NAME",
+            "nothing: the model keeps the direction; or name them anew, `signals={'sine': 'NAME'}`",
         )
     return faults
 
