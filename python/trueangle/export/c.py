@@ -46,6 +46,8 @@ class CHeader(PortableTarget):
             whole = chain.whole and terms.whole
             step = c_step(terms, chain.zero, chain.at_indicated, whole)
             parts.append(filled_code(step, n=name))
+        if chain.channels is not None:
+            parts.append(filled_code(chain.decoding(code_parts("header.c")["decode"]), name=name))
         parts.append(_self_test(name, chain))
         parts.append(f"#endif /* {guard} */\n")
         return "\n".join(parts)
@@ -72,6 +74,8 @@ def _comment(name: str, chain: Chain, terms: RunTimeTerms | None, header: Commen
     ]
     if chain.whole:
         own.append(f"Use: uint32_t corrected = {name}_correct(indicated);")
+    if chain.channels is not None:
+        own.append(f"Channels: uint32_t indicated = {name}_decode(sine, cosine);")
     own += [
         f"{'Or' if chain.whole else 'Use'}: int64_t corrected = {name}_correct_unwrapped(turns, "
         "indicated), in 2^-32 turns: the whole turns that the output has made since the model's "

@@ -17,7 +17,9 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runs.rawchannels import Channels
 from ..support.arrays import Array
+from .codetext import filled_code, float_literal
 from .pattern import TurnPattern
 from .table import TURN, Table, make_table
 
@@ -37,11 +39,26 @@ class Chain:
         Slow shafts first.
     at_indicated : bool
         The model's argument is the indicated angle: all are looked up at the reading.
+    channels : Channels, optional
+        Of which the indicated angle is decoded.
     """
 
     zero: int
     tables: tuple[Table, ...]
     at_indicated: bool
+    channels: Channels | None = None
+
+    def decoding(self, part: str) -> str:
+        """``part`` with the constants of the channels; empty without them."""
+        if self.channels is None:
+            return ""
+        *numbers, factor = self.channels.constants
+        names = ("offset_cosine", "offset_sine", "per_cosine", "per_sine", "slope")
+        values = dict(
+            zip(names, numbers, strict=True), factor=factor / self.channels.period * 2**32
+        )
+        literals = {name: float_literal(value, 17) for name, value in values.items()}
+        return filled_code(part, **literals)
 
     @property
     def whole(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -65,7 +66,7 @@ class PortableTarget(Target):
         return [{**options, "method": "cubic", "number": number} for number in NUMBERS[1:]]
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        chain = _chain(pattern, options)
+        chain = replace(_chain(pattern, options), channels=pattern.source.channels)
         terms = self.at_run_time(pattern, options)
         bits = options["bits"]
         if not 1 <= bits <= 32:

@@ -35,6 +35,8 @@ class RustModule(PortableTarget):
         if chain.whole:
             parts.append(_part("correct"))
         parts += [_unwrapped(chain), _self_test(chain)]
+        if chain.channels is not None:
+            parts.append(chain.decoding(code_parts("module.rs")["decode"]))
         if terms is not None:
             whole = chain.whole and terms.whole
             parts.append(rust_step(terms, chain.zero, chain.at_indicated, whole))
@@ -50,6 +52,7 @@ def _comment(chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> 
         "shifted left by 32 - n. Corrected = indicated - correction, looked up at the indicated "
         "angle" + ("; all tables at the same one." if chain.at_indicated else "."),
         "`correct_unwrapped` takes and gives the whole turns of the output as well.",
+        *([] if chain.channels is None else ["`decode` gives the reading of two channels."]),
         *([] if terms is None else [terms.use("step", "&mut state", "State::default()")]),
         *table_lines(chain),
     ]

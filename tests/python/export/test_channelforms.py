@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 import re
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -127,3 +129,67 @@ def test_a_table_of_the_angle_states_how_the_channels_are_decoded():
     y = (sine - numbers[2]) * numbers[3] - x * numbers[4]
     wanted = np.radians(model.channels.angle(sine, cosine))
     assert -np.arctan2(y, x) == pytest.approx(wanted, abs=1e-7)
+
+
+#: Reads pairs of doubles from a file, writes pairs of decoded and corrected angles.
+C_MAIN = """#include <stdint.h>
+#include <stdio.h>
+#include "joint.h"
+int main(void) {
+    double pair[2];
+    while (fread(pair, 8, 2, stdin) == 2) {
+        uint32_t angle = joint_decode(pair[0], pair[1]);
+        uint32_t both[2] = {angle, joint_correct(angle)};
+        fwrite(both, 4, 2, stdout);
+    }
+    return joint_self_test();
+}
+"""
+RUST_MAIN = """#![deny(warnings)]
+mod joint;
+use std::io::{Read, Write};
+fn main() {
+    let mut bytes = Vec::new();
+    std::io::stdin().read_to_end(&mut bytes).unwrap();
+    let number = |b: &[u8]| f64::from_le_bytes(b.try_into().unwrap());
+    for pair in bytes.chunks(16) {
+        let angle = joint::decode(number(&pair[..8]), number(&pair[8..]));
+        for value in [angle, joint::correct(angle)] {
+            std::io::stdout().write_all(&value.to_le_bytes()).unwrap();
+        }
+    }
+    assert_eq!(joint::SELF_TEST[0].1, joint::correct(joint::SELF_TEST[0].0));
+}
+"""
+
+
+@pytest.mark.parametrize("target", ["c", "rust"])
+@pytest.mark.parametrize(("direction", "periods"), [(1, 1), (-1, 3)])
+def test_both_channels_are_decoded_and_corrected_as_by_a_step(tmp_path, target, direction, periods):
+    compiler = {"c": "gcc", "rust": "rustc"}[target]
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler}")
+    model = drawn(8, 0.3, direction=direction, periods_per_turn=periods)
+    ending = {"c": ".h", "rust": ".rs"}[target]
+    made = ta.export_model(model, target, tmp_path / f"joint{ending}", bits=16)
+    main = tmp_path / ("main.c" if target == "c" else "main.rs")
+    main.write_text(C_MAIN if target == "c" else RUST_MAIN)
+    flags = ["-O2", "-std=c99", "-Wall", "-Werror", "-ffp-contract=off"]
+    flags = flags if target == "c" else ["--edition", "2021", "-O"]
+    subprocess.run([compiler, *flags, main, "-o", tmp_path / "main"], check=True, cwd=tmp_path)
+    rng = np.random.default_rng(3)
+    pairs = 2048.0 + 1000.0 * rng.normal(size=(5000, 2))
+    pairs[0] = math.nan
+    ran = subprocess.run(
+        [tmp_path / "main"], input=pairs.tobytes(), capture_output=True, check=True
+    )
+    angle, corrected = np.frombuffer(ran.stdout, np.uint32).reshape(-1, 2).T
+    assert angle[0] == 0
+    exact = model.channels.angle(*pairs[1:].T) * (2.0**32 / 360.0)
+    # The same double, rounded to the unit of the device; halves may fall to either side.
+    off = (angle[1:].astype(np.float64) - exact + 2.0**31) % 2.0**32 - 2.0**31
+    assert np.abs(off).max() < 0.5001
+    step = model.compensator()
+    wanted = np.array([step(s, c) for s, c in pairs[1:].tolist()]) / 360.0
+    off = (corrected[1:] / 2.0**32 - wanted + 0.5) % 1.0 - 0.5
+    assert np.abs(off).max() * 1296000.0 <= made.max_difference_arcsec + 0.01

@@ -160,3 +160,37 @@ static inline int @name@_self_test(void)
     }
     return 0;
 }
+
+//@ decode
+/* The angle of two channels in 2^-32 turns; 0 where both are at their middle or not finite. Compile
+   with -ffp-contract=off for the last bit. */
+static inline uint32_t @name@_decode(double sine, double cosine)
+{
+    static const double c[11] = {
+        1.0, -0.3333333333332844, 0.1999999999885511,
+        -0.14285714180976467, 0.11111106180455946, -0.09090773074808414,
+        0.07689953496306857, -0.06640233930429408, 0.056883492268090106,
+        -0.04348052215716463, 0.021135373157693246
+    };
+    const double pi = 3.141592653589793;
+    const double x = (cosine - (@offset_cosine@)) * @per_cosine@;
+    const double y = (sine - (@offset_sine@)) * @per_sine@ - x * (@slope@);
+    const double along = x < 0.0 ? -x : x, across = y < 0.0 ? -y : y;
+    const int steep = across > along;
+    const double most = steep ? across : along, least = steep ? along : across;
+    /* Above the tangent of an eighth of a turn's half the argument is turned by pi / 4. */
+    const int turned = least > 0.41421356237309515 * most;
+    const double t = turned ? (least - most) / (least + most) : least / most;
+    const double w = t * t, w2 = w * w, w4 = w2 * w2;
+    const double low = (c[0] + c[1] * w) + (c[2] + c[3] * w) * w2;
+    const double middle = (c[4] + c[5] * w) + (c[6] + c[7] * w) * w2;
+    const double high = (c[8] + c[9] * w) + c[10] * w2;
+    const double octant = (low + (middle + high * w4) * w4) * t + (turned ? 0.25 * pi : 0.0);
+    const double quadrant = steep ? 0.5 * pi - octant : octant;
+    const double half = x < 0.0 ? pi - quadrant : quadrant;
+    const double angle = (y < 0.0 ? -half : half) * (@factor@);
+    if (!(angle > -4294967296.0 && angle < 4294967296.0)) {
+        return 0;
+    }
+    return (uint32_t)(int64_t)(angle + (angle < 0.0 ? -0.5 : 0.5));
+}

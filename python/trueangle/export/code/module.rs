@@ -56,3 +56,36 @@ pub const SELF_TEST: [(u32, u32); 8] = [
 pub const SELF_TEST: [(i32, u32, u32); 8] = [
     @tests@
 ];
+
+//@ decode
+/// The angle of two channels in 2^-32 turns; 0 where both are at their middle or not finite.
+#[rustfmt::skip]
+pub fn decode(sine: f64, cosine: f64) -> u32 {
+    const PI: f64 = core::f64::consts::PI;
+    const C: [f64; 11] = [
+        1.0, -0.3333333333332844, 0.1999999999885511,
+        -0.14285714180976467, 0.11111106180455946, -0.09090773074808414,
+        0.07689953496306857, -0.06640233930429408, 0.056883492268090106,
+        -0.04348052215716463, 0.021135373157693246
+    ];
+    let x = (cosine - (@offset_cosine@)) * @per_cosine@;
+    let y = (sine - (@offset_sine@)) * @per_sine@ - x * (@slope@);
+    let (along, across) = (if x < 0.0 { -x } else { x }, if y < 0.0 { -y } else { y });
+    let steep = across > along;
+    let (most, least) = if steep { (across, along) } else { (along, across) };
+    // Above the tangent of an eighth of a turn's half the argument is turned by pi / 4.
+    let turned = least > 0.41421356237309515 * most;
+    let t = if turned { (least - most) / (least + most) } else { least / most };
+    let w = t * t;
+    let w2 = w * w;
+    let w4 = w2 * w2;
+    let low = (C[0] + C[1] * w) + (C[2] + C[3] * w) * w2;
+    let middle = (C[4] + C[5] * w) + (C[6] + C[7] * w) * w2;
+    let high = (C[8] + C[9] * w) + C[10] * w2;
+    let octant = (low + (middle + high * w4) * w4) * t + if turned { 0.25 * PI } else { 0.0 };
+    let quadrant = if steep { 0.5 * PI - octant } else { octant };
+    let half = if x < 0.0 { PI - quadrant } else { quadrant };
+    let angle = (if y < 0.0 { -half } else { half }) * (@factor@);
+    // A conversion of what is not a number gives 0.
+    (angle + if angle < 0.0 { -0.5 } else { 0.5 }) as i64 as u32
+}
