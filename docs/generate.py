@@ -18,6 +18,7 @@ import numpy as np
 mpl.use("Agg")
 
 from causes import causes_page
+from channelpicture import channel_picture
 from roomfiles import room_files_page
 from simulatorpictures import simulator_pictures
 
@@ -93,6 +94,9 @@ def figures(folder: Path) -> None:
         drawn_figure = draw()
         drawn_figure.savefig(folder / f"paper{number}.svg")
         mpl.pyplot.close(drawn_figure)
+    channels = channel_picture()
+    channels.savefig(folder / "channels.svg")
+    mpl.pyplot.close(channels)
     for name, shape in {"story": (1, 3), "story-narrow": (3, 1)}.items():
         told = story(*shape)
         told.savefig(folder / f"{name}.svg")
