@@ -184,7 +184,7 @@ def _scale(y: Array, cuts: Sequence[int]) -> float:
     steps = [np.diff(y[a:b]) ** 2 for a, b in itertools.pairwise(cuts)]
     every = np.concatenate(steps)
     between = 0.5 * float(np.median(every)) / 0.455 if every.size else 0.0
-    return float(max(between, 1e-9 * np.var(y)))
+    return max(between, 1e-9 * float(np.var(y)))
 
 
 def factors_of(account: FactorAccount, shafts: dict[str, float]) -> list[Factor]:

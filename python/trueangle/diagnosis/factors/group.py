@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ...joint.pattern import line_columns
+from ...joint.lines import line_columns
 from ...support.arrays import Array
 
 #: The factors, in the order in which equally strong ones are stated.
@@ -69,7 +69,7 @@ class Group:
     @property
     def is_product(self) -> bool:
         """Functions of the factor times a line."""
-        return self.values.shape[1] < self.columns.shape[1]
+        return bool(self.values.shape[1] < self.columns.shape[1])
 
     @classmethod
     def of_function(

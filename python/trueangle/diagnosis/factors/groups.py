@@ -8,9 +8,10 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...effects.orderspectrum import OrderSpectrum
-from ...joint.pattern import line_columns
+from ...joint.lines import line_columns
 from ...joint.signals import Signals
 from ...support.arrays import Array
 from .group import GRID, Group
@@ -142,7 +143,7 @@ class _Spectrum:
         return [float(k + 1) for k in best if spectrum[k] > STANDS_OUT]
 
 
-def _without_low(theta: Array, error: Array, run: Array) -> Array:
+def _without_low(theta: Array, error: Array, run: NDArray[np.int64]) -> Array:
     """The error less what its mean by run and the low orders take of it."""
     inside = [line_columns(theta, float(k)) for k in range(1, LOW + 1)]
     columns = np.column_stack([np.ones(theta.size), *inside])

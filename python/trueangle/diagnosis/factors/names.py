@@ -143,12 +143,11 @@ def _worst(names: Names, found: Sequence[Finding], sure: Sequence[int]) -> dict[
         return {}
     score, tau = names.beside(sure)
     worst: tuple[float, Sequence[int], Sequence[float]] | None = None
-    for group in [*([k] for k in sure), *_related(found, sure)]:
-        rest = [j for j in sure if j not in group]
-        freed, other = max(names.beside(rest, start) for start in (tau, names.account.tau))
-        better = freed - score
-        if better > ALIKE and (worst is None or better > worst[0]):
-            worst = (better, group, other)
+    for asked in [*([k] for k in sure), *_related(found, sure)]:
+        rest = [j for j in sure if j not in asked]
+        freed, free = max(names.beside(rest, start) for start in (tau, names.account.tau))
+        if freed - score > max(ALIKE, worst[0] if worst else 0.0):
+            worst = (freed - score, asked, free)
     if worst is not None:
         better, group, other = worst
         reason = (
@@ -158,8 +157,8 @@ def _worst(names: Names, found: Sequence[Finding], sure: Sequence[int]) -> dict[
         return dict.fromkeys(group, reason)
     for k in sure:
         follows = [f for f in EFFECTS[found[k].cause].form_of if f != TRANSITION]
-        other, free = names.beside([j for j in sure if j != k], tau, follows)
-        if follows and other > score - ALIKE:
+        freed, free = names.beside([j for j in sure if j != k], tau, follows)
+        if follows and freed > score - ALIKE:
             what = _followed(names, free, tau)
             return {k: f"a function of {what} explains the readings as well"}
     for k in sure:
@@ -209,7 +208,7 @@ def _one_function(findings: Sequence[Finding], regression: Regression) -> dict[i
 
 def _bump(finding: Finding) -> tuple[float, float]:
     values = [finding.parameters[name].value for name in ("place_deg", "width_deg")]
-    return float(values[0]), float(values[1])  # type: ignore[arg-type]
+    return float(values[0]), float(values[1])
 
 
 def _no_counts(findings: Sequence[Finding], regression: Regression) -> dict[int, str]:
