@@ -14,6 +14,9 @@ use crate::evidence::{GroupSums, Model, Noise, NoisePrior, Readings, Run, VARIAN
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 
+/// Predicted increase of the log evidence below which a noise is the best: tests ask for more.
+const CLOSE: f64 = 0.01;
+
 /// Columns (a row for each reading), errors and times of a run.
 type Given<'py> = (
     PyReadonlyArray2<'py, f64>,
@@ -60,8 +63,15 @@ impl PyGroups {
     }
 
     /// Variances of the noise of most evidence beside groups with these variances, each run with a
-    /// zero of its own.
-    fn noise<'py>(&self, py: Python<'py>, tau: Vec<f64>, scale: f64) -> PyResult<Vector<'py>> {
+    /// zero of its own; from `start`, where given, and to a hundredth in the log evidence.
+    #[pyo3(signature = (tau, scale, start=None))]
+    fn noise<'py>(
+        &self,
+        py: Python<'py>,
+        tau: Vec<f64>,
+        scale: f64,
+        start: Option<[f64; VARIANCES]>,
+    ) -> PyResult<Vector<'py>> {
         if !(scale > 0.0 && scale.is_finite()) {
             let problem = format!("scale must be above 0 and finite, got {scale}");
             return Err(argument_error(py, problem));
@@ -72,7 +82,9 @@ impl PyGroups {
         let inside: Vec<usize> = (0..tau.len()).filter(|&k| tau[k] > 0.0).collect();
         let found = detached(py, || {
             let model = Model::of_groups(groups, tau).among(&inside);
-            self.0.among(&inside).noise(&model, prior, prior.start())
+            let start = start.map_or_else(|| prior.start(), |own| own.map(f64::ln));
+            let own = self.0.among(&inside);
+            own.noise_within(&model, prior, start, CLOSE)
         })?;
         let found = found.ok_or_else(|| argument_error(py, LOST.into()))?;
         vector(py, &found.noise.variances())

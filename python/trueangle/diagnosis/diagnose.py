@@ -194,7 +194,11 @@ def _diagnosis(
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
+    named = confirmed_count(findings)
+    findings, factors = stated_factors(first, chosen, findings)
+    # What has lost its name may be what scatters.
     in_doubt = any(spot.supported and not spot.common for spot in spots)
+    in_doubt |= confirmed_count(findings) < named
     faults = data_faults(records_of(measured))
     spoilt = next((fault for fault in faults if fault.spoils_readings), None)
     for item in account.choice.scatter:
@@ -204,7 +208,6 @@ def _diagnosis(
             spots.append(equal)
         else:
             findings.append(scatter_finding(item, rest))
-    findings, factors = stated_factors(first, chosen, findings)
     if seen.ratio is not None:
         found = _ratio_finding(seen.ratio)
         findings.append(found)
@@ -247,6 +250,11 @@ def _diagnosis(
         measured,
         factors=factors,
     )
+
+
+def confirmed_count(findings: list[Finding]) -> int:
+    """Findings that are confirmed."""
+    return sum(finding.confirmed for finding in findings)
 
 
 def not_confirmed_terms(findings: list[Finding]) -> list[int]:

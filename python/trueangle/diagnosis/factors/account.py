@@ -17,7 +17,7 @@ from .factor import Curve, Factor
 from .group import FACTORS, Group
 
 #: Readings used at most; of more, one of every so many in a row.
-MOST_READINGS: Final = 4000
+MOST_READINGS: Final = 2500
 
 #: Part of the variance that each factor may have where the noise is first looked for.
 AT_FIRST: Final = 0.3
@@ -168,7 +168,7 @@ def factor_account(signals: Signals, error: Array, groups: Sequence[Group]) -> F
         tau = found
         if is_same:
             break
-        noise = core.noise(tau, scale)
+        noise = core.noise(tau, scale, noise)
         sums = core.sums(noise, total)
     return FactorAccount(groups, sums, tau, total, float(np.sum(noise)))
 

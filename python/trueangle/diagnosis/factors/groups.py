@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +35,17 @@ SAMPLED: Final = 2.5
 #: Shares of the range by which a factor must change to be one.
 SPEED_CHANGES, LOAD_CHANGES, TEMPERATURE_CHANGES = 0.1, 0.05, 0.1
 
+#: Deviation of sizes, over the greatest, below which they are one.
+ONE_SIZE: Final = 0.02
+
 #: Share of a turn below which the place is a smooth function, too.
 ARC: Final = 0.98
 
 #: Lengths of transitions after a reversal, in shares of the median stretch of one direction.
 LENGTHS: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
+
+#: Lengths of what rises before an event and settles after it, in shares of the longest run.
+SETTLES: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
 
 #: Share of the range within which values are one level, and hats at most.
 LEVEL: Final = 0.1
@@ -85,6 +91,7 @@ def factor_groups(
     lines: Sequence[float] = (),
     drawn: Sequence[float] = (),
     frequencies: Sequence[float] = (),
+    events: Sequence[tuple[int, int]] = (),
 ) -> list[Group]:
     """Groups of columns at these readings.
 
@@ -99,12 +106,14 @@ def factor_groups(
         Orders that every run has anew.
     frequencies : sequence of float
         Lines in Hz that every run has anew.
+    events : sequence of (int, int)
+        Run and row at which something happened once.
     """
     theta = signals.theta
     left = _without_low(theta, error, signals.run)
     known = [m for m in dict.fromkeys(lines) if m > 0.0]
     spectrum = _Spectrum(theta)
-    groups = [*_place(signals, [*known, *spectrum.peaks(left)])]
+    groups = [*_place(signals, [*known, *spectrum.peaks(left, LOW)])]
     for axis, product in _axes(signals):
         groups += axis.alone()
         if product is not None:
@@ -115,13 +124,14 @@ def factor_groups(
             groups += axis.times(theta, dict.fromkeys(asked), product)
     groups += _of_runs(signals, [*ALWAYS, *known[:2], *drawn])
     groups += _of_frequencies(signals, frequencies)
-    given = {*ALWAYS, *known, *drawn, *map(float, range(1, LOW + 1))}
-    return [
-        replace(group, alternatives=float(spectrum.count))
-        if len(group.orders) == 1 and group.orders[0] not in given
-        else group
-        for group in groups
-    ]
+    groups += _of_events(signals, events)
+    given = {*ALWAYS, *known, *drawn}
+    low = {float(k) for k in range(1, LOW + 1)}
+    for k, group in enumerate(groups):
+        sought = {*group.orders} - given - (low if group.factor == "place" else set())
+        if len(group.orders) == 1 and sought:
+            groups[k] = replace(group, alternatives=float(spectrum.count))
+    return groups
 
 
 class _Spectrum:
@@ -132,13 +142,13 @@ class _Spectrum:
         self.turns = float(np.ptp(theta)) / (2.0 * np.pi)
         self.sums = OrderSpectrum(theta, [0], 1.0, 1.0, self.count) if self.count > LOW else None
 
-    def peaks(self, values: Array) -> list[float]:
-        """The strongest orders above the low ones; none over an arc, where they run together."""
+    def peaks(self, values: Array, above: int = 0) -> list[float]:
+        """The strongest orders above some; none over an arc, where they run together."""
         power = float(values @ values)
         if self.sums is None or self.turns < ARC or not power > 0.0:
             return []
         spectrum = np.abs(self.sums.sums(values).sum(axis=1)) ** 2 / power
-        spectrum[:LOW] = 0.0
+        spectrum[:above] = 0.0
         best = np.argsort(spectrum)[::-1][:PEAKS]
         return [float(k + 1) for k in best if spectrum[k] > STANDS_OUT]
 
@@ -191,43 +201,14 @@ def _place(signals: Signals, lines: Iterable[float]) -> Iterator[Group]:
 def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:
     """Factors, each with its functions in products with lines; None without products."""
     d = signals.direction
-    both = bool((d > 0.0).any() and (d < 0.0).any())
-    if both:
-        at = np.array([-1.0, 1.0])
-        yield Axis("direction", d, _column, at, "sign"), _column
+    if bool((d > 0.0).any() and (d < 0.0).any()):
+        yield Axis("direction", d, _column, np.array([-1.0, 1.0]), "sign"), _column
         yield from ((axis, None) for axis in _reversals(signals))
-    v = signals.velocity
-    if v is not None and np.abs(v).max(initial=0.0) > 0.0:
-        top = float(np.abs(v).max())
-        apart = float(np.std(np.abs(v))) / top
-        if np.ptp(v) > 2.0 * SPEED_CHANGES * top:
-            grid = np.linspace(v.min(), v.max(), GRID)
-
-            def speed(x: Array) -> Array:
-                u = x / top
-                all_of = [u, np.abs(u), u * np.abs(u), u * u]
-                return np.column_stack(all_of if apart > 0.02 else all_of[:1])
-
-            def moving(x: Array) -> Array:
-                u = x / top
-                return np.column_stack([u, np.abs(u)] if apart > 0.02 else [u])
-
-            yield Axis("speed", v, speed, grid, "deg/s"), moving
-            if apart > 0.02:
-                yield Axis("speed", v, _hats(v), grid, "deg/s"), None
+    yield from _signed("speed", signals.velocity, 2.0 * SPEED_CHANGES, "deg/s")
     tau = signals.torque
-    if tau is not None and np.ptp(tau) > LOAD_CHANGES * np.abs(tau).max(initial=0.0) > 0.0:
-        most = float(np.abs(tau).max())
-        grid = np.linspace(tau.min(), tau.max(), GRID)
-
-        def load(x: Array) -> Array:
-            s = x / most
-            return np.column_stack([s, s * np.abs(s), np.abs(s)])
-
-        yield Axis("load", tau, load, grid, "Nm"), lambda x: x[:, None] / most
-        yield Axis("load", tau, _hats(tau), grid, "Nm"), None
-        if np.unique(np.sign(tau)).size > 1:
-            yield Axis("load_sign", np.sign(tau), _column, np.array([-1.0, 1.0]), "sign"), None
+    yield from _signed("load", tau, LOAD_CHANGES, "Nm")
+    if tau is not None and np.unique(np.sign(tau)).size > 1:
+        yield Axis("load_sign", np.sign(tau), _column, np.array([-1.0, 1.0]), "sign"), None
     kelvin = signals.temperature
     if kelvin is not None and np.ptp(kelvin) > TEMPERATURE_CHANGES:
         mean, half = float(kelvin.mean()), 0.5 * float(np.ptp(kelvin))
@@ -238,21 +219,35 @@ def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:
             return np.column_stack([s, s * s])
 
         def with_mean(x: Array) -> Array:
-            return np.column_stack([np.ones(x.size), (x - mean) / half])
+            return np.column_stack([np.ones(x.size), warm(x)])
 
         yield Axis("temperature", kelvin, warm, grid, "C"), with_mean
         yield Axis("temperature", kelvin, _hats(kelvin), grid, "C"), None
-    ampere = signals.current
-    if ampere is not None and np.ptp(ampere) > LOAD_CHANGES * np.abs(ampere).max(initial=0.0) > 0.0:
-        most_a = float(np.abs(ampere).max())
-        grid = np.linspace(ampere.min(), ampere.max(), GRID)
-
-        def field(x: Array) -> Array:
-            s = x / most_a
-            return np.column_stack([s, np.abs(s)])
-
-        yield Axis("current", ampere, field, grid, "A"), None
+    for axis, _ in _signed("current", signals.current, LOAD_CHANGES, "A"):
+        yield axis, None
     yield from ((axis, None) for axis in _clock(signals))
+
+
+def _signed(
+    factor: str, x: Array | None, changes: float, unit: str
+) -> Iterator[tuple[Axis, Basis | None]]:
+    """Functions of what has two signs: odd and even ones, and any, unless it has one size."""
+    top = 0.0 if x is None else float(np.abs(x).max(initial=0.0))
+    if x is None or not np.ptp(x) > changes * top > 0.0:
+        return
+    grid = np.linspace(x.min(), x.max(), GRID)
+    if float(np.std(np.abs(x))) < ONE_SIZE * top:
+        yield Axis(factor, x, lambda x: x[:, None] / top, grid, unit), lambda x: x[:, None] / top
+        return
+
+    def lines(x: Array) -> Array:
+        return np.column_stack([x / top, np.abs(x) / top])
+
+    def curves(x: Array) -> Array:
+        return np.hstack([lines(x), lines(x) * np.abs(x)[:, None] / top])
+
+    yield Axis(factor, x, curves, grid, unit), lines
+    yield Axis(factor, x, _hats(x), grid, unit), None
 
 
 def _hats(x: Array) -> Basis:
@@ -279,8 +274,14 @@ def _column(x: Array) -> Array:
 
 
 def _reversals(signals: Signals) -> Iterator[Axis]:
-    """Transitions after a reversal, by travel and by time."""
+    """Transitions after a reversal, by travel and by time.
+
+    They change sides with the direction, or not. Those from the start of a run, which may be at
+    rest or in the midst of a motion, are their own.
+    """
     since = _since(signals)
+    sign = np.where(signals.direction < 0.0, -1.0, 1.0)
+    first = signals.segment_first[signals.segment]
     for x, unit in ((signals.travel, "deg"), (since, "s")):
         if x is None:
             continue
@@ -292,9 +293,10 @@ def _reversals(signals: Signals) -> Iterator[Axis]:
         def decays(x: Array, lengths: Array = lengths) -> Array:
             return np.exp(-np.minimum(np.abs(x)[:, None] / lengths, 700.0)) * np.sign(x)[:, None]
 
-        # Signed by the direction: a reversal error changes sides.
-        signed = np.maximum(x, 1e-9 * whole) * np.where(signals.direction < 0.0, -1.0, 1.0)
-        yield Axis("reversal_time", signed, decays, np.linspace(1e-6, 0.5, GRID) * whole, unit)
+        at = np.linspace(1e-6, 0.5, GRID) * whole
+        x = np.maximum(x, 1e-9 * whole)
+        for own in (sign * ~first, 1.0 * ~first, sign * first):
+            yield Axis("reversal_time", x * own, decays, at, unit)
 
 
 def _since(signals: Signals) -> Array | None:
@@ -375,4 +377,26 @@ def _of_frequencies(signals: Signals, frequencies: Sequence[float]) -> Iterator[
         columns = np.hstack([wave * (signals.run == r)[:, None] for r in range(signals.runs)])
         scale = float(np.sqrt(np.mean(np.sum(columns**2, axis=1))))
         at = np.array([hertz])
-        yield Group("frequency", columns / scale, (), at, np.zeros((1, columns.shape[1])), "Hz")
+        values = np.zeros((1, columns.shape[1]))
+        yield Group("frequency", columns / scale, (), at, values, "Hz", 0.5 * len(signals))
+
+
+def _of_events(signals: Signals, events: Sequence[tuple[int, int]]) -> Iterator[Group]:
+    """What rises before an event of one run and settles after it, whatever step it leaves."""
+    longest = int(signals.row.max(initial=0)) + 1
+    for run, row in events:
+        inside = signals.run == run
+        away = signals.row - (row - 0.5)
+        at = np.linspace(-0.3, 0.3, GRID) * longest
+
+        def both(x: NDArray[Any]) -> Array:
+            lengths = np.array(SETTLES) * longest
+            decays = np.exp(-np.abs(x)[:, None] / lengths)
+            return np.hstack([decays * (x < 0.0)[:, None], decays * (x > 0.0)[:, None]])
+
+        columns = both(away) * inside[:, None]
+        scale = float(np.sqrt(np.sum(np.var(columns, axis=0))))
+        if scale > 0.0:
+            yield Group(
+                "run_time", columns / scale, (), at, both(at) / scale, "reading", len(signals)
+            )

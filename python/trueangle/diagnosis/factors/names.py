@@ -13,6 +13,7 @@ from ...effects import EFFECTS
 from ...effects.local_defect import LocalDefect
 from ...effects.missed_counts import MissedCounts
 from ...effects.missing_order import MissingOrder
+from ...effects.time_periodic import TimePeriodic
 from ...estimation.regression import Regression
 from ..confirmation import NOT_CONFIRMED
 from ..finding import Finding
@@ -61,7 +62,9 @@ def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]
     scale = float(np.sqrt(np.sum(np.var(columns, axis=0))))
     if not scale > 0.0:
         return None
-    return Group(NAME, columns / scale, (), np.zeros(1), np.zeros((1, columns.shape[1])), "")
+    sought = 0.5 * len(rows) if finding.cause == TimePeriodic.kind else 1.0
+    values = np.zeros((1, columns.shape[1]))
+    return Group(NAME, columns / scale, (), np.zeros(1), values, "", sought)
 
 
 class Names:
@@ -77,6 +80,7 @@ class Names:
 
     def __init__(self, account: FactorAccount, places: dict[int, int]) -> None:
         self.account, self.places = account, places
+        self._found: dict[tuple[object, ...], tuple[float, list[float]]] = {}
         self.free = [k for k, g in enumerate(account.groups) if g.factor != NAME]
         sizes = [0.0] * len(account.groups)
         own = [0.0] * len(account.groups)
@@ -102,9 +106,17 @@ class Names:
         allowed = [k for k in self.free if not self.is_of(k, without)]
         if start is not None:
             start = [0.0 if self.is_of(k, without) else tau for k, tau in enumerate(start)]
-        score, tau = self.account.best_beside(self.given(names), allowed, start)
-        price = np.log(len(self.account.groups) * SIZES)
-        return score - float(price) * sum(name in self.places for name in names), tau
+        given = self.given(names)
+        key = (*given, *(start or ()), *without)
+        if key not in self._found:
+            self._found[key] = self.account.best_beside(given, allowed, start)
+        score, tau = self._found[key]
+        return score - sum(self.price(name) for name in names if name in self.places), tau
+
+    def price(self, name: int) -> float:
+        """What a finding costs beside free functions, of which it is one, of one size."""
+        own = self.account.groups[self.places[name]].alternatives
+        return float(np.log(len(self.account.groups) * SIZES * own))
 
     def left(self, tau: Sequence[float], factors: Sequence[str]) -> float:
         """Variance of what the free functions of some factors take beside names."""
@@ -212,7 +224,7 @@ def _bump(finding: Finding) -> tuple[float, float]:
 
 
 def _no_counts(findings: Sequence[Finding], regression: Regression) -> dict[int, str]:
-    """Steps that are neither alike nor whole numbers of the sensor's counts."""
+    """Steps that are taken back, or neither alike nor whole numbers of the sensor's counts."""
     found = {}
     for k, finding in enumerate(findings):
         if not finding.confirmed or finding.cause != MissedCounts.kind:
@@ -220,7 +232,14 @@ def _no_counts(findings: Sequence[Finding], regression: Regression) -> dict[int,
         steps = finding.parameters["step_arcsec"]
         if not isinstance(steps.value, list):
             continue
-        sizes, stds = np.abs(steps.value), np.asarray(steps.std, dtype=np.float64)
+        runs = np.array(finding.parameters["run"].value)
+        signed, stds = np.array(steps.value), np.asarray(steps.std, dtype=np.float64)
+        together = (runs[:, None] == runs) & ~np.eye(len(runs), dtype=bool)
+        rest = np.abs(signed[:, None] + signed) / np.hypot(stds[:, None], stds)
+        if (together & (rest < SAME)).any():
+            found[k] = "a step that is taken back in the same run is an event: no count is lost"
+            continue
+        sizes = np.abs(signed)
         count = regression.signals.count or float(sizes.min())
         away = np.abs(sizes - count * np.round(sizes / count))
         if (away > SAME * np.hypot(stds, float(stds[np.argmin(sizes)]))).any():

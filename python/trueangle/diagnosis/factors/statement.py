@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects.missed_counts import MissedCounts
 from ...estimation.regression import Regression
 from ..finding import Finding
 from .account import MOST_READINGS, NAME, factor_account, factors_of
@@ -16,6 +17,9 @@ from .factor import Factor
 from .group import Group
 from .groups import factor_groups
 from .names import Names, name_group, names_by_form, taken_by_names
+
+#: Steps whose surroundings are looked at.
+MOST_EVENTS: Final = 4
 
 #: Lines of shafts that are looked at, most of them.
 MOST_LINES: Final = 24
@@ -42,7 +46,12 @@ def stated_factors(
     signals = chosen.signals.take(rows)
     error = first.readings.residual[rows]
     groups = factor_groups(
-        signals, error, _lines(chosen), _orders(chosen, drawn=True), _frequencies(chosen)
+        signals,
+        error,
+        _lines(chosen),
+        _orders(chosen, drawn=True),
+        _frequencies(chosen),
+        _events(chosen),
     )
     places: dict[int, int] = {}
     named: list[Group] = []
@@ -80,6 +89,12 @@ def _frequencies(regression: Regression) -> list[float]:
         term.shape.get("frequency_hz", term.shape.get("frequency")) for term in regression.terms
     ]
     return [float(np.mean(hertz)) for hertz in found if hertz is not None]
+
+
+def _events(regression: Regression) -> list[tuple[int, int]]:
+    """Run and row of the steps among the terms."""
+    steps = [term.shape for term in regression.terms if term.cause == MissedCounts.kind]
+    return [(step["run"], step["row"]) for step in steps][:MOST_EVENTS]
 
 
 def _orders(regression: Regression, *, drawn: bool) -> list[float]:
