@@ -13,7 +13,7 @@ import numpy as np
 from ..._core import Groups, GroupSums
 from ...joint.signals import Signals
 from ...support.arrays import Array
-from .factor import Curve, Factor
+from .factor import FactorCurve, Factor
 from .group import FACTORS, Group
 
 #: Readings used at most; of more, one of every so many in a row.
@@ -43,6 +43,9 @@ NAME: Final = "name"
 
 #: Smallest variance of readings that is distinguished from zero.
 NOTHING: Final = 1e-24
+
+#: Smallest variance of the noise, over that of the readings.
+ROUNDING: Final = 1e-9
 
 
 def _prior(groups: Sequence[Group]) -> list[float]:
@@ -160,7 +163,7 @@ def factor_account(signals: Signals, error: Array, groups: Sequence[Group]) -> F
     core = Groups(parts, widths)
     scale = _scale(y, cuts)
     noise = core.noise([AT_FIRST * total if _is_first(g) else 0.0 for g in groups], scale)
-    sums = core.sums(noise, total)
+    sums = core.sums(_above_rounding(noise, total), total)
     tau = [0.0] * len(groups)
     for _ in range(ROUNDS):
         _, found = sums.search([0.0] * len(groups), _prior(groups), tau)
@@ -169,8 +172,13 @@ def factor_account(signals: Signals, error: Array, groups: Sequence[Group]) -> F
         if is_same:
             break
         noise = core.noise(tau, scale, noise)
-        sums = core.sums(noise, total)
+        sums = core.sums(_above_rounding(noise, total), total)
     return FactorAccount(groups, sums, tau, total, float(np.sum(noise)))
+
+
+def _above_rounding(noise: Array, total: float) -> Array:
+    """White noise of readings without any: what rounding of products leaves."""
+    return np.array([max(noise[0], ROUNDING * total), *noise[1:]])
 
 
 def _is_first(group: Group) -> bool:
@@ -184,7 +192,7 @@ def _scale(y: Array, cuts: Sequence[int]) -> float:
     steps = [np.diff(y[a:b]) ** 2 for a, b in itertools.pairwise(cuts)]
     every = np.concatenate(steps)
     between = 0.5 * float(np.median(every)) / 0.455 if every.size else 0.0
-    return max(between, 1e-9 * float(np.var(y)))
+    return max(between, ROUNDING * float(np.var(y)))
 
 
 def factors_of(account: FactorAccount, shafts: dict[str, float]) -> list[Factor]:
@@ -283,7 +291,7 @@ def _curve(
     bounds: Array,
     mean: Array,
     covariance: Array,
-) -> Curve:
+) -> FactorCurve:
     """The function of the strongest axis of a factor's groups."""
     widest = max(members, key=lambda k: account.groups[k].at.size)
     at, unit = account.groups[widest].at, account.groups[widest].unit
@@ -312,4 +320,4 @@ def _curve(
         variance = slopes / np.maximum(squares, 1e-24)
     apart = BAND * np.sqrt(np.maximum(variance, 0.0))
     low = value - apart
-    return Curve(at, unit, value, np.maximum(low, 0.0) if products else low, value + apart)
+    return FactorCurve(at, unit, value, np.maximum(low, 0.0) if products else low, value + apart)

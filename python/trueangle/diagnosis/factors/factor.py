@@ -36,7 +36,7 @@ LISTED = 6
 
 
 @dataclass(frozen=True)
-class Curve:
+class FactorCurve:
     """A function of a factor with its 95 % band, arcsec.
 
     Attributes
@@ -88,7 +88,7 @@ class Factor(PlainResult):
         Confirmed causes that are forms of it.
     not_distinguished_from : tuple of str
         Factors that are the same columns in these runs.
-    curve : Curve
+    curve : FactorCurve
     """
 
     factor: str
@@ -101,7 +101,7 @@ class Factor(PlainResult):
     log_bayes_factor: float
     named_by: tuple[str, ...]
     not_distinguished_from: tuple[str, ...]
-    curve: Curve = field(repr=False)
+    curve: FactorCurve = field(repr=False)
 
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``factors``."""

@@ -112,7 +112,7 @@ def factor_groups(
     theta = signals.theta
     left = _without_low(theta, error, signals.run)
     known = [m for m in dict.fromkeys(lines) if m > 0.0]
-    spectrum = _Spectrum(theta)
+    spectrum = _PeakSpectrum(theta)
     groups = [*_place(signals, [*known, *spectrum.peaks(left, LOW)])]
     for axis, product in _axes(signals):
         groups += axis.alone()
@@ -134,7 +134,7 @@ def factor_groups(
     return groups
 
 
-class _Spectrum:
+class _PeakSpectrum:
     """Lines that stand out, of values at angles in radians."""
 
     def __init__(self, theta: Array) -> None:

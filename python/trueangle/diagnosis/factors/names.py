@@ -67,7 +67,7 @@ def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]
     return Group(NAME, columns / scale, (), np.zeros(1), values, "", sought)
 
 
-class Names:
+class NamedForms:
     """Findings as groups beside the free functions of an account.
 
     Parameters
@@ -128,7 +128,7 @@ class Names:
 
 
 def names_by_form(
-    names: Names, findings: Sequence[Finding], regression: Regression
+    names: NamedForms, findings: Sequence[Finding], regression: Regression
 ) -> list[Finding]:
     """The findings, those not confirmed whose form is not better than the free function.
 
@@ -149,7 +149,7 @@ def names_by_form(
             found[k] = replace(found[k], status=NOT_CONFIRMED, reason=reason)
 
 
-def _worst(names: Names, found: Sequence[Finding], sure: Sequence[int]) -> dict[int, str]:
+def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> dict[int, str]:
     """The findings, alone or those of related factors together, whose form is least right."""
     if not sure:
         return {}
@@ -194,7 +194,7 @@ def _related(found: Sequence[Finding], sure: Sequence[int]) -> list[list[int]]:
     return sets
 
 
-def _followed(names: Names, other: Sequence[float], tau: Sequence[float]) -> str:
+def _followed(names: NamedForms, other: Sequence[float], tau: Sequence[float]) -> str:
     """Factors that a model has and another one has not, in words."""
     new = [k for k in names.free if other[k] > 0.0 and tau[k] == 0.0]
     factors = dict.fromkeys(names.account.groups[k].factor for k in new)
@@ -239,17 +239,16 @@ def _no_counts(findings: Sequence[Finding], regression: Regression) -> dict[int,
         if (together & (rest < SAME)).any():
             found[k] = "a step that is taken back in the same run is an event: no count is lost"
             continue
-        sizes = np.abs(signed)
-        count = regression.signals.count or float(sizes.min())
-        away = np.abs(sizes - count * np.round(sizes / count))
-        if (away > SAME * np.hypot(stds, float(stds[np.argmin(sizes)]))).any():
+        count, sizes = regression.signals.count, np.abs(signed)
+        known = count * np.round(sizes / count) if count else np.average(sizes, weights=stds**-2)
+        if (np.abs(sizes - known) > SAME * stds).any():
             found[k] = (
                 "several steps of unequal sizes, none a whole number of counts, are one event"
             )
     return found
 
 
-def taken_by_names(names: Names, findings: Sequence[Finding], factor: str) -> tuple[str, ...]:
+def taken_by_names(names: NamedForms, findings: Sequence[Finding], factor: str) -> tuple[str, ...]:
     """Confirmed causes that are forms of a factor and leave less than 5 % of it."""
     sure = [k for k, f in enumerate(findings) if f.confirmed and k in names.places]
     own = [k for k in sure if factor in EFFECTS[findings[k].cause].form_of]

@@ -16,7 +16,7 @@ from .account import MOST_READINGS, NAME, factor_account, factors_of
 from .factor import Factor
 from .group import Group
 from .groups import factor_groups
-from .names import Names, name_group, names_by_form, taken_by_names
+from .names import NamedForms, name_group, names_by_form, taken_by_names
 
 #: Steps whose surroundings are looked at.
 MOST_EVENTS: Final = 4
@@ -62,7 +62,7 @@ def stated_factors(
     account = factor_account(signals, error, [*groups, *named])
     if account is None:
         return list(findings), []
-    names = Names(account, places)
+    names = NamedForms(account, places)
     found = names_by_form(names, findings, chosen)
     shafts = {name: abs(cycles) for name, cycles in chosen.belief.joint.shafts.items()}
     factors = [
