@@ -202,6 +202,8 @@ def factors_of(account: FactorAccount, shafts: dict[str, float]) -> list[Factor]
     kinds: dict[tuple[str, str | None], list[int]] = {}
     for k in account.inside:
         group = account.groups[k]
+        if group.factor == NAME:
+            continue
         shaft = _shaft(group.orders, shafts) if group.orders else None
         kinds.setdefault((group.factor, shaft), []).append(k)
     bounds = account.bounds

@@ -141,7 +141,7 @@ def names_by_form(
         for k, reason in reason_of(found, regression).items():
             found[k] = replace(found[k], status=NOT_CONFIRMED, reason=reason)
     while True:
-        sure = [k for k, f in enumerate(found) if f.confirmed and k in names.places]
+        sure = confirmed_names(names, found)
         wrong = _worst(names, found, sure)
         if not wrong:
             return found
@@ -248,15 +248,22 @@ def _no_counts(findings: Sequence[Finding], regression: Regression) -> dict[int,
     return found
 
 
-def taken_by_names(names: NamedForms, findings: Sequence[Finding], factor: str) -> tuple[str, ...]:
-    """Confirmed causes that are forms of a factor and leave less than 5 % of it."""
-    sure = [k for k, f in enumerate(findings) if f.confirmed and k in names.places]
-    own = [k for k in sure if factor in EFFECTS[findings[k].cause].form_of]
-    if not own:
-        return ()
+def confirmed_names(names: NamedForms, findings: Sequence[Finding]) -> list[int]:
+    """Places of the findings that are confirmed and have columns."""
+    return [k for k, f in enumerate(findings) if f.confirmed and k in names.places]
+
+
+def names_of(names: NamedForms, findings: Sequence[Finding], factor: str) -> tuple[str, ...]:
+    """Confirmed causes that are forms of a factor."""
+    causes = [findings[k].cause for k in confirmed_names(names, findings)]
+    return tuple(dict.fromkeys(c for c in causes if factor in EFFECTS[c].form_of))
+
+
+def takes_all(names: NamedForms, findings: Sequence[Finding], factor: str) -> bool:
+    """Confirmed causes leave less than 5 % of a factor to its free functions."""
+    sure = confirmed_names(names, findings)
     _, tau = names.beside(sure)
     left = names.left(tau, [factor])
+    own = [k for k in sure if factor in EFFECTS[findings[k].cause].form_of]
     taken = sum(names.account.variance(names.given(sure), [names.places[k]], tau) for k in own)
-    if left > (1.0 - TAKES) * (left + taken):
-        return ()
-    return tuple(dict.fromkeys(findings[k].cause for k in own))
+    return bool(left < (1.0 - TAKES) * (left + taken))

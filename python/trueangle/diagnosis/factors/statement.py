@@ -12,11 +12,18 @@ from numpy.typing import NDArray
 from ...effects.missed_counts import MissedCounts
 from ...estimation.regression import Regression
 from ..finding import Finding
-from .account import MOST_READINGS, NAME, factor_account, factors_of
+from .account import MOST_READINGS, factor_account, factors_of
 from .factor import Factor
 from .group import Group
 from .groups import factor_groups
-from .names import NamedForms, name_group, names_by_form, taken_by_names
+from .names import (
+    NamedForms,
+    confirmed_names,
+    name_group,
+    names_by_form,
+    names_of,
+    takes_all,
+)
 
 #: Steps whose surroundings are looked at.
 MOST_EVENTS: Final = 4
@@ -65,12 +72,24 @@ def stated_factors(
     names = NamedForms(account, places)
     found = names_by_form(names, findings, chosen)
     shafts = {name: abs(cycles) for name, cycles in chosen.belief.joint.shafts.items()}
-    factors = [
-        replace(factor, named_by=taken_by_names(names, found, factor.factor))
-        for factor in factors_of(account, shafts)
-        if factor.factor != NAME
-    ]
-    return found, factors
+    return found, _factors(names, found, shafts)
+
+
+def _factors(
+    names: NamedForms, found: Sequence[Finding], shafts: dict[str, float]
+) -> list[Factor]:
+    """What the readings follow with its names, and beside all names what has none."""
+    account = names.account
+    stated, named = [], set()
+    for factor in factors_of(account, shafts):
+        if own := names_of(names, found, factor.factor):
+            stated.append(replace(factor, named_by=own))
+            if takes_all(names, found, factor.factor):
+                named.add(factor.factor)
+    sure = confirmed_names(names, found)
+    left = replace(account, tau=np.maximum(names.given(sure), names.beside(sure)[1]).tolist())
+    stated += [factor for factor in factors_of(left, shafts) if factor.factor not in named]
+    return sorted(stated, key=lambda factor: -factor.rms)
 
 
 def _rows(regression: Regression) -> NDArray[np.int64]:
