@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -13,7 +13,7 @@ import numpy as np
 from ..._core import Groups, GroupSums
 from ...joint.signals import Signals
 from ...support.arrays import Array
-from .factor import FactorCurve, Factor
+from .factor import Factor, FactorCurve
 from .group import FACTORS, Group
 
 #: Readings used at most; of more, one of every so many in a row.
@@ -67,15 +67,12 @@ class FactorAccount:
         Prior variance of each group; 0 of those that are out.
     total : float
         Variance of the error.
-    left : float
-        Variance of the noise.
     """
 
     groups: Sequence[Group]
     sums: GroupSums
     tau: list[float]
     total: float
-    left: float
 
     @cached_property
     def prior(self) -> list[float]:
@@ -173,7 +170,7 @@ def factor_account(signals: Signals, error: Array, groups: Sequence[Group]) -> F
             break
         noise = core.noise(tau, scale, noise)
         sums = core.sums(_above_rounding(noise, total), total)
-    return FactorAccount(groups, sums, tau, total, float(np.sum(noise)))
+    return FactorAccount(groups, sums, tau, total)
 
 
 def _above_rounding(noise: Array, total: float) -> Array:
@@ -207,35 +204,29 @@ def factors_of(account: FactorAccount, shafts: dict[str, float]) -> list[Factor]
         shaft = _shaft(group.orders, shafts) if group.orders else None
         kinds.setdefault((group.factor, shaft), []).append(k)
     bounds = account.bounds
-    found: list[tuple[Factor, float]] = []
+    found = []
     for (factor, shaft), members in kinds.items():
-        lost = base - account.evidence(account.without(members))
         at = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in members])
         columns = np.hstack([account.groups[k].columns for k in members])
         rms, std = _size(columns, mean[at], covariance[np.ix_(at, at)])
         orders = [m for k in members for m in account.groups[k].orders]
         cycles = shafts[shaft] if shaft else 1.0
         found.append(
-            (
-                Factor(
-                    factor,
-                    shaft,
-                    tuple(sorted({m / cycles for m in orders})) or None,
-                    rms,
-                    max(rms - BAND * std, 0.0),
-                    rms + BAND * std,
-                    0.0,
-                    lost,
-                    (),
-                    _alike(account, members, factor),
-                    _curve(account, members, bounds, mean, covariance),
-                ),
-                rms**2,
+            Factor(
+                factor,
+                shaft,
+                tuple(sorted({m / cycles for m in orders})) or None,
+                rms,
+                max(rms - BAND * std, 0.0),
+                rms + BAND * std,
+                rms**2 / max(account.total, rms**2),
+                base - account.evidence(account.without(members)),
+                (),
+                _alike(account, members, factor),
+                _curve(account, members, bounds, mean, covariance),
             )
         )
-    whole = sum(power for _, power in found) + account.left
-    stated = [replace(f, share=power / whole) for f, power in found]
-    return sorted(stated, key=lambda f: (-f.rms, FACTORS.index(f.factor)))
+    return sorted(found, key=lambda f: (-f.rms, FACTORS.index(f.factor)))
 
 
 def _size(columns: Array, mean: Array, covariance: Array) -> tuple[float, float]:

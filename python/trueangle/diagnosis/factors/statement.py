@@ -75,9 +75,7 @@ def stated_factors(
     return found, _factors(names, found, shafts)
 
 
-def _factors(
-    names: NamedForms, found: Sequence[Finding], shafts: dict[str, float]
-) -> list[Factor]:
+def _factors(names: NamedForms, found: Sequence[Finding], shafts: dict[str, float]) -> list[Factor]:
     """What the readings follow with its names, and beside all names what has none."""
     account = names.account
     stated, named = [], set()
