@@ -195,7 +195,8 @@ def _diagnosis(
             findings = reconsidered_findings(chosen, findings, rest)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
     named = confirmed_count(findings)
-    findings, factors = stated_factors(first, chosen, findings)
+    bare = first if seen.delay is None else account.choice.start
+    findings, factors = stated_factors(bare, chosen, findings)
     # What has lost its name may be what scatters.
     in_doubt = any(spot.supported and not spot.common for spot in spots)
     in_doubt |= confirmed_count(findings) < named

@@ -15,6 +15,7 @@ from ...effects.missed_counts import MissedCounts
 from ...effects.missing_order import MissingOrder
 from ...effects.time_periodic import TimePeriodic
 from ...estimation.regression import Regression
+from ...support.arrays import Array
 from ..confirmation import NOT_CONFIRMED
 from ..finding import Finding
 from .account import ALIKE, NAME, FactorAccount
@@ -55,15 +56,22 @@ def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]
             continue
         runs = regression.signals.run[:, None, None] == np.arange(regression.signals.runs)[:, None]
         parts.append((term.run_effect.columns[:, None, :] * runs).reshape(regression.n, -1))
-    if not parts:
-        return None
-    columns = np.hstack(parts)[rows]
-    columns = columns / np.maximum(np.std(columns, axis=0), 1e-300)
-    scale = float(np.sqrt(np.sum(np.var(columns, axis=0))))
-    if not scale > 0.0:
-        return None
     sought = 0.5 * len(rows) if finding.cause == TimePeriodic.kind else 1.0
+    return _group(np.hstack(parts)[rows], sought) if parts else None
+
+
+def base_group(regression: Regression, rows: NDArray[np.int64]) -> Group | None:
+    """What is free whatever is found, but for zeros, as a group; None where nothing is."""
+    return _group(regression.readings.base[rows], 1.0)
+
+
+def _group(columns: Array, sought: float) -> Group | None:
+    spread = np.std(columns, axis=0)
+    columns = columns[:, spread > 0.0] / spread[spread > 0.0]
+    if not columns.size:
+        return None
     values = np.zeros((1, columns.shape[1]))
+    scale = float(np.sqrt(columns.shape[1]))
     return Group(NAME, columns / scale, (), np.zeros(1), values, "", sought)
 
 
@@ -76,10 +84,14 @@ class NamedForms:
         With a group for each finding.
     places : dict of int to int
         Group of a finding by its place in the list of findings.
+    base : int or None
+        Group that is in beside all others.
     """
 
-    def __init__(self, account: FactorAccount, places: dict[int, int]) -> None:
-        self.account, self.places = account, places
+    def __init__(
+        self, account: FactorAccount, places: dict[int, int], base: int | None = None
+    ) -> None:
+        self.account, self.places, self.base = account, places, base
         self._found: dict[tuple[object, ...], tuple[float, list[float]]] = {}
         self.free = [k for k, g in enumerate(account.groups) if g.factor != NAME]
         sizes = [0.0] * len(account.groups)
@@ -90,10 +102,12 @@ class NamedForms:
             sizes = account.sums.search(sizes, own, sizes)[1]
         least = 1e-4 * account.total
         self.sizes = [max(size, least) if own[k] else 0.0 for k, size in enumerate(sizes)]
+        if base is not None:
+            self.sizes[base] = account.total
 
     def given(self, names: Sequence[int]) -> list[float]:
         """The model of these findings alone."""
-        inside = {self.places[name] for name in names if name in self.places}
+        inside = {self.base, *(self.places[name] for name in names if name in self.places)}
         return [size if k in inside else 0.0 for k, size in enumerate(self.sizes)]
 
     def beside(
@@ -153,11 +167,14 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
     """The findings, alone or those of related factors together, whose form is least right."""
     if not sure:
         return {}
-    score, tau = names.beside(sure)
+    score, tau = max(names.beside(sure, start) for start in (None, names.account.tau))
     worst: tuple[float, Sequence[int], Sequence[float]] | None = None
     for asked in [*([k] for k in sure), *_related(found, sure)]:
         rest = [j for j in sure if j not in asked]
         freed, free = max(names.beside(rest, start) for start in (tau, names.account.tau))
+        if freed > score:
+            # What the search has met without them is tried with them, too.
+            score, tau = max((score, tau), names.beside(sure, free))
         if freed - score > max(ALIKE, worst[0] if worst else 0.0):
             worst = (freed - score, asked, free)
     if worst is not None:

@@ -18,6 +18,7 @@ from .group import Group
 from .groups import factor_groups
 from .names import (
     NamedForms,
+    base_group,
     confirmed_names,
     name_group,
     names_by_form,
@@ -40,7 +41,8 @@ def stated_factors(
     Parameters
     ----------
     first, chosen : Regression
-        Without a cause, against the simulation as it is stated; with the causes chosen.
+        Without a cause, against the simulation as it is stated (less a delay, where there is one);
+        with the causes chosen.
     findings : sequence of Finding
         Of terms of ``chosen``.
 
@@ -66,10 +68,12 @@ def stated_factors(
         if finding.group and (group := name_group(chosen, finding, rows)) is not None:
             places[k] = len(groups) + len(named)
             named.append(group)
-    account = factor_account(signals, error, [*groups, *named])
+    groups += named
+    free = base_group(chosen, rows)
+    account = factor_account(signals, error, groups if free is None else [*groups, free])
     if account is None:
         return list(findings), []
-    names = NamedForms(account, places)
+    names = NamedForms(account, places, None if free is None else len(groups))
     found = names_by_form(names, findings, chosen)
     shafts = {name: abs(cycles) for name, cycles in chosen.belief.joint.shafts.items()}
     return found, _factors(names, found, shafts)
