@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from trueangle.cli.paperstudy.study import JOINT_A, POSITIONS, lifted, simulated_groups
+from trueangle.cli.demo import JOINT_A, POSITIONS, lifted, simulated_groups
 from trueangle.plots.orderaxis import OrderAxis
 from trueangle.plots.palette import AFTER, BEFORE, MARKERS, MUTED, run_colour
 

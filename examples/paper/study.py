@@ -6,8 +6,7 @@ Run with ``python examples/paper/study.py``; prints tables only.
 import numpy as np
 
 import trueangle as ta
-from trueangle.cli.demo import short_report
-from trueangle.cli.paperstudy.study import (
+from trueangle.cli.demo import (
     GEAR_ORDERS,
     JOINT_A,
     JOINT_B,
@@ -16,6 +15,7 @@ from trueangle.cli.paperstudy.study import (
     lifted,
     paper_study,
     reduction,
+    short_report,
     simulated_groups,
 )
 from trueangle.planning import wanted_orders

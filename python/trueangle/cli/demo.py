@@ -1,16 +1,27 @@
-"""``trueangle demo``: what the package does, on simulated joints, without any file."""
+"""``trueangle demo``: what the package does, on simulated joints, without any file.
+
+Equations 8 and 9 of the paper give the error of two joints at 36 positions. The same
+values there follow from orders of the gear (100 for 8, 202 for 14, ...), for which the
+paper's correction makes the joint worse wherever it was not calibrated.
+"""
 
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
 
 from ..support.files import REPORT
 from .paths import Output
 
 if TYPE_CHECKING:
-    from .paperstudy.study import Reduction, Study
+    from numpy.typing import ArrayLike
 
+    from ..fitting.orders.result import OrderSelection
+    from ..planning.mountplan import CalibrationPlan
+    from ..runs.run import CalibrationRun
+    from ..support.arrays import Array
 
 HELP = "fit, correct and diagnose simulated joints; needs no files"
 EXAMPLE = "trueangle demo --report demo.html"
@@ -47,7 +58,6 @@ def _corrected(seed: int) -> str:
 
     from ..fitting.fit import fit
     from ..support.letterchart import letter_chart
-    from .paperstudy.study import JOINT_A, PUBLISHED, simulated_groups
 
     *groups, unseen = simulated_groups(JOINT_A, seed=seed)
     model = fit(groups).model
@@ -75,8 +85,6 @@ def _corrected(seed: int) -> str:
 
 def _between(seed: int) -> str:
     """What the 36 positions cannot tell."""
-    from .paperstudy.study import paper_study
-
     return (
         "What 36 positions cannot tell: orders 36 apart look the same there. A\n"
         "   correction may then be right at the positions and wrong between them.\n\n"
@@ -84,38 +92,28 @@ def _between(seed: int) -> str:
     )
 
 
-def _change(found: Reduction, where: str) -> str:
-    before, after = found.positions if where == "positions" else found.dense
-    change = found.at_positions if where == "positions" else found.in_between
-    return f"{before:4.0f} -> {after:3.0f} ({change:+.0f} %)"
-
-
 def short_report(study: Study) -> str:
     """The whole study in ten lines: what 36 positions say, and what lies between."""
     plan = study.plan
+    offset = f"{plan.mount_offsets_deg[-1]:g}"
     lines = [
         "The paper's study repeated (6 groups at 36 positions, peak-to-peak in arcsec)",
         "  joint, true orders       at 36 positions     everywhere",
     ]
-    for name, found in study.published.items():
-        lines.append(
-            f"  {name} as published           {_change(found, 'positions'):18}  "
-            f"{_change(found, 'dense')}"
-        )
-    for name, found in study.gear.items():
-        lines.append(
-            f"  {name} gear orders instead    {_change(found, 'positions'):18}  "
-            f"{_change(found, 'dense')}"
-        )
+
+    def add(joints: Mapping[str, Reduction], what: str) -> None:
+        for name, found in joints.items():
+            (before, after), (whole, left) = found.positions, found.dense
+            there = f"{before:4.0f} -> {after:3.0f} ({found.at_positions:+.0f} %)"
+            between = f"{whole:4.0f} -> {left:3.0f} ({found.in_between:+.0f} %)"
+            lines.append(f"  {name} {what:21}  {there:18}  {between}")
+
+    add(study.published, "as published")
+    add(study.gear, "gear orders instead")
     lines.append("  The 36 readings of both are the same: only others can tell.")
-    offset = plan.mount_offsets_deg[-1]
-    for name, found in study.planned.items():
-        lines.append(
-            f"  {name} read {offset:g} deg apart too  {_change(found, 'positions'):18}  "
-            f"{_change(found, 'dense')}"
-        )
+    add(study.planned, f"read {offset} deg apart too")
     lines.append(
-        f"  `ta.plan_mounts(gear_ratio=100)`: mounts at 0 and {offset:g} deg, "
+        f"  `ta.plan_mounts(gear_ratio=100)`: mounts at 0 and {offset} deg, "
         f"noise factor {plan.worst_noise_factor:.2f}"
     )
     return "\n".join(lines)
@@ -136,3 +134,231 @@ def _diagnosed(seed: int) -> str:
         "Why is a joint wrong? This one has a backlash of +-8 arcsec that its\n"
         f"   simulation does not know. What the diagnosis says of its runs:\n\n{result.summary()}"
     )
+
+
+#: Positions of the paper's prism and the groups it took; the last one verifies.
+POSITIONS: Final = 36
+GROUPS: Final = 6
+
+#: Scatter of one reading, arcsec: what the peak-to-peak of the compensated error leaves
+#: room for: 26.62 and 18.40 over 4.24 (mean range of 36 normal values) and over
+#: sqrt(1 + 15/180) (15 unknowns from 180 readings).
+NOISE: Final = {"a": 6.03, "b": 4.17}
+
+#: Gear orders of ratio 100 that stand at the paper's orders on 36 positions.
+GEAR_ORDERS: Final = {8: 100, 7: 101, 16: 200, 15: 201, 14: 202, 12: 300, 4: 400}
+
+#: The paper's figures: peak-to-peak before and after in arcsec, reduction in percent.
+PUBLISHED: Final = {"a": (149.53, 26.62, 82.20), "b": (101.35, 18.40, 81.85)}
+
+
+@dataclass(frozen=True)
+class PaperJoint:
+    """Error of a joint as a sum of sines: ``{order: (amplitude in arcsec, phase in deg)}``."""
+
+    name: str
+    constant: float
+    lines: Mapping[int, tuple[float, float]]
+
+    def error(self, degrees: ArrayLike) -> Array:
+        """Error in arcsec at reference angles in degrees."""
+        import numpy as np
+
+        x = np.radians(np.asarray(degrees, dtype=np.float64))
+        total = np.full(x.shape, self.constant)
+        for order, (amplitude, phase) in self.lines.items():
+            total += amplitude * np.sin(order * x + np.radians(phase))
+        return total
+
+
+#: Equation 8.
+JOINT_A: Final = PaperJoint(
+    "a",
+    0.0,
+    {
+        1: (14.10, 243.75),
+        4: (6.91, 26.73),
+        8: (18.05, 46.50),
+        12: (6.66, 264.24),
+        14: (33.36, 20.82),
+        15: (8.94, 57.88),
+        16: (19.60, 247.91),
+    },
+)
+
+#: Equation 9.
+JOINT_B: Final = PaperJoint(
+    "b",
+    -11.47,
+    {
+        1: (24.31, 15.81),
+        4: (10.18, 187.75),
+        7: (4.86, 147.06),
+        8: (13.85, 258.45),
+        12: (4.68, 213.24),
+        14: (17.71, 115.24),
+        16: (8.64, 128.30),
+    },
+)
+
+
+def lifted(joint: PaperJoint, orders: Mapping[int, int] | None = None) -> PaperJoint:
+    """The joint with some orders replaced by others that are the same at 36 positions.
+
+    Examples
+    --------
+    >>> float(abs(lifted(JOINT_A).error(10.0) - JOINT_A.error(10.0)).round(9))
+    0.0
+    """
+    from ..runs.aliasing import fold
+
+    lines = {}
+    for order, (amplitude, phase) in joint.lines.items():
+        high = (GEAR_ORDERS if orders is None else orders).get(order, order)
+        sign = fold(high, POSITIONS)[1] if high != order else 1
+        lines[high] = (amplitude, phase if sign > 0 else 180.0 - phase)
+    return PaperJoint(joint.name, joint.constant, lines)
+
+
+def simulated_groups(
+    joint: PaperJoint,
+    offsets_deg: Sequence[float] = (0.0,) * GROUPS,
+    noise: float | None = None,
+    seed: int = 0,
+) -> list[CalibrationRun]:
+    """Groups of 36 readings, each beginning ``offset`` after the first position."""
+    import numpy as np
+
+    from ..runs.run import CalibrationRun
+
+    random = np.random.default_rng(seed)
+    scatter = NOISE[joint.name] if noise is None else noise
+    runs = []
+    for number, offset in enumerate(offsets_deg):
+        reference = np.asarray(
+            np.arange(POSITIONS) * (360.0 / POSITIONS) + offset, dtype=np.float64
+        )
+        error = joint.error(reference) + random.normal(0.0, scatter, POSITIONS)
+        runs.append(
+            CalibrationRun(
+                reference,
+                reference + error / 3600.0,
+                period=360.0,
+                mount=np.full(POSITIONS, offset),
+                label=f"{joint.name}{number + 1}",
+            )
+        )
+    return runs
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Error before and after a correction, arcsec: at the positions and everywhere.
+
+    ``positions`` and ``dense`` are peak-to-peak (before, after), ``dense_rms`` is rms.
+    """
+
+    positions: tuple[float, float]
+    dense: tuple[float, float]
+    dense_rms: tuple[float, float]
+    orders: tuple[float, ...]
+
+    @property
+    def at_positions(self) -> float:
+        """Change of the peak-to-peak error at the positions, percent."""
+        return 100.0 * (self.positions[1] / self.positions[0] - 1.0)
+
+    @property
+    def in_between(self) -> float:
+        """Change of the peak-to-peak error on a dense grid, percent."""
+        return 100.0 * (self.dense[1] / self.dense[0] - 1.0)
+
+
+def reduction(
+    joint: PaperJoint,
+    runs: Sequence[CalibrationRun],
+    orders: Sequence[float],
+    held: CalibrationRun | None = None,
+) -> Reduction:
+    """Fit ``orders`` to the runs and correct a held-out run and a dense grid with them.
+
+    ``held`` defaults to the last run, which then takes no part in the fit.
+    """
+    import numpy as np
+
+    training, last = (runs, held) if held else (runs[:-1], runs[-1])
+
+    def columns(degrees: Array) -> Array:
+        x = np.radians(degrees)[:, None] * np.asarray(orders, dtype=np.float64)
+        return np.concatenate([np.cos(x), np.sin(x)], axis=1)
+
+    zeros = np.repeat(np.eye(len(training)), [len(run) for run in training], axis=0)
+    lines = columns(np.concatenate([run.reference for run in training]))
+    read = np.concatenate([3600.0 * run.centred_error for run in training])
+    found = np.linalg.lstsq(np.concatenate([lines, zeros], axis=1), read, rcond=None)[0]
+    coefficients = found[: 2 * len(orders)]
+    measured = 3600.0 * last.centred_error
+    after = measured - columns(last.reference) @ coefficients
+    grid = np.arange(0.0, 360.0, 0.05)
+    truth = joint.error(grid)
+    left = truth - columns(grid) @ coefficients
+    return Reduction(
+        (float(np.ptp(measured)), float(np.ptp(after))),
+        (float(np.ptp(truth)), float(np.ptp(left))),
+        (float(truth.std()), float(left.std())),
+        tuple(orders),
+    )
+
+
+@dataclass(frozen=True)
+class Study:
+    """The paper's study repeated, and the same with gear orders behind the aliases.
+
+    Attributes
+    ----------
+    selections : dict of str to OrderSelection
+        By the paper's method, per joint.
+    published : dict of str to Reduction
+        Joints as the paper published them.
+    gear : dict of str to Reduction
+        The same joints with all aliases lifted to gear orders, corrected as in the paper.
+    plan : CalibrationPlan
+        Two mounts that show the difference.
+    planned : dict of str to Reduction
+        Gear joints read on both mounts, orders selected by evidence.
+    """
+
+    selections: dict[str, OrderSelection]
+    published: dict[str, Reduction]
+    gear: dict[str, Reduction]
+    plan: CalibrationPlan
+    planned: dict[str, Reduction]
+
+
+def paper_study(seed: int = 0) -> Study:
+    """Repeat the paper's study with simulated groups of both joints.
+
+    Examples
+    --------
+    >>> study = paper_study()
+    >>> study.gear["a"].at_positions < -75.0 and study.gear["a"].in_between > 50.0
+    True
+    """
+    from ..fitting.orders.select import select_orders
+    from ..planning.plan import plan_mounts, wanted_orders
+
+    plan = plan_mounts(100.0, POSITIONS, 2)
+    offsets = [o for o in plan.mount_offsets_deg for _ in range(GROUPS // 2)]
+    selections, published, gear, planned = {}, {}, {}, {}
+    for joint in (JOINT_A, JOINT_B):
+        runs = simulated_groups(joint, seed=seed)
+        selection = select_orders(runs, range(1, 18), gear_ratio=100, method="paper")
+        selections[joint.name] = selection
+        published[joint.name] = reduction(joint, runs, selection.orders)
+        other = lifted(joint)
+        gear[joint.name] = reduction(other, simulated_groups(other, seed=seed), selection.orders)
+        read = simulated_groups(other, offsets, seed=seed)
+        found = select_orders(read, wanted_orders(100.0), gear_ratio=100).orders
+        held = simulated_groups(other, offsets[-1:], seed=seed + 1)[0]
+        planned[joint.name] = reduction(other, read, found, held)
+    return Study(selections, published, gear, plan, planned)

@@ -9,7 +9,7 @@ import pytest
 import trueangle as ta
 from conftest import ROOT
 from trueangle.cli import main
-from trueangle.cli.paperstudy.study import JOINT_A, lifted, simulated_groups
+from trueangle.cli.demo import JOINT_A, lifted, simulated_groups
 
 
 def write(path, runs):
