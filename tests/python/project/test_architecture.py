@@ -5,8 +5,6 @@ import re
 import sys
 import tomllib
 
-import pytest
-
 from conftest import ROOT
 
 sys.path.insert(0, str(ROOT / "docs"))
@@ -30,9 +28,9 @@ def test_the_table_has_every_room_in_the_order_of_the_floors():
     assert set(rooms_of_the_table()) == there
 
 
-@pytest.mark.parametrize("place", sorted(set(re.findall(r"`([\w/]+(?:/|\.py|\.rs))`", PAGE))))
-def test_what_the_page_names_is_there(place):
-    assert (PACKAGE / place).exists() or (ROOT / place).exists()
+def test_what_the_page_names_is_there():
+    named = set(re.findall(r"`([\w/]+(?:/|\.py|\.rs))`", PAGE))
+    assert [p for p in named if not ((PACKAGE / p).exists() or (ROOT / p).exists())] == []
 
 
 def test_tests_mirror_rooms():
