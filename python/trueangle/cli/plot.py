@@ -78,12 +78,11 @@ def _of_model(args: argparse.Namespace) -> Axes:
         raise ArgumentError(
             "one model has one picture: give one file and leave --kind out, or give the runs"
         )
-    of_runs = "gear_ratio shaft signal counts_per_turn_reference periods_per_turn topic facets"
-    refuse_given(
-        args, (*of_runs.split(), "unit_from"), "is of a picture of runs, and this is of a model"
-    )
+    of_runs = ("gear_ratio", "shaft", "signal", "counts_per_turn_reference", "periods_per_turn")
+    says = "is of a picture of runs, and this is of a model"
+    refuse_given(args, (*of_runs, "topic", "facets", "unit_from"), says)
     if args.orders != "auto":
-        raise ArgumentError("--orders is of a picture of runs, and this is of a model")
+        raise ArgumentError(f"--orders {says}")
     refuse_joint(args.joint, args.files)
     return model_error(model_asked(args.files[0], args.joint), errors_in=errors_in(args))
 

@@ -27,13 +27,9 @@ def imported(name):
         return None
 
 
-#: Modules a test of examples takes: workers share them, and a failure names its example.
-PARTS = [MODULES[start::8] for start in range(8)]
-
-
-@pytest.mark.parametrize("names", PARTS, ids=[f"part{part}" for part in range(len(PARTS))])
-def test_examples(names):
-    modules = [module for module in map(imported, names) if module]
+@pytest.mark.parametrize("start", range(8))  # shared by workers
+def test_examples(start):
+    modules = [module for module in map(imported, MODULES[start::8]) if module]
     names = {"np": np, "ta": ta}
     failed = [m.__name__ for m in modules if doctest.testmod(m, extraglobs=names).failed]
     assert not failed
