@@ -86,6 +86,27 @@ def clipped_rows(values: Array) -> NDArray[np.bool_]:
     return found
 
 
+def unclipped(
+    sine: Array, cosine: Array, named: str
+) -> tuple[NDArray[np.bool_], tuple[tuple[str, int], ...]]:
+    """Rows of which no channel is at a rail, and how many of each channel are.
+
+    Raises
+    ------
+    NoModelError
+        Too few are left.
+    """
+    rails = [("sine", clipped_rows(sine)), ("cosine", clipped_rows(cosine))]
+    kept = ~(rails[0][1] | rails[1][1])
+    left = int(kept.sum())
+    if left < 12:
+        raise NoModelError(
+            f"{named}: {left} of {kept.size} readings of the channels are not at a rail (clipped), "
+            "and 12 are needed: lower the gain of the amplifier"
+        )
+    return kept, tuple((name, int(rows.sum())) for name, rows in rails if rows.any())
+
+
 def estimate_channels(
     sine: Array, cosine: Array, named: str, *, periods: int = 1, period: float = 360.0
 ) -> ChannelEstimate:
@@ -98,15 +119,8 @@ def estimate_channels(
         that says which.
     """
     check_channels(sine, cosine, named)
-    rails = [("sine", clipped_rows(sine)), ("cosine", clipped_rows(cosine))]
-    kept = ~(rails[0][1] | rails[1][1])
-    clipped = tuple((name, int(rows.sum())) for name, rows in rails if rows.any())
+    kept, clipped = unclipped(sine, cosine, named)
     y, x = sine[kept], cosine[kept]
-    if y.size < 12:
-        raise NoModelError(
-            f"{named}: {y.size} readings of the channels are not at a rail, and 12 are needed: "
-            "lower the gain of the amplifier"
-        )
     found = _Fit(y, x, named)
     share = float((found.cells > 0).mean())
     if share >= _WHOLE:

@@ -12,7 +12,7 @@ from .. import _core
 from ..errors import NoModelError
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
-from .channels import CELLS, cell_counts, channels_of, check_channels, clipped_rows, inflation
+from .channels import CELLS, cell_counts, channels_of, check_channels, inflation, unclipped
 from .linear import least_squares
 
 #: Harmonics of the curve, where the channels went through their whole period.
@@ -41,7 +41,7 @@ def referenced_channels(
     """
     sine, cosine = (np.concatenate([run[i] for run in signals]) for i in (0, 1))
     check_channels(sine, cosine, named)
-    kept = ~(clipped_rows(sine) | clipped_rows(cosine))
+    kept, _ = unclipped(sine, cosine, named)
     unit = channels.direction * channels.periods_per_turn * 2.0 * math.pi / channels.period
     phases = [unit * run[2] for run in signals]
     zeros = [

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ..errors import ArgumentError
+from ..runs.channelangle import common_channels
 from ..runs.run import CalibrationRun
 
 
@@ -43,6 +46,26 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
         )
         for run, (sine, cosine, reference) in zip(runs, signals, strict=True)
     ]
+
+
+def channel_notes(runs: Sequence[CalibrationRun]) -> Iterator[str]:
+    """What a reader must know of the channels of runs: clipped readings, a phase that falls."""
+    if (channels := common_channels(runs)) is None:
+        return
+    from ..estimation.channels import clipped_rows
+
+    for role in ("sine", "cosine"):
+        values = np.concatenate([run.signals[role] for run in runs])
+        if clipped := int(clipped_rows(values).sum()):
+            yield (
+                f"{clipped} of {values.size} readings of the {role} channel are at its rail "
+                "(clipped): its constants are of the others; lower the gain of the amplifier."
+            )
+    if channels.direction < 0:
+        yield (
+            "The phase of the channels falls as the angle rises: sine and cosine are swapped, or "
+            "the sensor is reversed; the model decodes them as they are."
+        )
 
 
 def _named(run: CalibrationRun) -> str:

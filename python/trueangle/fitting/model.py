@@ -21,6 +21,7 @@ from ..runs.checks.record import records_of
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import student_quantile
+from .decoded import channel_notes
 from .fitdata import FitData
 from .rounding import COUNTED
 
@@ -54,6 +55,7 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
     if fit.missing:
         rows = "row" if fit.missing == 1 else "rows"
         yield f"{fit.missing} {rows} with an empty cell left out."
+    yield from channel_notes(fit.problem.runs)
     yield from (_sentence(remark) for remark in fit.remarks)
     records = records_of(fit.runs) if fit.moments is None else []
     for test in (duplicate_runs, duplicate_rows, missed_counts):

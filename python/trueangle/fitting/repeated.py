@@ -105,7 +105,7 @@ def covariance_with_repeats(
     added = _moved(sums, basis, (rounded, left), found.kind)
     wider = found.beside(added, freedom if left > rounded else math.inf)
     noise, all_of_it = np.diag(found.covariance)[1:].sum(), np.diag(wider.covariance)[1:].sum()
-    if left <= rounded or all_of_it < (1.0 + _TOLD) * noise:
+    if left <= rounded or all_of_it <= (1.0 + _TOLD) * noise:
         return wider
     said = (
         "orders left out repeat at every position, and the positions do not keep them apart from "

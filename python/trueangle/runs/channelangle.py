@@ -22,6 +22,11 @@ _MADE: Final = "angle of sine and cosine"
 
 _PERIOD: Final = 360.0
 
+#: Part of a period from reading to reading up to which its periods are counted, and how far the
+#: count may be off a whole number.
+_DENSE: Final = 0.3
+_WHOLE: Final = 0.05
+
 
 def with_channel_angle(
     table: FileReadings, periods: int | None, reference_counts: float | None
@@ -68,6 +73,13 @@ def with_channel_angle(
     sine, cosine = (table.raw(roles[role]) for role in ("sine", "cosine"))
     present = np.isfinite(true) & np.isfinite(sine) & np.isfinite(cosine)
     channels = _plain(table, sine[present], cosine[present], periods or 1, period)
+    counted = _periods(channels, sine[present], cosine[present], true[present])
+    if counted != channels.periods_per_turn:
+        raise table.error(
+            f"the channels go through {counted} periods in a turn of the reference, not "
+            f"{channels.periods_per_turn}: give --periods-per-turn {counted}",
+            roles["sine"].name,
+        )
     angle, channels = following(channels, sine, cosine, true)
     made = RoleColumn("indicated", _MADE, next(u for u, p in UNIT_PERIODS.items() if p == period))
     kept = {role: column for role, column in roles.items() if role != "error"}
@@ -96,6 +108,19 @@ def _plain(
         periods_per_turn=periods,
         period=period,
     )
+
+
+def _periods(channels: Channels, sine: Array, cosine: Array, reference: Array) -> int:
+    """Periods in a turn of the reference; those stated where the readings are too far apart."""
+    stated = channels.periods_per_turn
+    phase = stated / channels.period * channels.angle(sine, cosine)
+    moved = np.diff(reference) / channels.period
+    steps = wrap(np.diff(phase), 1.0)
+    travel = float(np.abs(moved).sum())
+    if travel < 1.0 / stated or np.abs(steps).max(initial=0.0) > _DENSE:
+        return stated
+    counted = abs(float(np.sign(moved) @ steps)) / travel
+    return round(counted) if abs(counted - round(counted)) < _WHOLE else stated
 
 
 def following(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.errors import ArgumentError
+from trueangle.errors import ArgumentError, FileError, NoModelError
 
 
 def table(periods, sign, zero, n=3000, seed=0, shaft=0.0, noise=1e-3):
@@ -89,3 +89,36 @@ def test_measured_channels_are_as_good_as_the_angle_of_the_chip(data_dir):
     chip = [run for run in ta.read_runs(file) if run.label == "xs_300u"]
     assert found.model.channels.direction == -1
     assert found.residual_std < 1.1 * ta.fit(chip, orders=range(1, 9)).residual_std
+
+
+def turn_of(periods=1, clip=math.inf, sign=1):
+    x = np.arange(0.0, 720.0, 0.6)
+    phase = sign * periods * np.radians(x)
+    rng = np.random.default_rng(3)
+    sine, cosine = (
+        np.clip(v + 1e-3 * rng.normal(size=x.size), -clip, clip)
+        for v in (np.sin(phase), np.cos(phase))
+    )
+    return {"reference_deg": x, "sine": sine, "cosine": cosine}
+
+
+def test_clipped_channels_are_said_and_too_few_readings_refused():
+    with pytest.raises(NoModelError, match=r"not at a rail \(clipped\), and 12 are needed"):
+        ta.fit(turn_of(clip=0.6), orders=[])
+    notes = ta.fit(turn_of(clip=0.9), orders=[]).notes
+    for role in ("sine", "cosine"):
+        assert sum(f"of the {role} channel are at its rail (clipped)" in n for n in notes) == 1
+    assert not any("rail" in note for note in ta.fit(turn_of(), orders=[]).notes)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_phase_that_falls_is_said(sign):
+    notes = ta.fit(turn_of(sign=sign), orders=[]).notes
+    assert any("falls as the angle rises" in note for note in notes) == (sign < 0)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_periods_that_the_reference_counts_are_asked_for(sign):
+    with pytest.raises(FileError, match="3 periods in a turn .* give --periods-per-turn 3"):
+        ta.fit(turn_of(periods=3, sign=sign), orders=[])
+    assert ta.fit(turn_of(3, sign=sign), [], periods_per_turn=3).model.channels is not None
