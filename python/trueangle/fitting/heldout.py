@@ -196,9 +196,11 @@ def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
     if len(train) > 1:
         check_new_run(others, travel, chosen)
     mean, _ = others.among(chosen, travel, beside)
-    shaft = Shaft("output", 1.0, chosen, tuple(mean[::2].tolist()), tuple(mean[1::2].tolist()))
+    pairs = zip(chosen, *mean.reshape(-1, 2).T.tolist(), strict=True)
+    # An order need not be a whole number: each is the first of a shaft of its own.
+    lines = [Shaft(f"order {k:g}", k, (1,), (a,), (b,)) for k, a, b in pairs]
     constant = fit.bare_model.constant
-    return HarmonicModel((shaft,), constant, problem.period, problem.argument)
+    return HarmonicModel(tuple(lines), constant, problem.period, problem.argument)
 
 
 def _refit(
