@@ -191,16 +191,16 @@ def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
     chosen = others.carriers(travel, beside)
     if not chosen:
         raise NoOrderError("no order is supported by the other runs")
+    # An order need not be a whole number: each is the first of a shaft of its own.
+    lines = {f"order {k:g}": k for k in chosen}
     if fit.known is None:
-        return _refit(fit, train, {"output": chosen}, shafts)
+        return _refit(fit, train, dict.fromkeys(lines, (1,)), lines)
     if len(train) > 1:
         check_new_run(others, travel, chosen)
     mean, _ = others.among(chosen, travel, beside)
-    pairs = zip(chosen, *mean.reshape(-1, 2).T.tolist(), strict=True)
-    # An order need not be a whole number: each is the first of a shaft of its own.
-    lines = [Shaft(f"order {k:g}", k, (1,), (a,), (b,)) for k, a, b in pairs]
-    constant = fit.bare_model.constant
-    return HarmonicModel(tuple(lines), constant, problem.period, problem.argument)
+    pairs = zip(lines.items(), mean.reshape(-1, 2).tolist(), strict=True)
+    found = tuple(Shaft(name, k, (1,), (a,), (b,)) for (name, k), (a, b) in pairs)
+    return HarmonicModel(found, fit.bare_model.constant, problem.period, problem.argument)
 
 
 def _refit(

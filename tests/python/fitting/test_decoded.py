@@ -119,6 +119,6 @@ def test_a_phase_that_falls_is_said(sign):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_periods_that_the_reference_counts_are_asked_for(sign):
-    with pytest.raises(FileError, match="3 periods in a turn .* give --periods-per-turn 3"):
+    with pytest.raises(FileError, match=r"3 periods in a turn .* give --periods-per-turn 3"):
         ta.fit(turn_of(periods=3, sign=sign), orders=[])
     assert ta.fit(turn_of(3, sign=sign), [], periods_per_turn=3).model.channels is not None

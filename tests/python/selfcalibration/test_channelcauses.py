@@ -140,7 +140,7 @@ def test_the_commands_state_the_sentence(tmp_path, capsys):
 
 @pytest.mark.parametrize("known", [True, False])
 def test_moved_stages_are_named(data_dir, known):
-    """RM44: each run against the first of its stage; nothing here was fitted to these runs."""
+    """RM44: each run against the first of its stage."""
     wanted = {"xd": "magnet_eccentricity", "zs": "gap"}
     table = np.genfromtxt(
         data_dir / "rm44_channels.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
