@@ -1,8 +1,8 @@
 """Selection of orders on measured data, and its command."""
 
 import importlib.util
-import math
 import json
+import math
 
 import numpy as np
 import pytest
