@@ -49,8 +49,7 @@ type Estimated<'py> = (
     Vec<Option<Alone>>,
 );
 
-pub(super) const LOST: &str =
-    "no evidence can be computed: a covariance is not positive by rounding";
+const LOST: &str = "no evidence can be computed: a covariance is not positive by rounding";
 
 /// Readings of runs, and the orders that are tested.
 #[pyclass(name = "Evidence", module = "trueangle._core", frozen)]
