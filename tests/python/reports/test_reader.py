@@ -15,7 +15,7 @@ BROWSER = find_browser()
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium installed: .ci/browser")
 
 #: Height of the page of a measured joint with a diagnosis, in pixels at this width, and its bytes.
-WIDTH, HIGHEST, LARGEST = 1280, 6000, 500_000
+WIDTH, HIGHEST, LARGEST = 1280, 6000, 600_000
 
 #: Questions on a joint, and what answers each; those of a section after one click on its link.
 QUESTIONS = {
