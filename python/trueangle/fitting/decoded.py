@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import ArgumentError
-from ..runs.channelangle import common_channels
+from ..runs.channelangle import common_channels, following
 from ..runs.run import CalibrationRun
 
 
@@ -27,7 +27,6 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
         return list(runs)
     # Few runs have channels.
     from ..estimation.referencedchannels import referenced_channels
-    from ..runs.channelangle import following
 
     first = given[0]
     kinds = {c and (c.direction, c.periods_per_turn, c.period) for c in given}

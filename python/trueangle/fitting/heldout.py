@@ -25,7 +25,6 @@ from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..support.arrays import Array
 from ..support.plainresult import ShownResult
 from .mixture import check_new_run
-from .orders.table import LEFT_OUT
 from .orders.zerogroups import some_angles
 from .robust import Loss
 
@@ -175,8 +174,8 @@ def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
         The other runs support no order.
     """
     train = [run for i, run in enumerate(fit.runs) if i not in fold]
-    shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.problem.shafts}
     if fit.evidence is None:
+        shafts = {shaft.name: shaft.cycles_per_turn for shaft in fit.problem.shafts}
         orders = {shaft.name: shaft.orders for shaft in fit.problem.shafts}
         return _refit(fit, train, orders, shafts)
     estimate = fit.evidence.estimate
@@ -187,7 +186,7 @@ def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
     problem = fit.problem
     kept = [angles for i, angles in enumerate(problem.angles) if i not in fold]
     travel = some_angles(kept, problem.period)
-    beside = [row.order for row in fit.evidence.table if row.verdict in LEFT_OUT]
+    beside = fit.evidence.left_out
     chosen = others.carriers(travel, beside)
     if not chosen:
         raise NoOrderError("no order is supported by the other runs")

@@ -21,7 +21,6 @@ from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
 from ..support.arrays import Array
 from .orders.result import OrderSelection
-from .orders.table import LEFT_OUT
 from .orders.zerogroups import some_angles
 from .problem import PlainSolution, Problem, SolvedProblem
 from .robust import FAR, RobustFit, given_weights, without_spikes
@@ -130,7 +129,7 @@ def _fitted(
     # Orders of shafts and of the estimate differ by rounding.
     named = [next((k for k in estimate.told if math.isclose(k, m)), m) for m in wanted]
     # What is left out on purpose is left out: no other order holds it.
-    beside = [row.order for row in selection.table if row.verdict in LEFT_OUT]
+    beside = selection.left_out
     mean, covariance = estimate.among(named, travel, beside)
     offsets, means, squares = [], [], 0.0
     for index, (run, weight) in enumerate(zip(problem.runs, weights, strict=True)):

@@ -151,6 +151,11 @@ class OrderTable(PlainResult):
         return {shaft: tuple(orders) for shaft, orders in found.items()}
 
     @property
+    def left_out(self) -> list[float]:
+        """Orders that are in the error and that no model shall have."""
+        return [row.order for row in self.table if row.verdict in LEFT_OUT]
+
+    @property
     def is_of_all_readings(self) -> bool:
         """Whether the estimate took every reading, and its coefficients are the best."""
         return self.estimate is not None and self.estimate.readings == self.samples
