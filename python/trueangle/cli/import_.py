@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..support.display_units import error_unit
-from ..support.layout import counted
+from ..support.layout import counted, laid_out
 from ..support.plainresult import json_text
 from .export import add_target_options, target_options
 from .options import add_errors_in, add_model_output, errors_in
@@ -69,6 +69,8 @@ def run(args: argparse.Namespace) -> int:
             f"  order {row['order']:g}: {shown.text(row['amplitude_arcsec'])} at "
             f"{row['phase_deg']:.1f} deg"
         )
+    if model.fit and model.fit.note:
+        print(laid_out([f"note: {model.fit.note}"]))
     return 0
 
 

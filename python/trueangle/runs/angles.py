@@ -106,8 +106,9 @@ def find_run_angles(
     def error(problem: str, name: str) -> FileError:
         return FileError(path, problem, line=1, column=name)
 
+    counts = {"reference": counts_per_turn_reference, "indicated": counts_per_turn}
     found = {
-        role: roles[role]._replace(unit=roles[role].unit or unit)
+        role: roles[role]._replace(unit=roles[role].unit or ("count" if counts.get(role) else unit))
         for role in ("reference", "indicated", "error")
         if role in roles
     }
@@ -128,7 +129,6 @@ def find_run_angles(
     if first.role == "reference" and "indicated" in found:
         indicated = found["indicated"]
         found["indicated"] = indicated._replace(unit=indicated.unit or first.unit)
-    counts = {"reference": counts_per_turn_reference}
     for role, column in found.items():
         if column.unit is None:
             raise error(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
@@ -130,9 +129,9 @@ class CalibrationRun:
         put(self, "period", check_period(self.period))
         put(self, "indicated_sign", checked_sign(self.indicated_sign))
         reference = signal_column("reference", self.reference, None)
-        put(self, "reference", reference)
         indicated = signal_column("indicated", self.indicated, reference.size)
-        put(self, "indicated", _resolved(indicated, reference, self.period))
+        put(self, "reference", _resolved(reference, indicated, self.period))
+        put(self, "indicated", _resolved(indicated, self.reference, self.period))
         for name in (*FIELDS, "weights"):
             values = getattr(self, name)
             if values is not None:
@@ -299,16 +298,21 @@ def runs_or_data(data: Any) -> tuple[list[CalibrationRun] | None, Any]:
     return list(data), data
 
 
-def _resolved(indicated: Array, reference: Array, period: float) -> Array:
-    """Readings, of which those that a double does not resolve to a period are half of one off.
+#: Turns whose fractions a double resolves to a 4096th.
+_RESOLVED = 2.0**40
+
+
+def _resolved(angle: Array, other: Array, period: float) -> Array:
+    """Angles, of which those that a double does not resolve within a turn are half of one off.
 
     Such a number (1e300) is no angle: whatever it wraps to is rounding, which could pass for a
-    good reading. Half a period off it is an outlier to every test.
+    good reading. Half a period off the ``other`` angle it is an outlier to every test.
     """
-    size, most = np.abs(indicated), period / sys.float_info.epsilon
+    size, most = np.abs(angle), _RESOLVED * period
     if size.max() <= most:
-        return indicated
-    resolved = np.where(size > most, reference + 0.5 * period, indicated)
+        return angle
+    beside = np.where(np.abs(other) > most, 0.0, other)
+    resolved = np.where(size > most, beside + 0.5 * period, angle)
     resolved.flags.writeable = False
     return resolved
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.cli import main
 
 SEED = 92_400
 STEP, GAIN = 360.0 / 65536.0, 0.6072
@@ -128,7 +129,7 @@ def test_a_lookup_of_a_mechaduino_is_known_to_its_last_digit_of_a_degree(decimal
 
 
 @pytest.mark.parametrize(("zero", "noise"), [(41.5, 0.006), (-163.0, 0.013), (179.8, 0.02)])
-def test_a_measured_lookup_keeps_its_zero_and_its_noise_is_smoothed(zero, noise, tmp_path):
+def test_a_measured_lookup_keeps_its_zero_and_its_noise_is_smoothed(zero, noise, tmp_path, capsys):
     """Noise of about an entry makes angles go backward: they are smoothed, and it is reported."""
     rng = np.random.default_rng(8)
     read = np.arange(16384) * (360.0 / 16384)
@@ -141,6 +142,9 @@ def test_a_measured_lookup_keeps_its_zero_and_its_noise_is_smoothed(zero, noise,
     off = np.mod(np.asarray(model.correct(read)) - true + 180.0, 360.0) - 180.0
     assert np.abs(off).max() < 2.0 * noise
     assert "go backward" in model.fit.note
+    assert main(["import", str(path), "--from", "mechaduino", "-o", str(tmp_path / "m.json")]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert f"note: {model.fit.note}" in printed
     path.write_text(f"const PROGMEM float lookup[] = {{\n{', '.join(map(str, table[::-1]))}\n}};\n")
     with pytest.raises(ta.TrueAngleError, match="do not go once around"):
         ta.import_model(path, "mechaduino")

@@ -50,6 +50,37 @@ def test_one_outlier_is_one():
     assert "1 outlier set aside" in told
 
 
+#: Degrees by which one reading is wrong, or what stands in its place.
+WRONG = (2.5, -11.0, 47.0, 180.0, -1e3, 1e9, -1e18, 1.5e300)
+
+
+@pytest.mark.parametrize("column", ["reference", "indicated"])
+@pytest.mark.parametrize("at", [0, 33, 58, 59])
+def test_one_reading_that_is_wrong_by_anything_moves_nothing(column, at):
+    """`fit`, which chooses the orders, sets it aside; `check` names its row and no other fault."""
+
+    def runs(wrong):
+        rng = np.random.default_rng(57)
+        for label in "abcd":
+            theta = np.sort(rng.uniform(0.0, 360.0, 60))
+            error = 0.08 * np.sin(np.radians(theta + 70.0)) + 0.03 * np.sin(np.radians(3 * theta))
+            angles = {"reference": theta, "indicated": theta + error + 1e-3 * rng.normal(size=60)}
+            if label == "b":
+                old = angles[column][at]
+                angles[column][at] = old + wrong if abs(wrong) < 1e6 else wrong
+            yield ta.CalibrationRun(**angles, period=360.0, label=label)
+
+    good = ta.fit(list(runs(0.0)))
+    for wrong in WRONG:
+        given = list(runs(wrong))
+        (fault,) = ta.check(given).data_faults
+        assert (fault.fault, fault.rows) == ("outliers", (at + 1,)), wrong
+        fit = ta.fit(given)
+        assert fit.wild == (("b", at),), wrong
+        assert fit.orders == good.orders
+        np.testing.assert_allclose(fit.amplitudes, good.amplitudes, rtol=0.02)
+
+
 @pytest.mark.parametrize("noise", ["normal", "none", "counts"])
 def test_clean_data_are_plain_least_squares(noise):
     rng = np.random.default_rng(13)

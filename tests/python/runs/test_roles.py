@@ -429,6 +429,19 @@ def test_every_column_has_its_own_unit_and_counts(reference, indicated, offset):
     np.testing.assert_allclose(run.indicated / run.period, said, atol=1e-12)
 
 
+def test_counts_of_a_turn_are_of_the_column_whose_unit_nothing_states():
+    """Else it has the unit of the reference."""
+    true = np.arange(0.0, 6.0, 0.1)
+    table = {"reference_rad": true, "enc": np.round(true * 5000 / (2.0 * np.pi))}
+    (run,) = ta.read_runs(table, signals={"indicated": "enc"}, counts_per_turn=5000)
+    np.testing.assert_allclose(run.indicated, true, atol=np.pi / 5000)
+    (run,) = ta.read_runs(table, signals={"indicated": "enc"})
+    assert run.indicated.tolist() == table["enc"].tolist()
+    table = {"step": true, "indicated_turn": true}
+    (run,) = ta.read_runs(table, signals={"reference": "step"}, counts_per_turn_reference=2.5)
+    np.testing.assert_allclose(run.reference / run.period, true / 2.5)
+
+
 @pytest.mark.parametrize("start", [0.0, 351.0])
 def test_uneven_facets_are_matched_within_a_hundredth_of_their_closest_two(start, tmp_path):
     """Two facets are 5 deg apart, so a reading may be 0.05 deg off any of them."""

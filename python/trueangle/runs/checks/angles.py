@@ -221,6 +221,9 @@ def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:
         spread = 1.4826 * float(median(np.abs(slip - median(slip))))
         typical = float(median(np.abs(ahead)))
         jumps = np.flatnonzero(np.abs(slip) > max(20.0 * spread, 10.0 * typical, LEAST_JUMP))
+        # One wild reading is no wrap: readings follow each.
+        alone = np.diff([0, *jumps + 1, len(record)]) < 2
+        jumps = jumps[~(alone[:-1] | alone[1:])]
         if jumps.size == 0:
             continue
         # A wrap falls from one end of the range to the other.

@@ -123,6 +123,11 @@ def test_a_reference_that_wraps_at_no_turn() -> None:
     slip = angle + np.where(angle > 200.0, -90.0, 0.0)
     assert not list(wrapped_reference([record(slip, angle)]))
     assert not list(wrapped_reference([record(np.mod(angle, 180.0), np.mod(angle, 180.0))]))
+    # One reading that is wrong is none either, wherever it is.
+    for at in (0, 1, 200, 398, 399):
+        for wrong in (-1e3, 1e9):
+            one = np.where(np.arange(400) == at, wrong, angle)
+            assert not list(wrapped_reference([record(one, angle)]))
 
 
 def test_a_reference_much_noisier_than_the_joint() -> None:
