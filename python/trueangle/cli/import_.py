@@ -58,19 +58,16 @@ def run(args: argparse.Namespace) -> int:
         }
         print(json_text(content))
         return 0
-    print(
-        f"{args.output}: {counted(rows, 'order')}, "
-        f"zero {zero_text(model.constant * 360.0 / model.period, 360.0)}"
-    )
     largest = max((row["amplitude_arcsec"] for row in rows), default=0.0)
     shown = error_unit(errors_in(args), largest, model.period)
+    zero = zero_text(model.constant * 360.0 / model.period, 360.0)
+    lines = [f"{args.output}: {counted(rows, 'order')}, zero {zero}"]
     for row in sorted(rows, key=lambda row: -row["amplitude_arcsec"])[:_SHOWN]:
-        print(
-            f"  order {row['order']:g}: {shown.text(row['amplitude_arcsec'])} at "
-            f"{row['phase_deg']:.1f} deg"
-        )
+        amplitude, phase = shown.text(row["amplitude_arcsec"]), row["phase_deg"]
+        lines.append(f"  order {row['order']:g}: {amplitude} at {phase:.1f} deg")
     if model.fit and model.fit.note:
-        print(laid_out([f"note: {model.fit.note}"]))
+        lines.append(f"note: {model.fit.note}")
+    print(laid_out(lines))
     return 0
 
 

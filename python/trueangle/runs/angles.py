@@ -121,20 +121,13 @@ def find_run_angles(
             found["error"].name,
         )
     first = found.get("reference") or found["indicated"]
-    if first.unit is None:
-        raise error(
-            f"its unit is not known; give it: {role_code(first.role, first.name, 'deg')}",
-            first.name,
-        )
     if first.role == "reference" and "indicated" in found:
         indicated = found["indicated"]
         found["indicated"] = indicated._replace(unit=indicated.unit or first.unit)
     for role, column in found.items():
         if column.unit is None:
-            raise error(
-                f"its unit is not known; give it: {role_code(role, column.name, 'arcsec')}",
-                column.name,
-            )
+            wanted = role_code(role, column.name, "arcsec" if role == "error" else "deg")
+            raise error(f"its unit is not known; give it: {wanted}", column.name)
         if column.unit == "count" and counts.get(role, counts_per_turn) is None:
             raise error(
                 "a reference in counts needs their number per turn: give "

@@ -298,21 +298,17 @@ def runs_or_data(data: Any) -> tuple[list[CalibrationRun] | None, Any]:
     return list(data), data
 
 
-#: Turns whose fractions a double resolves to a 4096th.
-_RESOLVED = 2.0**40
-
-
 def _resolved(angle: Array, other: Array, period: float) -> Array:
     """Angles, of which those that a double does not resolve within a turn are half of one off.
 
     Such a number (1e300) is no angle: whatever it wraps to is rounding, which could pass for a
     good reading. Half a period off the ``other`` angle it is an outlier to every test.
     """
-    size, most = np.abs(angle), _RESOLVED * period
-    if size.max() <= most:
+    most = 2.0**40 * period  # of so many turns a double resolves a 4096th
+    wild = np.abs(angle) > most
+    if not wild.any():
         return angle
-    beside = np.where(np.abs(other) > most, 0.0, other)
-    resolved = np.where(size > most, beside + 0.5 * period, angle)
+    resolved = np.where(wild, np.where(np.abs(other) > most, 0.0, other) + 0.5 * period, angle)
     resolved.flags.writeable = False
     return resolved
 

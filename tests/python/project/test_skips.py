@@ -1,6 +1,9 @@
 """Every reason for a skip belongs to a list, so that no job fails on one nobody listed."""
 
 import ast
+import re
+import sys
+import tomllib
 
 import pytest
 
@@ -33,6 +36,45 @@ def test_every_reason_is_on_a_list():
     listed = expected_skips("darwin", "win32", "linux", "partial")
     known = [f"{place}: {reason}" for place, reason in found if not listed.search(reason)]
     assert known == []
+
+
+#: Distributions whose modules have other names, and those that others bring.
+DISTRIBUTIONS = {
+    "can": "python-can",
+    "distributed": "dask",
+    "markupsafe": "jinja2",
+    "serial": "pyserial",
+    "sklearn": "scikit-learn",
+}
+
+
+def imported():
+    """Modules that `pytest.importorskip` asks for by name."""
+    for path in sorted(TESTS.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            called = isinstance(node, ast.Call) and ast.unparse(node.func)
+            if called == "pytest.importorskip" and isinstance(node.args[0], ast.Constant):
+                yield str(node.args[0].value)
+
+
+def test_every_module_asked_for_comes_with_the_extra_or_its_lack_is_on_a_list():
+    """What only POSIX has is on the list of Windows; ours need what an extra brings."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras, here, pending = project["optional-dependencies"], set(), ["trueangle[test]"]
+    while pending:
+        name, _, more = pending.pop().partition("[")
+        here.add(re.split("[^a-z0-9.-]", name.lower())[0])
+        if name == "trueangle":
+            pending += [entry for one in more.rstrip("]").split(",") for entry in extras[one]]
+    unknown = []
+    for module in set(imported()):
+        top = module.partition(".")[0]
+        if top in sys.stdlib_module_names:
+            known = expected_skips("win32", "partial").search(f"could not import '{module}'")
+        else:
+            known = DISTRIBUTIONS.get(top, top).replace("_", "-") in here or module in here
+        unknown += [] if known else [module]
+    assert unknown == []
 
 
 @pytest.mark.parametrize(
