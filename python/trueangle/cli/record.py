@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from pathlib import Path
 
 from .ending import put_off_ending
 from .options import add_errors_in, add_runs_output, errors_in
@@ -11,7 +12,6 @@ from .signal_options import add_signals, signals_of_both
 from .source_options import (
     SOURCES,
     add_source_options,
-    sent_text,
     source_argument,
     source_options,
 )
@@ -60,26 +60,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Record, print what was recorded."""
     from ..errors import ArgumentError
-    from ..recording.columns import Counts
-    from ..recording.record import Choices, record
+    from ..recording.output import RunsFile
+    from ..recording.recording import Choices, record
     from ..recording.screen import Screen
 
     if args.rate is not None and not 0.0 < args.rate < math.inf:
         raise ArgumentError(f"--rate must be positive, got {args.rate!r}")
     choices = Choices(
         signals_of_both(args.signal),
-        Counts(args.counts_per_turn, args.counts_per_turn_reference),
         source_options(args),
-        args.pattern,
-        args.label,
-        sent_text(args),
-        args.append,
+        (args.counts_per_turn, args.counts_per_turn_reference),
         args.rate,
-        args.seconds,
+        math.inf if args.seconds is None else args.seconds,
         args.until,
     )
     screen = Screen(args.progress, errors_in(args))
     with put_off_ending() as stopped:
-        found = record(args.sources, args.output, choices, screen, stopped)
-        print("\n".join(screen.summary(found.recording)), flush=True)
-    return ENDED if found.ended == "source" else 0
+        file = RunsFile(Path(args.output), args.label, args.append)
+        recording, ended = record(args.sources, file, choices, screen.show, stopped)
+        print("\n".join(screen.summary(recording)), flush=True)
+    return ENDED if ended == "source" else 0

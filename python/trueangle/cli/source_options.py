@@ -20,9 +20,10 @@ SOURCES = (
 
 def source_argument(text: str) -> str:
     """A source as it is typed: an input where it is a file that is there."""
-    from ..recording.sources import is_live
+    from ..recording.sources import kind_of
 
-    return Input(text) if os.path.exists(text) and not is_live(text) else text
+    is_live = kind_of(text) not in ("file", "")
+    return Input(text) if os.path.exists(text) and not is_live else text
 
 
 def add_source_options(parser: argparse.ArgumentParser) -> None:
@@ -55,9 +56,4 @@ def source_options(args: argparse.Namespace) -> SourceOptions:
     from ..recording.sources import SourceOptions
 
     fields = tuple(name.lstrip("-") for _joint, _role, name, _unit in args.signal or ())
-    return SourceOptions(args.baud or 115200, args.dbc, fields)
-
-
-def sent_text(args: argparse.Namespace) -> str | None:
-    """What is sent to the device, a line."""
-    return None if args.send is None else f"{args.send}\n"
+    return SourceOptions(args.baud or 115200, args.dbc, fields, args.pattern, args.send)

@@ -20,7 +20,6 @@ from .signal_options import add_signals, reading_options
 from .source_options import (
     SOURCES,
     add_source_options,
-    sent_text,
     source_argument,
     source_options,
 )
@@ -152,8 +151,7 @@ def _batches(
             args, ("baud", "dbc", "pattern", "send"), "is for lines that arrive: SOURCE is a file"
         )
         return read_batches(Path(args.log), model, options)
-    source = source_options(args)
-    return watched_batches(args.log, model, options, source, args.pattern, sent_text(args))
+    return watched_batches(args.log, model, options, source_options(args))
 
 
 def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace) -> str:

@@ -6,20 +6,21 @@ import math
 import threading
 import time
 from collections import deque
-from itertools import chain
+from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from ..support.arrays import Array
-from .lines import LineLayout, layout_of, layout_of_names
-from .sources import Source
+from .lines import layout_of, layout_of_columns, layout_of_pattern
+from .sources import Source, SourceOptions
 
-#: Seconds between two reads of a fast source, and seconds of silence after which a line is whole.
-PAUSE: Final = 0.002
+#: Seconds between two reads of a fast source, between two looks at what was read, and of silence
+#: after which a line is whole.
+_PAUSE: Final = 0.002
+TICK: Final = 0.05
 _SILENCE: Final = 0.02
-#: Seconds that a read waits, and after which a layout is found by the lines there are.
-_WAIT: Final = 0.1
+#: Seconds after which a layout is found by the lines there are.
 _HURRY: Final = 0.2
 #: Seconds between two times at least: those of a run differ.
 _STEP: Final = 1e-6
@@ -31,20 +32,14 @@ _LOOKED_AT: Final = 200
 
 
 class Rows(NamedTuple):
-    """Rows of one source.
+    """Rows of one source, shape (n, columns), and the seconds of their arrival."""
 
-    Attributes
-    ----------
-    texts : list of sequences of bytes
-        Cells as they came.
-    values : ndarray, shape (n, columns)
-    time : ndarray
-        Seconds of arrival.
-    """
-
-    texts: list[Any]
     values: Array
     time: Array
+
+    def at(self, places: Any) -> Rows:
+        """Those at some places: numbers or truth values."""
+        return Rows(self.values[places], self.time[places])
 
 
 class Arrivals:
@@ -54,8 +49,8 @@ class Arrivals:
     ----------
     source : Source
         Opened; closed by `close`.
-    layout : LineLayout, optional
-        Else it is found by the first lines.
+    options : SourceOptions
+        With the pattern of its lines, and what is sent to it.
     start : float
         Of the clock (`time.monotonic`) from which seconds count.
 
@@ -67,17 +62,22 @@ class Arrivals:
         What ended the source, where it did not end by itself.
     """
 
-    def __init__(self, source: Source, layout: LineLayout | None, start: float) -> None:
-        self.source, self.layout = source, layout or layout_of_names(source.names)
+    def __init__(self, source: Source, options: SourceOptions, start: float) -> None:
+        self.source = source
+        self.layout = None if options.pattern is None else layout_of_pattern(options.pattern)
+        if source.names:
+            self.layout = layout_of_columns("CSV", source.names)
+        if options.send is not None:
+            source.send(f"{options.send}\n".encode())
         self.rejected: list[bytes] = []
         self.problem: OSError | None = None
         self._start, self._opened = start, time.monotonic()
         self._read: deque[tuple[float, bytes]] = deque()
-        self._waiting: list[tuple[bytes, float]] = []
-        self._tail = b""
-        self._partial = False
+        self._lines: list[bytes] = []
+        self._times: list[float] = []
+        self._tail, self._partial = b"", False
         self._before, self._stamp = math.nan, -math.inf
-        self._intervals = [0, 0.0, 0.0]  # lines, and sums of their intervals and squares
+        self._intervals = np.zeros(3)  # lines, and sums of their intervals and squares
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
@@ -95,10 +95,9 @@ class Arrivals:
     @property
     def jitter(self) -> float:
         """Standard deviation of a time of arrival, seconds, were the lines sent evenly."""
-        count, total, squares = self._intervals
-        if count < 2:
-            return math.nan
-        return math.sqrt(max(squares / count - (total / count) ** 2, 0.0) / 2.0)
+        count, total, squares = self._intervals.tolist()
+        spread = squares / count - (total / count) ** 2 if count > 1 else math.nan
+        return math.sqrt(max(spread, 0.0) / 2.0)
 
     def close(self) -> None:
         """Stop reading; what has been read can still be taken."""
@@ -109,40 +108,41 @@ class Arrivals:
 
     def _work(self) -> None:
         before = 0.0
-        while not self._stopped.is_set():
-            try:
-                data = self.source.read(_WAIT)
-            except OSError as error:
-                self.problem = error
-                return
-            if data is None:
-                return
-            now = time.monotonic()
-            if data:
-                self._read.append((now, data))
-                if now - before < 2.0 * PAUSE:  # many lines in one read are cheaper
-                    time.sleep(PAUSE)
-                before = now
+        try:
+            while not self._stopped.is_set() and (data := self.source.read()) is not None:
+                now = time.monotonic()
+                if data:
+                    self._read.append((now, data))
+                    if now - before < 2.0 * _PAUSE:  # many lines in one read are cheaper
+                        time.sleep(_PAUSE)
+                    before = now
+        except OSError as error:
+            self.problem = error
+
+    def batches(self) -> Iterator[Rows]:
+        """Rows until the source ends, none where none are known by a look."""
+        over = False
+        while not over:
+            over = self.is_over and not self._read
+            yield self.take() if self.look() else Rows(np.empty((0, 0)), np.empty(0))
+            if not (over or self._read):
+                time.sleep(TICK)
 
     def look(self) -> bool:
         """Take lines apart that have arrived; whether their layout is known by now."""
-        over = not self._thread.is_alive()
-        while self._read and len(self._waiting) < _BATCH:
+        over = self.is_over
+        while self._read and len(self._lines) < _BATCH:
             self._split(*self._read.popleft())
-        if (
-            over and not self._read and self._tail and not self._stopped.is_set()
-        ):  # no line: it was not ended
-            self.rejected.append(self._tail)
+        if over and not self._read and self._tail and not self._stopped.is_set():
+            self.rejected.append(self._tail)  # no line: it was not ended
             self._tail = b""
-        if self.layout is None and self._waiting:
-            lines = [line for line, _time in self._waiting[:_LOOKED_AT]]
-            waited = time.monotonic() - self._start - self._waiting[0][1]
-            self.layout = layout_of(lines, over or waited > _HURRY)
-            if self.layout is None and (over or len(self._waiting) > _LOOKED_AT):
-                kept = 0 if over else _LOOKED_AT // 2  # the oldest are not looked at again
-                gone = len(self._waiting) - kept
-                self.rejected += [line for line, _time in self._waiting[:gone]]
-                del self._waiting[:gone]
+        if self.layout is None and self._lines:
+            waited = time.monotonic() - self._start - self._times[0]
+            self.layout = layout_of(self._lines[:_LOOKED_AT], over or waited > _HURRY)
+            if self.layout is None and (over or len(self._lines) > _LOOKED_AT):
+                gone = len(self._lines) - (0 if over else _LOOKED_AT // 2)
+                self.rejected += self._lines[:gone]  # the oldest are not looked at again
+                del self._lines[:gone], self._times[:gone]
         return self.layout is not None
 
     def _split(self, now: float, data: bytes) -> None:
@@ -154,9 +154,9 @@ class Arrivals:
         seconds = now - self._start
         if math.isnan(self._before):
             self._partial = self.source.midway and now - self._opened < _SILENCE
-        *lines, self._tail = (
-            (self._tail + data).replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
-        )
+            self._before = seconds
+        data = (self._tail + data).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        *lines, self._tail = data.split(b"\n")
         if len(self._tail) > _LONGEST:
             lines.append(self._tail)
             self._tail = b""
@@ -164,41 +164,25 @@ class Arrivals:
             self.rejected.append(lines.pop(0))
             self._partial = False
         if not lines:
-            self._before = seconds if math.isnan(self._before) else self._before
             return
-        step, within = 0.0, len(lines) - 1
-        if not math.isnan(self._before):
-            gap, (count, total, _) = seconds - self._before, self._intervals
-            step = min(gap / len(lines), total / count if count else gap)
-            self._intervals[0] += len(lines)
-            self._intervals[1] += gap
-            self._intervals[2] += within * step**2 + (gap - within * step) ** 2
+        gap, (count, total, _), within = seconds - self._before, self._intervals, len(lines) - 1
+        step = min(gap / len(lines), total / count if count else gap)
+        if gap > 0.0:
+            squares = within * step**2 + (gap - within * step) ** 2
+            self._intervals += len(lines), gap, squares
         first = max(seconds - within * max(step, _STEP), self._stamp + _STEP)
         step = max((seconds - first) / max(within, 1), _STEP)
-        self._waiting += [(line, first + i * step) for i, line in enumerate(lines)]
-        self._before, self._stamp = seconds, first + within * step
+        self._lines += lines
+        self._times += [first + i * step for i in range(len(lines))]
+        self._before, self._stamp = seconds, self._times[-1]
 
     def take(self) -> Rows:
         """Rows that arrived until the last look, whose layout is known."""
         assert self.layout is not None
-        lines = [line for line, _ in self._waiting]
-        texts: list[Any] = self.layout.rows(lines)
-        times = np.array([seconds for _, seconds in self._waiting])
-        self._waiting = []
-        none = [b"nan"] * len(self.layout.names)
-        numbers = map(float, chain.from_iterable(none if row is None else row for row in texts))
-        values = np.fromiter(numbers, float).reshape(len(texts), len(none))
-        good = np.isfinite(values).all(axis=1)
-        if good.all():
-            return Rows(texts, values, times)
-        kept = good.tolist()
-        self.rejected += [
-            line
-            for line, is_row in zip(lines, kept, strict=True)
-            if not is_row and line.strip() and line != self.layout.header
-        ]
-        return Rows(
-            [row for row, is_row in zip(texts, kept, strict=True) if is_row],
-            values[good],
-            times[good],
-        )
+        lines, rows = self._lines, Rows(self.layout.values(self._lines), np.array(self._times))
+        self._lines, self._times = [], []
+        good = np.isfinite(rows.values).all(axis=1)
+        passed = (b"", self.layout.header)
+        wrong = [lines[i] for i in np.flatnonzero(~good)]
+        self.rejected += [line for line in wrong if line.strip() not in passed]
+        return rows.at(good)

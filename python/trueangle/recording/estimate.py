@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from contextlib import suppress
+from itertools import pairwise
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,33 +21,24 @@ from ..support.distributions import chi_squared_quantile
 CELLS: Final = 72
 _HIGHEST: Final = 32
 _CHANCE: Final = 0.01
-#: Part of a turn by which an angle moves back before it has turned round.
-_BACK: Final = 1.0 / 288.0
-#: Turns of travel after which a joint that swings has made one, if it was read everywhere.
-_SWUNG: Final = 2.0
-#: Seconds over which a speed is taken.
+#: Variance of all orders by turns, in that of white noise, from which on noise is not white.
+_COLOURED: Final = 1.5
+#: Turns by which an angle moves before it has another direction, and seconds that make a speed.
+_MOVED: Final = 1.0 / 288.0
 _SPEED: Final = 0.5
 
 
-def places_in_turn(angle: Array, period: float) -> NDArray[np.intp]:
-    """Cells of the turn that angles lie in."""
-    return np.asarray(np.floor(np.mod(angle / period, 1.0) * CELLS).astype(np.intp) % CELLS)
+class LiveOrder(NamedTuple):
+    """One order: its cosine and sine, and their standard error, in the unit of the angles."""
 
+    order: int
+    value: complex
+    std: float
 
-def _coefficients(found: MomentsFit) -> NDArray[np.complex128]:
-    """Cosine and sine of every order that is looked at; 0 of those that were not told apart."""
-    values = np.zeros(_HIGHEST, dtype=complex)
-    values[: found.cosine.size] = found.cosine + 1j * found.sine
-    return values
-
-
-class LiveOrder:
-    """One order: amplitude and standard error in the unit of the angles, phase in degrees."""
-
-    def __init__(self, order: int, value: complex, std: float) -> None:
-        self.order, self.value, self.std = order, value, std
-        self.amplitude = abs(value)
-        self.phase_deg = math.degrees(math.atan2(value.real, value.imag)) % 360.0
+    @property
+    def phase_deg(self) -> float:
+        """Phase of its sine, degrees."""
+        return math.degrees(math.atan2(self.value.real, self.value.imag)) % 360.0
 
 
 class Travel:
@@ -64,60 +57,43 @@ class Travel:
     def __init__(self, period: float) -> None:
         self.cells = np.zeros((2, CELLS), dtype=np.int64)
         self.turns, self.speeds = 0.0, [math.inf, 0.0]
-        self._period, self._direction = period, 0
-        self._last = self._extreme = self._anchor = math.nan
-        self._from: tuple[float, float] | None = None
+        self._period, self._sign = period, 0
+        self._last = self._mark = math.nan
+        self._from = 0.0, 0.0
 
-    def path(self, angle: Array) -> Array:
-        """Angles in turns, without jumps from those before on."""
-        turn = np.asarray(angle) / self._period
-        last = float(turn[0]) if math.isnan(self._last) else self._last
-        return last + np.cumsum(wrap(np.diff(turn, prepend=last), 1.0))
+    def add(self, angle: Array, time: Array) -> NDArray[np.intp]:
+        """Take in angles in the order they were read.
 
-    def add(self, angle: Array, time: Array) -> Array:
-        """Take in angles; the direction of travel at each, 0 before it is known."""
-        path = self.path(angle)
+        Returns
+        -------
+        ndarray of int, shape (3, n)
+            Cell of each, direction (0 at first), and whole turns travelled by it.
+        """
+        turn = angle / self._period
         if math.isnan(self._last):
-            self._extreme = self._anchor = float(path[0])
-        directions = self._directions(path)
-        self._last = float(path[-1])
-        if abs(self._last - self._anchor) > _BACK:
-            self.turns += abs(self._last - self._anchor)
-            self._anchor = self._last
-        places = places_in_turn(path, 1.0)
+            self._last = self._mark = float(turn[0])
+            self._from = self._last, float(time[0])
+        path = self._last + np.cumsum(wrap(np.diff(turn, prepend=self._last), 1.0))
+        steps, before = [], self._sign
+        for place in path.tolist():
+            if abs(place - self._mark) > _MOVED:
+                self._sign = 1 if place > self._mark else -1
+                self.turns += abs(place - self._mark)
+                self._mark = place
+            steps.append((self._sign, int(self.turns)))
+        directions, turns = np.transpose(steps)
+        directions[directions == 0] = self._sign  # it had moved that way already
+        cells = np.floor(path % 1.0 * CELLS).astype(np.intp) % CELLS
         for row, sign in enumerate((1, -1)):
-            self.cells[row] += np.bincount(places[directions == sign], minlength=CELLS)
-        self._take_speed(self._last, float(time[-1]))
-        return directions
-
-    def _directions(self, path: Array) -> Array:
-        """Direction at each place of a path: it turns where it comes back by more than noise."""
-        found, start = np.empty(path.size), 0
-        while start < path.size:
-            part, sign = path[start:], self._direction
-            if sign == 0:
-                moved = np.flatnonzero(np.abs(part - self._extreme) > _BACK)
-                stop = int(moved[0]) if moved.size else part.size
-                new = 0 if not moved.size else int(np.sign(part[stop] - self._extreme))
-            else:
-                tops = np.maximum.accumulate(np.maximum(sign * part, sign * self._extreme))
-                back = np.flatnonzero(tops - sign * part > _BACK)
-                stop, new = (int(back[0]), -sign) if back.size else (part.size, sign)
-                self._extreme = sign * float(tops[min(stop, part.size - 1)])
-            found[start : start + stop] = sign
-            if stop < part.size:
-                self._direction, self._extreme = new, float(part[stop])
-            start += stop
-        return found
-
-    def _take_speed(self, place: float, time: float) -> None:
-        if self._from is None:
-            self._from = place, time
-        elif time - self._from[1] >= _SPEED:
-            speed = abs(place - self._from[0]) / (time - self._from[1])
-            if abs(place - self._from[0]) > _BACK:
-                self.speeds = [min(self.speeds[0], speed), max(self.speeds[1], speed)]
-            self._from = place, time
+            self.cells[row] += np.bincount(cells[directions == sign], minlength=CELLS)
+        self._last = float(path[-1])
+        seconds, far = float(time[-1]) - self._from[1], abs(self._last - self._from[0])
+        if seconds >= _SPEED or self._sign != before:
+            if far > _MOVED and self._sign == before:
+                slow, fast = self.speeds
+                self.speeds = [min(slow, far / seconds), max(fast, far / seconds)]
+            self._from = self._last, float(time[-1])
+        return np.array([cells, directions, turns])
 
     @property
     def covered(self) -> Array:
@@ -134,15 +110,14 @@ class Estimate:
     """The error by place, and its orders with their standard errors, in constant memory.
 
     Orders are those of all readings by least squares, with one zero for each direction. Their
-    standard error is that of white noise or, where turns differ by more than it makes of them,
+    variance is that of white noise or, where turns differ by more than it makes of them,
 
     ::
 
-        s_k² = Σ_w |c_kw - mean|² / (2 n (n - 1))
+        s_k² = Σ_w |c_kw - c_k,w-1|² / (4 n (n - 1))
 
-    with the coefficients c of each of n turns. The orders are settled when the last turn has
-    changed none by more than its standard error; there turns differ by their steps,
-    Σ_w |c_kw - c_k,w-1|² / (4 n (n - 1)), in which a drift does not hide.
+    with the coefficients c of each of n turns: by their steps, in which a drift does not hide.
+    The orders are settled when the last turn has changed none by more than its standard error.
 
     Parameters
     ----------
@@ -155,142 +130,67 @@ class Estimate:
         Those above what noise makes of the largest of all looked at, with 99 %; the strongest
         first.
     turns : int
-        Turns of which each told all orders.
+        Turns of travel that were read everywhere.
     is_settled : bool
     """
 
     def __init__(self, period: float) -> None:
-        self.period, self.travel = period, Travel(period)
+        self.travel = Travel(period)
         self.orders: list[LiveOrder] = []
-        self._values = self._before = np.zeros(_HIGHEST, dtype=complex)
         self.turns, self.is_settled = 0, False
-        self._highest = _HIGHEST
+        self._all, self._turn = (Moments(range(1, _HIGHEST + 1), period=period) for _ in "ab")
+        self._empty, self._seen = self._turn.copy(), np.zeros(CELLS, dtype=bool)
+        self._period, self._zero = period, math.nan
         self._sums = np.zeros((2, CELLS))
-        self._zero = math.nan
-        self._moments, self._window = self._empty(), self._empty()
-        self._seen = np.zeros(CELLS, dtype=bool)
-        self._closed_at, self._from = 0.0, math.nan
-        self._mean = np.zeros(_HIGHEST, dtype=complex)
-        self._last = self._mean.copy()
-        self._scatter, self._steps = np.zeros(_HIGHEST), np.zeros(_HIGHEST)
+        self._values = self._last = np.zeros(_HIGHEST, dtype=complex)
+        self._steps = np.zeros(_HIGHEST)
 
     def add(self, reference: Array, indicated: Array, time: Array) -> None:
         """Take in readings in the order they were taken."""
         error = indicated - reference
         if math.isnan(self._zero):
             self._zero = float(error[0])
-        error = self._zero + wrap(error - self._zero, self.period)
-        path = self.travel.path(reference)
-        start = 0
-        while start < path.size:
-            if math.isnan(self._from):
-                self._from = float(path[0])
-            off = path[start:] - self._from
-            ends = np.flatnonzero(np.abs(off) >= 1.0)
-            stop = start + int(ends[0]) + 1 if ends.size else path.size
-            rows = slice(start, stop)
-            self._take(reference[rows], error[rows], time[rows])
-            swung = self.travel.turns - self._closed_at > _SWUNG
-            if ends.size or swung:
-                self._from += float(np.trunc(off[stop - start - 1]))
-                self._end_turn()
-            start = stop
-
-    def _take(self, reference: Array, error: Array, time: Array) -> None:
-        """Take in readings over part of a turn; judge the orders where they end one."""
-        directions = self.travel.add(reference, time)
-        places = places_in_turn(reference, self.period)
-        self._sums[0] += np.bincount(places, minlength=CELLS)
-        self._sums[1] += np.bincount(places, error, CELLS)
-        for sign in (-1, 1):
-            rows = directions == sign
-            if rows.any():
-                for sums in (self._moments, self._window):
+        error = self._zero + wrap(error - self._zero, self._period)
+        before = int(self.travel.turns)
+        cells, signs, turns = self.travel.add(reference, time)
+        self._sums[0] += np.bincount(cells, minlength=CELLS)
+        self._sums[1] += np.bincount(cells, error, CELLS)
+        ends = (np.flatnonzero(np.diff(turns, prepend=before)) + 1).tolist()
+        for start, stop in pairwise(sorted({0, *ends, error.size})):
+            for sign in {*signs[start:stop].tolist()} - {0}:
+                rows = start + np.flatnonzero(signs[start:stop] == sign)
+                for sums in (self._all, self._turn):
                     sums.update(reference[rows], error[rows], run=sign)
-        self._seen[places] = True
+            self._seen[cells[start:stop]] = True
+            if stop in ends and self._seen.all():
+                with suppress(RankError):  # it goes on until its places tell the orders apart
+                    self._end_turn(self._turn.solve(), self._all.solve())
 
-    def _end_turn(self) -> None:
-        """Take in the turn that has ended, if it was read everywhere; else it goes on."""
-        if not self._seen.all():
-            return
-        found = self._solved(self._window)
-        if found is not None:
-            self._close(_coefficients(found))
-            self._judge()
-        self._window, self._seen = self._empty(), np.zeros(CELLS, dtype=bool)
-        self._closed_at = self.travel.turns
-
-    def _close(self, values: NDArray[np.complex128]) -> None:
-        """Take in the coefficients of one turn."""
+    def _end_turn(self, turn: MomentsFit, found: MomentsFit) -> None:
+        """Find the orders by all readings, and judge whether the last turn has changed them."""
+        self._turn, self._seen = self._empty.copy(), np.zeros(CELLS, dtype=bool)
         self.turns += 1
-        if self.turns > 1:
-            self._steps += np.abs(values - self._last) ** 2
-        off = values - self._mean
-        self._mean, self._last = self._mean + off / self.turns, values
-        self._scatter += np.abs(off) ** 2 * (1.0 - 1.0 / self.turns)
-
-    def _empty(self) -> Moments:
-        return Moments(range(1, _HIGHEST + 1), period=self.period)
-
-    def _solved(self, sums: Moments) -> MomentsFit | None:
-        """Orders of some readings: as many as these tell apart."""
-        while self._highest:
-            try:
-                return sums.solve(range(1, self._highest + 1))
-            except RankError:
-                self._highest //= 2
-        return None
-
-    def _judge(self) -> None:
-        """Find the orders at the end of a turn, and whether it has changed them."""
-        before, known = self._before, {order.order for order in self.orders}
-        self.update()
-        known |= {order.order for order in self.orders}
-        self._before = self._values
-        changes = np.abs(self._values - before)
-        self.is_settled = self.turns > 1 and all(
-            changes[k - 1] <= self._stds[k - 1] for k in known if k <= self._stds.size
-        )
-
-    def update(self) -> None:
-        """Find the orders by all readings so far, after the first whole turn."""
-        if not self.turns:
-            return
-        found = self._solved(self._moments)
-        if found is None:
-            return
-        white = np.diag(found.covariance)[1:].reshape(-1, 2).mean(axis=1)
-        each = 4.0 * self.turns * max(self.turns - 1.0, 1.0)
-        steps, scatter = (x[: white.size] / each for x in (self._steps, 2.0 * self._scatter))
+        more = max(self.turns - 1.0, 1.0)
+        last, self._last = self._last, turn.cosine + 1j * turn.sine
+        self._steps += np.abs(self._last - last) ** 2 * (self.turns > 1)
+        before, known = self._values, {order.order for order in self.orders}
+        self._values = found.cosine + 1j * found.sine
+        white = np.maximum(np.diag(found.covariance)[1:].reshape(-1, 2).mean(axis=1), 1e-300)
+        own = self._steps / (4.0 * self.turns * more)
         # All orders together first: noise of any colour is in each.
-        white = white * self._larger(
-            np.mean(steps / np.maximum(white, 1e-300), keepdims=True), np.ones(1), white.size
-        )
-        self._stds = np.sqrt(self._larger(steps, white))
-        variance = self._larger(scatter, white)
-        least = math.sqrt(-2.0 * math.log(_CHANCE / _HIGHEST))
-        self._values = _coefficients(found)
-        values = self._values[: white.size].tolist()
+        common = float(np.median(own / white))
+        white = white * (common if common > _COLOURED else 1.0)
+        limit = chi_squared_quantile(1.0 - _CHANCE / _HIGHEST, 2.0 * more) / (2.0 * more)
+        std = np.sqrt(np.where(own > limit * white, own, white))
+        least = math.sqrt(-2.0 * math.log(_CHANCE / _HIGHEST)) * std
         self.orders = [
-            LiveOrder(k, value, std)
-            for k, (value, std) in enumerate(
-                zip(values, np.sqrt(variance).tolist(), strict=True), 1
-            )
-            if abs(value) > least * self._stds[k - 1]
+            LiveOrder(int(i) + 1, complex(self._values[i]), float(std[i]))
+            for i in np.argsort(-np.abs(self._values))
+            if abs(self._values[i]) > least[i]
         ]
-        self.orders.sort(key=lambda order: -order.amplitude)
-
-    def _larger(self, by_turns: Array, white: Array, orders: int = 1) -> Array:
-        """Variances by what turns differ by, where that is more than noise makes of it.
-
-        Each is the mean of those of so many ``orders``.
-        """
-        if self.turns < 2:
-            return white
-        degrees = 2.0 * orders * (self.turns - 1.0)
-        chance = _CHANCE * orders / _HIGHEST
-        limit = chi_squared_quantile(1.0 - chance, degrees) / degrees
-        return np.where(by_turns > limit * white, by_turns, white)
+        known |= {order.order for order in self.orders}
+        changes = np.abs(self._values - before)
+        self.is_settled = self.turns > 1 and all(changes[k - 1] <= std[k - 1] for k in known)
 
     @property
     def curve(self) -> tuple[Array, Array]:
@@ -309,7 +209,7 @@ class Estimate:
             "orders": [
                 {
                     "order": order.order,
-                    "amplitude_arcsec": scale * order.amplitude,
+                    "amplitude_arcsec": scale * abs(order.value),
                     "phase_deg": order.phase_deg,
                     "std_arcsec": scale * order.std,
                 }

@@ -5,21 +5,29 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from ..errors import ArgumentError
-from ..formats.seriallog import NUMBER, PAIR
+from ..formats.seriallog import NUMBER
+from ..support.arrays import Array
 
 #: Lines that agree on their layout.
 _ENOUGH: Final = 3
-_VALUE: Final = rb"(%s)" % NUMBER
-
+_NUMBER: Final = re.compile(rb"(?<![\w.])%s(?![\w.])" % NUMBER)
+#: What is between two numbers where several blanks are one: a mark, and the name of the second.
+_BLANKS: Final = re.compile(rb"([ \t])[ \t]+")
+_GAP: Final = re.compile(
+    rb" ?([,;\t]?)[ \t]?(?:([A-Za-z_][\w.\[\]/-]*(?: [\w.\[\]/-]+){0,4})[ \t]?[:=])?[ \t]?"
+)
 #: A name of a column, which no sentence is.
-_NAME: Final = re.compile(r"-?[A-Za-z_][^,;\t]*(?<![.:!?])")
+_NAME: Final = re.compile("-?[A-Za-z_][^,;\t\ufffd]*(?<![.:!?])")
 
 #: Cells of a line, or None where it is no row.
-Cells = Callable[[bytes], Sequence[bytes] | None]
+Cells = Callable[[bytes], Sequence[bytes | float] | None]
 
 
 class LineLayout(NamedTuple):
@@ -44,21 +52,19 @@ class LineLayout(NamedTuple):
     header: bytes | None = None
     every: re.Pattern[bytes] | None = None
 
-    def rows(self, lines: Sequence[bytes]) -> list[Sequence[bytes] | None]:
-        """Cells of each line; all at once where all are rows, which is five times as fast."""
-        if self.every is not None and len(self.names) > 1:
-            found = self.every.findall(b"\n".join(lines))
-            if len(found) == len(lines):
-                return found
-        return [*map(self.cells, lines)]
+    def values(self, lines: Sequence[bytes]) -> Array:
+        """Numbers of each line, shape (n, columns); NaN of one that is no row.
 
-
-class _Seen(NamedTuple):
-    """What one line alone shows of the layout."""
-
-    kind: str
-    names: tuple[str, ...] | int
-    between: bytes = b""
+        All at once where all are rows, which is five times as fast.
+        """
+        found: list[Any] = self.every.findall(b"\n".join(lines)) if self.every else []
+        if len(found) != len(lines):
+            none = (b"nan",) * len(self.names)
+            found = [self.cells(line) or none for line in lines]
+        elif len(self.names) == 1:
+            found = [(cell,) for cell in found]
+        numbers = np.fromiter(map(float, chain.from_iterable(found)), float)
+        return numbers.reshape(len(lines), len(self.names))
 
 
 def layout_of(lines: Sequence[bytes], hurry: bool = False) -> LineLayout | None:
@@ -72,37 +78,42 @@ def layout_of(lines: Sequence[bytes], hurry: bool = False) -> LineLayout | None:
     'CSV'
     """
     seen = [_seen(line) for line in lines]
-    counts: Counter[_Seen] = Counter()
-    best = None
-    for found in filter(None, seen):
-        counts[found] += 1
-        if counts[found] == _ENOUGH:
-            best = found
-            break
-    if best is None and hurry and counts:
-        best = counts.most_common(1)[0][0]
-    if best is None:
+    counts = Counter(filter(None, seen))
+    enough = [found for found, count in counts.items() if count >= _ENOUGH]
+    if not (enough or (hurry and counts)):
         return None
-    if best.kind == "JSON":
-        return LineLayout("JSON", best.names, _json_cells(best.names))  # type: ignore[arg-type]
-    if best.kind == "name:value pairs":
-        names: Any = best.names
-        pairs = [rb"%s[ \t]*[:=][ \t]*%s" % (re.escape(name.encode()), _VALUE) for name in names]
-        return _matching(best.kind, names, rb"[ \t,;]+".join(pairs))
-    width: Any = best.names
-    before = lines[: seen.index(best)]
-    header = next((line for line in reversed(before) if _named(line, best.between, width)), None)
-    names = _named(header, best.between, width) if header is not None else None
-    between = {b" ": rb"[ \t]+", b"\t": rb" *\t *"}.get(
-        best.between, rb"[ \t]*%s[ \t]*" % best.between
-    )
-    given = names or tuple(f"column{i + 1}" for i in range(width))
-    return _matching(best.kind, given, between.join([_VALUE] * width), header)
+    best = (enough or [counts.most_common(1)[0][0]])[0]
+    if isinstance(best[0], str):
+        return LineLayout("JSON", best, lambda line: _members(line, best))
+    marks, named = zip(*best, strict=True)
+    mark = (*marks[1:], b"")[0]
+    kind = "name:value pairs" if any(named) else "CSV" if mark else "numbers"
+    heads = ((line.strip(), _head(line, mark)) for line in reversed(lines[: seen.index(best)]))
+    header, head = next((h for h in heads if h[1] and len(h[1]) == len(best)), (None, ()))
+    given = [name.decode() or f"column{i}" for i, name in enumerate(named, 1)]
+    return layout_of_columns(kind, head or tuple(given), best, header)
 
 
-def layout_of_names(names: tuple[str, ...]) -> LineLayout | None:
-    """The layout of CSV whose columns are known; None where there are none."""
-    return _matching("CSV", names, b",".join([_VALUE] * len(names))) if names else None
+def layout_of_columns(
+    kind: str,
+    names: tuple[str, ...],
+    gaps: Sequence[tuple[bytes, bytes]] = (),
+    header: bytes | None = None,
+) -> LineLayout:
+    """The layout of lines of numbers, with a mark and a name before each: of CSV without any."""
+    pattern = b""
+    for mark, name in gaps or [(b"", b""), *[(b",", b"")] * (len(names) - 1)]:
+        between = rb" *%s[ \t]*" % mark if mark else rb"[ \t]+"
+        label = rb"%s[ \t]*[:=][ \t]*" % re.escape(name) if name else b""
+        pattern += (between if pattern else b"") + label + rb"(%s)" % NUMBER
+    # Each has one way to match: a long line of rubbish costs its length.
+    whole = re.compile(pattern + rb"[ \t]*[,;]?")
+
+    def cells(line: bytes) -> Sequence[bytes] | None:
+        match = whole.fullmatch(line.strip())
+        return match.groups() if match else None
+
+    return LineLayout(kind, names, cells, header, re.compile(rb"^%s$" % pattern, re.MULTILINE))
 
 
 def layout_of_pattern(pattern: str) -> LineLayout:
@@ -122,87 +133,50 @@ def layout_of_pattern(pattern: str) -> LineLayout:
             f"pattern {pattern!r} names no group; name columns as in 'S(?P<step>\\d+) "
             "R(?P<raw>\\d+)'"
         )
-    groups = list(found.groupindex.values())
-    number = re.compile(_VALUE)
 
     def cells(line: bytes) -> Sequence[bytes] | None:
         match = found.search(line)
-        given = match.group(0, *groups)[1:] if match else [b""]
-        return given if all(cell and number.fullmatch(cell) for cell in given) else None
+        given = [*match.groupdict(b"").values()] if match else [b""]
+        return given if all(map(_NUMBER.fullmatch, given)) else None
 
     return LineLayout("pattern", tuple(found.groupindex), cells)
 
 
-def _seen(line: bytes) -> _Seen | None:
+def _seen(line: bytes) -> tuple[Any, ...] | None:
+    """What one line alone shows of the layout: marks and names of its numbers, or those of JSON."""
     text = line.strip()
     if text.startswith(b"{"):
-        names = tuple(_numbers(text))
-        return _Seen("JSON", names) if names else None
-    pairs = PAIR.findall(text)
-    if pairs and not PAIR.sub(b"", text).strip(b" \t,;"):
-        return _Seen("name:value pairs", tuple(name.decode("ascii") for name, _ in pairs))
-    between = next((mark for mark in (b";", b",", b"\t") if mark in text), b" ")
-    parts = _split(text, between)
-    if not parts or not all(re.fullmatch(NUMBER, part.strip()) for part in parts):
-        return None
-    return _Seen("numbers" if between == b" " else "CSV", len(parts), between)
+        return tuple(_numbers(text)) or None
+    *gaps, end = _NUMBER.split(_BLANKS.sub(rb"\1", text))
+    found = [match.groups(b"") for match in map(_GAP.fullmatch, gaps) if match]
+    is_row = 0 < len(found) == len(gaps) and not found[0][0] and not end.strip(b" ,;")
+    return tuple(found) if is_row else None
 
 
-def _split(text: bytes, between: bytes) -> list[bytes]:
-    text = text.strip()
-    return text.split() if between == b" " else text.removesuffix(between).split(between)
-
-
-def _named(line: bytes, between: bytes, width: int) -> tuple[str, ...] | None:
-    """Names that a line gives to so many columns."""
-    try:
-        names = tuple(part.decode().strip().strip('"') for part in _split(line, between))
-    except UnicodeDecodeError:
-        return None
+def _head(line: bytes, mark: bytes) -> tuple[str, ...]:
+    """Names of columns, if a line has some."""
+    text = line.strip()
+    parts = text.removesuffix(mark).split(mark) if mark else text.split()
+    names = tuple(part.decode("utf-8", "replace").strip().strip('"') for part in parts)
     words = all(name.isprintable() and _NAME.fullmatch(name) for name in names)
-    return names if words and len(set(names)) == len(names) == width else None
+    return names if words and len(set(names)) == len(names) else ()
 
 
-def _matching(
-    kind: str, names: tuple[str, ...], pattern: bytes, header: bytes | None = None
-) -> LineLayout:
-    """The layout of lines that match a pattern with a group for each column."""
-    # Each has one way to match: a line of blanks costs its length.
-    whole = re.compile(pattern + rb"[,;]?")
-
-    def cells(line: bytes) -> Sequence[bytes] | None:
-        match = whole.fullmatch(line.strip())
-        return match.groups() if match else None
-
-    return LineLayout(kind, names, cells, header, re.compile(rb"^%s$" % pattern, re.MULTILINE))
+def _members(text: bytes, names: Sequence[str]) -> list[float] | None:
+    found = _numbers(text)
+    return [found[name] for name in names] if found.keys() >= {*names} else None
 
 
 def _numbers(text: bytes) -> dict[str, float]:
     """Numbers of an object by their names, those of objects within it behind a dot."""
+
+    def flat(values: Any, before: str) -> Iterator[tuple[str, float]]:
+        for name, value in values.items() if isinstance(values, dict) else ():
+            if type(value) in (int, float):
+                yield before + name, value
+            yield from flat(value, f"{before}{name}.")
+
     try:
-        found = json.loads(text)
+        return dict(flat(json.loads(text), ""))
     except (ValueError, RecursionError):
         return {}
-    flat: dict[str, float] = {}
-
-    def add(values: dict[str, Any], before: str) -> None:
-        for name, value in values.items():
-            if isinstance(value, dict):
-                add(value, f"{before}{name}.")
-            elif isinstance(value, int | float) and not isinstance(value, bool):
-                flat[before + name] = value
-
-    if isinstance(found, dict):
-        add(found, "")
-    return flat
-
-
-def _json_cells(names: tuple[str, ...]) -> Cells:
-    def cells(line: bytes) -> Sequence[bytes] | None:
-        found = _numbers(line)
-        try:
-            return [repr(found[name]).encode() for name in names]
-        except KeyError:
-            return None
-
-    return cells

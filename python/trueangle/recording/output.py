@@ -6,6 +6,7 @@ import contextlib
 import csv
 import errno
 import io
+import itertools
 import os
 import time
 from collections.abc import Iterator, Sequence
@@ -13,6 +14,8 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import ArgumentError, FileError
+from ..support.arrays import Array
+from ..support.layout import counted
 
 #: Bytes of a page: what a call of the system puts into one is there as a whole, or not at all.
 _PAGE: Final = 4096
@@ -68,23 +71,22 @@ class WholeFile:
             flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0)
             self._handle = os.open(self.path, flags, 0o666)
             self._size = os.fstat(self._handle).st_size
+        pieces, self._waiting = self._pieces(self._waiting), b""
         try:
-            for piece in self._pieces():
+            for piece in pieces:
                 if os.write(self._handle, piece) < len(piece):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
                 self._size += len(piece)
-            self._waiting = b""
             with contextlib.suppress(OSError):  # the null device, some network file systems
                 os.fsync(self._handle)
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._handle, self._size)
-            self._waiting = b""
             raise OSError(error.errno, error.strerror, str(self.path)) from None
 
-    def _pieces(self) -> Iterator[bytes]:
+    def _pieces(self, data: bytes) -> Iterator[bytes]:
         """Whole lines, as many as the page of the file takes."""
-        data, start = self._waiting, 0
+        start = 0
         self._longest = max(self._longest, 1 + max(map(len, data.split(b"\n"))))
         while start < len(data):
             room = _PAGE - self._size % _PAGE
@@ -130,41 +132,30 @@ class RunsFile:
         is_device = path.exists() and not path.is_file()
         rejected = path if is_device else path.with_name(path.name + ".rejected")
         self.rows, self.rejected = WholeFile(path), WholeFile(rejected, filled=False)
-        self._header: list[str] | None = None
-        self._given, self.label = label, label or "1"
+        self._header: list[str] = []
         there = [p for p in (path, rejected) if p.is_file() and p.stat().st_size]
         if there and not append:
             raise FileError(
                 there[0], "is there already: name another file, or add a run to it (`append=True`)"
             )
-        if path in there:
-            self._continue(path)
+        labels = self._continued(path) if path in there else set()
+        if label in labels:
+            raise ArgumentError(f"label: {path} has a run {label!r}; give another label")
+        numbers = map(str, itertools.count(len(labels) + 1))
+        self.label = label or next(number for number in numbers if number not in labels)
 
-    def _continue(self, path: Path) -> None:
-        """Find the columns and labels of a file that is there, and end it with a whole row."""
+    def _continued(self, path: Path) -> set[str]:
+        """The labels of a file that is there; it ends with a whole row then."""
         with open(path, "r+b") as file:
-            size = file.seek(0, os.SEEK_END)
-            end = size
-            while end and (file.seek(end - 1), file.read(1))[1] != b"\n":
-                end -= 1
-            file.truncate(end)
+            size = sum(len(line) for line in file if line.endswith(b"\n"))
+            file.truncate(size)
         with open(path, encoding="utf-8", newline="") as text:
             rows = csv.reader(text)
-            self._header = next(rows, None)
-            if not self._header:
-                return
-            if "run" not in self._header:
-                raise FileError(
-                    path, "has no column run: only what was recorded is continued", line=1
-                )
-            place = self._header.index("run")
-            labels = {row[place] for row in rows if len(row) > place}
-        if self._given in labels:
-            raise ArgumentError(f"label: {path} has a run {self._given!r}; give another label")
-        number = len(labels) + 1
-        while self._given is None and str(number) in labels:
-            number += 1
-        self.label = self._given or str(number)
+            self._header = next(rows, [])
+            if self._header and "run" not in self._header:
+                problem = "has no column run: only what was recorded is continued"
+                raise FileError(path, problem, line=1)
+            return {cell for row in rows for cell in row[self._header.index("run") :][:1]}
 
     def begin(self, names: Sequence[str]) -> None:
         """State the columns, those of the rows behind the label of the run.
@@ -182,20 +173,24 @@ class RunsFile:
                 "another file",
                 line=1,
             )
-        self._start = _line([self.label])[:-1] + b","
+        label = _line([self.label])[:-1].replace(b"%", b"%%")
+        self._row = label + b",%.15g" * len(names) + b"\n"
         if not self._header:
             self.rows.add(_line(header), 0)
-        self._header = header
 
-    def add(self, columns: Sequence[Sequence[bytes]]) -> None:
-        """Add rows, column by column."""
-        rows = [*zip(*columns, strict=True)]
-        start = self._start
-        self.rows.add(b"".join([start + b",".join(row) + b"\n" for row in rows]), len(rows))
+    def add(self, values: Array) -> None:
+        """Add rows, shape (n, columns)."""
+        self.rows.add(self._row * len(values) % tuple(values.ravel().tolist()), len(values))
 
     def reject(self, lines: Sequence[bytes]) -> None:
         """Keep lines that are no rows, as they came."""
         self.rejected.add(b"".join([line + b"\n" for line in lines]), len(lines))
+
+    @property
+    def rejections(self) -> str:
+        """How many lines were no rows, and where they are kept."""
+        kept = f" ({self.rejected.path})" if self.rejected.lines else ""
+        return f"{counted(self.rejected.lines, 'line')} rejected{kept}"
 
     def close(self) -> None:
         """End both files."""

@@ -7,6 +7,8 @@ import sys
 from collections import deque
 from typing import Final, TextIO
 
+import numpy as np
+
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
 from ..support.layout import counted
@@ -42,38 +44,34 @@ class Screen:
         self._counts: deque[tuple[float, int]] = deque([(0.0, 0)])
         self._began = False
 
-    def show(self, recording: LiveRecording, now: float, ended: str | None = None) -> None:
+    def show(self, recording: LiveRecording, now: float, ended: str = "") -> None:
         """Draw, where it is time to, at the first reading, or where the recording has ended."""
         first = recording.rows > 0 and not self._began
         if not (first or ended) and now - self._drawn < _DRAWN[self.style]:
             return
         self._began |= first
         self._drawn = now
-        if recording.estimate is not None:
-            recording.estimate.update()
-        new = recording.new_faults(now, ended is not None)
+        new = recording.new_faults(now, bool(ended))
         self._counts.append((now, recording.rows))
         while len(self._counts) > 2 and now - self._counts[1][0] >= _RATE:
             self._counts.popleft()
         then, rows = self._counts[0]
         rate = (recording.rows - rows) / max(now - then, 1e-9)
+        lines = []
         if self.style == "json":
-            state = {"rate_hz": round(rate, 3), **recording.to_dict(now), "ended": ended}
-            self._stream.write(json.dumps(state) + "\n")
+            state = {"rate_hz": round(rate, 3), **recording.to_dict(now), "ended": ended or None}
+            lines.append(json.dumps(state))
         elif self.style == "text":
-            self._draw(self.lines(recording, now, rate))
+            lines += self.lines(recording, now, rate)
         if not self._redraws and self.style != "json":
-            for name, says in new.items():
-                self._stream.write(f"trueangle: warning: {name}: {says}\n")
-        self._stream.flush()
-
-    def _draw(self, lines: list[str]) -> None:
+            lines += [f"trueangle: warning: {name}: {says}" for name, says in new.items()]
         if self._redraws and self._lines:
             # What redraws itself steers the terminal, which printed text must not.
             steering = getattr(self._stream, "steering", self._stream)
             steering.write(f"\x1b[{self._lines}F\x1b[J")
-        self._stream.write("".join(f"{line}\n" for line in lines))
         self._lines = len(lines)
+        self._stream.write("".join(f"{line}\n" for line in lines))
+        self._stream.flush()
 
     def lines(self, recording: LiveRecording, now: float, rate: float) -> list[str]:
         """The screen."""
@@ -81,28 +79,26 @@ class Screen:
         lines = [f"{now:.1f} s  {rate:.1f}/s  {head}"]
         travel = recording.travel
         if travel is not None and recording.rows:
-            for row, mark in enumerate(_MARKS):
-                cells = "".join("#" if count else "." for count in travel.cells[row].tolist())
-                lines.append(f"{mark} [{cells}] {360.0 * travel.covered[row]:.0f} deg")
+            for mark, read, share in zip(_MARKS, travel.cells, travel.covered, strict=True):
+                cells = "".join("#" if count else "." for count in read)
+                lines.append(f"{mark} [{cells}] {360.0 * share:.0f} deg")
             slow, fast = (360.0 * speed for speed in travel.speeds)
             speeds = f"{slow:.3g} to {fast:.3g} deg/s" if fast else "none yet"
             lines.append(f"travelled {travel.turns:.2f} turns  speed {speeds}")
-        if recording.estimate is not None:
-            places, error = recording.estimate.curve
-            if error.size > 1:
-                size = arcsec(1.0, recording.period) * error
-                lines += letter_chart(360.0 * places, {"o": size}, "arcsec")
+        places, error = recording.estimate.curve if recording.estimate else ((), ())
+        if len(error) > 1:
+            size = arcsec(1.0, recording.period) * np.asarray(error)
+            lines += letter_chart(360.0 * np.asarray(places), {"o": size}, "arcsec")
         return [line[:200] for line in (*lines, *told)]
 
     def summary(self, recording: LiveRecording) -> list[str]:
         """What was recorded, and what it tells."""
         file, estimate = recording.file, recording.estimate
-        kept = f" ({file.rejected.path})" if file.rejected.lines else ""
         lines = [
             f"{file.rows.path}: {counted(recording.rows, 'reading')} in run {file.label}, "
-            f"{counted(file.rejected.lines, 'line')} rejected{kept}"
+            f"{file.rejections}"
         ]
-        for address, arrival in zip(recording.addresses, recording.arrivals, strict=True):
+        for address, arrival in recording.arrivals.items():
             if arrival.layout is not None:
                 names = ", ".join(arrival.layout.names)
                 lines.append(f"{address}: {arrival.layout.kind}, columns {names}")
@@ -110,14 +106,13 @@ class Screen:
                 lines.append(f"{address}: ended by a fault: {arrival.problem}")
         if recording.unpaired:
             lines.append(f"{counted(recording.unpaired, 'reading')} without a reference")
-        if recording.is_stamped and recording.rows > 1:
-            jitter = 1e3 * recording.arrivals[recording.main].jitter
-            lines.append(f"times are those of arrival, jitter {jitter:.2g} ms")
+        if recording.jitter >= 0.0:
+            lines.append(f"times are those of arrival, jitter {1e3 * recording.jitter:.2g} ms")
         for order in estimate.orders[:_SHOWN] if estimate else ():
-            size, std = (arcsec(x, recording.period) for x in (order.amplitude, order.std))
+            size, std = (arcsec(x, recording.period) for x in (abs(order.value), order.std))
             shown = error_unit(self._errors_in, size).text(size, std)
             lines.append(f"order {order.order:3d}  {shown} at {order.phase_deg:.0f} deg")
-        if estimate is not None and estimate.turns and not estimate.orders:
+        if estimate is not None and estimate.turns > 1 and not estimate.orders:
             lines.append("no order above the noise")
         lines += [f"fault {name}: {says}" for name, says in recording.faults.items()]
         return [*lines, f"missing: {recording.missing or 'nothing'}"]

@@ -15,20 +15,14 @@ from ..runs.files import Conversion
 from ..runs.source import ReadingOptions, checked_reading_options
 from ..support.layout import counted
 from .arrivals import Arrivals
-from .lines import layout_of_pattern
 from .sources import SourceOptions, open_source
-
-#: Seconds between two looks at what has arrived.
-_TICK = 0.05
 
 
 def watched_batches(
     address: str,
     model: HarmonicModel,
     reading: ReadingOptions,
-    options: SourceOptions | None = None,
-    pattern: str | None = None,
-    send: str | None = None,
+    options: SourceOptions,
 ) -> Iterator[ReadingBatch]:
     """Batches of the rows that arrive from a source, until it ends.
 
@@ -38,11 +32,7 @@ def watched_batches(
         See `trueangle.recording.sources.open_source`.
     model : HarmonicModel
     reading : ReadingOptions
-    options : SourceOptions, optional
-    pattern : str, optional
-        Columns of a line as named groups.
-    send : str, optional
-        Sent to the device at the start.
+    options : SourceOptions
 
     Yields
     ------
@@ -54,43 +44,28 @@ def watched_batches(
     FileError
         No line is a row, or a column is missing; the source ends by a fault.
     """
-    layout = None if pattern is None else layout_of_pattern(pattern)
-    source = open_source(address, options or SourceOptions())
-    arrivals = Arrivals(source, layout, time.monotonic())
+    arrivals = Arrivals(open_source(address, options), options, time.monotonic())
     columns, rejected = None, 0
     try:
-        if send is not None:
-            source.send(send.encode())
-        while True:
-            ended = arrivals.is_over and not arrivals.is_behind
-            if arrivals.look() and arrivals.layout is not None:
-                names = arrivals.layout.names
-                if columns is None:
-                    given = Conversion.of(checked_reading_options(reading))
-                    columns = WatchedColumns.of(address, names, reading, given, None)
-                rows = arrivals.take()
-                if rows.texts:
-                    found = dict(zip(names, np.ascontiguousarray(rows.values.T), strict=True))
-                    batch = columns.batch(found.__getitem__, model)
-                    yield batch if batch.time is not None else batch._replace(time=rows.time)
+        for rows in arrivals.batches():
             rejected += len(arrivals.rejected)
             arrivals.rejected = []
-            if ended:
-                break
-            if not arrivals.is_behind:
-                time.sleep(_TICK)
+            names = arrivals.layout.names if arrivals.layout is not None else ()
+            if columns is None and names:
+                given = Conversion.of(checked_reading_options(reading))
+                columns = WatchedColumns.of(address, names, reading, given, None)
+            if columns is not None and rows.time.size:
+                found = dict(zip(names, np.ascontiguousarray(rows.values.T), strict=True))
+                batch = columns.batch(found.__getitem__, model)
+                yield batch if batch.time is not None else batch._replace(time=rows.time)
     finally:
         arrivals.close()
+    lines = counted(rejected, "line")
     if rejected and columns is not None:
-        warnings.warn(
-            f"{address}: {counted(rejected, 'line')} that {'is' if rejected == 1 else 'are'} no "
-            "row of numbers rejected",
-            MessageLinesWarning,
-            stacklevel=level_of_caller(),
-        )
+        be = "is" if rejected == 1 else "are"
+        text = f"{address}: {lines} that {be} no row of numbers rejected"
+        warnings.warn(text, MessageLinesWarning, stacklevel=level_of_caller())
     if arrivals.problem is not None:
         raise FileError(address, f"ended by a fault: {arrivals.problem}")
     if columns is None:
-        raise FileError(
-            address, f"no line is a row of numbers, {counted(rejected, 'line')} rejected"
-        )
+        raise FileError(address, f"no line is a row of numbers, {lines} rejected")

@@ -74,8 +74,9 @@ def test_standard_errors_hold_what_turns_differ_by():
                 estimate.add(angle[rows], angle[rows] + error[rows], rows * 1e-3)
             order = next(order for order in estimate.orders if order.order == 1)
             pulls += [(order.value - 1.0).real / order.std, order.value.imag / order.std]
-        # Student's t of 20 degrees has 1.05, and 48 of them tell it to 10 %: within three of these.
-        assert 0.73 < np.sqrt(np.mean(np.square(pulls))) < 1.37, (moved, pulls)
+        # By their steps 11 turns have 15 degrees: Student's t has 1.07, and 48 of them tell it to
+        # 11 %: within three of these.
+        assert 0.72 < np.sqrt(np.mean(np.square(pulls))) < 1.42, (moved, pulls)
 
 
 def test_a_drift_is_not_enough():
@@ -94,13 +95,8 @@ def test_travel_knows_where_it_was_and_which_way(sign):
     rng = np.random.default_rng(SEED)
     there = np.concatenate([np.arange(0.0, 1.5, 0.002), np.arange(1.5, 1.25, -0.002)])
     path = sign * there + rng.normal(0.0, 2e-4, there.size)
-    found = [
+    for rows in np.array_split(np.arange(path.size), 40):
         travel.add(path[rows] % 1.0, rows * 0.01)
-        for rows in np.array_split(np.arange(path.size), 40)
-    ]
-    directions = np.concatenate(found)
-    assert set(directions[10:740]) == {sign}
-    assert set(directions[-115:]) == {-sign}
     one_way, other = travel.covered[:: int(sign)]
     assert one_way == 1.0
     assert other == pytest.approx(0.25, abs=2.0 / CELLS)
@@ -115,4 +111,4 @@ def test_few_positions_leave_the_orders_that_they_tell_apart():
         angle = np.arange(72) * 5.0 + 360.0 * turn
         estimate.add(angle, angle + np.sin(3.0 * np.radians(angle)), angle / 30.0)
     assert [order.order for order in estimate.orders] == [3]
-    assert estimate.orders[0].amplitude == pytest.approx(1.0, rel=1e-6)
+    assert abs(estimate.orders[0].value) == pytest.approx(1.0, rel=1e-6)

@@ -19,6 +19,7 @@ from .wires import joint_lines, recorded
 KILLED = """
 import os, random, signal, sys, time
 from pathlib import Path
+import numpy as np
 from trueangle.recording.output import RunsFile
 random.seed(52_002)
 for i in range(50):
@@ -29,7 +30,7 @@ for i in range(50):
         os.fsync = lambda handle: None  # as many moments of writing as there are
         file.begin(["a", "b"])
         while True:
-            file.add([[b"1.2345678"] * 500, [b"9.876"] * 500])
+            file.add(np.array([[1.2345678, 9.876]] * 500))
             file.rows.flush()
     while not path.exists():
         time.sleep(0.0005)

@@ -6,7 +6,6 @@ import json
 import numpy as np
 import pytest
 
-from trueangle.recording.columns import Counts
 from trueangle.recording.screen import Screen
 
 from .wires import joint_lines, recorded
@@ -87,7 +86,7 @@ def test_lost_bytes_and_silence_are_faults(tmp_path):
 def test_a_shaft_without_a_reference_is_recorded_for_selfcal(tmp_path):
     lines = [f"{i % 4096}" for i in range(0, 20_000, 37)]
     signals = {"indicated": ("column1", "count")}
-    recording = recorded(tmp_path / "a.csv", lines, signals, Counts(4096.0))
+    recording = recorded(tmp_path / "a.csv", lines, signals, (4096.0, None))
     assert recording.travel.is_covered
     assert (tmp_path / "a.csv").read_text().startswith("run,time_s,indicated_deg\n")
     assert recording.estimate is None

@@ -1,6 +1,5 @@
 """`trueangle watch` takes the same sources as `record`."""
 
-import io
 import json
 import os
 import sys
@@ -13,6 +12,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import FileError
+from trueangle.recording.sources import SourceOptions
 from trueangle.recording.watched import watched_batches
 from trueangle.runs.source import ReadingOptions
 
@@ -62,14 +62,23 @@ def test_lines_of_a_port_are_watched(tmp_path, monkeypatch, capsys):
     assert windows[-1]["time_s"] > windows[0]["time_s"] > 0.0
 
 
+def typed(monkeypatch, text):
+    """Standard input with a text, open."""
+    read, write = os.pipe()
+    os.write(write, text.encode())
+    os.close(write)
+    monkeypatch.setattr(sys, "stdin", os.fdopen(read))
+    return sys.stdin
+
+
 @pytest.mark.parametrize("argument", ["reference", "indicated"])
 @pytest.mark.parametrize("unit", [360.0, 2.0 * np.pi])
 def test_batches_have_the_unit_of_the_model(monkeypatch, argument, unit):
     text = "time_ms,reference_deg,indicated_deg\n0,10,10.5\n500,20,19.5\n1000,30,30.25\n"
-    monkeypatch.setattr(sys, "stdin", io.StringIO(text))
     shaft = ta.Shaft("output", 1, [1], [1e-4 * unit], [0.0])
     model = ta.HarmonicModel([shaft], period=unit, argument=argument)
-    (batch,) = watched_batches("-", model, ReadingOptions())
+    with typed(monkeypatch, text):
+        (batch,) = watched_batches("-", model, ReadingOptions(), SourceOptions())
     reference, error = np.array([10.0, 20.0, 30.0]), np.array([0.5, -0.5, 0.25])
     angle = reference if argument == "reference" else reference + error
     wanted = (angle * unit / 360.0, error * unit / 360.0, [0.0, 0.5, 1.0])
@@ -79,6 +88,5 @@ def test_batches_have_the_unit_of_the_model(monkeypatch, argument, unit):
 
 def test_no_row_and_no_column_are_errors(monkeypatch):
     for text, says in (("", "no line is a row"), ("a,b\n1,2\n", "no column reference_deg")):
-        monkeypatch.setattr(sys, "stdin", io.StringIO(text))
-        with pytest.raises(FileError, match=says):
-            list(watched_batches("-", MODEL, ReadingOptions()))
+        with typed(monkeypatch, text), pytest.raises(FileError, match=says):
+            list(watched_batches("-", MODEL, ReadingOptions(), SourceOptions()))

@@ -5,9 +5,9 @@ import time
 import numpy as np
 
 from trueangle.recording.arrivals import Arrivals
-from trueangle.recording.columns import Counts
 from trueangle.recording.output import RunsFile
-from trueangle.recording.recording import LiveRecording
+from trueangle.recording.recording import Choices, LiveRecording
+from trueangle.recording.sources import SourceOptions
 
 
 class Given:
@@ -18,7 +18,7 @@ class Given:
     def __init__(self, pieces):
         self.pieces, self.sent = list(pieces), b""
 
-    def read(self, timeout):
+    def read(self):
         return self.pieces.pop(0) if self.pieces else None
 
     def send(self, data):
@@ -28,38 +28,32 @@ class Given:
         pass
 
 
-def arrived(data, layout=None, sizes=(1 << 16,)):
+def arrived(data, pattern=None, sizes=(1 << 16,)):
     """Rows and rejected lines of bytes that arrive in pieces of these sizes."""
     pieces, at, i = [], 0, 0
     while at < len(data):
         pieces.append(data[at : at + sizes[i % len(sizes)]])
         at += sizes[i % len(sizes)]
         i += 1
-    arrivals = Arrivals(Given(pieces), layout, time.monotonic())
+    arrivals = Arrivals(Given(pieces), SourceOptions(pattern=pattern), time.monotonic())
     while not arrivals.is_over:
         time.sleep(0.001)
-    texts, values, times = [], [], []
-    while True:
-        behind = arrivals.is_behind
-        if arrivals.look():
-            rows = arrivals.take()
-            texts += rows.texts
-            values += rows.values.tolist()
-            times += rows.time.tolist()
-        if not behind:
-            return arrivals, texts, np.array(values), np.array(times)
+    values, times = [], []
+    for rows in arrivals.batches():
+        values += rows.values.tolist()
+        times += rows.time.tolist()
+    return arrivals, np.array(values), np.array(times)
 
 
-def recorded(path, lines, signals=None, counts=None, **options):
+def recorded(path, lines, signals=None, counts=(None, None), **options):
     """A recording of lines that are there at once."""
     data = "".join(f"{line}\n" for line in lines).encode()
-    arrivals = Arrivals(Given([data]), None, time.monotonic())
+    arrivals = Arrivals(Given([data]), SourceOptions(), time.monotonic())
     while not arrivals.is_over:
         time.sleep(0.001)
     file = RunsFile(path, options.pop("label", None), options.pop("append", False))
-    recording = LiveRecording(
-        ["given"], [arrivals], file, signals or {}, counts or Counts(), **options
-    )
+    choices = Choices(signals or {}, SourceOptions(), counts, **options)
+    recording = LiveRecording({"given": arrivals}, file, choices)
     recording.take(0.0)
     while recording.is_behind:
         recording.take(0.0)
