@@ -142,7 +142,7 @@ def find_run_angles(
         raise error(
             f"{name} is added to a reference, and there is none beside the error", first.name
         )
-    period = UNIT_PERIODS.get(first.unit, _PERIOD)
+    period = UNIT_PERIODS.get(first.unit or "", _PERIOD)
 
     def part(column: RoleColumn | None) -> _Part | None:
         if column is None:

@@ -48,19 +48,17 @@ def spikes(error: Array, angle: Array, period: float) -> tuple[NDArray[np.bool_]
     if error.size < 4 * _NEIGHBOURS:
         return none, np.zeros_like(error)
     order = np.argsort(np.mod(angle, period), kind="stable")
-    half = _NEIGHBOURS // 2
-    around = np.concatenate([error[order[-half:]], error[order], error[order[:half]]])
-    windows = np.lib.stride_tricks.sliding_window_view(around, _NEIGHBOURS)
+    around = _windows(error[order])
     deviation = np.empty_like(error)
-    deviation[order] = error[order] - median(windows, axis=1)
+    deviation[order] = error[order] - median(around, axis=1)
     distance = np.abs(deviation)
     # On a slope most readings are the median of their neighbours: what they scatter by is what
     # they are off the line between the next two, 3/2 of the variance.
-    inner = around[half - 1 : around.size - half + 1]
-    between = inner[1:-1] - 0.5 * (inner[:-2] + inner[2:])
+    middle = _NEIGHBOURS // 2
+    between = around[:, middle] - 0.5 * (around[:, middle - 1] + around[:, middle + 1])
     # Readings in counts: most deviations may be exactly 0, the rest one count.
-    scale = max(robust_scale(deviation), float(quantile(distance, 0.8)))
-    limit = WILD * max(scale, robust_scale(between) / math.sqrt(1.5))
+    scales = robust_scale(deviation), robust_scale(between) / math.sqrt(1.5)
+    limit = WILD * max(*scales, float(quantile(distance, 0.8)))
     far = distance > limit
     if far.any():
         # Across a gap a steep error is far off its neighbours, but not off the line between them.
@@ -72,4 +70,14 @@ def spikes(error: Array, angle: Array, period: float) -> tuple[NDArray[np.bool_]
         line = before + share * (after - before)
         distance[order] = np.minimum(distance[order], np.abs(error[order] - line))
         far &= distance > limit
+        # On a slope a wild reading moves the median of those beside it, which do without it.
+        wilder = _windows(np.where(far, distance, 0.0)[order]) > 2.0 * distance[order, None]
+        around = np.where(wilder, _windows((error - deviation)[order]), around)
+        far[order] &= np.abs(error[order] - median(around, axis=1)) > limit
     return (none if far.mean() > WILD_SHARE else far), distance
+
+
+def _windows(values: Array) -> Array:
+    """Each of the values of a turn with the three before it and the three after it."""
+    around = np.pad(values, _NEIGHBOURS // 2, mode="wrap")
+    return np.lib.stride_tricks.sliding_window_view(around, _NEIGHBOURS)

@@ -5,6 +5,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.fitting.robust import without_spikes
+from trueangle.runs.outliers import spikes
 
 TRUTH = 0.2
 SIGMA = 0.01
@@ -79,6 +80,20 @@ def test_one_reading_that_is_wrong_by_anything_moves_nothing(column, at):
         assert fit.wild == (("b", at),), wrong
         assert fit.orders == good.orders
         np.testing.assert_allclose(fit.amplitudes, good.amplitudes, rtol=0.02)
+
+
+@pytest.mark.parametrize("size", [-180.0, 63.0, 5.0])
+def test_what_is_beside_a_wild_reading_is_not_wild(size):
+    """On a slope the wild one moves the median of its neighbours."""
+    rng = np.random.default_rng(8)
+    angle = np.sort(rng.uniform(0.0, 360.0, 163))
+    noise = 4e-4 * rng.normal(size=163)
+    for at in range(163):
+        error = 0.3 * np.sin(np.radians(3 * angle)) + noise
+        error[at] += size
+        far, distance = spikes(error, angle, 360.0)
+        assert np.flatnonzero(far).tolist() == [at]
+        assert distance[at] == pytest.approx(abs(size), rel=0.05)
 
 
 @pytest.mark.parametrize("noise", ["normal", "none", "counts"])
