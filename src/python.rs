@@ -15,6 +15,7 @@ mod evidence;
 mod factor;
 mod failure;
 mod fit;
+mod groups;
 mod linear;
 mod lines;
 mod moments;
@@ -68,6 +69,9 @@ mod _core {
 
     #[pymodule_export]
     use super::evidence::PyEvidence;
+
+    #[pymodule_export]
+    use super::groups::{PyGroupSums, PyGroups};
 
     #[pymodule_export]
     use super::factor::{PyFactor, settled, short_stretches};

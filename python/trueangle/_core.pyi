@@ -232,6 +232,34 @@ class Evidence:
     ]: ...
 
 @final
+class Groups:
+    """Readings of runs, and groups of columns."""
+
+    def __new__(
+        cls,
+        runs: Sequence[tuple[NDArray[np.float64] | None, ...]],
+        widths: Sequence[int],
+    ) -> Groups: ...
+    def noise(
+        self, tau: Sequence[float], scale: float, start: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]: ...
+    def sums(self, noise: Sequence[float] | NDArray[np.float64], total: float) -> GroupSums: ...
+
+@final
+class GroupSums:
+    """What models of groups need of readings under a noise."""
+
+    def search(
+        self, given: Sequence[float], probabilities: Sequence[float], start: Sequence[float]
+    ) -> tuple[float, list[float]]: ...
+    def posterior(
+        self, tau: Sequence[float]
+    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]: ...
+    def changes(
+        self, tau: Sequence[float]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+
+@final
 class LinearModel:
     @staticmethod
     def of_rows(

@@ -48,6 +48,12 @@ impl Candidate {
 
     /// Change of the log evidence by letting the group in with this variance.
     pub fn gain(&self, tau: f64) -> f64 {
+        let (fit, log_root) = self.parts(tau);
+        fit - log_root
+    }
+
+    /// What the group fits with this variance, which grows with it, and what its volume costs.
+    fn parts(&self, tau: f64) -> (f64, f64) {
         let m = self.q.len();
         let (mut lower, mut z) = (self.s.clone(), self.q.clone());
         lower *= tau;
@@ -68,7 +74,7 @@ impl Candidate {
             log_root += lower[(i, i)].ln();
             square += z[i] * z[i];
         }
-        0.5 * tau * square - log_root
+        (0.5 * tau * square, log_root)
     }
 
     /// The variance of these that gains most, and what it gains.
@@ -77,6 +83,15 @@ impl Candidate {
         gains.fold((0.0, f64::NEG_INFINITY), |best, own| {
             if own.1 > best.1 { own } else { best }
         })
+    }
+
+    /// The same; None where no variance gains more than `least`, mostly told by the greatest alone.
+    pub fn best_above(&self, sizes: &[f64], least: f64) -> Option<(f64, f64)> {
+        let greatest = sizes.iter().copied().fold(0.0, f64::max);
+        if self.parts(greatest).0 <= least {
+            return None;
+        }
+        Some(self.best(sizes)).filter(|best| best.1 > least)
     }
 }
 
@@ -94,8 +109,9 @@ pub struct Solved {
     places: Vec<usize>,
     /// `P` at all columns.
     reach: DMatrix<f64>,
-    /// `s` and `q` at all columns; of use where groups are out.
-    outside: DMatrix<f64>,
+    /// `s` of each group; of use where it is out.
+    outside: Vec<DMatrix<f64>>,
+    /// `q` at all columns; of use where groups are out.
     moments: DVector<f64>,
 }
 
@@ -126,10 +142,16 @@ impl Solved {
             };
             own
         });
+        // Products between groups are of no use.
+        let outside = bounds.iter().map(|&(from, to)| {
+            let own = sums.products.view((from, from), (to - from, to - from));
+            let (beside, reached) = (cross.columns_range(from..to), reach.columns_range(from..to));
+            own - beside.tr_mul(&reached)
+        });
         Some(Self {
             log_evidence: found.log_evidence,
             places: places.collect(),
-            outside: &sums.products - cross.tr_mul(&reach),
+            outside: outside.collect(),
             moments: sums.moments.column(0) - cross.tr_mul(&mean),
             bounds,
             mean,
@@ -143,17 +165,14 @@ impl Solved {
     pub fn outside(&self, j: usize) -> Candidate {
         let (from, to) = self.bounds[j];
         Candidate {
-            s: self
-                .outside
-                .view((from, from), (to - from, to - from))
-                .into_owned(),
+            s: self.outside[j].clone(),
             q: self.moments.rows(from, to - from).into_owned(),
         }
     }
 
     /// What differs of each group in each run from the shared coefficients.
     pub(super) fn differences(&self, grams: &[Gram]) -> Vec<Vec<Candidate>> {
-        let mut mean = DVector::zeros(self.outside.nrows());
+        let mut mean = DVector::zeros(self.moments.nrows());
         for (k, &(from, to)) in self.bounds.iter().enumerate() {
             if self.model.tau[k] > 0.0 {
                 let own = self.mean.rows(self.places[k], to - from);

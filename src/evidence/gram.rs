@@ -71,6 +71,8 @@ pub struct Gram {
 
 impl Gram {
     /// From the upper triangle of products of whitened rows: zero, columns, error.
+    ///
+    /// The row of the zero is complete.
     fn of(products: &[f64], stride: usize, columns: usize, (factor, count): (f64, usize)) -> Self {
         let m = columns - 2;
         let at = |i: usize, j: usize| products[i.min(j) * stride + i.max(j)];
@@ -100,6 +102,31 @@ impl Readings {
         threads::map_parts(self.runs().len(), self.threads(), work).collect()
     }
 
+    /// The Gram matrix of all runs with one zero, in one pass.
+    pub fn pooled(&self, noise: Noise) -> Gram {
+        let work = |r: usize| self.products(&self.runs()[r], noise);
+        let (columns, stride) = (self.columns(), Rows::width(self.columns()));
+        let count = self.len() as f64;
+        let level = |run: &Run| run.mean() * run.len() as f64 / count;
+        let mean: f64 = self.runs().iter().map(level).sum();
+        let (mut total, mut factor) = (vec![0.0; columns * stride], 0.0);
+        let last = columns - 1;
+        let parts = threads::map_parts(self.runs().len(), self.threads(), work);
+        for ((own, root), run) in parts.zip(self.runs()) {
+            for (sum, part) in total.iter_mut().zip(&own) {
+                *sum += part;
+            }
+            // Errors of a run are less its mean: that is put back as so much of the zero.
+            let level = run.mean() - mean;
+            total[last * stride + last] += level * (2.0 * own[last] + level * own[0]);
+            for c in 0..last {
+                total[c * stride + last] += level * own[c];
+            }
+            factor += root;
+        }
+        Gram::of(&total, stride, columns, (factor, self.len()))
+    }
+
     /// Threads of a pass over the readings.
     pub(super) fn threads(&self) -> usize {
         if self.len() < THREADED {
@@ -110,6 +137,13 @@ impl Readings {
     }
 
     fn gram(&self, run: &Run, noise: Noise) -> Gram {
+        let (products, root) = self.products(run, noise);
+        let columns = self.columns();
+        Gram::of(&products, Rows::width(columns), columns, (root, run.len()))
+    }
+
+    /// Products of the whitened rows of a run, and the logarithm of its factor's determinant.
+    fn products(&self, run: &Run, noise: Noise) -> (Vec<f64>, f64) {
         let factor = Factor::new(noise, run.decays());
         let columns = self.columns();
         let stride = Rows::width(columns);
@@ -121,6 +155,6 @@ impl Readings {
             factor.whiten(start, &mut rows, &mut state);
             rows.add_products(&rows, &mut products);
         }
-        Gram::of(&products, stride, columns, (factor.log_root, run.len()))
+        (products, factor.log_root)
     }
 }

@@ -26,6 +26,12 @@ impl Model {
         }
     }
 
+    /// Groups of these widths with a variance each, the same in every run.
+    pub fn of_groups(widths: Vec<usize>, tau: Vec<f64>) -> Self {
+        let omega = vec![0.0; tau.len()];
+        Self { widths, tau, omega }
+    }
+
     /// Groups with a variance that all runs share.
     pub fn active(&self) -> Vec<usize> {
         (0..self.tau.len()).filter(|&k| self.tau[k] > 0.0).collect()
@@ -108,7 +114,7 @@ impl Model {
 
 impl Sums {
     /// Adds some columns of a run to `total`, without its effects of variances `omega`.
-    fn add_without_effects(&self, omega: &[f64], columns: &[usize], total: &mut Self) {
+    pub(super) fn add_without_effects(&self, omega: &[f64], columns: &[usize], total: &mut Self) {
         let picked = |rows: &[usize]| self.products.select_rows(rows).select_columns(columns);
         total.products += picked(columns);
         total.moments += self.moments.select_rows(columns);

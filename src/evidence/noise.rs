@@ -79,6 +79,17 @@ impl Readings {
         prior: NoisePrior,
         start: [f64; VARIANCES],
     ) -> Option<NoiseFit> {
+        self.noise_within(model, prior, start, CLOSE)
+    }
+
+    /// The same, up to a predicted increase of the log evidence of `close`.
+    pub fn noise_within(
+        &self,
+        model: &Model,
+        prior: NoisePrior,
+        start: [f64; VARIANCES],
+        close: f64,
+    ) -> Option<NoiseFit> {
         let (low, high) = prior.bounds();
         let mut now = self.at(model, prior, start.map(|x| x.clamp(low, high)))?;
         let mut damping = 0.0;
@@ -96,7 +107,7 @@ impl Readings {
                 interrupt::point();
                 let own = (&gradient, &precision, damping);
                 let (next, gain) = newton(&now.position, own, (low, high))?;
-                if gain < CLOSE || step == STEPS {
+                if gain < close || step == STEPS {
                     break;
                 }
                 let next = self.at(model, prior, next);

@@ -1,4 +1,6 @@
-//! Readings of runs, and the rows of their columns: zero, cosines and sines of orders, error.
+//! Readings of runs, and the rows of their columns: zero, groups of columns, error.
+//!
+//! The columns of a group are the cosine and the sine of an order, or any that are given.
 
 use std::sync::Arc;
 
@@ -16,10 +18,19 @@ pub const CHUNK: usize = 256;
 /// Bytes that a reading takes at most: its own numbers, factor, residual and products of terms.
 const BYTES: usize = 40 * size_of::<f64>();
 
+/// What the columns of a run are made of.
+#[derive(Clone, Debug)]
+enum Source {
+    /// Angles in radians.
+    Angles(Vec<f64>),
+    /// The columns themselves, a row of this width for each reading.
+    Columns { values: Vec<f64>, width: usize },
+}
+
 /// Readings of one run, in the order in which they were read.
 #[derive(Clone, Debug)]
 pub struct Run {
-    theta: Vec<f64>,
+    source: Source,
     error: Vec<f64>,
     mean: f64,
     decays: Vec<Terms>,
@@ -37,18 +48,44 @@ impl Run {
         same_length("error", error.len(), "theta", theta.len())?;
         room(theta.len() * BYTES)?;
         finite("theta", theta)?;
+        Self::of(Source::Angles(theta.to_vec()), error, time)
+    }
+
+    /// Of columns, a row of `width` for each error, and times as in [`Run::new`].
+    pub fn of_columns(
+        columns: &[f64],
+        width: usize,
+        error: &[f64],
+        time: Option<&[f64]>,
+    ) -> Result<Self, Error> {
+        if error.is_empty() {
+            return Err(Error::NoReadings);
+        }
+        same_length(
+            "columns",
+            columns.len(),
+            "width * error",
+            width * error.len(),
+        )?;
+        room(error.len() * BYTES + size_of_val(columns))?;
+        finite("columns", columns)?;
+        let values = columns.to_vec();
+        Self::of(Source::Columns { values, width }, error, time)
+    }
+
+    fn of(source: Source, error: &[f64], time: Option<&[f64]>) -> Result<Self, Error> {
         finite("error", error)?;
         let decays = match time {
             Some(time) => {
-                same_length("time", time.len(), "theta", theta.len())?;
+                same_length("time", time.len(), "error", error.len())?;
                 finite("time", time)?;
                 decays(&in_steps(time)?)
             }
-            None => decays(&(0..theta.len()).map(|i| i as f64).collect::<Vec<_>>()),
+            None => decays(&(0..error.len()).map(|i| i as f64).collect::<Vec<_>>()),
         };
         let mean = error.iter().sum::<f64>() / error.len() as f64;
         Ok(Self {
-            theta: theta.to_vec(),
+            source,
             error: error.iter().map(|e| e - mean).collect(),
             mean,
             decays,
@@ -58,7 +95,7 @@ impl Run {
 
     /// With weights above 0: the noise of a reading is as of weight 1, over their roots.
     pub fn weighted(mut self, weights: &[f64]) -> Result<Self, Error> {
-        same_length("weights", weights.len(), "theta", self.len())?;
+        same_length("weights", weights.len(), "error", self.len())?;
         if let Some(index) = weights.iter().position(|w| !(*w > 0.0 && w.is_finite())) {
             return Err(Error::Weight {
                 what: "weights",
@@ -72,12 +109,12 @@ impl Run {
 
     /// Readings.
     pub fn len(&self) -> usize {
-        self.theta.len()
+        self.error.len()
     }
 
     /// True without a reading.
     pub fn is_empty(&self) -> bool {
-        self.theta.is_empty()
+        self.error.is_empty()
     }
 
     /// Decays of the noise between readings.
@@ -130,13 +167,26 @@ fn in_steps(time: &[f64]) -> Result<Vec<f64>, Error> {
     Ok(time.iter().map(|t| (t - time[0]) / step).collect())
 }
 
-/// Runs, and the orders that are tested.
+/// Groups of columns.
+#[derive(Clone, Debug)]
+enum Groups {
+    /// Orders; as whole numbers, too, where they are.
+    Orders {
+        orders: Vec<f64>,
+        whole: Option<Vec<u32>>,
+    },
+    /// Widths of the groups, and the columns given that they have in turn.
+    Columns {
+        widths: Vec<usize>,
+        columns: Vec<usize>,
+    },
+}
+
+/// Runs, and the groups of columns that are tested.
 #[derive(Clone, Debug)]
 pub struct Readings {
     runs: Arc<Vec<Run>>,
-    orders: Vec<f64>,
-    /// The orders as whole numbers, where they are.
-    whole: Option<Vec<u32>>,
+    groups: Groups,
 }
 
 impl Readings {
@@ -156,24 +206,39 @@ impl Readings {
         if runs.is_empty() {
             return Err(Error::NoReadings);
         }
-        let places: Vec<usize> = (0..orders.len()).collect();
-        let all = Self {
+        Ok(Self {
             runs: Arc::new(runs),
-            orders,
-            whole: None,
-        };
-        Ok(all.among(&places))
+            groups: Groups::of_orders(orders),
+        })
     }
 
-    /// The same readings with some of the orders.
+    /// Of runs with columns ([`Run::of_columns`]), which are groups of these widths in turn.
+    pub fn of_groups(runs: Vec<Run>, widths: Vec<usize>) -> Result<Self, Error> {
+        if runs.is_empty() {
+            return Err(Error::NoReadings);
+        }
+        let total = widths.iter().sum();
+        for (run, own) in runs.iter().enumerate() {
+            let Source::Columns { width, .. } = own.source else {
+                unreachable!("runs have columns");
+            };
+            same_length("columns", width, "widths", total).map_err(|cause| Error::InRun {
+                run,
+                cause: Box::new(cause),
+            })?;
+        }
+        let columns = (0..total).collect();
+        Ok(Self {
+            runs: Arc::new(runs),
+            groups: Groups::Columns { widths, columns },
+        })
+    }
+
+    /// The same readings with some of the groups.
     pub fn among(&self, places: &[usize]) -> Self {
-        let orders: Vec<f64> = places.iter().map(|&k| self.orders[k]).collect();
-        let is_whole = |k: &f64| k.fract() == 0.0 && *k <= f64::from(u32::MAX);
-        let whole = orders.iter().all(is_whole);
         Self {
             runs: Arc::clone(&self.runs),
-            whole: whole.then(|| orders.iter().map(|&k| k as u32).collect()),
-            orders,
+            groups: self.groups.among(places),
         }
     }
 
@@ -182,9 +247,20 @@ impl Readings {
         &self.runs
     }
 
-    /// The orders.
+    /// The orders; none where columns were given.
     pub fn orders(&self) -> &[f64] {
-        &self.orders
+        match &self.groups {
+            Groups::Orders { orders, .. } => orders,
+            Groups::Columns { .. } => &[],
+        }
+    }
+
+    /// Columns of each group.
+    pub fn widths(&self) -> Vec<usize> {
+        match &self.groups {
+            Groups::Orders { orders, .. } => vec![2; orders.len()],
+            Groups::Columns { widths, .. } => widths.clone(),
+        }
     }
 
     /// Readings of all runs.
@@ -197,33 +273,43 @@ impl Readings {
         self.len() == 0
     }
 
-    /// Columns of a row: the zero, a cosine and a sine of every order, the error.
+    /// Columns of a row: the zero, those of every group, the error.
     pub fn columns(&self) -> usize {
-        2 * self.orders.len() + 2
+        let own = match &self.groups {
+            Groups::Orders { orders, .. } => 2 * orders.len(),
+            Groups::Columns { columns, .. } => columns.len(),
+        };
+        own + 2
     }
 
     /// Rows of a chunk of a run.
     pub(super) fn rows(&self, run: &Run, start: usize, count: usize) -> Rows {
         let columns = self.columns();
         let mut rows = Rows::zeros(count, columns);
-        let mut waves = vec![0.0; 2 * self.orders.len() * count];
-        let theta = &run.theta[start..start + count];
-        if let Some(orders) = &self.whole {
-            let answer = waves::Answer::default();
-            waves::rows(theta, orders, answer, &mut waves).expect("lengths are right");
-        } else {
-            for (order, pair) in self.orders.iter().zip(waves.chunks_exact_mut(2 * count)) {
-                for (i, x) in theta.iter().enumerate() {
-                    (pair[count + i], pair[i]) = (order * x).sin_cos();
+        match (&self.groups, &run.source) {
+            (Groups::Orders { orders, whole }, Source::Angles(theta)) => {
+                let theta = &theta[start..start + count];
+                let waves = waves_of(theta, orders, whole.as_deref());
+                for i in 0..count {
+                    let row = rows.row_mut(i);
+                    for c in 0..2 * orders.len() {
+                        row[c + 1] = waves[c * count + i];
+                    }
                 }
             }
+            (Groups::Columns { columns, .. }, Source::Columns { values, width }) => {
+                for i in 0..count {
+                    let own = &values[(start + i) * width..][..*width];
+                    for (out, &c) in rows.row_mut(i)[1..].iter_mut().zip(columns) {
+                        *out = own[c];
+                    }
+                }
+            }
+            _ => unreachable!("runs are made of what their groups are"),
         }
         for i in 0..count {
             let row = rows.row_mut(i);
             row[0] = 1.0;
-            for c in 0..2 * self.orders.len() {
-                row[c + 1] = waves[c * count + i];
-            }
             row[columns - 1] = run.error[start + i];
             if let Some(roots) = &run.roots {
                 for x in &mut row[..columns] {
@@ -233,4 +319,47 @@ impl Readings {
         }
         rows
     }
+}
+
+impl Groups {
+    fn of_orders(orders: Vec<f64>) -> Self {
+        let is_whole = |k: &f64| k.fract() == 0.0 && *k <= f64::from(u32::MAX);
+        let whole = orders.iter().all(is_whole);
+        Self::Orders {
+            whole: whole.then(|| orders.iter().map(|&k| k as u32).collect()),
+            orders,
+        }
+    }
+
+    fn among(&self, places: &[usize]) -> Self {
+        match self {
+            Self::Orders { orders, .. } => {
+                Self::of_orders(places.iter().map(|&k| orders[k]).collect())
+            }
+            Self::Columns { widths, columns } => {
+                let first = |k: usize| widths[..k].iter().sum::<usize>();
+                let own = |&k: &usize| columns[first(k)..][..widths[k]].to_vec();
+                Self::Columns {
+                    widths: places.iter().map(|&k| widths[k]).collect(),
+                    columns: places.iter().flat_map(own).collect(),
+                }
+            }
+        }
+    }
+}
+
+/// Cosine and sine of every order in turn, one after the other.
+fn waves_of(theta: &[f64], orders: &[f64], whole: Option<&[u32]>) -> Vec<f64> {
+    let count = theta.len();
+    let mut waves = vec![0.0; 2 * orders.len() * count];
+    if let Some(whole) = whole {
+        waves::rows(theta, whole, waves::Answer::default(), &mut waves).expect("lengths are right");
+        return waves;
+    }
+    for (order, pair) in orders.iter().zip(waves.chunks_exact_mut(2 * count)) {
+        for (i, x) in theta.iter().enumerate() {
+            (pair[count + i], pair[i]) = (order * x).sin_cos();
+        }
+    }
+    waves
 }

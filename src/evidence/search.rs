@@ -302,10 +302,14 @@ impl<'a> Search<'a> {
         let left = score - without.loss - self.coming(&rest, k, now.model.tau[k]);
         self.offer(|| rest.clone(), left, best);
         for &j in outside {
-            let (tau, gain) = without.other(j).best(&self.prior.sizes);
-            let model = || with(&rest, &[(j, tau, rest.omega[j])]);
-            let coming = self.coming(&rest, j, tau);
-            self.offer(model, left + gain + coming, best);
+            // All sizes are equally probable.
+            let coming = self.coming(&rest, j, self.prior.sizes[0]);
+            let known = best.as_ref().map_or(f64::NEG_INFINITY, |b| b.score);
+            let least = known.min(self.best - self.window) - left - coming;
+            if let Some((tau, gain)) = without.other(j).best_above(&self.prior.sizes, least) {
+                let model = || with(&rest, &[(j, tau, rest.omega[j])]);
+                self.offer(model, left + gain + coming, best);
+            }
         }
         Some(())
     }

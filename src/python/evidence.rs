@@ -49,7 +49,8 @@ type Estimated<'py> = (
     Vec<Option<Alone>>,
 );
 
-const LOST: &str = "no evidence can be computed: a covariance is not positive by rounding";
+pub(super) const LOST: &str =
+    "no evidence can be computed: a covariance is not positive by rounding";
 
 /// Readings of runs, and the orders that are tested.
 #[pyclass(name = "Evidence", module = "trueangle._core", frozen)]

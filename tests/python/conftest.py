@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import re
 import signal
 import sys
 from pathlib import Path
-from typing import Any
 
 # As the command has it, and for what tests start: where the cores are taken by other tests,
 # threads of numpy that wait for each other cost ten times the work. Before numpy is imported.
@@ -33,39 +31,16 @@ if hasattr(signal, "SIGHUP"):
 
 ROOT = Path(__file__).resolve().parents[2]
 
-# Nor does it which causes a diagnosis tried: where no time is given, a test's work ends after so
-# many questions whether its time is up, however busy the machine. The five seconds of the default
-# hold 650 (10 000 readings) to 3000 (1600) of them; a test has this many times a thousand.
-# Tests of the default ask for `default_time`, those that need a whole account for `patient`.
-QUESTIONS = 1000.0
+# Work where no time is given is counted and ends alike everywhere; tests that need a whole account,
+# whatever it takes, ask for `patient`.
 PATIENT = 20.0
-PATIENCE = PATIENT if os.environ.get("TRUEANGLE_NIGHTLY") == "1" else 3.0
-DEFAULT_TIME = deadline.LEAST
-deadline.LEAST = PATIENCE * DEFAULT_TIME
-
-
-class Counted(deadline.Deadline):
-    """A pace at which every question whether time is up takes as long."""
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        asked = itertools.count()
-        kwargs.setdefault("processor", lambda: next(asked) * DEFAULT_TIME / QUESTIONS)
-        super().__init__(*args, **kwargs)
-
-
-deadline.Deadline = Counted  # type: ignore[misc]
-
-
-@pytest.fixture
-def default_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work without a time given has what users give it."""
-    monkeypatch.setattr(deadline, "LEAST", DEFAULT_TIME)
+DEFAULT_WORK = deadline.LEAST
 
 
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work without a time given comes to its own end."""
-    monkeypatch.setattr(deadline, "LEAST", PATIENT * DEFAULT_TIME)
+    monkeypatch.setattr(deadline, "LEAST", PATIENT * DEFAULT_WORK)
 
 
 @pytest.fixture(scope="session")

@@ -103,7 +103,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         metavar="TIME",
         help="the best account in that time, as 10s, 2min or seconds; it says what is missing "
-        "(default: 5 s of the processor, or 0.5 ms a reading of many)",
+        "(default: as much work as ordinary readings take three times over, on any machine)",
     )
     add_progress(parser)
     add_errors_in(parser)

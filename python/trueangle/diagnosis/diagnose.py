@@ -28,6 +28,7 @@ from .confirmation import NOT_CONFIRMED
 from .delay import delay_finding
 from .discrepancy import discrepancy_of, unfolded_error
 from .drive import diagnose_drive
+from .factors.statement import stated_factors
 from .finding import Finding
 from .findings import (
     equal_scatter,
@@ -101,11 +102,11 @@ def diagnose(
     gain : bool
         Measure the gain on held-out runs (about half of the time).
     within : float, optional
-        Seconds that it may take; by itself 5 s of the processor, or 0.5 ms a reading of more
-        than 10 000, whatever the readings; ordinary ones need a third of that. When they are
-        up, the account so far is given and says that it is incomplete (`Diagnosis.complete`,
-        ``notes``): causes may be missing, and what was not held out is not confirmed. Seven
-        tenths of the time are for the choice of causes.
+        Seconds that it may take. By itself work is counted and no clock looked at, so that the
+        same readings give the same account on any machine, however busy; ordinary ones need a
+        third of what may be done. When either is up, the account so far is given and says that
+        it is incomplete (`Diagnosis.complete`, ``notes``): causes may be missing, and what was
+        not held out is not confirmed. Seven tenths of the time are for the choice of causes.
     progress : {"none", "auto", "text", "json"}
         What is done and how much is left, on stderr, after the first second; ``"auto"`` is
         text on a terminal and nothing elsewhere.
@@ -193,7 +194,12 @@ def _diagnosis(
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
+    named = confirmed_count(findings)
+    bare = first if seen.delay is None else account.choice.start
+    findings, factors = stated_factors(bare, chosen, findings)
+    # What has lost its name may be what scatters.
     in_doubt = any(spot.supported and not spot.common for spot in spots)
+    in_doubt |= confirmed_count(findings) < named
     faults = data_faults(records_of(measured))
     spoilt = next((fault for fault in faults if fault.spoils_readings), None)
     for item in account.choice.scatter:
@@ -209,7 +215,8 @@ def _diagnosis(
         if not found.confirmed:
             corrected = replace(corrected, joint=stated.joint)
     if seen.delay is not None:
-        findings.append(delay_finding(seen.delay, chosen, first, gain and not at.over, rest))
+        sure = regression_without(chosen, not_confirmed_terms(findings), settled=True)
+        findings.append(delay_finding(seen.delay, sure, first, gain and not at.over, rest))
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
     extended = corrected.with_effects(
         effect for finding in findings if finding.confirmed for effect in finding.effects
@@ -242,7 +249,18 @@ def _diagnosis(
         not at.cut,
         log,
         measured,
+        factors=factors,
     )
+
+
+def confirmed_count(findings: list[Finding]) -> int:
+    """Findings that are confirmed."""
+    return sum(finding.confirmed for finding in findings)
+
+
+def not_confirmed_terms(findings: list[Finding]) -> list[int]:
+    """Terms of the findings that are not confirmed."""
+    return [k for finding in findings if not finding.confirmed for k in finding.group]
 
 
 def _used(runs: list[CalibrationRun]) -> int:

@@ -18,6 +18,7 @@ from ..support.plainresult import json_text
 from .beliefs import Belief
 from .correctable import Correctable
 from .discrepancy import Discrepancy
+from .factors.factor import Factor
 from .finding import Finding
 from .goodness import Unexplained
 from .torque import TorqueAccount
@@ -52,6 +53,7 @@ class DiagnosisData(Correctable):
     simulated: MeasuredMinusSimulated | None = None
     runs: list[CalibrationRun] = field(repr=False, compare=False, default_factory=list)
     torque: TorqueAccount | None = None
+    factors: list[Factor] = field(default_factory=list)
 
     @property
     def is_enough(self) -> bool:
@@ -177,6 +179,7 @@ class DiagnosisData(Correctable):
             "readings": self.readings,
             "readings_used": self.readings_used,
             "unexplained": self._unexplained(),
+            "factors": [factor.to_dict() for factor in self.factors],
             "findings": [finding.to_dict() for finding in self.findings],
             "beliefs": [belief.to_dict() for belief in self.beliefs],
             "data_faults": [fault.to_dict() for fault in self.data_faults],

@@ -53,6 +53,8 @@ class Diagnosis(DiagnosisData):
         The log of another simulator that the simulation stands on.
     runs : list of CalibrationRun
         The readings, as given.
+    factors : list of Factor
+        What measured minus simulated follows, strongest first, whether it has a name or not.
     torque : TorqueAccount or None
         What the drive's torque lacks, where the readings and the simulator's log have one.
     """

@@ -111,6 +111,9 @@ def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
         lacking = [f.summary() for f in diagnosis.torque.findings if f.confirmed]
         if lacking:
             lines += _wrapped(f"Confirmed in the drive's torque: {'; '.join(lacking)}.", 2)
+    for factor in diagnosis.factors:
+        if not factor.named_by:
+            lines += _wrapped(f"Follows {factor.sentence(unit)}.", 2)
     if doubtful:
         lines += _wrapped(f"Listed and not confirmed: {', '.join(doubtful)}.", 2)
     if wrong:

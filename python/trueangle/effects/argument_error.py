@@ -48,6 +48,7 @@ class ArgumentShift(Effect):
         "The pattern was taken as a function of one angle and belongs to the other (indicated "
         "against true): it differs by the product of the pattern and its slope."
     )
+    form_of: ClassVar[tuple[str, ...]] = ("place",)
     measure: ClassVar[str] = "free angles dense enough for the sums of the gear's orders"
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         MissingOrder: "free angles, with lines at the sums and differences of known orders",

@@ -65,6 +65,7 @@ class Backlash(Effect):
         "whose sign is the direction of travel, whatever the speed, load and place."
     )
     factor: ClassVar[str] = "direction"
+    form_of: ClassVar[tuple[str, ...]] = ("direction", "reversal_time")
     measure: ClassVar[str] = "approach every position from both directions, within each run"
     acts_on_runs: ClassVar[bool] = True
 

@@ -62,6 +62,7 @@ class ChannelSkew(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("time",)
     factor: ClassVar[str] = "velocity"
+    form_of: ClassVar[tuple[str, ...]] = ("speed", "speed_place")
     form_follows: ClassVar[bool] = True
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         Latency: "two speeds at angles dense enough for twice the sensor's order",

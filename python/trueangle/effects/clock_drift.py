@@ -47,6 +47,7 @@ class ClockDrift(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("time",)
     factor: ClassVar[str] = "velocity"
+    form_of: ClassVar[tuple[str, ...]] = ("speed", "run_time")
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         Latency: "longer runs: a delay is the same at their end",
         ScaleError: "out and back in one run, with a stop in between",

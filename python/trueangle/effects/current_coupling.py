@@ -47,6 +47,7 @@ class CurrentCoupling(FactorEffect):
     )
     needs: ClassVar[tuple[str, ...]] = ("current",)
     factor: ClassVar[str] = "torque"
+    form_of: ClassVar[tuple[str, ...]] = ("current",)
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         TorsionalCompliance: "lock the output, or drive current without torque (d axis)",
         ThermalDrift: "change current and temperature independently",

@@ -63,6 +63,7 @@ class DirectionalPattern(Effect):
         "forward and backward have different shapes."
     )
     factor: ClassVar[str] = "direction"
+    form_of: ClassVar[tuple[str, ...]] = ("direction_place",)
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         Backlash: "both directions over the whole turn",
         Latency: "two speeds at least a factor of 3 apart: play does not grow with speed",

@@ -96,6 +96,7 @@ class DriftWithinRun(Effect):
         "such a drift; a free path in time describes the noise."
     )
     factor: ClassVar[str] = "time"
+    form_of: ClassVar[tuple[str, ...]] = ("run_time",)
     measure: ClassVar[str] = "sweep out and back, or several turns, in each run, with time stamps"
     transfers: ClassVar[bool] = False
     confused_with: ClassVar[Mapping[type[Effect], str]] = {

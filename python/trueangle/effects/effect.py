@@ -48,6 +48,8 @@ class Effect(TabledParameters):
         What has to take several values for it to show, and whose labels are shuffled in
         the negative control: "direction", "velocity", "temperature", "torque", "mount",
         "angle", "run", "time", "none".
+    form_of : tuple of str
+        Factors of an account without names of which it is a form; none for what has no such.
     confused_with : mapping of Effect class to str
         Causes before it in the list that it can be taken for, each with the measurement
         that tells them apart.
@@ -96,6 +98,7 @@ class Effect(TabledParameters):
     sentence: ClassVar[str]
     needs: ClassVar[tuple[str, ...]] = ()
     factor: ClassVar[str] = "angle"
+    form_of: ClassVar[tuple[str, ...]] = ()
     confused_with: ClassVar[Mapping[type[Effect], str]] = {}
     measure: ClassVar[str] = ""
     contains: ClassVar[tuple[type[Effect], ...]] = ()

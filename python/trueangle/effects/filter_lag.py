@@ -80,6 +80,7 @@ class FilterLag(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("time",)
     factor: ClassVar[str] = "velocity"
+    form_of: ClassVar[tuple[str, ...]] = ("speed_place",)
     measure: ClassVar[str] = (
         "record moving at two or more speeds in both directions, densely enough for gear lines"
     )

@@ -52,6 +52,7 @@ class Latency(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("time",)
     factor: ClassVar[str] = "velocity"
+    form_of: ClassVar[tuple[str, ...]] = ("speed", "speed_place")
     measure: ClassVar[str] = (
         "record moving, time-stamped, in both directions at two speeds a factor of 3 apart"
     )

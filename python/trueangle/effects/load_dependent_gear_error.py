@@ -52,6 +52,7 @@ class LoadDependentGearError(FactorEffect):
     )
     needs: ClassVar[tuple[str, ...]] = ("torque",)
     factor: ClassVar[str] = "torque"
+    form_of: ClassVar[tuple[str, ...]] = ("load_place",)
     of_motion: ClassVar[bool] = True
     measure: ClassVar[str] = "repeat the runs at a second load, densely enough for the gear's lines"
     confused_with: ClassVar[Mapping[type[Effect], str]] = {

@@ -82,6 +82,7 @@ class LocalDefect(Effect):
         "A damaged tooth, pole or graduation line: a bump at one place of one shaft, the same "
         "in every pass."
     )
+    form_of: ClassVar[tuple[str, ...]] = ("place",)
     measure: ClassVar[str] = "a second pass over the place in steps finer than the bump"
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         MissingOrder: "free angles, finer than the bump",

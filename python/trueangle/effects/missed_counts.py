@@ -51,6 +51,7 @@ class MissedCounts(Effect):
         "every reading is off by the same step."
     )
     factor: ClassVar[str] = "time"
+    form_of: ClassVar[tuple[str, ...]] = ("run", "run_time")
     measure: ClassVar[str] = "more readings before and after in one run, closing at the start angle"
     transfers: ClassVar[bool] = False
     located: ClassVar[bool] = True

@@ -61,6 +61,7 @@ class MissingOrder(Effect):
     kind: ClassVar[str] = "missing_order"
     size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = "A periodic error of one shaft that the simulation does not have."
+    form_of: ClassVar[tuple[str, ...]] = ("place",)
     measure: ClassVar[str] = FREE_ANGLES
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         TorsionalCompliance: "a second load, or the base turned by 180 deg",

@@ -79,6 +79,7 @@ class NonIntegerOrder(Effect):
         "another phase in every run."
     )
     factor: ClassVar[str] = "run"
+    form_of: ClassVar[tuple[str, ...]] = ("run_place",)
     measure: ClassVar[str] = "several turns in one record, and several records, at free angles"
     transfers: ClassVar[bool] = False
     confused_with: ClassVar[Mapping[type[Effect], str]] = {

@@ -86,6 +86,7 @@ class PreslidingHysteresis(Effect):
         "branch to the other over a transition length and remembers where it turned."
     )
     factor: ClassVar[str] = "direction"
+    form_of: ClassVar[tuple[str, ...]] = ("direction", "reversal_time")
     measure: ClassVar[str] = _AFTER_REVERSAL
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         Backlash: _AFTER_REVERSAL,

@@ -52,6 +52,7 @@ class ReferenceLines(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("mount",)
     factor: ClassVar[str] = "mount"
+    form_of: ClassVar[tuple[str, ...]] = ("mount_place",)
     of_motion: ClassVar[bool] = True
     measure: ClassVar[str] = (
         "turn the reference on its mount by different angles (0, 130, 250 deg) and repeat"

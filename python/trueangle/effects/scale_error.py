@@ -41,6 +41,7 @@ class ScaleError(Effect):
         "The ratio or the count of the scale is not what the reading is computed with: the "
         "error grows in proportion to the angle turned."
     )
+    form_of: ClassVar[tuple[str, ...]] = ("place",)
     measure: ClassVar[str] = "turn several turns in both directions"
     acts_on_runs: ClassVar[bool] = True
 

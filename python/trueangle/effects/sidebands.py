@@ -59,6 +59,7 @@ class Sidebands(Effect):
         "Eccentricity or tilt at the output changes the depth of mesh as it turns: a gear line "
         "is modulated and has neighbours one or two orders away."
     )
+    form_of: ClassVar[tuple[str, ...]] = ("place",)
     measure: ClassVar[str] = FREE_ANGLES
     confused_with: ClassVar[Mapping[type[Effect], str]] = {MissingOrder: FREE_ANGLES}
     located: ClassVar[bool] = True

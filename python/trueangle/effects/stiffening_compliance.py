@@ -65,6 +65,7 @@ class StiffeningCompliance(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("torque",)
     factor: ClassVar[str] = "torque"
+    form_of: ClassVar[tuple[str, ...]] = ("load", "load_sign")
     of_motion: ClassVar[bool] = True
     measure: ClassVar[str] = "repeat the runs at three or more loads of both signs"
     confused_with: ClassVar[Mapping[type[Effect], str]] = {

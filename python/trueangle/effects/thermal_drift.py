@@ -58,6 +58,7 @@ class ThermalDrift(FactorEffect):
     )
     needs: ClassVar[tuple[str, ...]] = ("temperature",)
     factor: ClassVar[str] = "temperature"
+    form_of: ClassVar[tuple[str, ...]] = ("temperature", "temperature_place")
     measure: ClassVar[str] = (
         "repeat the runs at a second temperature at least 10 K away, logging the sensor's own"
     )

@@ -80,6 +80,7 @@ class TimePeriodic(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("time",)
     factor: ClassVar[str] = "run"
+    form_of: ClassVar[tuple[str, ...]] = ("frequency",)
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         MissingOrder: "a second speed, or several runs that start at one angle",
         DriftWithinRun: "longer runs",

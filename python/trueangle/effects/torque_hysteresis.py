@@ -67,6 +67,7 @@ class TorqueHysteresis(Effect):
     )
     needs: ClassVar[tuple[str, ...]] = ("torque",)
     factor: ClassVar[str] = "torque"
+    form_of: ClassVar[tuple[str, ...]] = ("load", "load_sign")
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         Backlash: "turn the torque round without turning the joint, or carry two loads",
         TorsionalCompliance: "load and unload at one place, to two values of one torque",

@@ -46,6 +46,7 @@ class TorsionalCompliance(FactorEffect):
     )
     needs: ClassVar[tuple[str, ...]] = ("torque",)
     factor: ClassVar[str] = "torque"
+    form_of: ClassVar[tuple[str, ...]] = ("load", "load_sign")
     measure: ClassVar[str] = "repeat the runs at a second, known load (or with the arm off)"
     acts_on_runs: ClassVar[bool] = True
 

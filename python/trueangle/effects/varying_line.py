@@ -61,6 +61,12 @@ class VaryingLine(Effect):
         "narrower cause has."
     )
     factor: ClassVar[str] = "velocity"
+    form_of: ClassVar[tuple[str, ...]] = (
+        "speed_place",
+        "temperature_place",
+        "load_place",
+        "run_place",
+    )
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         FilterLag: "three speeds: a filter's lines change with speed, and all of them",
         ChannelSkew: "angles dense enough for twice the sensor's order",

@@ -58,6 +58,7 @@ class WrongGearRatio(Effect):
         "The simulation counts with another gear ratio than the joint has: all lines of the "
         "motor and the wave generator stand at other orders, together."
     )
+    form_of: ClassVar[tuple[str, ...]] = ("place",)
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         MissingOrder: "count the motor's turns in one turn of the output",
         Sidebands: "count the motor's turns in one turn of the output",

@@ -53,6 +53,7 @@ class ZeroSlip(Effect):
         "zero, which no other factor of the run explains."
     )
     factor: ClassVar[str] = "run"
+    form_of: ClassVar[tuple[str, ...]] = ("run",)
     measure: ClassVar[str] = "repeat the run several times under equal conditions"
     transfers: ClassVar[bool] = False
     confused_with: ClassVar[Mapping[type[Effect], str]] = {

@@ -13,6 +13,7 @@ import trueangle._core as _core
 
 from ..joint.lines import VANISHES
 from ..support.arrays import Array
+from ..support.deadline import current_deadline
 from .blocks import BlockProducts, Blocks
 from .whitening import Whitener
 
@@ -155,10 +156,12 @@ class Projection:
 
     def gain(self, columns: Array) -> tuple[float, Array]:
         """Deviance that ``columns`` save together, and their coefficients."""
+        current_deadline().spend(columns.size)
         return self.beside.gain(columns)
 
     def gains(self, columns: Array) -> Array:
         """Deviance that each column saves alone."""
+        current_deadline().spend(columns.size)
         before, after, moment = self.beside.powers(columns)
         excited = after > EXCITED * np.maximum(before, 1e-300)
         saved = moment**2 / np.where(excited, after, 1.0)
@@ -208,6 +211,7 @@ class Projection:
 
     def ratio_of(self, columns: Array) -> tuple[float, float]:
         """Best ratio of variances of a run effect beside what is fitted, and what it saves."""
+        current_deadline().spend(columns.size)
         return self.beside.ratio(columns)
 
     def drawn_line(self, angles: Array, low: float, high: float, steps: int) -> tuple[float, float]:

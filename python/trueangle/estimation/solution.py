@@ -16,6 +16,7 @@ import trueangle._core as _core
 from ..joint.pattern import JointPattern, Pattern
 from ..joint.signals import Signals
 from ..support.arrays import Array
+from ..support.deadline import current_deadline
 from .extension import Extension
 from .lines import LineBasis
 from .projection import Projection, project
@@ -70,6 +71,7 @@ class Solution(Projection):
         terms = tuple(terms)
         blocks = (readings.base, *(term.columns for term in terms))
         design = _grown(blocks, before)
+        current_deadline().spend(design.size)
         effects = [term.run_effect for term in terms if term.run_effect is not None]
         known = [] if before is None else before.factors
         factors, found, target, outlying = _core.settled(

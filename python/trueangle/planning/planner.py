@@ -18,7 +18,7 @@ from .nextruns import NextRuns, RivalEvidence
 from .scales import DesignScales
 from .search import RunSearch
 
-#: Readings whose diagnosis may take as long by default as a plan may: ten seconds.
+#: Readings whose diagnosis may take as much work by default as a plan may.
 WORK = 20_000
 
 
@@ -49,8 +49,8 @@ def next_runs(
     One choice after the other is changed to the best there is (speed, motion, load, temperature,
     mount, current, then the levels between), run after run, until all is told or nothing more is.
     Readings are then lowered to the fewest that do, and runs are looked for that need half of
-    those, as long as there are any. Half a second to some seconds; after ten of the processor
-    where no time is given, the best so far is the answer, and ``notes`` say so.
+    those, as long as there are any. Half a second to some seconds; after as much work
+    as two diagnoses where no time is given, the best so far is the answer, and ``notes`` say so.
     """
     with with_deadline() as at, at.bounded(WORK), one_blas_thread():
         return _next_runs(earlier, believed, spots, noise, limits)

@@ -22,9 +22,9 @@ from typing import Final, TextIO
 from ..errors import ArgumentError
 from .suggestions import check_choice
 
-#: What work may take where no time was given, in seconds of its thread's processor: so much, or
-#: so much for each item of many. Work on ordinary readings takes a third of that.
-LEAST, PER_ITEM = 5.0, 5e-4
+#: Work that may be done where no time was given, in numbers of columns that are fitted or scored:
+#: so many, or so many for each item of many. Ordinary readings take a third of that.
+LEAST, PER_ITEM = 4e7, 4e3
 
 #: Ways of showing progress.
 STYLES: Final = ("auto", "text", "json", "none")
@@ -45,8 +45,8 @@ class Deadline:
         on a terminal and nothing elsewhere. Nothing is shown in the first second.
     stream : text stream, optional
         In place of stderr.
-    clock, processor : callable
-        Seconds that pass, and seconds that the processor spends on this thread.
+    clock : callable
+        Seconds that pass.
 
     Attributes
     ----------
@@ -66,7 +66,6 @@ class Deadline:
         style: str = "none",
         stream: TextIO | None = None,
         clock: Callable[[], float] = time.monotonic,
-        processor: Callable[[], float] = time.thread_time,
     ) -> None:
         if within is not None and not (within > 0.0 and math.isfinite(within)):
             raise ArgumentError(f"within must be a time above zero in seconds, got {within!r}")
@@ -77,15 +76,15 @@ class Deadline:
         if style == "auto":
             style = "text" if self._stream is not None and self._stream.isatty() else "none"
         self._style = "none" if self._stream is None else style
-        self._clock, self._processor = clock, processor
+        self._clock = clock
         self._begun = self._shown = clock()
         self._shown += _FIRST - _INTERVAL
         self._share = 1.0
         self._stage, self._entered = "", self._begun
         self._width = 0
         self._cut = ""
-        #: Of `bounded` work: when it began, and what it may take.
-        self._started, self._bound = 0.0, math.inf
+        #: Of `bounded` work: what was done, and what may be.
+        self._spent, self._bound = 0.0, math.inf
         self.within = within
         self.stopped = False
 
@@ -105,9 +104,9 @@ class Deadline:
             self._cut = self._stage or "starting"
         return late or self.stopped
 
-    @property
-    def _spent(self) -> float:
-        return self._processor() - self._started
+    def spend(self, numbers: int) -> None:
+        """So many numbers of columns are fitted or scored."""
+        self._spent += numbers
 
     @property
     def why(self) -> str:
@@ -117,23 +116,23 @@ class Deadline:
         if self.within is not None:
             return f"the {self.within:g} s given were up"
         return (
-            f"the {self._bound:.2g} s of the processor that it has by default were up (a longer "
-            "time can be given, as within)"
+            f"the work that is done by default ({self._bound:.2g} numbers) was done (a time can be "
+            "given, as within)"
         )
 
     @contextlib.contextmanager
     def bounded(self, items: int) -> Iterator[None]:
         """Work on so many items that must come to an end where no time was given.
 
-        The processor's time is counted, of this thread alone: it is the same on a busy machine.
+        What is done is counted (`spend`), and no clock looked at: the same readings give the same
+        account on any machine, however busy.
         """
-        before = self._started, self._bound, self._cut
-        self._started, self._bound = self._processor(), max(LEAST, PER_ITEM * items)
-        self._cut = ""
+        before = self._spent, self._bound, self._cut
+        self._spent, self._bound, self._cut = 0.0, max(LEAST, PER_ITEM * items), ""
         try:
             yield
         finally:
-            self._started, self._bound, self._cut = before
+            self._spent, self._bound, self._cut = before
 
     @property
     def cut(self) -> str:

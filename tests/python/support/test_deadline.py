@@ -20,6 +20,7 @@ from trueangle.cli import main
 from trueangle.cli.values import seconds
 from trueangle.errors import ArgumentError
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
+from trueangle.support import deadline
 from trueangle.support.deadline import (
     Deadline,
     _clock_text,
@@ -143,22 +144,20 @@ def test_a_step_that_was_not_finished_names_nothing():
     assert result.findings == []
 
 
-@pytest.mark.usefixtures("default_time")
 def test_work_without_a_time_given_is_bounded_by_its_readings():
-    now = [0.0]
-    for items, allowed in ((0, 5.0), (10_000, 5.0), (40_000, 20.0)):
-        now[0] = 0.0
-        work = Deadline(processor=lambda: now[0])
+    """By what is done: no clock is looked at."""
+    for items, allowed in ((0, 40_000_000), (10_000, 40_000_000), (40_000, 160_000_000)):
+        work = Deadline(clock=Ticks())
         with work.bounded(items):
             work.at("rounds", 0, 9)
-            now[0] = allowed - 0.01
+            work.spend(allowed - 1)
             assert not work.over
             with work.part(0.5):
                 assert work.over
-            now[0] = allowed + 1e-9
+            work.spend(1)
             assert work.over
             assert work.cut == "rounds"
-            assert f"the {allowed:.2g} s of the processor" in work.why
+            assert f"({allowed:.2g} numbers) was done" in work.why
         assert not work.over
         assert work.cut == "", "what follows is no part of it"
 
@@ -176,35 +175,18 @@ def test_readings_that_are_not_used_bring_no_time(monkeypatch):
 
 
 def test_a_time_that_is_given_is_the_only_one():
-    now = [0.0]
-    work = Deadline(1e3, clock=lambda: 0.0, processor=lambda: now[0])
+    work = Deadline(1e3, clock=lambda: 0.0)
     with work.bounded(10):
-        now[0] = 1e6
+        work.spend(10**12)
         assert not work.over
 
 
-class Busy:
-    """A processor that is looked at, and has worked a while each time."""
-
-    def __init__(self, each):
-        self.seconds, self.each = 0.0, each
-
-    def __call__(self):
-        self.seconds += self.each
-        return self.seconds
-
-
-@pytest.mark.usefixtures("default_time")
 @pytest.mark.parametrize("command", [False, True])
 def test_a_diagnosis_comes_to_an_end_by_itself_and_says_so(command, files, capsys, monkeypatch):
-    """So slow a processor that the time is up after the first causes: what is there is told."""
+    """Work that is up after the first causes: what is there is told."""
     monkeypatch.chdir(files)
-    usual = Deadline.__init__
-
-    def slow(self, *args, **more):
-        usual(self, *args, **{**more, "processor": Busy(1.0)})
-
-    monkeypatch.setattr(Deadline, "__init__", slow)
+    monkeypatch.setattr(deadline, "LEAST", 1e5)
+    monkeypatch.setattr(deadline, "PER_ITEM", 0.0)
     if command:
         assert main(["diagnose", "r.csv", "--simulation", "believed.toml"]) == 0
         told = capsys.readouterr().out
@@ -214,7 +196,7 @@ def test_a_diagnosis_comes_to_an_end_by_itself_and_says_so(command, files, capsy
         assert not result.is_enough
         told = result.summary()
     assert told.startswith("INCOMPLETE: the ")
-    assert "s of the processor that it has by default were up" in " ".join(told.split())
+    assert "the work that is done by default (1e+05 numbers) was done" in " ".join(told.split())
     assert "Measured minus simulated" in told
 
 

@@ -52,15 +52,9 @@ SPARE = {
 #: Of these groups the ordinary run asks every so many.
 EVERY = {"turning": 4, "bursts": 3, "tables": 3, "episodes": 3}
 
-#: Of these the ordinary run asks for what users are told where they give no time: what has no name
-#: takes many times as long to come to its own end, and is unexplained before.
-BY_DEFAULT = ("outside", "episodes")
-
 
 @pytest.mark.parametrize("group", WANTED if LARGE else SPARE)
-def test_group(group: str, request: pytest.FixtureRequest) -> None:
-    if group in BY_DEFAULT and not LARGE:
-        request.getfixturevalue("default_time")
+def test_group(group: str) -> None:
     verdicts = [
         attempt(case) for case in cases(group, SEEDS)[:: 1 if LARGE else EVERY.get(group, 2)]
     ]

@@ -1,0 +1,316 @@
+"""Which factors the error follows: a search over groups of columns by their evidence."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from ..._core import Groups, GroupSums
+from ...joint.signals import Signals
+from ...support.arrays import Array
+from .factor import Factor, FactorCurve
+from .group import FACTORS, Group
+
+#: Readings used at most; of more, one of every so many in a row.
+MOST_READINGS: Final = 2500
+
+#: Part of the variance that each factor may have where the noise is first looked for.
+AT_FIRST: Final = 0.3
+
+#: Columns and orders of groups that the noise is first looked for beside.
+FEW: Final = 4
+LOWEST: Final = 4.0
+
+#: Rounds of noise and search at most.
+ROUNDS: Final = 3
+
+#: Log Bayes factor below which two accounts are not distinguished (Kass and Raftery: 20 to 1).
+ALIKE: Final = 3.0
+
+#: Share of what a group's leaving takes that another must give back to be tried in its place.
+TRIED: Final = 0.5
+
+#: Standard deviations of a 95 % interval.
+BAND: Final = 1.96
+
+#: What groups that are forms of a name have in the place of a factor.
+NAME: Final = "name"
+
+#: Smallest variance of readings that is distinguished from zero.
+NOTHING: Final = 1e-24
+
+#: Smallest variance of the noise, over that of the readings.
+ROUNDING: Final = 1e-9
+
+
+def _prior(groups: Sequence[Group]) -> list[float]:
+    """Of each group: one of them is expected, and as much of what stood out of many as of one."""
+    each = 1.0 / max(len(groups), 2)
+    return [0.0 if group.factor == NAME else each / group.alternatives for group in groups]
+
+
+@dataclass(frozen=True, eq=False)
+class FactorAccount:
+    """Groups of columns at readings, and which of them are in.
+
+    Attributes
+    ----------
+    groups : sequence of Group
+    sums : GroupSums
+        Under the noise that was found.
+    tau : list of float
+        Prior variance of each group; 0 of those that are out.
+    total : float
+        Variance of the error.
+    """
+
+    groups: Sequence[Group]
+    sums: GroupSums
+    tau: list[float]
+    total: float
+
+    @cached_property
+    def prior(self) -> list[float]:
+        """Prior probability of each group."""
+        return _prior(self.groups)
+
+    @cached_property
+    def inside(self) -> list[int]:
+        """Groups that are in."""
+        return [k for k, tau in enumerate(self.tau) if tau > 0.0]
+
+    def evidence(self, tau: Sequence[float]) -> float:
+        """Log evidence of a model."""
+        return self.sums.posterior(list(tau))[0]
+
+    def variance(
+        self, tau: Sequence[float], groups: Sequence[int], beside: Sequence[float] | None = None
+    ) -> float:
+        """Variance over the readings of what some groups of a model take.
+
+        Of a model and groups ``beside`` it, where given.
+        """
+        whole = list(tau) if beside is None else list(np.maximum(tau, beside))
+        _, mean, _ = self.sums.posterior(whole)
+        taken: Array = np.zeros(len(self.groups[0].columns))
+        for k in groups:
+            if whole[k] > 0.0:
+                own = slice(int(self.bounds[k]), int(self.bounds[k + 1]))
+                taken = taken + self.groups[k].columns @ mean[own]
+        return float(np.var(taken))
+
+    @cached_property
+    def bounds(self) -> Array:
+        """First column of each group, and the one past the last."""
+        return np.cumsum([0, *(group.columns.shape[1] for group in self.groups)])
+
+    def without(self, groups: Iterable[int]) -> list[float]:
+        """The model less some groups."""
+        left = list(self.tau)
+        for k in groups:
+            left[k] = 0.0
+        return left
+
+    def best_beside(
+        self, given: Sequence[float], allowed: Iterable[int], start: Sequence[float] | None = None
+    ) -> tuple[float, list[float]]:
+        """Score and model of the best of some groups beside those given."""
+        probabilities = [0.0] * len(self.groups)
+        for k in allowed:
+            if given[k] == 0.0:
+                probabilities[k] = self.prior[k]
+        begin = [0.0] * len(self.groups) if start is None else list(start)
+        return self.sums.search(list(given), probabilities, begin)
+
+
+def factor_account(signals: Signals, error: Array, groups: Sequence[Group]) -> FactorAccount | None:
+    """The groups that readings follow, under the noise of most evidence.
+
+    ::
+
+        y = z + sum_g X_g b_g + n,   b_g ~ 0 or N(0, tau_g I)
+
+    with one zero z for all runs, and noise of white and five exponential parts in every run.
+
+    Parameters
+    ----------
+    signals : Signals
+    error : ndarray, shape (n,)
+    groups : sequence of Group
+    """
+    total = float(np.var(error))
+    if not total > NOTHING:
+        return None
+    widths = [group.columns.shape[1] for group in groups]
+    columns = np.hstack([group.columns for group in groups])
+    y = error - error.mean()
+    cuts = [0, *(np.flatnonzero(np.diff(signals.run)) + 1).tolist(), len(y)]
+    clock = signals.clock if signals.time is not None else None
+    parts = []
+    for start, stop in itertools.pairwise(cuts):
+        time = None if clock is None else np.maximum.accumulate(clock[start:stop])
+        if time is not None and not time[-1] > time[0]:
+            time = None
+        parts.append((columns[start:stop], y[start:stop], time))
+    core = Groups(parts, widths)
+    scale = _scale(y, cuts)
+    noise = core.noise([AT_FIRST * total if _is_first(g) else 0.0 for g in groups], scale)
+    sums = core.sums(_above_rounding(noise, total), total)
+    tau = [0.0] * len(groups)
+    for _ in range(ROUNDS):
+        _, found = sums.search([0.0] * len(groups), _prior(groups), tau)
+        is_same = [t > 0.0 for t in found] == [t > 0.0 for t in tau]
+        tau = found
+        if is_same:
+            break
+        noise = core.noise(tau, scale, noise)
+        sums = core.sums(_above_rounding(noise, total), total)
+    return FactorAccount(groups, sums, tau, total)
+
+
+def _above_rounding(noise: Array, total: float) -> Array:
+    """White noise of readings without any: what rounding of products leaves."""
+    return np.array([max(noise[0], ROUNDING * total), *noise[1:]])
+
+
+def _is_first(group: Group) -> bool:
+    """Groups that the noise is first looked for beside: no strong error is taken for slow noise."""
+    low = len(group.orders) == 0 or max(group.orders) <= LOWEST
+    return group.factor == NAME or (group.columns.shape[1] <= FEW and low and not group.is_product)
+
+
+def _scale(y: Array, cuts: Sequence[int]) -> float:
+    """Variance of the noise by neighbours, or a small part of that of the readings."""
+    steps = [np.diff(y[a:b]) ** 2 for a, b in itertools.pairwise(cuts)]
+    every = np.concatenate(steps)
+    between = 0.5 * float(np.median(every)) / 0.455 if every.size else 0.0
+    return max(between, ROUNDING * float(np.var(y)))
+
+
+def factors_of(account: FactorAccount, shafts: dict[str, float]) -> list[Factor]:
+    """The factors that are in, strongest first."""
+    _, mean, covariance = account.sums.posterior(account.tau)
+    base = account.evidence(account.tau)
+    kinds: dict[tuple[str, str | None], list[int]] = {}
+    for k in account.inside:
+        group = account.groups[k]
+        if group.factor == NAME:
+            continue
+        shaft = _shaft(group.orders, shafts) if group.orders else None
+        kinds.setdefault((group.factor, shaft), []).append(k)
+    bounds = account.bounds
+    found = []
+    for (factor, shaft), members in kinds.items():
+        at = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in members])
+        columns = np.hstack([account.groups[k].columns for k in members])
+        rms, std = _size(columns, mean[at], covariance[np.ix_(at, at)])
+        orders = [m for k in members for m in account.groups[k].orders]
+        cycles = shafts[shaft] if shaft else 1.0
+        found.append(
+            Factor(
+                factor,
+                shaft,
+                tuple(sorted({m / cycles for m in orders})) or None,
+                rms,
+                max(rms - BAND * std, 0.0),
+                rms + BAND * std,
+                rms**2 / max(account.total, rms**2),
+                base - account.evidence(account.without(members)),
+                (),
+                _alike(account, members, factor),
+                _curve(account, members, bounds, mean, covariance),
+            )
+        )
+    return sorted(found, key=lambda f: (-f.rms, FACTORS.index(f.factor)))
+
+
+def _size(columns: Array, mean: Array, covariance: Array) -> tuple[float, float]:
+    """Root mean square of a function, and its standard deviation.
+
+    ::
+
+        E f = m' Q m + tr(Q C),   var f = 4 m' Q C Q m + 2 tr(Q C Q C)
+    """
+    centred = columns - columns.mean(axis=0)
+    power = centred.T @ centred / len(columns)
+    both = power @ covariance
+    square = float(mean @ power @ mean)
+    spread = 4.0 * float(mean @ both @ power @ mean) + 2.0 * float(np.sum(both * both.T))
+    rms = float(np.sqrt(max(square, 0.0)))
+    return rms, float(np.sqrt(max(spread, 0.0))) / max(2.0 * rms, 1e-12)
+
+
+def _shaft(orders: Sequence[float], shafts: dict[str, float]) -> str:
+    """The shaft of whose turn orders are low whole numbers; the output else."""
+    for name, cycles in shafts.items():
+        if name == "output" or abs(cycles) < 2.0:
+            continue
+        ratios = [m / abs(cycles) for m in orders]
+        if all(abs(r - round(r)) < 1e-6 and 1 <= round(r) <= 8 for r in ratios):
+            return name
+    return "output"
+
+
+def _alike(account: FactorAccount, members: Sequence[int], factor: str) -> tuple[str, ...]:
+    """Factors any of which explains as much in the place of one."""
+    rest = account.without(members)
+    own, _ = account.best_beside(rest, members)
+    kinds: dict[str, list[int]] = {}
+    for k, group in enumerate(account.groups):
+        if account.tau[k] == 0.0 and group.factor not in (factor, NAME):
+            kinds.setdefault(group.factor, []).append(k)
+    losses, _, instead = account.sums.changes(account.tau)
+    orders = {m for k in members for m in account.groups[k].orders}
+    means = [k for k in kinds.get("place", []) if orders & {*account.groups[k].orders}]
+    found = []
+    for kind, others in kinds.items():
+        beside = [*others, *(means if kind.endswith("_place") and kind != "place" else [])]
+        if max(instead[k, j] / max(losses[k], 1e-9) for k in members for j in beside) < TRIED:
+            continue
+        score, tau = account.best_beside(rest, beside)
+        if score > own - ALIKE and any(tau[k] > 0.0 for k in others):
+            found.append(kind)
+    return tuple(sorted(found, key=FACTORS.index))
+
+
+def _curve(
+    account: FactorAccount,
+    members: Sequence[int],
+    bounds: Array,
+    mean: Array,
+    covariance: Array,
+) -> FactorCurve:
+    """The function of the strongest axis of a factor's groups."""
+    widest = max(members, key=lambda k: account.groups[k].at.size)
+    at, unit = account.groups[widest].at, account.groups[widest].unit
+    own = [k for k in members if np.array_equal(account.groups[k].at, at)]
+    value: Array = np.zeros(at.size)
+    variance: Array = np.zeros(at.size)
+    products = account.groups[own[0]].is_product
+    if not products:
+        index = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in own])
+        rows = np.hstack([account.groups[k].values for k in own])
+        value = rows @ mean[index]
+        variance = np.einsum("ij,jk,ik->i", rows, covariance[np.ix_(index, index)], rows)
+    else:
+        squares, slopes = np.zeros(at.size), np.zeros(at.size)
+        for k in own:
+            values = account.groups[k].values
+            index = np.arange(bounds[k], bounds[k + 1])
+            pair = mean[index].reshape(-1, 2)
+            spread = covariance[np.ix_(index, index)]
+            for part in range(2):
+                f = values @ pair[:, part]
+                own_part = spread[part::2, part::2]
+                squares += f**2
+                slopes += f**2 * np.einsum("ij,jk,ik->i", values, own_part, values)
+        value = np.sqrt(squares)
+        variance = slopes / np.maximum(squares, 1e-24)
+    apart = BAND * np.sqrt(np.maximum(variance, 0.0))
+    low = value - apart
+    return FactorCurve(at, unit, value, np.maximum(low, 0.0) if products else low, value + apart)

@@ -1,0 +1,137 @@
+"""What the error follows: one factor, the size of its function, and the function with its band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from ...support.arrays import Array
+from ...support.display_units import ErrorUnit
+from ...support.plainresult import PlainResult
+
+#: Factors in words.
+WORDS = {
+    "place": "the place",
+    "direction": "the direction",
+    "direction_place": "the direction times the place",
+    "reversal_time": "the time since the last reversal",
+    "run_time": "the time in the run",
+    "run": "the run (its zero)",
+    "run_place": "the run times the place",
+    "speed": "the speed",
+    "speed_place": "the speed times the place",
+    "load": "the load",
+    "load_sign": "the sign of the load",
+    "load_place": "the load times the place",
+    "temperature": "the temperature",
+    "temperature_place": "the temperature times the place",
+    "current": "the current",
+    "mount_place": "the place on the reference's mount",
+    "step": "the step of the sensor",
+    "frequency": "a line in time",
+}
+
+#: Orders that are listed.
+LISTED = 6
+
+
+@dataclass(frozen=True)
+class FactorCurve:
+    """A function of a factor with its 95 % band, arcsec.
+
+    Attributes
+    ----------
+    at : ndarray, shape (g,)
+        Values of the factor, in ``unit``.
+    unit : str
+    value, low, high : ndarray, shape (g,)
+        Of a product with the place: of the amplitude of its orders.
+    """
+
+    at: Array
+    unit: str
+    value: Array
+    low: Array
+    high: Array
+
+    def to_dict(self) -> dict[str, Any]:
+        """The entry ``curve``."""
+        return {
+            "at": self.at.tolist(),
+            "unit": self.unit,
+            "value_arcsec": self.value.tolist(),
+            "low_arcsec": self.low.tolist(),
+            "high_arcsec": self.high.tolist(),
+        }
+
+
+@dataclass(frozen=True)
+class Factor(PlainResult):
+    """What measured minus simulated follows.
+
+    Attributes
+    ----------
+    factor : str
+        One of ``place``, ``direction``, ``speed`` ..., or one of them with ``_place``: times a
+        pattern of the angle.
+    shaft : str or None
+        Whose place.
+    orders : tuple of float or None
+        Lines of the place, in cycles of a turn of the shaft.
+    rms, low, high : float
+        Of its function over the readings, arcsec, with its 95 % interval.
+    share : float
+        Of the variance of the readings, from 0 to 1.
+    log_bayes_factor : float
+        Natural logarithm, with the factor over without it.
+    named_by : tuple of str
+        Confirmed causes that are forms of it.
+    not_distinguished_from : tuple of str
+        Factors that are the same columns in these runs.
+    curve : FactorCurve
+    """
+
+    factor: str
+    shaft: str | None
+    orders: tuple[float, ...] | None
+    rms: float
+    low: float
+    high: float
+    share: float
+    log_bayes_factor: float
+    named_by: tuple[str, ...]
+    not_distinguished_from: tuple[str, ...]
+    curve: FactorCurve = field(repr=False)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The entry of ``factors``."""
+        return {
+            "factor": self.factor,
+            "shaft": self.shaft,
+            "orders": None if self.orders is None else list(self.orders),
+            "rms_arcsec": self.rms,
+            "low_arcsec": self.low,
+            "high_arcsec": self.high,
+            "share": self.share,
+            "log_bayes_factor": self.log_bayes_factor,
+            "named_by": list(self.named_by),
+            "not_distinguished_from": list(self.not_distinguished_from),
+            "curve": self.curve.to_dict(),
+        }
+
+    def sentence(self, unit: ErrorUnit) -> str:
+        """The factor in words: what is followed, how much, and whether it has a name."""
+        also = [WORDS[other] for other in self.not_distinguished_from]
+        text = " or ".join([WORDS[self.factor], *also])
+        if self.orders:
+            shown = ", ".join(f"{order:.6g}" for order in self.orders[:LISTED])
+            more = " ..." if len(self.orders) > LISTED else ""
+            of = "" if self.shaft in (None, "output") else f" of the {self.shaft}"
+            text += f" (order{'s' if len(self.orders) > 1 else ''} {shown}{more}{of})"
+        n = unit.number
+        text += f", {n(self.rms)} {unit.name} rms ({n(self.low)} to {n(self.high)})"
+        names = ", ".join(self.named_by)
+        return text + (f": {names}" if names else ": no named form fits")
+
+    def _brief(self) -> str:
+        return f"{self.factor}, {self.rms:.3g} arcsec rms, {', '.join(self.named_by) or 'no name'}"

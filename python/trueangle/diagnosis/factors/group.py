@@ -1,0 +1,111 @@
+"""A group of columns: functions of one factor, with or without lines of the place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...joint.lines import line_columns
+from ...support.arrays import Array
+
+#: The factors, in the order in which equally strong ones are stated.
+FACTORS: Final = (
+    "place",
+    "direction",
+    "direction_place",
+    "reversal_time",
+    "speed",
+    "speed_place",
+    "load",
+    "load_sign",
+    "load_place",
+    "temperature",
+    "temperature_place",
+    "current",
+    "mount_place",
+    "run",
+    "run_place",
+    "run_time",
+    "frequency",
+)
+
+#: Values of a factor at which its function is stated.
+GRID: Final = 25
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Columns that are in or out together.
+
+    Attributes
+    ----------
+    factor : str
+        One of `FACTORS`.
+    columns : ndarray, shape (n, w)
+        At the readings; the mean square of a row is 1.
+    orders : tuple of float
+        Lines of the place, in cycles of an output turn; none of a function of the factor alone.
+    at : ndarray, shape (g,)
+        Values of the factor.
+    values : ndarray, shape (g, w) or (g, v)
+        The columns there; of a product with a line its v functions of the factor, each of which
+        has a cosine and a sine among the columns.
+    unit : str
+    alternatives : float
+        Groups of which it was the one that stood out.
+    """
+
+    factor: str
+    columns: Array
+    orders: tuple[float, ...]
+    at: Array
+    values: Array
+    unit: str
+    alternatives: float = 1.0
+
+    @property
+    def is_product(self) -> bool:
+        """Functions of the factor times a line."""
+        return bool(self.values.shape[1] < self.columns.shape[1])
+
+    @classmethod
+    def of_function(
+        cls,
+        factor: str,
+        x: Array,
+        basis: Callable[[Array], Array],
+        at: Array,
+        unit: str,
+        orders: tuple[float, ...] = (),
+    ) -> Group | None:
+        """Functions of a factor's values at the readings; None where they do not change."""
+        columns = basis(x)
+        scale = _scale(columns)
+        if not scale > 0.0:
+            return None
+        return cls(factor, columns / scale, orders, at, basis(at) / scale, unit)
+
+    @classmethod
+    def of_product(
+        cls,
+        factor: str,
+        x: Array,
+        basis: Callable[[Array], Array],
+        at: Array,
+        unit: str,
+        theta: Array,
+        order: float,
+    ) -> Group:
+        """Functions of a factor's values times a line of the angle ``theta``, radians."""
+        functions, line = basis(x), line_columns(theta, order)
+        columns = (functions[:, :, None] * line[:, None, :]).reshape(len(theta), -1)
+        scale = _scale(columns)
+        return cls(factor, columns / scale, (order,), at, basis(at) / scale, unit)
+
+
+def _scale(columns: Array) -> float:
+    """Root mean square of a row, less its mean."""
+    return float(np.sqrt(np.sum(np.var(columns, axis=0))))

@@ -1,0 +1,402 @@
+"""The groups of columns that readings of these runs can tell of."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects.orderspectrum import OrderSpectrum
+from ...joint.lines import line_columns
+from ...joint.signals import Signals
+from ...support.arrays import Array
+from .group import GRID, Group
+
+#: Orders of the output, each a group; and the bands above them, a group each.
+LOW: Final = 12
+BANDS: Final = ((13, 24), (25, 48))
+
+#: Lines that products with a factor are always asked for.
+ALWAYS: Final = (1.0, 2.0)
+
+#: Lines of a spectrum that are asked for beside, and by how much each must stand out of the mean
+#: power: of noise alone about one of 500 does.
+PEAKS: Final = 5
+STANDS_OUT: Final = 8.0
+
+#: Orders that a spectrum is looked at up to, and readings for each.
+ORDERS: Final = 400
+SAMPLED: Final = 2.5
+
+#: Shares of the range by which a factor must change to be one.
+SPEED_CHANGES, LOAD_CHANGES, TEMPERATURE_CHANGES = 0.1, 0.05, 0.1
+
+#: Deviation of sizes, over the greatest, below which they are one.
+ONE_SIZE: Final = 0.02
+
+#: Share of a turn below which the place is a smooth function, too.
+ARC: Final = 0.98
+
+#: Lengths of transitions after a reversal, in shares of the median stretch of one direction.
+LENGTHS: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
+
+#: Lengths of what rises before an event and settles after it, in shares of the longest run.
+SETTLES: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
+
+#: Share of the range within which values are one level, and hats at most.
+LEVEL: Final = 0.1
+KNOTS: Final = 8
+
+#: Runs up to which each may have a pattern.
+MOST_RUNS: Final = 24
+
+Basis = Callable[[Array], Array]
+
+
+class Axis:
+    """A factor: its values at the readings, and functions of them."""
+
+    def __init__(self, factor: str, x: Array, basis: Basis, at: Array, unit: str) -> None:
+        self.factor, self.x, self.basis, self.at, self.unit = factor, x, basis, at, unit
+
+    def alone(self) -> Iterator[Group]:
+        """Its function."""
+        group = Group.of_function(self.factor, self.x, self.basis, self.at, self.unit)
+        if group is not None:
+            yield group
+
+    def times(
+        self, theta: Array, orders: Iterable[float], basis: Basis | None = None
+    ) -> Iterator[Group]:
+        """Its products with lines."""
+        for order in orders:
+            yield Group.of_product(
+                f"{self.factor}_place",
+                self.x,
+                basis or self.basis,
+                self.at,
+                self.unit,
+                theta,
+                order,
+            )
+
+
+def factor_groups(
+    signals: Signals,
+    error: Array,
+    lines: Sequence[float] = (),
+    drawn: Sequence[float] = (),
+    frequencies: Sequence[float] = (),
+    events: Sequence[tuple[int, int]] = (),
+) -> list[Group]:
+    """Groups of columns at these readings.
+
+    Parameters
+    ----------
+    signals : Signals
+    error : ndarray, shape (n,)
+        Measured minus simulated, whose spectra propose further lines.
+    lines : sequence of float
+        Orders, in cycles of an output turn, that are looked at whatever the spectra are.
+    drawn : sequence of float
+        Orders that every run has anew.
+    frequencies : sequence of float
+        Lines in Hz that every run has anew.
+    events : sequence of (int, int)
+        Run and row at which something happened once.
+    """
+    theta = signals.theta
+    left = _without_low(theta, error, signals.run)
+    known = [m for m in dict.fromkeys(lines) if m > 0.0]
+    spectrum = _PeakSpectrum(theta)
+    groups = [*_place(signals, [*known, *spectrum.peaks(left, LOW)])]
+    for axis, product in _axes(signals):
+        groups += axis.alone()
+        if product is not None:
+            own = product(axis.x)
+            asked = [*ALWAYS, *known[:LOW]]
+            for column in own.T:
+                asked += spectrum.peaks(left * (column - column.mean()))
+            groups += axis.times(theta, dict.fromkeys(asked), product)
+    groups += _of_runs(signals, [*ALWAYS, *known[:2], *drawn])
+    groups += _of_frequencies(signals, frequencies)
+    groups += _of_events(signals, events)
+    given = {*ALWAYS, *known, *drawn}
+    low = {float(k) for k in range(1, LOW + 1)}
+    for k, group in enumerate(groups):
+        sought = {*group.orders} - given - (low if group.factor == "place" else set())
+        if len(group.orders) == 1 and sought:
+            groups[k] = replace(group, alternatives=float(spectrum.count))
+    return groups
+
+
+class _PeakSpectrum:
+    """Lines that stand out, of values at angles in radians."""
+
+    def __init__(self, theta: Array) -> None:
+        self.count = int(min(ORDERS, theta.size / SAMPLED))
+        self.turns = float(np.ptp(theta)) / (2.0 * np.pi)
+        self.sums = OrderSpectrum(theta, [0], 1.0, 1.0, self.count) if self.count > LOW else None
+
+    def peaks(self, values: Array, above: int = 0) -> list[float]:
+        """The strongest orders above some; none over an arc, where they run together."""
+        power = float(values @ values)
+        if self.sums is None or self.turns < ARC or not power > 0.0:
+            return []
+        spectrum = np.abs(self.sums.sums(values).sum(axis=1)) ** 2 / power
+        spectrum[:above] = 0.0
+        best = np.argsort(spectrum)[::-1][:PEAKS]
+        return [float(k + 1) for k in best if spectrum[k] > STANDS_OUT]
+
+
+def _without_low(theta: Array, error: Array, run: NDArray[np.int64]) -> Array:
+    """The error less what its mean by run and the low orders take of it."""
+    inside = [line_columns(theta, float(k)) for k in range(1, LOW + 1)]
+    columns = np.column_stack([np.ones(theta.size), *inside])
+    left = error - columns @ np.linalg.lstsq(columns, error, rcond=1e-9)[0]
+    counts = np.maximum(np.bincount(run), 1)
+    return np.asarray(left - (np.bincount(run, left) / counts)[run])
+
+
+def _place(signals: Signals, lines: Iterable[float]) -> Iterator[Group]:
+    """Lines, bands of lines, and over an arc a smooth function of the place."""
+    theta = signals.theta
+    start, span = float(theta.min()), float(np.ptp(theta))
+    turns = span / (2.0 * np.pi)
+    whole = turns >= ARC
+    at = np.linspace(0.0, 360.0, 73) if whole else np.degrees(np.linspace(start, start + span, 49))
+    degrees = signals.degrees
+
+    def waves(orders: Sequence[float]) -> Basis:
+        return lambda x: np.hstack([line_columns(np.radians(x), m) for m in orders])
+
+    low = [float(k) for k in range(1, LOW + 1)]
+    for m in dict.fromkeys([*low, *lines]):
+        group = Group.of_function("place", degrees, waves([m]), at, "deg", (m,))
+        if group is not None:
+            yield group
+    for first, last in BANDS:
+        if last * SAMPLED < theta.size:
+            band = tuple(float(k) for k in range(first, last + 1))
+            group = Group.of_function("place", degrees, waves(band), at, "deg", band)
+            if group is not None:
+                yield group
+    middle = np.degrees(start + 0.5 * span)
+
+    def smooth(x: Array) -> Array:
+        u = (x - middle) / max(0.5 * np.degrees(span), 1e-12)
+        return np.column_stack([u, u**2, u**3] if not whole else [u])
+
+    # Over several turns this is a ramp of the travel, which no pattern is.
+    travel = at if not whole else np.degrees(np.linspace(start, start + span, GRID))
+    group = Group.of_function("place", degrees, smooth, travel, "deg")
+    if group is not None:
+        yield group
+
+
+def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:
+    """Factors, each with its functions in products with lines; None without products."""
+    d = signals.direction
+    if bool((d > 0.0).any() and (d < 0.0).any()):
+        yield Axis("direction", d, _column, np.array([-1.0, 1.0]), "sign"), _column
+        yield from ((axis, None) for axis in _reversals(signals))
+    yield from _signed("speed", signals.velocity, 2.0 * SPEED_CHANGES, "deg/s")
+    tau = signals.torque
+    yield from _signed("load", tau, LOAD_CHANGES, "Nm")
+    if tau is not None and np.unique(np.sign(tau)).size > 1:
+        yield Axis("load_sign", np.sign(tau), _column, np.array([-1.0, 1.0]), "sign"), None
+    kelvin = signals.temperature
+    if kelvin is not None and np.ptp(kelvin) > TEMPERATURE_CHANGES:
+        mean, half = float(kelvin.mean()), 0.5 * float(np.ptp(kelvin))
+        grid = np.linspace(kelvin.min(), kelvin.max(), GRID)
+
+        def warm(x: Array) -> Array:
+            s = (x - mean) / half
+            return np.column_stack([s, s * s])
+
+        def with_mean(x: Array) -> Array:
+            return np.column_stack([np.ones(x.size), warm(x)])
+
+        yield Axis("temperature", kelvin, warm, grid, "C"), with_mean
+        yield Axis("temperature", kelvin, _hats(kelvin), grid, "C"), None
+    for axis, _ in _signed("current", signals.current, LOAD_CHANGES, "A"):
+        yield axis, None
+    yield from ((axis, None) for axis in _clock(signals))
+
+
+def _signed(
+    factor: str, x: Array | None, changes: float, unit: str
+) -> Iterator[tuple[Axis, Basis | None]]:
+    """Functions of what has two signs: odd and even ones, and any, unless it has one size."""
+    top = 0.0 if x is None else float(np.abs(x).max(initial=0.0))
+    if x is None or not np.ptp(x) > changes * top > 0.0:
+        return
+    grid = np.linspace(x.min(), x.max(), GRID)
+    if float(np.std(np.abs(x))) < ONE_SIZE * top:
+        yield Axis(factor, x, lambda x: x[:, None] / top, grid, unit), lambda x: x[:, None] / top
+        return
+
+    def lines(x: Array) -> Array:
+        return np.column_stack([x / top, np.abs(x) / top])
+
+    def curves(x: Array) -> Array:
+        return np.hstack([lines(x), lines(x) * np.abs(x)[:, None] / top])
+
+    yield Axis(factor, x, curves, grid, unit), lines
+    yield Axis(factor, x, _hats(x), grid, unit), None
+
+
+def _hats(x: Array) -> Basis:
+    """Hats at levels of what is set, and at quantiles of what moves: any function of it."""
+    order = np.sort(x)
+    step = 0.5 * LEVEL * float(order[-1] - order[0])
+    cuts = np.flatnonzero(np.diff(order) > step)
+    edges = np.concatenate([[0], cuts + 1, [order.size]])
+    knots = np.array([order[a:b].mean() for a, b in itertools.pairwise(edges)])
+    if not 2 <= knots.size <= KNOTS:
+        knots = np.quantile(order, np.linspace(0.0, 1.0, KNOTS))
+    knots = np.unique(knots)
+
+    def basis(values: Array) -> Array:
+        return np.column_stack(
+            [np.interp(values, knots, row) for row in np.eye(knots.size)[: max(knots.size - 1, 1)]]
+        )
+
+    return basis
+
+
+def _column(x: Array) -> Array:
+    return np.asarray(x[:, None])
+
+
+def _reversals(signals: Signals) -> Iterator[Axis]:
+    """Transitions after a reversal, by travel and by time.
+
+    They change sides with the direction, or not. Those from the start of a run, which may be at
+    rest or in the midst of a motion, are their own.
+    """
+    since = _since(signals)
+    sign = np.where(signals.direction < 0.0, -1.0, 1.0)
+    first = signals.segment_first[signals.segment]
+    for x, unit in ((signals.travel, "deg"), (since, "s")):
+        if x is None:
+            continue
+        whole = float(np.median(_longest(signals, x)))
+        if not whole > 0.0:
+            continue
+        lengths = np.array(LENGTHS) * whole
+
+        def decays(x: Array, lengths: Array = lengths) -> Array:
+            return np.exp(-np.minimum(np.abs(x)[:, None] / lengths, 700.0)) * np.sign(x)[:, None]
+
+        at = np.linspace(1e-6, 0.5, GRID) * whole
+        x = np.maximum(x, 1e-9 * whole)
+        for own in (sign * ~first, 1.0 * ~first, sign * first):
+            yield Axis("reversal_time", x * own, decays, at, unit)
+
+
+def _since(signals: Signals) -> Array | None:
+    """Seconds since the last reversal."""
+    if signals.time is None:
+        return None
+    first = np.zeros(signals.segment_direction.size)
+    order = np.arange(len(signals))[::-1]
+    first[signals.segment[order]] = signals.clock[order]
+    return np.asarray(signals.clock - first[signals.segment])
+
+
+def _longest(signals: Signals, x: Array) -> Array:
+    longest = np.zeros(signals.segment_direction.size)
+    np.maximum.at(longest, signals.segment, x)
+    return np.asarray(longest[longest > 0.0] if (longest > 0.0).any() else longest)
+
+
+def _clock(signals: Signals) -> Iterator[Axis]:
+    """Time in the run: what all runs show of it; what each has of its own is noise."""
+    spans = [float(np.ptp(signals.clock[a:b])) for a, b in signals.run_bounds()]
+    whole = max(spans, default=0.0)
+    if not whole > 0.0:
+        return
+
+    def path(x: Array) -> Array:
+        u = x / whole
+        return np.column_stack([u, u * u, np.exp(-u / 0.1), np.exp(-u / 0.03)])
+
+    unit = "s" if signals.time is not None else "reading"
+    yield Axis("run_time", signals.clock, path, np.linspace(0.0, whole, GRID), unit)
+
+
+def _of_runs(signals: Signals, lines: Sequence[float]) -> Iterator[Group]:
+    """Zeros of the runs, their trend, and patterns of their own."""
+    if signals.runs < 2:
+        return
+    run = signals.run.astype(np.float64)
+    at = np.arange(signals.runs, dtype=np.float64)
+
+    def each(x: Array) -> Array:
+        return np.asarray(x[:, None] == at, dtype=np.float64)
+
+    zeros = Axis("run", run, each, at, "run")
+    yield from zeros.alone()
+    if signals.runs > 2:
+        yield from Axis("run", run, _in_order, at, "run").alone()
+    if signals.runs <= MOST_RUNS:
+        # One of the runs less: what all have in common is of the place.
+        yield from zeros.times(signals.theta, dict.fromkeys(lines), lambda x: each(x)[:, 1:])
+    mount = signals.mount
+    if mount is not None and np.ptp(mount) > 0.0:
+        degrees = np.degrees(signals.theta - mount)
+        for k in (1.0, 2.0, 3.0, 4.0):
+            group = Group.of_function(
+                "mount_place",
+                degrees,
+                lambda x, k=k: line_columns(np.radians(x), k),  # type: ignore[misc]
+                np.linspace(0.0, 360.0, 73),
+                "deg",
+                (k,),
+            )
+            if group is not None:
+                yield group
+
+
+def _in_order(x: Array) -> Array:
+    """What changes from run to run in their order: a trend, and what settles."""
+    return np.column_stack([x, x**2 / 8.0, 4.0 * np.exp(-x / 2.0)])
+
+
+def _of_frequencies(signals: Signals, frequencies: Sequence[float]) -> Iterator[Group]:
+    """Lines in time, of a phase of its own in every run."""
+    if signals.time is None:
+        return
+    for hertz in frequencies:
+        wave = line_columns(2.0 * np.pi * signals.clock, hertz)
+        columns = np.hstack([wave * (signals.run == r)[:, None] for r in range(signals.runs)])
+        scale = float(np.sqrt(np.mean(np.sum(columns**2, axis=1))))
+        at = np.array([hertz])
+        values = np.zeros((1, columns.shape[1]))
+        yield Group("frequency", columns / scale, (), at, values, "Hz", 0.5 * len(signals))
+
+
+def _of_events(signals: Signals, events: Sequence[tuple[int, int]]) -> Iterator[Group]:
+    """What rises before an event of one run and settles after it, whatever step it leaves."""
+    longest = int(signals.row.max(initial=0)) + 1
+    for run, row in events:
+        inside = signals.run == run
+        away = signals.row - (row - 0.5)
+        at = np.linspace(-0.3, 0.3, GRID) * longest
+
+        def both(x: NDArray[Any]) -> Array:
+            lengths = np.array(SETTLES) * longest
+            decays = np.exp(-np.abs(x)[:, None] / lengths)
+            return np.hstack([decays * (x < 0.0)[:, None], decays * (x > 0.0)[:, None]])
+
+        columns = both(away) * inside[:, None]
+        scale = float(np.sqrt(np.sum(np.var(columns, axis=0))))
+        if scale > 0.0:
+            yield Group(
+                "run_time", columns / scale, (), at, both(at) / scale, "reading", len(signals)
+            )

@@ -1,0 +1,286 @@
+"""Is a finding's form right? It is held against the free functions of all factors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects import EFFECTS
+from ...effects.local_defect import LocalDefect
+from ...effects.missed_counts import MissedCounts
+from ...effects.missing_order import MissingOrder
+from ...effects.time_periodic import TimePeriodic
+from ...estimation.regression import Regression
+from ...support.arrays import Array
+from ..confirmation import NOT_CONFIRMED
+from ..finding import Finding
+from .account import ALIKE, NAME, FactorAccount
+from .factor import WORDS
+from .group import Group
+
+#: Variances that a group may have: each name has one of them.
+SIZES: Final = 7
+
+#: Share of what its factors take that a name must take.
+TAKES: Final = 0.95
+
+#: Factors that hold each other's functions: speeds have a direction, loads a sign.
+FAMILIES: Final = (
+    {"direction", "reversal_time", "speed"},
+    {"load", "load_sign"},
+    {"run", "run_time", "temperature"},
+)
+
+#: The factor of how an error settles after a reversal, which is told of any: no name stands by it.
+TRANSITION: Final = "reversal_time"
+
+#: Bumps of one place from which on they are one function of it; and how near, in their widths,
+#: two are that are one.
+MOST_BUMPS, NEAR = 3, 3.0
+
+#: Standard errors within which a step is a whole number of counts, or as large as another.
+SAME: Final = 3.0
+
+
+def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]) -> Group | None:
+    """A finding's own columns at some readings as a group; None of what has none."""
+    parts = []
+    for k in finding.group:
+        term = regression.terms[k]
+        if term.run_effect is None:
+            parts.append(term.columns)
+            continue
+        runs = regression.signals.run[:, None, None] == np.arange(regression.signals.runs)[:, None]
+        parts.append((term.run_effect.columns[:, None, :] * runs).reshape(regression.n, -1))
+    sought = 0.5 * len(rows) if finding.cause == TimePeriodic.kind else 1.0
+    return _group(np.hstack(parts)[rows], sought) if parts else None
+
+
+def base_group(regression: Regression, rows: NDArray[np.int64]) -> Group | None:
+    """What is free whatever is found, but for zeros, as a group; None where nothing is."""
+    return _group(regression.readings.base[rows], 1.0)
+
+
+def _group(columns: Array, sought: float) -> Group | None:
+    spread = np.std(columns, axis=0)
+    columns = columns[:, spread > 0.0] / spread[spread > 0.0]
+    if not columns.size:
+        return None
+    values = np.zeros((1, columns.shape[1]))
+    scale = float(np.sqrt(columns.shape[1]))
+    return Group(NAME, columns / scale, (), np.zeros(1), values, "", sought)
+
+
+class NamedForms:
+    """Findings as groups beside the free functions of an account.
+
+    Parameters
+    ----------
+    account : FactorAccount
+        With a group for each finding.
+    places : dict of int to int
+        Group of a finding by its place in the list of findings.
+    base : int or None
+        Group that is in beside all others.
+    """
+
+    def __init__(
+        self, account: FactorAccount, places: dict[int, int], base: int | None = None
+    ) -> None:
+        self.account, self.places, self.base = account, places, base
+        self._found: dict[tuple[object, ...], tuple[float, list[float]]] = {}
+        self.free = [k for k, g in enumerate(account.groups) if g.factor != NAME]
+        sizes = [0.0] * len(account.groups)
+        own = [0.0] * len(account.groups)
+        for k in places.values():
+            own[k] = 0.5
+        if places:
+            sizes = account.sums.search(sizes, own, sizes)[1]
+        least = 1e-4 * account.total
+        self.sizes = [max(size, least) if own[k] else 0.0 for k, size in enumerate(sizes)]
+        if base is not None:
+            self.sizes[base] = account.total
+
+    def given(self, names: Sequence[int]) -> list[float]:
+        """The model of these findings alone."""
+        inside = {self.base, *(self.places[name] for name in names if name in self.places)}
+        return [size if k in inside else 0.0 for k, size in enumerate(self.sizes)]
+
+    def beside(
+        self,
+        names: Sequence[int],
+        start: Sequence[float] | None = None,
+        without: Sequence[str] = (),
+    ) -> tuple[float, list[float]]:
+        """Score and groups of the best free functions, without some factors, beside findings."""
+        allowed = [k for k in self.free if not self.is_of(k, without)]
+        if start is not None:
+            start = [0.0 if self.is_of(k, without) else tau for k, tau in enumerate(start)]
+        given = self.given(names)
+        key = (*given, *(start or ()), *without)
+        if key not in self._found:
+            self._found[key] = self.account.best_beside(given, allowed, start)
+        score, tau = self._found[key]
+        return score - sum(self.price(name) for name in names if name in self.places), tau
+
+    def price(self, name: int) -> float:
+        """What a finding costs beside free functions, of which it is one, of one size."""
+        own = self.account.groups[self.places[name]].alternatives
+        return float(np.log(len(self.account.groups) * SIZES * own))
+
+    def left(self, tau: Sequence[float], factors: Sequence[str]) -> float:
+        """Variance of what the free functions of some factors take beside names."""
+        return self.account.variance(tau, [k for k in self.free if self.is_of(k, factors)])
+
+    def is_of(self, k: int, factors: Sequence[str]) -> bool:
+        """A group is of one of the factors."""
+        return self.account.groups[k].factor in factors
+
+
+def names_by_form(
+    names: NamedForms, findings: Sequence[Finding], regression: Regression
+) -> list[Finding]:
+    """The findings, those not confirmed whose form is not better than the free function.
+
+    One is confirmed where a free function of any factors in its place has no more than a log
+    Bayes factor of 3 in its favour, and where beside it the free functions of its own factors
+    take no more than 5 % of what both take.
+    """
+    found = list(findings)
+    for reason_of in (_one_function, _no_counts):
+        for k, reason in reason_of(found, regression).items():
+            found[k] = replace(found[k], status=NOT_CONFIRMED, reason=reason)
+    while True:
+        sure = confirmed_names(names, found)
+        wrong = _worst(names, found, sure)
+        if not wrong:
+            return found
+        for k, reason in wrong.items():
+            found[k] = replace(found[k], status=NOT_CONFIRMED, reason=reason)
+
+
+def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> dict[int, str]:
+    """The findings, alone or those of related factors together, whose form is least right."""
+    if not sure:
+        return {}
+    score, tau = max(names.beside(sure, start) for start in (None, names.account.tau))
+    worst: tuple[float, Sequence[int], Sequence[float]] | None = None
+    for asked in [*([k] for k in sure), *_related(found, sure)]:
+        rest = [j for j in sure if j not in asked]
+        freed, free = max(names.beside(rest, start) for start in (tau, names.account.tau))
+        if freed > score:
+            # What the search has met without them is tried with them, too.
+            score, tau = max((score, tau), names.beside(sure, free))
+        if freed - score > max(ALIKE, worst[0] if worst else 0.0):
+            worst = (freed - score, asked, free)
+    if worst is not None:
+        better, group, other = worst
+        reason = (
+            f"a free function of {_followed(names, other, tau)} explains the readings better "
+            f"(log Bayes factor {better:.0f})"
+        )
+        return dict.fromkeys(group, reason)
+    for k in sure:
+        follows = [f for f in EFFECTS[found[k].cause].form_of if f != TRANSITION]
+        freed, free = names.beside([j for j in sure if j != k], tau, follows)
+        if follows and freed > score - ALIKE:
+            what = _followed(names, free, tau)
+            return {k: f"a function of {what} explains the readings as well"}
+    for k in sure:
+        if found[k].cause == MissingOrder.kind:
+            continue
+        own = names.account.variance(names.given(sure), [names.places[k]], tau)
+        left = names.left(tau, EFFECTS[found[k].cause].form_of)
+        if own < TAKES * (own + left):
+            share = 100.0 * own / (own + left)
+            return {k: f"its form takes {share:.0f} % of what its factors take"}
+    return {}
+
+
+def _related(found: Sequence[Finding], sure: Sequence[int]) -> list[list[int]]:
+    """Findings whose factors are functions of each other in motion to and fro: sets of several."""
+    sets = []
+    for family in FAMILIES:
+        own = [k for k in sure if family & {*EFFECTS[found[k].cause].form_of}]
+        if len(own) > 1:
+            sets.append(own)
+    return sets
+
+
+def _followed(names: NamedForms, other: Sequence[float], tau: Sequence[float]) -> str:
+    """Factors that a model has and another one has not, in words."""
+    new = [k for k in names.free if other[k] > 0.0 and tau[k] == 0.0]
+    factors = dict.fromkeys(names.account.groups[k].factor for k in new)
+    return " and ".join(WORDS[factor] for factor in factors) or "its factor"
+
+
+def _one_function(findings: Sequence[Finding], regression: Regression) -> dict[int, str]:
+    """Bumps that are one function of the place."""
+    bumps = [k for k, f in enumerate(findings) if f.confirmed and f.cause == LocalDefect.kind]
+    at = {k: _bump(findings[k]) for k in bumps}
+    because = "several bumps beside each other are one function of the place"
+    if len(bumps) > MOST_BUMPS:
+        return dict.fromkeys(bumps, because)
+    near = {
+        k
+        for k in bumps
+        for j in bumps
+        if j != k
+        and abs((at[k][0] - at[j][0] + 180.0) % 360.0 - 180.0) < NEAR * (at[k][1] + at[j][1])
+    }
+    return dict.fromkeys(sorted(near), because)
+
+
+def _bump(finding: Finding) -> tuple[float, float]:
+    values = [finding.parameters[name].value for name in ("place_deg", "width_deg")]
+    return float(values[0]), float(values[1])
+
+
+def _no_counts(findings: Sequence[Finding], regression: Regression) -> dict[int, str]:
+    """Steps that are taken back, or neither alike nor whole numbers of the sensor's counts."""
+    found = {}
+    for k, finding in enumerate(findings):
+        if not finding.confirmed or finding.cause != MissedCounts.kind:
+            continue
+        steps = finding.parameters["step_arcsec"]
+        if not isinstance(steps.value, list):
+            continue
+        runs = np.array(finding.parameters["run"].value)
+        signed, stds = np.array(steps.value), np.asarray(steps.std, dtype=np.float64)
+        together = (runs[:, None] == runs) & ~np.eye(len(runs), dtype=bool)
+        rest = np.abs(signed[:, None] + signed) / np.hypot(stds[:, None], stds)
+        if (together & (rest < SAME)).any():
+            found[k] = "a step that is taken back in the same run is an event: no count is lost"
+            continue
+        count, sizes = regression.signals.count, np.abs(signed)
+        known = count * np.round(sizes / count) if count else np.average(sizes, weights=stds**-2)
+        if (np.abs(sizes - known) > SAME * stds).any():
+            found[k] = (
+                "several steps of unequal sizes, none a whole number of counts, are one event"
+            )
+    return found
+
+
+def confirmed_names(names: NamedForms, findings: Sequence[Finding]) -> list[int]:
+    """Places of the findings that are confirmed and have columns."""
+    return [k for k, f in enumerate(findings) if f.confirmed and k in names.places]
+
+
+def names_of(names: NamedForms, findings: Sequence[Finding], factor: str) -> tuple[str, ...]:
+    """Confirmed causes that are forms of a factor."""
+    causes = [findings[k].cause for k in confirmed_names(names, findings)]
+    return tuple(dict.fromkeys(c for c in causes if factor in EFFECTS[c].form_of))
+
+
+def takes_all(names: NamedForms, findings: Sequence[Finding], factor: str) -> bool:
+    """Confirmed causes leave less than 5 % of a factor to its free functions."""
+    sure = confirmed_names(names, findings)
+    _, tau = names.beside(sure)
+    left = names.left(tau, [factor])
+    own = [k for k in sure if factor in EFFECTS[findings[k].cause].form_of]
+    taken = sum(names.account.variance(names.given(sure), [names.places[k]], tau) for k in own)
+    return bool(left < (1.0 - TAKES) * (left + taken))

@@ -1,0 +1,137 @@
+"""The factors of a diagnosis, and its findings held against them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...effects.missed_counts import MissedCounts
+from ...estimation.regression import Regression
+from ..finding import Finding
+from .account import MOST_READINGS, factor_account, factors_of
+from .factor import Factor
+from .group import Group
+from .groups import factor_groups
+from .names import (
+    NamedForms,
+    base_group,
+    confirmed_names,
+    name_group,
+    names_by_form,
+    names_of,
+    takes_all,
+)
+
+#: Steps whose surroundings are looked at.
+MOST_EVENTS: Final = 4
+
+#: Lines of shafts that are looked at, most of them.
+MOST_LINES: Final = 24
+
+
+def stated_factors(
+    first: Regression, chosen: Regression, findings: Sequence[Finding]
+) -> tuple[list[Finding], list[Factor]]:
+    """Findings confirmed by their form, and the factors that the readings follow.
+
+    Parameters
+    ----------
+    first, chosen : Regression
+        Without a cause, against the simulation as it is stated (less a delay, where there is one);
+        with the causes chosen.
+    findings : sequence of Finding
+        Of terms of ``chosen``.
+
+    Returns
+    -------
+    findings : list of Finding
+    factors : list of Factor
+    """
+    rows = _rows(chosen)
+    signals = chosen.signals.take(rows)
+    error = first.readings.residual[rows]
+    groups = factor_groups(
+        signals,
+        error,
+        _lines(chosen),
+        _orders(chosen, drawn=True),
+        _frequencies(chosen),
+        _events(chosen),
+    )
+    places: dict[int, int] = {}
+    named: list[Group] = []
+    for k, finding in enumerate(findings):
+        if finding.group and (group := name_group(chosen, finding, rows)) is not None:
+            places[k] = len(groups) + len(named)
+            named.append(group)
+    groups += named
+    free = base_group(chosen, rows)
+    account = factor_account(signals, error, groups if free is None else [*groups, free])
+    if account is None:
+        return list(findings), []
+    names = NamedForms(account, places, None if free is None else len(groups))
+    found = names_by_form(names, findings, chosen)
+    shafts = {name: abs(cycles) for name, cycles in chosen.belief.joint.shafts.items()}
+    return found, _factors(names, found, shafts)
+
+
+def _factors(names: NamedForms, found: Sequence[Finding], shafts: dict[str, float]) -> list[Factor]:
+    """What the readings follow with its names, and beside all names what has none."""
+    account = names.account
+    stated, named = [], set()
+    for factor in factors_of(account, shafts):
+        if own := names_of(names, found, factor.factor):
+            stated.append(replace(factor, named_by=own))
+            if takes_all(names, found, factor.factor):
+                named.add(factor.factor)
+    sure = confirmed_names(names, found)
+    left = replace(account, tau=np.maximum(names.given(sure), names.beside(sure)[1]).tolist())
+    stated += [factor for factor in factors_of(left, shafts) if factor.factor not in named]
+    return sorted(stated, key=lambda factor: -factor.rms)
+
+
+def _rows(regression: Regression) -> NDArray[np.int64]:
+    """Readings that take part: no outliers, and one of every so many where there are many."""
+    rows = np.flatnonzero(~regression.outlying)
+    if rows.size <= MOST_READINGS:
+        return rows
+    edges = np.linspace(0, rows.size, MOST_READINGS + 1).astype(np.int64)
+    rng = np.random.default_rng(0)
+    return np.asarray(rows[edges[:-1] + (rng.random(MOST_READINGS) * np.diff(edges)).astype(int)])
+
+
+def _frequencies(regression: Regression) -> list[float]:
+    """Lines in time among the terms, Hz."""
+    found = [
+        term.shape.get("frequency_hz", term.shape.get("frequency")) for term in regression.terms
+    ]
+    return [float(np.mean(hertz)) for hertz in found if hertz is not None]
+
+
+def _events(regression: Regression) -> list[tuple[int, int]]:
+    """Run and row of the steps among the terms."""
+    steps = [term.shape for term in regression.terms if term.cause == MissedCounts.kind]
+    return [(step["run"], step["row"]) for step in steps][:MOST_EVENTS]
+
+
+def _orders(regression: Regression, *, drawn: bool) -> list[float]:
+    """Orders of the terms: those that every run draws anew, or the others."""
+    found: list[float] = []
+    for term in regression.terms:
+        if (term.run_effect is not None) is drawn:
+            order = term.line if term.line is not None else term.shape.get("order", [])
+            found += np.atleast_1d(np.asarray(order, dtype=np.float64)).tolist()
+    return found
+
+
+def _lines(regression: Regression) -> list[float]:
+    """Orders of the terms, of the simulation's pattern, and of the gear."""
+    joint = regression.belief.joint
+    found = _orders(regression, drawn=False) + regression.belief.pattern.orders.tolist()
+    found += [abs(joint.output_order(name, k)) for name, k in joint.gear_orders()]
+    highest = 0.5 * len(regression.signals)
+    return [m for m in dict.fromkeys(found) if 0.0 < m < highest][:MOST_LINES]

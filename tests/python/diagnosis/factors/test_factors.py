@@ -1,0 +1,126 @@
+"""What an error follows, whether or not it has a name: forms that no cause has."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import trueangle as ta
+from trueangle.simulation import Joint, Simulation
+
+NOISE = 1.2
+
+#: A direct joint of which nothing is believed.
+EMPTY = Simulation(Joint(1.0, "none"), sigma_arcsec=NOISE)
+
+SPEEDS = (9.0, 24.0, 55.0)
+
+
+def measured(rng, error, speeds=SPEEDS, repeats=2, readings=300, span=650.0, **recorded):
+    """Runs there and back, in which ``error(theta, direction, v, t, run)`` was measured."""
+    runs, clock = [], 0.0
+    for r in range(len(speeds) * repeats):
+        v = speeds[r % len(speeds)]
+        t = np.sort(rng.uniform(0.0, 2.0 * span / v, readings))
+        up = t < span / v
+        theta = rng.uniform(0.0, 360.0) + np.where(up, v * t, 2.0 * span - v * t)
+        e = error(theta, np.where(up, 1.0, -1.0), v, t, r) + NOISE * rng.standard_normal(readings)
+        signals = {name: value(t, r) for name, value in recorded.items()}
+        runs.append(
+            ta.CalibrationRun(theta, theta + e / 3600.0, period=360.0, time=clock + t, **signals)
+        )
+        clock += t[-1] + 30.0
+    return runs
+
+
+def confirmed(found):
+    return [finding.cause for finding in found.findings if finding.confirmed]
+
+
+@pytest.fixture
+def rng(request):
+    return np.random.default_rng(4711)
+
+
+def test_nothing_follows_nothing(rng):
+    found = ta.diagnose(measured(rng, lambda theta, *_: 0.0 * theta), EMPTY)
+    assert found.factors == []
+
+
+def test_a_zero_that_follows_the_speed_is_no_new_zero_of_each_run(rng):
+    runs = measured(rng, lambda theta, d, v, t, r: np.full(theta.size, v / 11.0), repeats=3)
+    found = ta.diagnose(runs, EMPTY)
+    assert "zero_slip" not in confirmed(found)
+    speed = found.factors[0]
+    assert speed.factor == "speed"
+    truth = np.std([v / 11.0 for v in SPEEDS])
+    assert speed.low < truth < speed.high
+    assert speed.named_by == ()
+    assert "Follows the speed" in found.summary()
+
+
+def test_interpolation_that_follows_the_temperature_is_stated_with_its_order(rng):
+    def kelvin(t, r):
+        return 21.0 + 9.0 * (r % 2) + 2.0 * (1.0 - np.exp(-t / 20.0))
+
+    def error(theta, d, v, t, r):
+        return 0.35 * (kelvin(t, r) - 21.0) * np.sin(np.radians(48.0 * theta + 70.0))
+
+    runs = measured(rng, error, speeds=(31.0,), repeats=2, readings=700, temperature=kelvin)
+    found = ta.diagnose(runs, EMPTY)
+    first = found.factors[0]
+    assert first.factor == "temperature_place"
+    assert first.orders == (48.0,)
+    # With temperature the amplitude rises from nothing.
+    assert first.curve.value[0] < 0.5 < 2.5 < first.curve.value[-1]
+
+
+def test_a_flat_facet_is_a_function_of_the_place_and_no_row_of_bumps(rng):
+    def error(theta, *_):
+        return 9.0 * (np.abs((theta - 140.0) % 360.0 - 180.0) > 173.0)
+
+    found = ta.diagnose(measured(rng, error, readings=400), EMPTY)
+    assert "local_defect" not in confirmed(found)
+    assert {factor.factor for factor in found.factors} == {"place"}
+    curve = found.factors[0].curve
+    assert 310.0 <= curve.at[np.argmax(curve.value)] <= 330.0 or curve.value.max() > 5.0
+    assert all(0.0 <= factor.share <= 1.0 for factor in found.factors)
+
+
+def test_what_one_speed_cannot_tell_is_stated_together(rng):
+    runs = measured(rng, lambda theta, d, *_: 4.0 * d, speeds=(20.0,), repeats=4)
+    found = ta.diagnose(runs, EMPTY)
+    (first,) = found.factors
+    assert {first.factor, *first.not_distinguished_from} == {"direction", "speed"}
+
+
+def test_a_name_that_fits_names_its_factor(rng):
+    found = ta.diagnose(measured(rng, lambda theta, d, *_: 4.0 * d), EMPTY)
+    assert confirmed(found) == ["backlash"]
+    (first,) = found.factors
+    assert first.factor == "direction"
+    assert first.named_by == ("backlash",)
+    assert first.low < 4.0 < first.high
+    np.testing.assert_allclose(first.curve.value, [-4.0, 4.0], atol=0.3)
+    printed = json.loads(found.to_json())["factors"][0]
+    assert printed["factor"] == "direction"
+    assert printed["curve"]["unit"] == "sign"
+    assert printed["orders"] is None
+
+
+def test_sizes_hold_the_truth_as_often_as_stated():
+    inside = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        phase = rng.uniform(0.0, 6.0)
+        found = ta.diagnose(
+            measured(rng, lambda theta, *_, p=phase: 0.8 * np.sin(np.radians(5.0 * theta) + p)),
+            EMPTY,
+            gain=False,
+        )
+        first = found.factors[0]
+        assert (first.factor, first.orders) == ("place", (5.0,))
+        inside.append(first.low < 0.8 / np.sqrt(2.0) < first.high)
+    assert sum(inside) >= 9, "12 intervals of 95 %: fewer than 9 hold once in 20 000"
