@@ -107,5 +107,5 @@ class Group:
 
 
 def _scale(columns: Array) -> float:
-    """Root mean square of a row, less its mean."""
-    return float(np.sqrt(np.sum(np.var(columns, axis=0))))
+    """Root mean square of a row, less its mean; 1 of columns that do not change."""
+    return float(np.sqrt(np.sum(np.var(columns, axis=0)))) or 1.0

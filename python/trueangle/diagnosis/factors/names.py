@@ -14,6 +14,7 @@ from ...effects.local_defect import LocalDefect
 from ...effects.missed_counts import MissedCounts
 from ...effects.missing_order import MissingOrder
 from ...effects.time_periodic import TimePeriodic
+from ...estimation.factor import orthonormal_basis
 from ...estimation.regression import Regression
 from ...support.arrays import Array
 from ..confirmation import NOT_CONFIRMED
@@ -41,6 +42,9 @@ TRANSITION: Final = "reversal_time"
 #: Bumps of one place from which on they are one function of it; and how near, in their widths,
 #: two are that are one.
 MOST_BUMPS, NEAR = 3, 3.0
+
+#: Part of columns that is left beside others that are the same.
+_SAME: Final = 1e-6
 
 #: Standard errors within which a step is a whole number of counts, or as large as another.
 SAME: Final = 3.0
@@ -136,9 +140,25 @@ class NamedForms:
         """Variance of what the free functions of some factors take beside names."""
         return self.account.variance(tau, [k for k in self.free if self.is_of(k, factors)])
 
+    def same(self, name: int) -> list[str]:
+        """Factors whose functions are the columns of a finding in this design: speed at one speed."""
+        groups = self.account.groups
+        basis = orthonormal_basis(_centred(groups[self.places[name]].columns))
+        found = []
+        for k in self.free:
+            columns = _centred(groups[k].columns)
+            left = columns - basis @ (basis.T @ columns)
+            if np.abs(left).max() <= _SAME * np.abs(columns).max(initial=0.0):
+                found.append(groups[k].factor)
+        return found
+
     def is_of(self, k: int, factors: Sequence[str]) -> bool:
         """A group is of one of the factors."""
         return self.account.groups[k].factor in factors
+
+
+def _centred(columns: Array) -> Array:
+    return np.asarray(columns - columns.mean(axis=0))
 
 
 def names_by_form(
@@ -186,8 +206,9 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
         return dict.fromkeys(group, reason)
     for k in sure:
         follows = [f for f in EFFECTS[found[k].cause].form_of if f != TRANSITION]
+        follows += names.same(k)
         freed, free = names.beside([j for j in sure if j != k], tau, follows)
-        if follows and freed > score - ALIKE:
+        if follows and freed > score:
             what = _followed(names, free, tau)
             return {k: f"a function of {what} explains the readings as well"}
     for k in sure:
