@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..effects import EFFECTS, Effect
+from ..effects import EFFECTS, KINDS, Effect
 from ..errors import ArgumentError
 from ..joint.signals import join_runs
 from ..model.model import HarmonicModel
@@ -62,7 +62,7 @@ def terms_from_effects(
     for i, effect in enumerate(effects):
         if isinstance(effect, Mapping):
             table = dict(effect)
-            effect = EFFECTS[table.pop("kind")].from_table(table)
+            effect = KINDS[table.pop("kind")].from_table(table)
         of_type(f"effects[{i}]", effect, Effect, EFFECT)
         terms += effect.to_terms(period, cycles)
     return tuple(terms)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from ..effects import EFFECTS
+from ..effects import EFFECTS, Curve
 from ..effects.wrong_gear_ratio import WrongGearRatio
 from ..errors import ArgumentError
 from ..estimation.quantity import quantity
@@ -218,8 +218,12 @@ def _diagnosis(
         sure = regression_without(chosen, not_confirmed_terms(findings), settled=True)
         findings.append(delay_finding(seen.delay, sure, first, gain and not at.over, rest))
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
+    curves = [curve for factor in factors if not factor.named_by for curve in factor.effects]
+    if rest.found and curves:
+        # What a function of a factor explains is not unexplained, though it has no name.
+        rest = unexplained_remainder(_less_curves(chosen, curves, sim), sim.sigma_arcsec or None)
     extended = corrected.with_effects(
-        effect for finding in findings if finding.confirmed for effect in finding.effects
+        [*(e for finding in findings if finding.confirmed for e in finding.effects), *curves]
     )
     beliefs, findings = misplaced_beliefs(beliefs, findings, sim)
     notes = [_incomplete(at, gain)] if at.cut else []
@@ -237,7 +241,7 @@ def _diagnosis(
         findings,
         spots,
         extended,
-        _overall(first, chosen),
+        _overall(first, _as_extended(chosen, findings, curves, sim)),
         len(every),
         len(signals),
         rest.noise.correlation,
@@ -251,6 +255,21 @@ def _diagnosis(
         measured,
         factors=factors,
     )
+
+
+def _as_extended(
+    chosen: Regression, findings: list[Finding], curves: list[Curve], sim: Simulation
+) -> Regression:
+    """With what extends the simulation alone: confirmed causes and curves."""
+    sure = regression_without(chosen, not_confirmed_terms(findings), settled=True)
+    return _less_curves(sure, curves, sim) if curves else sure
+
+
+def _less_curves(regression: Regression, curves: list[Curve], sim: Simulation) -> Regression:
+    """The same terms in readings less what curves show there."""
+    shown = [curve.expected(regression.signals, sim.surroundings) for curve in curves]
+    less = regression.of_readings(regression.readings.less(np.sum(shown, axis=0)))
+    return less.with_terms(regression.terms)
 
 
 def confirmed_count(findings: list[Finding]) -> int:

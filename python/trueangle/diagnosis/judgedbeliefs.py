@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from ..effects import EFFECTS, Effect
+from ..effects import Effect
 from ..effects.ambiguity import Ambiguity
 from ..effects.missing_order import MissingOrder
 from ..estimation.extension import Extension
@@ -42,6 +42,8 @@ def _scaled_effect(
         value = getattr(effect, entry.name)
         if isinstance(value, float) and ("arcsec" in entry.name or entry.name in LINEAR):
             changes[entry.name] = factor * value
+        elif "arcsec" in entry.name and isinstance(value, tuple):
+            changes[entry.name] = tuple(factor * size for size in value)
         elif isinstance(value, tuple) and value and isinstance(value[0], tuple):
             changes[entry.name] = tuple((m, factor * a, phase) for m, a, phase in value)
     other = replace(effect, **changes)  # type: ignore[type-var]
@@ -64,7 +66,7 @@ def effects_as_measured(
     signals, around = regression.signals, sim.surroundings
     worst: tuple[float, Simulation] | None = None
     for k, effect in enumerate(believed.effects):
-        if not EFFECTS[effect.kind].transfers:
+        if not effect.transfers:
             continue
         column = effect.expected(signals, around)
         alike = {effect.kind}.union(*(s.causes for s in spots if effect.kind in s.causes))
@@ -131,7 +133,7 @@ def judged_beliefs(
     kept = tuple(
         new
         for new in believed.effects
-        if not EFFECTS[new.kind].transfers
+        if not new.transfers
         or np.any(new.expected(regression.signals, sim.surroundings))
         or new in sim.effects
     )
@@ -139,7 +141,7 @@ def judged_beliefs(
 
 
 def _effect(regression: Regression, sim: Simulation, old: Effect, new: Effect) -> Belief | None:
-    if not EFFECTS[old.kind].transfers:
+    if not old.transfers:
         return None
     signals, around = regression.signals, sim.surroundings
     column = old.expected(signals, around)

@@ -42,11 +42,12 @@ from .outliers import Outliers as Outliers
 from .heteroscedastic_noise import HeteroscedasticNoise as HeteroscedasticNoise
 from .timestamp_jitter import TimestampJitter as TimestampJitter
 from .quantisation import Quantisation as Quantisation
+from .curve import Curve as Curve
 # ruff: isort: on
 
-from .effect import EFFECTS, Effect
+from .effect import EFFECTS, KINDS, Effect
 
-__all__ = ["EFFECTS", "Effect"]
+__all__ = ["EFFECTS", "KINDS", "Effect"]
 
 __doc__ = "\n".join(
     [

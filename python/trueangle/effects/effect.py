@@ -25,6 +25,9 @@ from .search import Array, Fitted
 #: defined. Where two explain equally much the first is named.
 EFFECTS: dict[str, type[Effect]] = {}
 
+#: What a simulation can hold: every effect, and the curves that stand for forms without a name.
+KINDS: dict[str, type[Effect]] = {}
+
 #: Turns of travel up to which a flexible cause can imitate others: any.
 ALWAYS = math.inf
 
@@ -50,6 +53,8 @@ class Effect(TabledParameters):
         "angle", "run", "time", "none".
     form_of : tuple of str
         Factors of an account without names of which it is a form; none for what has no such.
+    is_cause : bool
+        It has a name, by which a diagnosis looks for it.
     confused_with : mapping of Effect class to str
         Causes before it in the list that it can be taken for, each with the measurement
         that tells them apart.
@@ -99,6 +104,7 @@ class Effect(TabledParameters):
     needs: ClassVar[tuple[str, ...]] = ()
     factor: ClassVar[str] = "angle"
     form_of: ClassVar[tuple[str, ...]] = ()
+    is_cause: ClassVar[bool] = True
     confused_with: ClassVar[Mapping[type[Effect], str]] = {}
     measure: ClassVar[str] = ""
     contains: ClassVar[tuple[type[Effect], ...]] = ()
@@ -123,7 +129,9 @@ class Effect(TabledParameters):
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "kind" in cls.__dict__:
-            EFFECTS[cls.kind] = cls
+            KINDS[cls.kind] = cls
+            if cls.is_cause:
+                EFFECTS[cls.kind] = cls
 
     # -- simulate ------------------------------------------------------------------
 

@@ -51,7 +51,7 @@ class Hypothesis:
 
     def errors(self, signals: Signals, around: JointPattern) -> list[Array]:
         """Its error at every reading, arcsec; several draws of one that is random."""
-        draws = 1 if all(EFFECTS[e.kind].transfers for e in self.effects) else DRAWS
+        draws = 1 if all(e.transfers for e in self.effects) else DRAWS
         return [
             np.sum([e.signal(signals, around, np.random.default_rng(k)) for e in self.effects], 0)
             for k in range(draws)

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from ..effects import EFFECTS, Effect, MissingOrder, ReferenceLines
+from ..effects import KINDS, Effect, MissingOrder, ReferenceLines
 from ..errors import ArgumentError
 from ..joint.joint import Joint
 from ..joint.pattern import Harmonic, JointPattern, Pattern
@@ -47,7 +47,7 @@ class Simulation(ShownResult):
     harmonics : tuple of Harmonic
         Lines of the pattern p.
     effects : tuple of Effect
-        Anything of `trueangle.effects.EFFECTS`.
+        Anything of `trueangle.effects.KINDS`.
     sigma_arcsec : float
         White noise of one reading.
     runs : tuple of RunDesign
@@ -294,7 +294,7 @@ def _effects(effects: Iterable[Effect]) -> tuple[Effect, ...]:
 
 def _meant(value: object) -> str:
     """The effect that stands for what was given."""
-    effect = EFFECTS.get(getattr(value, "kind", ""))
+    effect = KINDS.get(getattr(value, "kind", ""))
     if effect is None:
         return ""
     return f"the effect of kind '{effect.kind}' is trueangle.simulation.{effect.__name__}"

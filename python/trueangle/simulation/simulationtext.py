@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from ..effects import EFFECTS, Effect
+from ..effects import KINDS, Effect
 from ..errors import ArgumentError, FileError
 from ..joint.declared import Bearing, DeclaredShaft, Head
 from ..joint.joint import Joint
@@ -199,16 +199,16 @@ def _value(path: str | Path, where: str, name: str, value: Any, wanted: str) -> 
 def _effect(path: str | Path, where: str, table: dict[str, Any]) -> Effect:
     parameters = dict(table)
     kind = parameters.pop("kind", None)
-    if not isinstance(kind, str) or kind not in EFFECTS:
+    if not isinstance(kind, str) or kind not in KINDS:
         raise FileError(
             path,
-            f"{where}: kind must be one of {', '.join(EFFECTS)}, got "
+            f"{where}: kind must be one of {', '.join(KINDS)}, got "
             f"{'none' if kind is None else shown_value(kind)}"
-            f"{did_you_mean(kind, EFFECTS) if isinstance(kind, str) else ''}",
+            f"{did_you_mean(kind, KINDS) if isinstance(kind, str) else ''}",
         )
     for name, value in parameters.items():
         parameters[name] = _checked_numbers(path, f"{where}: {shown_value(name)}", value)
-    return guarded_build(path, where, lambda: EFFECTS[kind].from_table(parameters))
+    return guarded_build(path, where, lambda: KINDS[kind].from_table(parameters))
 
 
 def _checked_numbers(path: str | Path, where: str, value: Any) -> Any:

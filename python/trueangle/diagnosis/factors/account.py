@@ -13,6 +13,7 @@ import numpy as np
 from ..._core import Groups, GroupSums
 from ...joint.signals import Signals
 from ...support.arrays import Array
+from .extension import curves_of
 from .factor import Factor, FactorCurve
 from .group import FACTORS, Group
 
@@ -224,6 +225,13 @@ def factors_of(account: FactorAccount, shafts: dict[str, float]) -> list[Factor]
                 (),
                 _alike(account, members, factor),
                 _curve(account, members, bounds, mean, covariance),
+                curves_of(
+                    factor,
+                    shaft,
+                    [account.groups[k] for k in members],
+                    [mean[bounds[k] : bounds[k + 1]] for k in members],
+                    shafts,
+                ),
             )
         )
     return sorted(found, key=lambda f: (-f.rms, FACTORS.index(f.factor)))

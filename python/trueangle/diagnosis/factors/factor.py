@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ...effects.curve import Curve
 from ...support.arrays import Array
 from ...support.display_units import ErrorUnit
 from ...support.plainresult import PlainResult
@@ -89,6 +91,8 @@ class Factor(PlainResult):
     not_distinguished_from : tuple of str
         Factors that are the same columns in these runs.
     curve : FactorCurve
+    effects : list of Curve
+        What stands for it in a simulation; none of what other runs do not show.
     """
 
     factor: str
@@ -102,6 +106,7 @@ class Factor(PlainResult):
     named_by: tuple[str, ...]
     not_distinguished_from: tuple[str, ...]
     curve: FactorCurve = field(repr=False)
+    effects: Sequence[Curve] = field(repr=False, default=())
 
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``factors``."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -50,21 +51,36 @@ class Group:
         Lines of the place, in cycles of an output turn; none of a function of the factor alone.
     at : ndarray, shape (g,)
         Values of the factor.
-    values : ndarray, shape (g, w) or (g, v)
-        The columns there; of a product with a line its v functions of the factor, each of which
-        has a cosine and a sine among the columns.
+    function : callable
+        The columns at values of the factor, shape (g, w); of a product with a line its functions of
+        the factor, shape (g, w / 2), each of which has a cosine and a sine among the columns. None
+        of a group that is none.
     unit : str
     alternatives : float
         Groups of which it was the one that stood out.
+    once : bool
+        It is of one run, and no other will show it.
     """
 
     factor: str
     columns: Array
     orders: tuple[float, ...]
     at: Array
-    values: Array
+    function: Callable[[Array], Array] | None
     unit: str
     alternatives: float = 1.0
+    once: bool = False
+
+    @cached_property
+    def values(self) -> Array:
+        """The functions at `at`."""
+        return self.functions_at(self.at)
+
+    def functions_at(self, x: Array) -> Array:
+        """The functions at values of the factor; zeros where there is none."""
+        if self.function is None:
+            return np.zeros((x.size, self.columns.shape[1]))
+        return self.function(x)
 
     @property
     def is_product(self) -> bool:
@@ -86,7 +102,7 @@ class Group:
         scale = _scale(columns)
         if not scale > 0.0:
             return None
-        return cls(factor, columns / scale, orders, at, basis(at) / scale, unit)
+        return cls(factor, columns / scale, orders, at, lambda x: basis(x) / scale, unit)
 
     @classmethod
     def of_product(
@@ -103,7 +119,7 @@ class Group:
         functions, line = basis(x), line_columns(theta, order)
         columns = (functions[:, :, None] * line[:, None, :]).reshape(len(theta), -1)
         scale = _scale(columns)
-        return cls(factor, columns / scale, (order,), at, basis(at) / scale, unit)
+        return cls(factor, columns / scale, (order,), at, lambda x: basis(x) / scale, unit)
 
 
 def _scale(columns: Array) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -377,26 +378,24 @@ def _of_frequencies(signals: Signals, frequencies: Sequence[float]) -> Iterator[
         columns = np.hstack([wave * (signals.run == r)[:, None] for r in range(signals.runs)])
         scale = float(np.sqrt(np.mean(np.sum(columns**2, axis=1))))
         at = np.array([hertz])
-        values = np.zeros((1, columns.shape[1]))
-        yield Group("frequency", columns / scale, (), at, values, "Hz", 0.5 * len(signals))
+        yield Group("frequency", columns / scale, (), at, None, "Hz", 0.5 * len(signals))
 
 
 def _of_events(signals: Signals, events: Sequence[tuple[int, int]]) -> Iterator[Group]:
     """What rises before an event of one run and settles after it, whatever step it leaves."""
     longest = int(signals.row.max(initial=0)) + 1
+    at = np.linspace(-0.3, 0.3, GRID) * longest
+    lengths = np.array(SETTLES) * longest
+
+    def both(x: NDArray[Any], scale: float = 1.0) -> Array:
+        decays = np.exp(-np.abs(x)[:, None] / lengths) / scale
+        return np.hstack([decays * (x < 0.0)[:, None], decays * (x > 0.0)[:, None]])
+
     for run, row in events:
         inside = signals.run == run
         away = signals.row - (row - 0.5)
-        at = np.linspace(-0.3, 0.3, GRID) * longest
-
-        def both(x: NDArray[Any]) -> Array:
-            lengths = np.array(SETTLES) * longest
-            decays = np.exp(-np.abs(x)[:, None] / lengths)
-            return np.hstack([decays * (x < 0.0)[:, None], decays * (x > 0.0)[:, None]])
-
         columns = both(away) * inside[:, None]
         scale = float(np.sqrt(np.sum(np.var(columns, axis=0))))
         if scale > 0.0:
-            yield Group(
-                "run_time", columns / scale, (), at, both(at) / scale, "reading", len(signals)
-            )
+            own, count = partial(both, scale=scale), len(signals)
+            yield Group("run_time", columns / scale, (), at, own, "reading", count, once=True)

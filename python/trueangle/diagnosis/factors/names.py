@@ -74,9 +74,8 @@ def _group(columns: Array, sought: float) -> Group | None:
     columns = columns[:, spread > 0.0] / spread[spread > 0.0]
     if not columns.size:
         return None
-    values = np.zeros((1, columns.shape[1]))
     scale = float(np.sqrt(columns.shape[1]))
-    return Group(NAME, columns / scale, (), np.zeros(1), values, "", sought)
+    return Group(NAME, columns / scale, (), np.zeros(1), None, "", sought)
 
 
 class NamedForms:

@@ -1,0 +1,81 @@
+"""A factor without a name in the simulation: its function as curves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...effects.curve import POINTS, PRODUCTS, VALUES, Curve
+from ...support.arrays import Array
+from .group import Group
+
+#: Points of a turn, at least.
+LEAST = 72
+
+#: Part of the larger of two functions below which the smaller one is rounding.
+_ROUNDING = 1e-3
+
+
+def curves_of(
+    factor: str,
+    shaft: str | None,
+    groups: Sequence[Group],
+    means: Sequence[Array],
+    shafts: Mapping[str, float],
+) -> list[Curve]:
+    """The function of a factor's groups as effects; none of what no other run shows.
+
+    ::
+
+        f(x) (A cos mθ + B sin mθ)    or, where A and B change apart, two of these
+
+    Parameters
+    ----------
+    factor : str
+    shaft : str or None
+        Whose orders products have.
+    groups : sequence of Group
+        Of that factor.
+    means : sequence of ndarray
+        Coefficients of the columns of each.
+    shafts : mapping of str to float
+        Turns of each in one turn of the output.
+    """
+    own = [(group, mean) for group, mean in zip(groups, means, strict=True) if not group.once]
+    if factor in PRODUCTS:
+        cycles = shafts.get(shaft or "output", 1.0)
+        return [
+            curve
+            for group, mean in own
+            for curve in _product(factor, shaft or "output", cycles, group, mean)
+        ]
+    if factor == "place" and any(group.at[-1] - group.at[0] == 360.0 for group, _ in own):
+        # A ramp over several turns is no pattern of one.
+        own = [(group, mean) for group, mean in own if group.orders]
+    return [_alone(factor, own)] if factor in VALUES and own else []
+
+
+def _alone(factor: str, own: Sequence[tuple[Group, Array]]) -> Curve:
+    at = own[0][0].at
+    highest = max((m for group, _ in own for m in group.orders), default=0.0)
+    if highest:
+        turns = (at[-1] - at[0]) / 360.0
+        count = max(LEAST, int(np.ceil(POINTS * highest * turns)))
+        at = np.linspace(at[0], at[-1], 1 + count)
+    values = sum((group.functions_at(at) @ mean for group, mean in own), np.zeros(at.size))
+    return Curve(factor, tuple(at.tolist()), tuple(values.tolist()))
+
+
+def _product(factor: str, shaft: str, cycles: float, group: Group, mean: Array) -> list[Curve]:
+    parts, sizes, lines = np.linalg.svd(group.values @ mean.reshape(-1, 2), full_matrices=False)
+    found = []
+    for part, size, (cosine, sine) in zip(parts.T, sizes, lines, strict=False):
+        if not size > _ROUNDING * sizes[0]:
+            continue
+        sign = 1.0 if part[np.argmax(np.abs(part))] > 0.0 else -1.0
+        phase = float(np.degrees(np.arctan2(sign * cosine, sign * sine)) % 360.0)
+        values = tuple((sign * size * part).tolist())
+        orders = tuple(m / cycles for m in group.orders)
+        found.append(Curve(factor, tuple(group.at.tolist()), values, shaft, orders, (phase,)))
+    return found
