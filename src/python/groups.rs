@@ -131,6 +131,14 @@ impl PyGroupSums {
         Ok((found.score, found.model.tau))
     }
 
+    /// The sums of the errors less a function of all columns.
+    fn less(&self, coefficients: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
+        let own = values(&coefficients);
+        let columns = self.0.widths().iter().sum();
+        same_length("coefficients", own.len(), "columns", columns)?;
+        Ok(Self(self.0.less(&own)))
+    }
+
     /// Log evidence, mean and covariance of the coefficients under variances of the groups.
     fn posterior<'py>(&self, py: Python<'py>, tau: Vec<f64>) -> PyResult<Solution<'py>> {
         check(&tau, self.0.widths().len())?;

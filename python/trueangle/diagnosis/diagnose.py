@@ -261,8 +261,10 @@ def _as_extended(
     chosen: Regression, findings: list[Finding], curves: list[Curve], sim: Simulation
 ) -> Regression:
     """With what extends the simulation alone: confirmed causes and curves."""
-    sure = regression_without(chosen, not_confirmed_terms(findings), settled=True)
-    return _less_curves(sure, curves, sim) if curves else sure
+    sure = {k for finding in findings if finding.confirmed for k in finding.group}
+    others = [k for k in range(len(chosen.terms)) if k not in sure]
+    named = regression_without(chosen, others, settled=True) if others else chosen
+    return _less_curves(named, curves, sim) if curves else named
 
 
 def _less_curves(regression: Regression, curves: list[Curve], sim: Simulation) -> Regression:

@@ -36,6 +36,7 @@ TERMS = {
         T.PreslidingHysteresis(30 * A, 0.5 * R, 0.3), T.Latency(0.002), T.FilterLag(100.0, 0.5),
         T.ThermalDrift(2 * A, 1e-3), T.TorsionalCompliance(3 * A), T.LocalDefect(1.0, 0.03, 60 * A),
         T.StiffeningCompliance(A, 0.01 * A, A, 4.0, gravity=0.5), T.CurrentCoupling(A),
+        T.Curve("temperature", (18.0, 21.0, 25.0), (-30 * A, 9 * A, 20 * A)),
     ),
 }  # fmt: skip
 

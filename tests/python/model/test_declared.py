@@ -9,6 +9,7 @@ from trueangle.model.term import TERMS as KINDS
 from trueangle.model.terms import (
     ChannelSkew,
     CurrentCoupling,
+    Curve,
     DirectionalPattern,
     JointCoupling,
     ScaleError,
@@ -71,7 +72,7 @@ def every_term():
         ta.Latency(0.002), ChannelSkew(0.002, 3.0), ta.LocalDefect(100.0, 8.0, 0.01, 3.0),
         ta.StiffeningCompliance(A, A, A, 1.0, 30.0), ScaleError(2e-4, -90.0, 250.0),
         ta.PreslidingHysteresis(0.02, 3.0), CurrentCoupling(A), VaryingLine(**own),
-        JointCoupling("elbow", A),
+        JointCoupling("elbow", A), Curve("current", (0.0, 1.0), (A, -A)),
     )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from trueangle.model.terms import (
     TERMS,
     ChannelSkew,
     CurrentCoupling,
+    Curve,
     DirectionalPattern,
     JointCoupling,
     ScaleError,
@@ -56,6 +57,7 @@ def any_terms(draw):
         ScaleError(
             draw(st.floats(-0.3, 0.3)), draw(st.floats(-9.0, 0.0)), draw(st.floats(1.0, 9.0))
         ),
+        Curve("torque", (draw(st.floats(-9.0, 0.0)), 1.0, 2.5), draw(st.tuples(*[numbers] * 3))),
     )
 
 

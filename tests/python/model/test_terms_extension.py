@@ -14,9 +14,9 @@ from trueangle.diagnosis.correction import (
     terms_from_effects,
     without_terms,
 )
+from trueangle.effects import EFFECTS, KINDS, Effect
 from trueangle.model.terms import TERMS
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
-from trueangle.simulation.effects import EFFECTS, Effect
 
 ARCSEC = 1.0 / 3600.0
 
@@ -63,11 +63,15 @@ TABLES = {
         "place_deg": 90.0, "width_deg": 8.0, "height_arcsec": 12.0, "shaft": "motor"
     },
     "scale_error": {"relative_error": 5e-5, "start_deg": -2000.0, "stop_deg": 2000.0},
+    "curve": {
+        "factor": "temperature_place", "at": [21.0, 26.0, 30.0], "value_arcsec": [2.0, 9.0, -4.0],
+        "shaft": "motor", "orders": [2.0, 3.0], "phase_deg": [40.0, 75.0],
+    },
 }  # fmt: skip
 
 
 def effect(kind):
-    return EFFECTS[kind].from_table(TABLES[kind])
+    return KINDS[kind].from_table(TABLES[kind])
 
 
 def simulation(*effects, sigma=0.0):
@@ -146,12 +150,12 @@ def test_no_parameter_of_an_effect_is_dropped_on_the_way_to_its_term(kind):
     for name, value in table.items():
         if isinstance(value, str):
             texts = {"absolute": "signed", "motor": "output", "speed": "velocity", "wrist": "arm"}
-            other = texts[value]
+            other = texts.get(value, "load_place")
         elif isinstance(value, list):
             other = [[x[0], 1.5 * x[1], x[2]] if isinstance(x, list) else 1.5 * x for x in value]
         else:
             other = 0.5 * value
-        changed = EFFECTS[kind].from_table(table | {name: other})
+        changed = KINDS[kind].from_table(table | {name: other})
         assert terms_from_effects([changed], 360.0, JOINT.shafts) != as_it_is, name
 
 
@@ -273,7 +277,7 @@ def test_diagnosing_extends_the_correction(tmp_path, capsys):
 
 def test_every_cause_is_a_term_or_a_line_or_has_a_reason():
     lines = {"missing_order", "sidebands", "argument_error"}
-    assert set(EFFECTS) == set(TERMS) | set(NOT_AT_RUN_TIME) | lines
+    assert set(EFFECTS) == (set(TERMS) - {"curve"}) | set(NOT_AT_RUN_TIME) | lines
     assert not set(TERMS) & set(NOT_AT_RUN_TIME)
     found = [EFFECTS["zero_slip"].from_table({"standard_deviation_arcsec": 1.0})]
     assert terms_from_effects(found, 360.0) == ()

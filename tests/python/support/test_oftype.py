@@ -9,7 +9,7 @@ import pytest
 
 import trueangle as ta
 from trueangle import simulation, terms
-from trueangle.effects import EFFECTS
+from trueangle.effects import KINDS
 from trueangle.errors import ArgumentError, KindError
 from trueangle.model.term import TERMS
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
@@ -75,8 +75,8 @@ def test_wrong_kinds_are_refused_at_the_door(what: str) -> None:
 @pytest.mark.parametrize("kind", TERMS)
 def test_every_term_and_effect_of_one_kind_names_the_other(kind: str) -> None:
     """The names that messages give can be imported."""
-    effect = EFFECTS[kind].__name__
-    assert getattr(simulation, effect) is EFFECTS[kind]
+    effect = KINDS[kind].__name__
+    assert getattr(simulation, effect) is KINDS[kind]
     assert getattr(terms, TERMS[kind].__name__.removesuffix("Term")) is TERMS[kind]
 
 

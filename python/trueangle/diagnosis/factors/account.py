@@ -193,9 +193,19 @@ def _scale(y: Array, cuts: Sequence[int]) -> float:
     return max(between, ROUNDING * float(np.var(y)))
 
 
-def factors_of(account: FactorAccount, shafts: dict[str, float]) -> list[Factor]:
-    """The factors that are in, strongest first."""
-    _, mean, covariance = account.sums.posterior(account.tau)
+def factors_of(
+    account: FactorAccount, shafts: dict[str, float], beside: Sequence[float] | None = None
+) -> list[Factor]:
+    """The factors that are in, strongest first.
+
+    Of a model with names, of variances ``beside``, the functions are those of what these leave:
+    where both are the same columns, all of it is the name's.
+    """
+    sums, tau = account.sums, account.tau
+    if beside is not None:
+        _, named, _ = sums.posterior(list(beside))
+        sums, tau = sums.less(named), np.where(np.array(beside) > 0.0, 0.0, tau).tolist()
+    _, mean, covariance = sums.posterior(tau)
     base = account.evidence(account.tau)
     kinds: dict[tuple[str, str | None], list[int]] = {}
     for k in account.inside:

@@ -51,10 +51,15 @@ SAME: Final = 3.0
 
 
 def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]) -> Group | None:
-    """A finding's own columns at some readings as a group; None of what has none."""
+    """A finding's own columns at some readings as a group; None of what has none.
+
+    What says how the noise goes has none: the account has a noise of its own.
+    """
     parts = []
     for k in finding.group:
         term = regression.terms[k]
+        if EFFECTS[finding.cause].describes_noise(term):
+            continue
         if term.run_effect is None:
             parts.append(term.columns)
             continue
@@ -140,7 +145,7 @@ class NamedForms:
         return self.account.variance(tau, [k for k in self.free if self.is_of(k, factors)])
 
     def same(self, name: int) -> list[str]:
-        """Factors whose functions are the columns of a finding in this design: speed at one speed."""
+        """Factors whose functions are columns of a finding in this design: speed at one speed."""
         groups = self.account.groups
         basis = orthonormal_basis(_centred(groups[self.places[name]].columns))
         found = []

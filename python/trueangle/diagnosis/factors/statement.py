@@ -89,8 +89,9 @@ def _factors(names: NamedForms, found: Sequence[Finding], shafts: dict[str, floa
             if takes_all(names, found, factor.factor):
                 named.add(factor.factor)
     sure = confirmed_names(names, found)
-    left = replace(account, tau=np.maximum(names.given(sure), names.beside(sure)[1]).tolist())
-    stated += [factor for factor in factors_of(left, shafts) if factor.factor not in named]
+    given = names.given(sure)
+    left = replace(account, tau=np.maximum(given, names.beside(sure)[1]).tolist())
+    stated += [f for f in factors_of(left, shafts, given) if f.factor not in named]
     return sorted(stated, key=lambda factor: -factor.rms)
 
 

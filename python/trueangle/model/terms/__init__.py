@@ -15,6 +15,7 @@ itself.
 from __future__ import annotations
 
 from ..term import TERMS, Term
+from .curve import CurveTerm as Curve
 from .load import CurrentCouplingTerm as CurrentCoupling
 from .load import LoadDependentGearErrorTerm as LoadDependentGearError
 from .load import StiffeningComplianceTerm as StiffeningCompliance
@@ -36,6 +37,7 @@ __all__ = [
     "Backlash",
     "ChannelSkew",
     "CurrentCoupling",
+    "Curve",
     "DirectionalPattern",
     "FilterLag",
     "JointCoupling",
