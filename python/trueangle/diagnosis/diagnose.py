@@ -28,12 +28,9 @@ from .confirmation import NOT_CONFIRMED
 from .delay import delay_finding
 from .discrepancy import discrepancy_of, unfolded_error
 from .drive import diagnose_drive
-from .factors.statement import stated_factors
 from .finding import Finding
 from .findings import (
     equal_scatter,
-    findings_of,
-    reconsidered_findings,
     scatter_doubt,
     scatter_finding,
 )
@@ -41,6 +38,7 @@ from .gates import many_causes, not_the_only_ratio
 from .gearedlines import GearedLinesRatio
 from .goodness import Unexplained, goodness_of_fit
 from .judgedbeliefs import judged_beliefs
+from .naming import named_causes
 from .penalty import regression_without
 from .remainder import leftover_of, unexplained_remainder
 from .result import Diagnosis
@@ -57,8 +55,8 @@ LEAST_READINGS = 20
 #: Standard deviations beyond which readings are outliers whatever the mean.
 OUTLYING_ANYWAY = 12.0
 
-#: Shares of the time given after which the choice of causes, and what is said of each, end.
-FOR_CHOICE, FOR_FINDINGS = 0.7, 0.92
+#: Share of the time given after which the choice of causes ends.
+FOR_CHOICE = 0.7
 
 
 @told_kinds
@@ -182,24 +180,14 @@ def _diagnosis(
         account = account_of(every, error, stated)
     seen = account.seen
     sim, every, signals, rows = seen.sim, seen.every, seen.signals, seen.rows
-    chosen = account.choice.chosen
-    rest = unexplained_remainder(chosen, sim.sigma_arcsec or None)
-    first = account.first
-    with at.part(FOR_FINDINGS):
-        findings, spots, doubtful = findings_of(chosen, account.choice.spots, gain, rest)
-    if doubtful and not rest.found and not at.cut:
-        # What is not confirmed explains nothing; the others may well without it.
-        others = regression_without(chosen, doubtful, settled=True)
-        rest = unexplained_remainder(others, sim.sigma_arcsec or None)
-        if rest.found:
-            findings = reconsidered_findings(chosen, findings, rest)
-    beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
-    named = confirmed_count(findings)
+    first, sigma = account.first, sim.sigma_arcsec or None
     bare = first if seen.delay is None else account.choice.start
-    findings, factors = stated_factors(bare, chosen, findings)
+    named = named_causes(account.choice.chosen, bare, account.choice.spots, gain, sigma)
+    chosen, rest, spots, factors = named.chosen, named.rest, named.spots, named.factors
+    findings = list(named.findings)
+    beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
     # What has lost its name may be what scatters.
-    in_doubt = any(spot.supported and not spot.common for spot in spots)
-    in_doubt |= confirmed_count(findings) < named
+    in_doubt = bool(named.lost) or any(spot.supported and not spot.common for spot in spots)
     faults = data_faults(records_of(measured))
     spoilt = next((fault for fault in faults if fault.spoils_readings), None)
     for item in account.choice.scatter:
@@ -221,7 +209,7 @@ def _diagnosis(
     curves = [curve for factor in factors if not factor.named_by for curve in factor.effects]
     if rest.found and curves:
         # What a function of a factor explains is not unexplained, though it has no name.
-        rest = unexplained_remainder(_less_curves(chosen, curves, sim), sim.sigma_arcsec or None)
+        rest = unexplained_remainder(_less_curves(chosen, curves, sim), sigma)
     extended = corrected.with_effects(
         [*(e for finding in findings if finding.confirmed for e in finding.effects), *curves]
     )
@@ -232,7 +220,7 @@ def _diagnosis(
     before = goodness_of_fit(
         leftover_of(first.signals, residual if rows is None else residual[rows], first.cache),
         float(first.lines.orders.max()),
-        sim.sigma_arcsec or None,
+        sigma,
     )
     return Diagnosis(
         discrepancy_of(every, residual),
@@ -272,11 +260,6 @@ def _less_curves(regression: Regression, curves: list[Curve], sim: Simulation) -
     shown = [curve.expected(regression.signals, sim.surroundings) for curve in curves]
     less = regression.of_readings(regression.readings.less(np.sum(shown, axis=0)))
     return less.with_terms(regression.terms)
-
-
-def confirmed_count(findings: list[Finding]) -> int:
-    """Findings that are confirmed."""
-    return sum(finding.confirmed for finding in findings)
 
 
 def not_confirmed_terms(findings: list[Finding]) -> list[int]:

@@ -23,8 +23,8 @@ from ..errors import ArgumentError
 from .suggestions import check_choice
 
 #: Work that may be done where no time was given, in numbers of columns that are fitted or scored:
-#: so many, or so many for each item of many. Ordinary readings take a third of that.
-LEAST, PER_ITEM = 4e7, 4e3
+#: so many, or so many for each item of many. Ordinary readings take a tenth to a third of that.
+LEAST, PER_ITEM = 1e8, 6e3
 
 #: Ways of showing progress.
 STYLES: Final = ("auto", "text", "json", "none")

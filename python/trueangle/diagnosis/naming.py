@@ -1,0 +1,119 @@
+"""What the causes chosen are called, beside what the error follows whatever its name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..effects import EFFECTS
+from ..effects.ambiguity import Ambiguity
+from ..estimation.regression import Regression
+from ..support.deadline import current_deadline
+from .factors.factor import Factor
+from .factors.statement import stated_factors
+from .finding import Finding
+from .findings import findings_of, reconsidered_findings
+from .goodness.unexplained import Unexplained
+from .penalty import regression_without
+from .remainder import unexplained_remainder
+from .selection import select_again
+
+#: Share of the work that the names may take, with all before them.
+FOR_FINDINGS = 0.92
+
+
+@dataclass(frozen=True)
+class NamedCauses:
+    """Causes chosen, each as a finding, and the factors that the readings follow.
+
+    Attributes
+    ----------
+    chosen : Regression
+    rest : Unexplained
+        What they leave.
+    findings : list of Finding
+    spots : list of Ambiguity
+    factors : list of Factor
+    lost : list of int
+        Terms of findings whose form is not better than the free function of its factors.
+    """
+
+    chosen: Regression
+    rest: Unexplained
+    findings: list[Finding]
+    spots: list[Ambiguity]
+    factors: list[Factor]
+    lost: list[int]
+
+    @property
+    def unnamed(self) -> float:
+        """Variance of what the readings follow and no name fits."""
+        return sum(factor.rms**2 for factor in self.factors if not factor.named_by)
+
+
+def named_causes(
+    chosen: Regression,
+    bare: Regression,
+    spots: list[Ambiguity],
+    gain: bool,
+    sigma: float | None,
+) -> NamedCauses:
+    """Names of causes that were chosen, by their forms.
+
+    Where a form is worse than a free function, the causes are chosen once more, factor by factor:
+    those names count if each of them holds and less is left without one.
+
+    Parameters
+    ----------
+    chosen : Regression
+    bare : Regression
+        Without a cause.
+    spots : list of Ambiguity
+    gain : bool
+        Measure what findings gain.
+    sigma : float or None
+        Noise that the simulation states, arcsec.
+    """
+    found = _named(chosen, bare, spots, gain, sigma)
+    if not found.lost or current_deadline().over:
+        return found
+    again = chosen_by_factor(chosen, found.lost, found.factors)
+    if again is None:
+        return found
+    other = _named(again, bare, spots, gain, sigma)
+    return other if not other.lost and other.unnamed < found.unnamed else found
+
+
+def chosen_by_factor(
+    regression: Regression, lost: Sequence[int], factors: Sequence[Factor]
+) -> Regression | None:
+    """The causes without some terms, and for each factor without a name those that are forms of it.
+
+    The strongest factor comes first: what one form took of several is named by each of its own.
+    """
+    rest = regression_without(regression, lost, settled=True)
+    found = rest
+    for factor in factors:
+        if not factor.named_by:
+            forms = [k for k, effect in EFFECTS.items() if factor.factor in effect.form_of[:1]]
+            found = select_again(found, forms)
+    return None if len(found.terms) <= len(rest.terms) else found
+
+
+def _named(
+    chosen: Regression, bare: Regression, spots: list[Ambiguity], gain: bool, sigma: float | None
+) -> NamedCauses:
+    at = current_deadline()
+    rest = unexplained_remainder(chosen, sigma)
+    with at.part(FOR_FINDINGS):
+        findings, spots, doubtful = findings_of(chosen, spots, gain, rest)
+    if doubtful and not rest.found and not at.cut:
+        # What is not confirmed explains nothing; the others may well without it.
+        others = regression_without(chosen, doubtful, settled=True)
+        rest = unexplained_remainder(others, sigma)
+        if rest.found:
+            findings = reconsidered_findings(chosen, findings, rest)
+    held, factors = stated_factors(bare, chosen, findings)
+    both = zip(findings, held, strict=True)
+    lost = [k for one, other in both if one.confirmed and not other.confirmed for k in one.group]
+    return NamedCauses(chosen, rest, held, spots, factors, lost)
