@@ -207,9 +207,10 @@ def _diagnosis(
         findings.append(delay_finding(seen.delay, sure, first, gain and not at.over, rest))
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
     curves = [curve for factor in factors if not factor.named_by for curve in factor.effects]
+    shown = _less_curves(chosen, curves, sim) if curves else chosen
     if rest.found and curves:
         # What a function of a factor explains is not unexplained, though it has no name.
-        rest = unexplained_remainder(_less_curves(chosen, curves, sim), sigma)
+        rest = unexplained_remainder(shown, sigma)
     extended = corrected.with_effects(
         [*(e for finding in findings if finding.confirmed for e in finding.effects), *curves]
     )
@@ -225,7 +226,7 @@ def _diagnosis(
     return Diagnosis(
         discrepancy_of(every, residual),
         _structure(first),
-        _noise(chosen, rest),
+        _noise(shown, rest),
         findings,
         spots,
         extended,

@@ -195,9 +195,14 @@ def test_a_law_that_does_not_reach_another_level_gains_nothing_there():
     ]  # fmt: skip
     result = ta.diagnose(runs, sim)
     found = {f.cause: f.gain for f in result.findings}
-    # What its form leaves is no play: there is none. It is left, and said to be.
+    # What its form leaves is no play: there is none. The speed has it, in a form without a name.
     assert set(found) == {"latency"}
-    assert result.unexplained.found
+    assert not any(f.confirmed for f in result.findings)
+    (factor,) = result.factors
+    assert (factor.factor, factor.named_by) == ("speed", ())
+    assert not result.unexplained.found
+    assert result.noise == pytest.approx(1.0, abs=0.04)
+    assert result.gain["rms_after_arcsec"] < 1.02
     gain = found["latency"]
     assert gain.reducible_share > 0.8
     assert gain.by_level.reducible_share < gain.reducible_share - 0.3

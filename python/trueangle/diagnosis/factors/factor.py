@@ -136,7 +136,10 @@ class Factor(PlainResult):
         n = unit.number
         text += f", {n(self.rms)} {unit.name} rms ({n(self.low)} to {n(self.high)})"
         names = ", ".join(self.named_by)
-        return text + (f": {names}" if names else ": no named form fits")
+        if names:
+            return f"{text}: {names}"
+        held = "; the extended simulation holds its curve" if self.effects else ""
+        return f"{text}: no named form fits{held}"
 
     def _brief(self) -> str:
         return f"{self.factor}, {self.rms:.3g} arcsec rms, {', '.join(self.named_by) or 'no name'}"
