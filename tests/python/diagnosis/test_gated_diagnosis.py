@@ -14,7 +14,7 @@ from .test_gates import SIM
 
 
 def test_drag_is_no_latency():
-    """An error that grows with the square of the speed is told as something without a name."""
+    """An error that grows with the square of the speed follows it in a form without a name."""
     rng = np.random.default_rng(31)
     runs = []
     for run in ta.simulate(SIM, 12):
@@ -23,9 +23,15 @@ def test_drag_is_no_latency():
         indicated = run.reference + error / 3600.0 * run.period / 360.0
         runs.append(dataclasses.replace(run, indicated=indicated))
     result = ta.diagnose(runs, SIM)
-    assert "latency" not in [f.cause for f in result.findings if f.confirmed]
+    assert not any(f.confirmed for f in result.findings)
+    (factor,) = result.factors
+    assert (factor.factor, factor.named_by) == ("speed", ())
+    speeds = np.array([-30.0, 30.0])
+    (curve,) = factor.effects
+    found = np.interp(speeds, curve.at, curve.value_arcsec)
+    assert found[1] - found[0] == pytest.approx(2.0 * 0.01 * 900.0, rel=0.05)
     assert result.unexplained is not None
-    assert result.unexplained.found
+    assert not result.unexplained.found
 
 
 @pytest.mark.parametrize(

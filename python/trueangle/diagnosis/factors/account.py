@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -89,18 +89,21 @@ class FactorAccount:
         """Log evidence of a model."""
         return self.sums.posterior(list(tau))[0]
 
-    def variance(
-        self, tau: Sequence[float], groups: Sequence[int], beside: Sequence[float] | None = None
-    ) -> float:
-        """Variance over the readings of what some groups of a model take.
+    def less(self, given: Sequence[float], tau: Sequence[float]) -> FactorAccount:
+        """Of what groups that are given leave by themselves: the others of a model.
 
-        Of a model and groups ``beside`` it, where given.
+        Where both are the same columns, all of it is theirs.
         """
-        whole = list(tau) if beside is None else list(np.maximum(tau, beside))
-        _, mean, _ = self.sums.posterior(whole)
+        _, mean, _ = self.sums.posterior(list(given))
+        others = np.where(np.array(given) > 0.0, 0.0, tau).tolist()
+        return replace(self, sums=self.sums.less(mean), tau=others)
+
+    def variance(self, tau: Sequence[float], groups: Sequence[int]) -> float:
+        """Variance over the readings of what some groups of a model take."""
+        _, mean, _ = self.sums.posterior(list(tau))
         taken: Array = np.zeros(len(self.groups[0].columns))
         for k in groups:
-            if whole[k] > 0.0:
+            if tau[k] > 0.0:
                 own = slice(int(self.bounds[k]), int(self.bounds[k + 1]))
                 taken = taken + self.groups[k].columns @ mean[own]
         return float(np.var(taken))
@@ -198,14 +201,10 @@ def factors_of(
 ) -> list[Factor]:
     """The factors that are in, strongest first.
 
-    Of a model with names, of variances ``beside``, the functions are those of what these leave:
-    where both are the same columns, all of it is the name's.
+    Of a model with names, of variances ``beside``, the functions are those of what these leave.
     """
-    sums, tau = account.sums, account.tau
-    if beside is not None:
-        _, named, _ = sums.posterior(list(beside))
-        sums, tau = sums.less(named), np.where(np.array(beside) > 0.0, 0.0, tau).tolist()
-    _, mean, covariance = sums.posterior(tau)
+    shown = account if beside is None else account.less(beside, account.tau)
+    _, mean, covariance = shown.sums.posterior(shown.tau)
     base = account.evidence(account.tau)
     kinds: dict[tuple[str, str | None], list[int]] = {}
     for k in account.inside:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -140,9 +140,19 @@ class NamedForms:
         own = self.account.groups[self.places[name]].alternatives
         return float(np.log(len(self.account.groups) * SIZES * own))
 
-    def left(self, tau: Sequence[float], factors: Sequence[str]) -> float:
-        """Variance of what the free functions of some factors take beside names."""
-        return self.account.variance(tau, [k for k in self.free if self.is_of(k, factors)])
+    def taken(
+        self,
+        sure: Sequence[int],
+        own: Iterable[int],
+        tau: Sequence[float],
+        factors: Sequence[str],
+    ) -> tuple[float, float]:
+        """Variance that some findings take, and that free functions of factors take of the rest."""
+        given = self.given(sure)
+        rest = self.account.less(given, tau)
+        free = [k for k in self.free if self.is_of(k, factors)]
+        mine = sum(self.account.variance(given, [self.places[k]]) for k in own)
+        return mine, rest.variance(rest.tau, free)
 
     def same(self, name: int) -> list[str]:
         """Factors whose functions are columns of a finding in this design: speed at one speed."""
@@ -218,8 +228,7 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
     for k in sure:
         if found[k].cause == MissingOrder.kind:
             continue
-        own = names.account.variance(names.given(sure), [names.places[k]], tau)
-        left = names.left(tau, EFFECTS[found[k].cause].form_of)
+        own, left = names.taken(sure, [k], tau, EFFECTS[found[k].cause].form_of)
         if own < TAKES * (own + left):
             share = 100.0 * own / (own + left)
             return {k: f"its form takes {share:.0f} % of what its factors take"}
@@ -305,7 +314,6 @@ def takes_all(names: NamedForms, findings: Sequence[Finding], factor: str) -> bo
     """Confirmed causes leave less than 5 % of a factor to its free functions."""
     sure = confirmed_names(names, findings)
     _, tau = names.beside(sure)
-    left = names.left(tau, [factor])
     own = [k for k in sure if factor in EFFECTS[findings[k].cause].form_of]
-    taken = sum(names.account.variance(names.given(sure), [names.places[k]], tau) for k in own)
+    taken, left = names.taken(sure, own, tau, [factor])
     return bool(left < (1.0 - TAKES) * (left + taken))
