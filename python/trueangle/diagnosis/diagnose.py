@@ -181,8 +181,7 @@ def _diagnosis(
     seen = account.seen
     sim, every, signals, rows = seen.sim, seen.every, seen.signals, seen.rows
     first, sigma = account.first, sim.sigma_arcsec or None
-    bare = first if seen.delay is None else account.choice.start
-    named = named_causes(account.choice.chosen, bare, account.choice.spots, gain, sigma)
+    named = named_causes(account.choice.chosen, account.choice.spots, gain, sigma)
     chosen, rest, spots, factors = named.chosen, named.rest, named.spots, named.factors
     findings = list(named.findings)
     beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)

@@ -53,7 +53,6 @@ class NamedCauses:
 
 def named_causes(
     chosen: Regression,
-    bare: Regression,
     spots: list[Ambiguity],
     gain: bool,
     sigma: float | None,
@@ -66,21 +65,19 @@ def named_causes(
     Parameters
     ----------
     chosen : Regression
-    bare : Regression
-        Without a cause.
     spots : list of Ambiguity
     gain : bool
         Measure what findings gain.
     sigma : float or None
         Noise that the simulation states, arcsec.
     """
-    found = _named(chosen, bare, spots, gain, sigma)
+    found = _named(chosen, spots, gain, sigma)
     if not found.lost or current_deadline().over:
         return found
     again = chosen_by_factor(chosen, found.lost, found.factors)
     if again is None:
         return found
-    other = _named(again, bare, spots, gain, sigma)
+    other = _named(again, spots, gain, sigma)
     return other if not other.lost and other.unnamed < found.unnamed else found
 
 
@@ -101,7 +98,7 @@ def chosen_by_factor(
 
 
 def _named(
-    chosen: Regression, bare: Regression, spots: list[Ambiguity], gain: bool, sigma: float | None
+    chosen: Regression, spots: list[Ambiguity], gain: bool, sigma: float | None
 ) -> NamedCauses:
     at = current_deadline()
     rest = unexplained_remainder(chosen, sigma)
@@ -113,7 +110,7 @@ def _named(
         rest = unexplained_remainder(others, sigma)
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
-    held, factors = stated_factors(bare, chosen, findings)
+    held, factors = stated_factors(chosen, findings)
     both = zip(findings, held, strict=True)
     lost = [k for one, other in both if one.confirmed and not other.confirmed for k in one.group]
     return NamedCauses(chosen, rest, held, spots, factors, lost)

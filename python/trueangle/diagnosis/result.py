@@ -62,8 +62,9 @@ class Diagnosis(DiagnosisData):
     def plot(self, ax: Axes | None = None) -> Axes:
         """Gain of every finding with its interval (needs ``trueangle[plot]``).
 
-        `trueangle.plots.measured_and_simulated` and `trueangle.plots.error_left` show the
-        readings themselves.
+        `trueangle.plots.factors` shows what the error follows, and
+        `trueangle.plots.measured_and_simulated` and `trueangle.plots.error_left` the readings
+        themselves.
         """
         axes: Axes = result_picture(self, ax)
         return axes

@@ -16,6 +16,7 @@ from .controlcharts import fleet_history, watched_windows
 from .detection import detection
 from .diagnosispictures import error_left, gains
 from .drawnreadings import before_after, error_curves, measured_and_simulated, residuals
+from .factorpictures import factors
 from .fleetpictures import fleet_overview, fleet_patterns, fleet_phasors, fleet_sizes
 from .kinds import drawn as drawn
 from .kinds import fit_plot
@@ -30,6 +31,7 @@ __all__ = [
     "detection",
     "error_curves",
     "error_left",
+    "factors",
     "fit_plot",
     "fleet_history",
     "fleet_overview",

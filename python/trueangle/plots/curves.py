@@ -68,17 +68,17 @@ class Points:
 
 
 @dataclass(frozen=True)
-class Curve:
+class ModelCurve:
     """A model over the angle in degrees: error and its standard deviation in arcsec."""
 
     angle: Array
     error: Array
     std: Array | None
 
-    def scaled(self, factor: float) -> Curve:
+    def scaled(self, factor: float) -> ModelCurve:
         """The model with its errors in another unit."""
         std = None if self.std is None else factor * self.std
-        return Curve(self.angle, factor * self.error, std)
+        return ModelCurve(self.angle, factor * self.error, std)
 
 
 def rms_amplitude(parts: Iterable[Points]) -> float:
@@ -119,7 +119,7 @@ def error_points(fit: FitResult) -> list[Points]:
     return found
 
 
-def model_curve(model: HarmonicModel, span: tuple[float, float] | None = None) -> Curve:
+def model_curve(model: HarmonicModel, span: tuple[float, float] | None = None) -> ModelCurve:
     """The model without its constant, over ``span`` (deg), the turn or the part that was seen."""
     highest = max(model.orders, default=1.0)
     low, high = fitted_degrees(model) if span is None else span
@@ -129,7 +129,7 @@ def model_curve(model: HarmonicModel, span: tuple[float, float] | None = None) -
     factor = ARCSEC_PER_TURN / model.period
     error = factor * (np.asarray(model.error(theta)) - model.constant)
     std = None if model.covariance is None else factor * model.band(theta)
-    return Curve(angle, error, std)
+    return ModelCurve(angle, error, std)
 
 
 def strong_gear_order(
@@ -142,7 +142,7 @@ def strong_gear_order(
     return float(max(fine)[1]) if part > _NOTABLE else None
 
 
-def curve_envelope(curve: Curve) -> tuple[Array, Array, Array]:
+def curve_envelope(curve: ModelCurve) -> tuple[Array, Array, Array]:
     """Least and greatest value of a curve, at places of which each holds several periods.
 
     Returns

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from . import palette
 from .canvas import grid, marked, turn_axis
-from .curves import CONFIDENCE, Curve, curve_envelope, thinned_points
+from .curves import CONFIDENCE, ModelCurve, curve_envelope, thinned_points
 from .panel import Cloud, Panel
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def _style(ax: Axes, cloud: Cloud, dense: bool) -> dict[str, Any]:
     return {"marker": marker, "markersize": size, "color": colour, **faint}
 
 
-def draw_panel_curve(ax: Axes, curve: Curve, dense: bool) -> None:
+def draw_panel_curve(ax: Axes, curve: ModelCurve, dense: bool) -> None:
     """A model's curve with its band; its envelope where gear orders fill the picture."""
     if dense:
         ax.fill_between(

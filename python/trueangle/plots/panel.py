@@ -12,7 +12,7 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 
 from ..support.arrays import Array
-from .curves import Curve, Points
+from .curves import ModelCurve, Points
 
 #: What the colour of readings stands for: their run, or what was done to them.
 Role: TypeAlias = Literal["run", "before", "after", "measured", "simulated"]
@@ -60,7 +60,7 @@ class Panel:
         What the x axis shows; by default what the readings cover.
     angles : bool
         The x axis has ticks at whole parts of a turn.
-    model : Curve, optional
+    model : ModelCurve, optional
         In the unit of the picture; ``dense`` where only its envelope can be drawn.
     medians : (ndarray, ndarray), optional
         Places and medians of the readings about them.
@@ -75,7 +75,7 @@ class Panel:
     clouds: tuple[Cloud, ...]
     span: tuple[float, float] | None = None
     angles: bool = True
-    model: Curve | None = None
+    model: ModelCurve | None = None
     dense: bool = False
     medians: tuple[Array, Array] | None = None
     zero: bool = False
@@ -90,7 +90,7 @@ class PanelPicture:
     told: str
 
 
-def magnified_segment(whole: Panel, order: float, model: Curve | None = None) -> Panel:
+def magnified_segment(whole: Panel, order: float, model: ModelCurve | None = None) -> Panel:
     """A few periods of an order as large as they are, in the middle: both ends may be thin."""
     low, high = segment_span(whole, order)
     clouds = []

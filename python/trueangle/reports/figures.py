@@ -15,6 +15,7 @@ from ..plots.amplitudespectrum import draw_spectrum, spectrum_text
 from ..plots.curves import Points
 from ..plots.diagnosispictures import draw_error_left
 from ..plots.drawnpanel import draw_panel
+from ..plots.factorpictures import draw_factor, factor_title
 from ..plots.orderlines import order_lines
 from ..plots.pagechart import page_axes, page_chart
 from ..plots.panel import PanelPicture
@@ -51,6 +52,8 @@ _MOST_RUNS: Final = 12
 _WIDE, _NARROW = 7.5, 3.4
 #: Orders whose phases are shown, the largest.
 _MOST_PHASES: Final = 12
+#: Factors that are shown, the strongest.
+_MOST_FACTORS: Final = 9
 #: Part of the measured error that a simulation must expect to be drawn with it.
 _FLAT: Final = 1e-3
 
@@ -98,6 +101,8 @@ def figures_of_diagnosis(
         picture = comparison_picture(pairs, scale.unit, diagnosis.extended)
         arrangement = "stacked" if len(picture.panels) == 2 else "above"
         found["measured-simulated"] = panel_figure(picture, arrangement, "height:16rem")
+    if diagnosis.factors:
+        found["factors"] = _factors(diagnosis, scale)
     left = error_left_of(diagnosis)
     if left is not None and len(left.rows) > 2:
         ax = page_axes(5.0, 1.0 + 0.3 * len(left.rows))
@@ -109,6 +114,18 @@ def figures_of_diagnosis(
             "alt": left.told(scale.unit), "charts": [chart], "arrangement": "row",
         }  # fmt: skip
     return found
+
+
+def _factors(diagnosis: Diagnosis, scale: ErrorScale) -> Figure:
+    """One chart for each factor: its function with the band."""
+    charts, told = [], []
+    for factor in diagnosis.factors[:_MOST_FACTORS]:
+        ax = page_axes(_NARROW, 2.0)
+        draw_factor(ax, factor, scale.unit)
+        told.append(ax.get_label())
+        title = factor_title(factor)
+        charts.append(page_chart(ax, title=title[0].upper() + title[1:], height="height:12rem"))
+    return {"alt": " ".join(map(str, told)), "charts": charts, "arrangement": "multiples"}
 
 
 def panel_figure(

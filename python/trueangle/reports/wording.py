@@ -13,6 +13,7 @@ FIGURE_TITLES: Final = {
     "spectrum": "Size of every order",
     "phases": "Phase and size of every order, run by run",
     "before-after": "Held-out runs before and after correction",
+    "factors": "Function of each factor",
 }
 
 #: Conditions of a run: where they stand, their name and unit.

@@ -9,7 +9,7 @@ import trueangle as ta
 from plots.strokes import strokes
 from trueangle.fitting.orders.select import select_orders
 from trueangle.fitting.phases import run_phases
-from trueangle.plots.curves import Curve, Points
+from trueangle.plots.curves import ModelCurve, Points
 from trueangle.plots.pagechart import page_axes, page_chart
 from trueangle.plots.phasesoverruns import draw_phase_of_order
 from trueangle.reports.linenames import line_names
@@ -116,7 +116,7 @@ def test_every_error_of_a_page_is_in_its_unit(asked, turn, fit):
     """A whole turn is what a turn has, in arrays, readings and curves alike."""
     scale = error_scale(asked, 50.0, fit.runs)
     whole = np.array([1_296_000.0, -648_000.0])
-    curve = Curve(np.zeros(2), whole, np.abs(whole)).scaled(scale.factor)
+    curve = ModelCurve(np.zeros(2), whole, np.abs(whole)).scaled(scale.factor)
     readings = Points("a", np.zeros(2), whole).scaled(scale.factor)
     for values in (readings.y, curve.error):
         np.testing.assert_allclose(values, [turn, -turn / 2.0])

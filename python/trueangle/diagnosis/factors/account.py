@@ -311,7 +311,7 @@ def _curve(
     products = account.groups[own[0]].is_product
     if not products:
         index = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in own])
-        rows = np.hstack([account.groups[k].values for k in own])
+        rows = np.hstack([account.groups[k].values_about_mean() for k in own])
         value = rows @ mean[index]
         variance = np.einsum("ij,jk,ik->i", rows, covariance[np.ix_(index, index)], rows)
     else:

@@ -63,7 +63,7 @@ def _alone(factor: str, own: Sequence[tuple[Group, Array]]) -> Curve:
         turns = (at[-1] - at[0]) / 360.0
         count = max(LEAST, int(np.ceil(POINTS * highest * turns)))
         at = np.linspace(at[0], at[-1], 1 + count)
-    values = sum((group.functions_at(at) @ mean for group, mean in own), np.zeros(at.size))
+    values = sum((group.values_about_mean(at) @ mean for group, mean in own), np.zeros(at.size))
     return Curve(factor, tuple(at.tolist()), tuple(values.tolist()))
 
 

@@ -76,6 +76,10 @@ class Group:
         """The functions at `at`."""
         return self.functions_at(self.at)
 
+    def values_about_mean(self, x: Array | None = None) -> Array:
+        """The functions at `at`, or at other values, less their means over the readings."""
+        return self.functions_at(self.at if x is None else x) - self.columns.mean(axis=0)
+
     def functions_at(self, x: Array) -> Array:
         """The functions at values of the factor; zeros where there is none."""
         if self.function is None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...effects.missed_counts import MissedCounts
 from ...estimation.regression import Regression
 from ..finding import Finding
+from ..rounding import unrounded
 from .account import MOST_READINGS, factor_account, factors_of
 from .factor import Factor
 from .group import Group
@@ -34,15 +35,14 @@ MOST_LINES: Final = 24
 
 
 def stated_factors(
-    first: Regression, chosen: Regression, findings: Sequence[Finding]
+    chosen: Regression, findings: Sequence[Finding]
 ) -> tuple[list[Finding], list[Factor]]:
     """Findings confirmed by their form, and the factors that the readings follow.
 
     Parameters
     ----------
-    first, chosen : Regression
-        Without a cause, against the simulation as it is stated (less a delay, where there is one);
-        with the causes chosen.
+    chosen : Regression
+        With the causes chosen, of errors less a delay or another ratio, where there is one.
     findings : sequence of Finding
         Of terms of ``chosen``.
 
@@ -53,7 +53,7 @@ def stated_factors(
     """
     rows = _rows(chosen)
     signals = chosen.signals.take(rows)
-    error = first.readings.residual[rows]
+    error = unrounded(chosen).readings.residual[rows]
     groups = factor_groups(
         signals,
         error,
