@@ -72,13 +72,33 @@ def named_causes(
         Noise that the simulation states, arcsec.
     """
     found = _named(chosen, spots, gain, sigma)
-    if not found.lost or current_deadline().over:
+    told = [spot for spot in found.spots if is_told_by_factors(spot, found.factors)]
+    if not (found.lost or told) or current_deadline().over:
         return found
-    again = chosen_by_factor(chosen, found.lost, found.factors)
+    alike = {cause for spot in told for cause in spot.causes}
+    doubted = [k for k, term in enumerate(chosen.terms) if term.cause in alike]
+    again = chosen_by_factor(chosen, [*found.lost, *doubted], found.factors)
     if again is None:
         return found
-    other = _named(again, spots, gain, sigma)
+    open_spots = [spot for spot in spots if not any({*spot.causes} <= {*t.causes} for t in told)]
+    other = _named(again, open_spots, gain, sigma)
     return other if not other.lost and other.unnamed < found.unnamed else found
+
+
+def is_told_by_factors(spot: Ambiguity, factors: Sequence[Factor]) -> bool:
+    """Whether one alone of the causes that a design does not tell apart is a form of a factor.
+
+    A zero of each run and a drift with the temperature may have the same columns in a few runs;
+    of more, the one that needs fewer of them is told by its evidence.
+    """
+    known = {
+        name
+        for factor in factors
+        if not factor.named_by
+        for name in (factor.factor, *factor.not_distinguished_from)
+    }
+    forms = [cause for cause in spot.causes if known & {*EFFECTS[cause].form_of}]
+    return spot.supported and len(forms) == 1
 
 
 def chosen_by_factor(

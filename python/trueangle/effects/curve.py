@@ -105,10 +105,10 @@ class Curve(Effect):
             return np.zeros(len(signals))
         if self._repeats:
             x = self.at[0] + (x - self.at[0]) % 360.0
-        found = np.interp(x, self.at, self.value_arcsec)
+        found: Array = np.asarray(np.interp(x, self.at, self.value_arcsec))
         if self.orders:
-            found = found * line_sum(signals.theta, self._lines(around.joint.shafts))
-        return np.asarray(found)
+            found *= line_sum(signals.theta, self._lines(around.joint.shafts))
+        return found
 
     @property
     def needs(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -147,9 +147,9 @@ class Curve(Effect):
     def _repeats(self) -> bool:
         return self.factor == "place" and self.at[-1] - self.at[0] == 360.0
 
-    def _lines(self, shafts: Mapping[str, float]) -> list[tuple[float, float, float]]:
+    def _lines(self, shafts: Mapping[str, float]) -> tuple[tuple[float, float, float], ...]:
         if self.shaft != "output" and self.shaft not in shafts:
             raise ArgumentError(f"effect 'curve': the joint has no shaft '{self.shaft}'")
         cycles = shafts.get(self.shaft, 1.0)
         pairs = zip(self.orders, self.phase_deg, strict=True)
-        return [(m * cycles, 1.0, phase) for m, phase in pairs]
+        return tuple((m * cycles, 1.0, phase) for m, phase in pairs)

@@ -84,7 +84,8 @@ class Group:
         """The functions at values of the factor; zeros where there is none."""
         if self.function is None:
             return np.zeros((x.size, self.columns.shape[1]))
-        return self.function(x)
+        found: Array = self.function(x)
+        return found
 
     @property
     def is_product(self) -> bool:

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 from ...errors import ArgumentError
 from ...support.suggestions import check_choice
 from .. import forms
-from ..forms import Form, Lines
+from ..forms import Form, Lines, Scaled
 from ..term import Term
 
 #: What a curve may follow at run time.
@@ -128,9 +128,9 @@ class CurveTerm(Term):
     def _bent(self, at: float, level: float) -> Form:
         return self._straight(at, level)._replace(absolute=True)
 
-    def _straight(self, at: float, level: float) -> forms.Scaled:
+    def _straight(self, at: float, level: float) -> Scaled:
         own = 0.0 if self.orders else level
-        return forms.Scaled(self.follows, own, self._times(level), origin=at)
+        return Scaled(self.follows, own, self._times(level), origin=at)
 
     def _times(self, factor: float) -> Lines:
         return tuple((m, factor * a, factor * b) for m, a, b in self.lines)
