@@ -78,7 +78,8 @@ class Group:
 
     def values_about_mean(self, x: Array | None = None) -> Array:
         """The functions at `at`, or at other values, less their means over the readings."""
-        return self.functions_at(self.at if x is None else x) - self.columns.mean(axis=0)
+        found = self.functions_at(self.at if x is None else x)
+        return np.asarray(found - self.columns.mean(axis=0))
 
     def functions_at(self, x: Array) -> Array:
         """The functions at values of the factor; zeros where there is none."""
