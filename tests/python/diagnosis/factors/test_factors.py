@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.joint.signals import join_runs
 from trueangle.simulation import Joint, Simulation
+
+from ..test_arc import sweeps
 
 NOISE = 1.2
 
@@ -124,3 +127,92 @@ def test_sizes_hold_the_truth_as_often_as_stated():
         assert (first.factor, first.orders) == ("place", (5.0,))
         inside.append(first.low < 0.8 / np.sqrt(2.0) < first.high)
     assert sum(inside) >= 9, "12 intervals of 95 %: fewer than 9 hold once in 20 000"
+
+
+def left_on(simulation, runs):
+    """Error of runs less a simulation, arcsec, one zero of all aside."""
+    left = []
+    for run in runs:
+        error = 3600.0 * (np.mod(run.indicated - run.reference + 180.0, 360.0) - 180.0)
+        left.append(error - simulation.predict(join_runs([run])))
+    return float(np.std(np.concatenate(left)))
+
+
+def kelvin(t, r):
+    return 21.0 + 9.0 * (r % 2) + 2.0 * (1.0 - np.exp(-t / 20.0))
+
+
+#: Errors that no cause has, and the factor that each follows first.
+NAMELESS = {
+    "speed": lambda theta, d, v, t, r: np.full(theta.size, np.sqrt(v)),
+    "temperature_place": lambda theta, d, v, t, r: (
+        0.35 * (kelvin(t, r) - 21.0) * np.sin(np.radians(48.0 * theta + 70.0))
+    ),
+    "place": lambda theta, *_: 9.0 * (np.abs((theta - 140.0) % 360.0 - 180.0) > 173.0),
+    "direction_place": lambda theta, d, *_: d * np.where(np.sin(np.radians(theta)) > 0.4, 3.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("factor", NAMELESS)
+def test_a_curve_leaves_the_noise_on_fresh_runs_and_after_correction(factor):
+    def runs(seed):
+        made = np.random.default_rng(seed)
+        return measured(made, NAMELESS[factor], repeats=3, temperature=kelvin)
+
+    found = ta.diagnose(runs(1), EMPTY)
+    assert factor in {one.factor for one in found.factors}
+    fresh = runs(2)
+    before, after = left_on(EMPTY, fresh), left_on(found.simulation(), fresh)
+    # A flat top has corners that no 48 lines have.
+    assert after < 1.15 * NOISE < 0.75 * before
+    claimed = found.gain["rms_after_arcsec"] / found.gain["rms_before_arcsec"]
+    # In the readings that were fitted, of which a curve of many lines takes some noise.
+    assert claimed == pytest.approx(after / before, rel=0.15)
+    model = found.correction()
+    left = []
+    for run in fresh:
+        signals = {"velocity": run.speed, "temperature": run.temperature}
+        theta = model.correct(run.indicated, direction=np.sign(run.speed), **signals)
+        left.append(3600.0 * (np.mod(theta - run.reference + 180.0, 360.0) - 180.0))
+    assert np.std(np.concatenate(left)) < 1.15 * NOISE
+
+
+def test_what_loses_its_name_is_named_factor_by_factor():
+    """One pattern of three orders stood for a play and a pattern of one."""
+    found = ta.diagnose(sweeps(6512), Simulation())
+    named = {factor.factor: factor.named_by for factor in found.factors}
+    assert named["direction"] == ("backlash",)
+    assert named["direction_place"] == ("direction_dependent_pattern",)
+    pattern = next(f for f in found.findings if f.cause == "direction_dependent_pattern")
+    assert pattern.parameters["orders"].value == [2.0]
+
+
+@pytest.mark.parametrize(
+    ("cause", "factor", "error"),
+    [
+        ("thermal_drift", "temperature", lambda r, zeros: 0.4 * (kelvin(0.0, r) - 21.0)),
+        ("zero_slip", "run", lambda r, zeros: zeros[r]),
+    ],
+)
+def test_zeros_and_temperature_are_told_by_the_factor_with_evidence(rng, cause, factor, error):
+    zeros = rng.normal(0.0, 3.0, 9)
+
+    def of_run(theta, d, v, t, r):
+        return np.full(theta.size, error(r, zeros))
+
+    runs = measured(
+        rng, of_run, repeats=3, temperature=lambda t, r: np.full(t.size, kelvin(0.0, r))
+    )
+    found = ta.diagnose(runs, EMPTY)
+    assert confirmed(found) == [cause]
+    assert found.factors[0].factor == factor
+    assert found.factors[0].named_by == (cause,)
+
+
+def test_a_free_path_of_the_noise_is_no_group_of_names():
+    """It has as many columns as readings: the account has a noise of its own."""
+    rng = np.random.default_rng(5)
+    paths = iter(np.cumsum(rng.normal(0.0, 0.5, (6, 300)), axis=1))
+    found = ta.diagnose(measured(rng, lambda theta, *_: next(paths)), EMPTY)
+    assert found.complete
+    assert confirmed(found) == []
