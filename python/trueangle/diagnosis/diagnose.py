@@ -205,7 +205,7 @@ def _diagnosis(
         sure = regression_without(chosen, not_confirmed_terms(findings), settled=True)
         findings.append(delay_finding(seen.delay, sure, first, gain and not at.over, rest))
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
-    curves = [curve for factor in factors if not factor.named_by for curve in factor.effects]
+    curves = named.curves
     shown = _less_curves(chosen, curves, sim) if curves else chosen
     if rest.found and curves:
         # What a function of a factor explains is not unexplained, though it has no name.

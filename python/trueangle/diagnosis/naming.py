@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from ..effects import EFFECTS
+from ..effects import EFFECTS, Curve
 from ..effects.ambiguity import Ambiguity
 from ..estimation.regression import Regression
 from ..support.deadline import current_deadline
@@ -44,6 +44,11 @@ class NamedCauses:
     spots: list[Ambiguity]
     factors: list[Factor]
     lost: list[int]
+
+    @property
+    def curves(self) -> list[Curve]:
+        """What stands for factors in the simulation that no name fits."""
+        return [c for factor in self.factors if not factor.named_by for c in factor.effects]
 
     @property
     def unnamed(self) -> float:
@@ -131,6 +136,10 @@ def _named(
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
     held, factors = stated_factors(chosen, findings)
+    # Causes that the design does not tell apart say other things of other runs: no curve does.
+    seen = [cause for spot in spots if spot.supported for cause in spot.causes]
+    forms = {form for cause in seen for form in EFFECTS[cause].form_of}
+    factors = [replace(f, effects=()) if f.factor in forms else f for f in factors]
     both = zip(findings, held, strict=True)
     lost = [k for one, other in both if one.confirmed and not other.confirmed for k in one.group]
     return NamedCauses(chosen, rest, held, spots, factors, lost)
