@@ -36,6 +36,12 @@ ALIKE: Final = 3.0
 #: Share of what a group's leaving takes that another must give back to be tried in its place.
 TRIED: Final = 0.5
 
+#: Share of a function that is left by columns which are nearly the same.
+SAME_COLUMNS: Final = 0.05
+
+#: Columns of groups that are compared so, at most.
+MOST_ALIKE: Final = 8
+
 #: Standard deviations of a 95 % interval.
 BAND: Final = 1.96
 
@@ -232,7 +238,7 @@ def factors_of(
                 rms**2 / max(account.total, rms**2),
                 base - account.evidence(account.without(members)),
                 (),
-                _alike(account, members, factor),
+                _alike(account, members, factor, mean),
                 _curve(account, members, bounds, mean, covariance),
                 curves_of(
                     factor,
@@ -273,8 +279,13 @@ def _shaft(orders: Sequence[float], shafts: dict[str, float]) -> str:
     return "output"
 
 
-def _alike(account: FactorAccount, members: Sequence[int], factor: str) -> tuple[str, ...]:
-    """Factors any of which explains as much in the place of one."""
+def _alike(
+    account: FactorAccount, members: Sequence[int], factor: str, mean: Array
+) -> tuple[str, ...]:
+    """Factors any of which explains as much in the place of one, or is nearly the same columns.
+
+    Of the latter the evidence may tell, and tells of errors of the signals.
+    """
     rest = account.without(members)
     own, _ = account.best_beside(rest, members)
     kinds: dict[str, list[int]] = {}
@@ -286,6 +297,9 @@ def _alike(account: FactorAccount, members: Sequence[int], factor: str) -> tuple
     means = [k for k in kinds.get("place", []) if orders & {*account.groups[k].orders}]
     found = []
     for kind, others in kinds.items():
+        if _is_function_of(account, members, others, mean):
+            found.append(kind)
+            continue
         beside = [*others, *(means if kind.endswith("_place") and kind != "place" else [])]
         if max(instead[k, j] / max(losses[k], 1e-9) for k in members for j in beside) < TRIED:
             continue
@@ -293,6 +307,25 @@ def _alike(account: FactorAccount, members: Sequence[int], factor: str) -> tuple
         if score > own - ALIKE and any(tau[k] > 0.0 for k in others):
             found.append(kind)
     return tuple(sorted(found, key=FACTORS.index))
+
+
+def _is_function_of(
+    account: FactorAccount, members: Sequence[int], others: Sequence[int], mean: Array
+) -> bool:
+    """What a group mostly is, in as many columns as a factor has, holds the factor's function."""
+    groups, bounds = account.groups, account.bounds
+    own = sum(groups[k].columns @ mean[bounds[k] : bounds[k + 1]] for k in members)
+    own = np.asarray(own - np.mean(own))
+    width = sum(groups[k].columns.shape[1] for k in members)
+    for k in others:
+        columns = groups[k].columns
+        if columns.shape[1] <= MOST_ALIKE:
+            parts = np.linalg.svd(columns - columns.mean(axis=0), full_matrices=False)[0]
+            mostly = parts[:, :width]
+            left = own - mostly @ (mostly.T @ own)
+            if left @ left < SAME_COLUMNS * (own @ own):
+                return True
+    return False
 
 
 def _curve(
