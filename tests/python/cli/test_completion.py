@@ -162,7 +162,7 @@ FIT_HEAVY = HEAVY | {"trueangle.export", "trueangle.joint.pattern", "shutil", "g
         ("fit --help", HEAVY | ARRAYS, 32),
         ("plan --help", HEAVY | ARRAYS, 32),
         ("selfcal --help", HEAVY | ARRAYS, 32),
-        ("completion zsh", HEAVY, 137),
+        ("completion zsh", HEAVY, 138),
         ("fit runs.csv -o model.json", FIT_HEAVY, 133),
         ("fit runs.csv --orders 1-4 -o model.json", FIT_HEAVY, 125),
     ],
