@@ -11,14 +11,7 @@ from ..errors import ArgumentError, FileError
 from ..formats.columns import find_columns
 from ..support.angles import UNIT_PERIODS
 from ..support.arrays import Array
-from ..support.roles import (
-    ANGLE_UNITS,
-    ANGLES,
-    RoleColumn,
-    role_code,
-    role_kind,
-    wanted_columns,
-)
+from ..support.roles import ANGLE_UNITS, ANGLES, RoleColumn, role_code, role_kind, wanted_columns
 from ..support.signals import find_signal
 from .arrivals import Rows
 

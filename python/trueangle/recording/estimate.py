@@ -10,9 +10,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+import trueangle._core as _core
+
 from ..errors import RankError
-from ..estimation.moments import Moments
-from ..estimation.momentsfit import MomentsFit
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_quantile
@@ -20,6 +20,7 @@ from ..support.distributions import chi_squared_quantile
 #: Cells of a turn, orders that are looked at, and the chance that one of them is there by noise.
 CELLS: Final = 72
 _HIGHEST: Final = 32
+_ORDERS: Final = [list(range(1, _HIGHEST + 1))]
 _CHANCE: Final = 0.01
 #: Variance of all orders by turns, in that of white noise, from which on noise is not white.
 _COLOURED: Final = 1.5
@@ -138,8 +139,9 @@ class Estimate:
         self.travel = Travel(period)
         self.orders: list[LiveOrder] = []
         self.turns, self.is_settled = 0, False
-        self._all, self._turn = (Moments(range(1, _HIGHEST + 1), period=period) for _ in "ab")
-        self._empty, self._seen = self._turn.copy(), np.zeros(CELLS, dtype=bool)
+        self._all: dict[int, _core.Moments] = {}  # by direction
+        self._turn: dict[int, _core.Moments] = {}
+        self._seen = np.zeros(CELLS, dtype=bool)
         self._period, self._zero = period, math.nan
         self._sums = np.zeros((2, CELLS))
         self._values = self._last = np.zeros(_HIGHEST, dtype=complex)
@@ -160,22 +162,29 @@ class Estimate:
             for sign in {*signs[start:stop].tolist()} - {0}:
                 rows = start + np.flatnonzero(signs[start:stop] == sign)
                 for sums in (self._all, self._turn):
-                    sums.update(reference[rows], error[rows], run=sign)
+                    if sign not in sums:
+                        sums[sign] = _core.Moments(self._period, [1.0], _ORDERS)
+                    sums[sign].update(reference[rows], error[rows])
             self._seen[cells[start:stop]] = True
             if stop in ends and self._seen.all():
                 with suppress(RankError):  # it goes on until its places tell the orders apart
-                    self._end_turn(self._turn.solve(), self._all.solve())
+                    self._end_turn(*map(self._solved, (self._turn, self._all)))
 
-    def _end_turn(self, turn: MomentsFit, found: MomentsFit) -> None:
+    def _solved(self, sums: dict[int, _core.Moments]) -> tuple[Any, Array]:
+        """Cosine and sine of all orders, and variance of either."""
+        found = _core.fit_moments([*sums.values()], self._period, [1.0], _ORDERS)
+        variance = np.diag(found.covariance)[1:].reshape(-1, 2).mean(axis=1)
+        return np.array(found.cosine[0]) + 1j * np.array(found.sine[0]), variance
+
+    def _end_turn(self, turn: tuple[Any, Array], found: tuple[Any, Array]) -> None:
         """Find the orders by all readings, and judge whether the last turn has changed them."""
-        self._turn, self._seen = self._empty.copy(), np.zeros(CELLS, dtype=bool)
+        self._turn, self._seen = {}, np.zeros(CELLS, dtype=bool)
         self.turns += 1
         more = max(self.turns - 1.0, 1.0)
-        last, self._last = self._last, turn.cosine + 1j * turn.sine
+        last, (self._last, _) = self._last, turn
         self._steps += np.abs(self._last - last) ** 2 * (self.turns > 1)
         before, known = self._values, {order.order for order in self.orders}
-        self._values = found.cosine + 1j * found.sine
-        white = np.maximum(np.diag(found.covariance)[1:].reshape(-1, 2).mean(axis=1), 1e-300)
+        self._values, white = found[0], np.maximum(found[1], 1e-300)
         own = self._steps / (4.0 * self.turns * more)
         # All orders together first: noise of any colour is in each.
         common = float(np.median(own / white))

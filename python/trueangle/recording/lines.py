@@ -12,11 +12,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from ..errors import ArgumentError
-from ..formats.seriallog import NUMBER
 from ..support.arrays import Array
 
 #: Lines that agree on their layout.
 _ENOUGH: Final = 3
+#: A number as firmware prints it.
+NUMBER: Final = rb"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER: Final = re.compile(rb"(?<![\w.])%s(?![\w.])" % NUMBER)
 #: What is between two numbers where several blanks are one: a mark, and the name of the second.
 _BLANKS: Final = re.compile(rb"([ \t])[ \t]+")

@@ -19,10 +19,7 @@ from .sources import SourceOptions, open_source
 
 
 def watched_batches(
-    address: str,
-    model: HarmonicModel,
-    reading: ReadingOptions,
-    options: SourceOptions,
+    address: str, model: HarmonicModel, reading: ReadingOptions, options: SourceOptions
 ) -> Iterator[ReadingBatch]:
     """Batches of the rows that arrive from a source, until it ends.
 
