@@ -38,7 +38,7 @@ PRODUCTS: Final = ("direction_place", "speed_place", "load_place", "temperature_
 POINTS: Final = 16
 
 #: Part of the strongest line below which others are rounding.
-_ROUNDING: Final = 1e-6
+_ROUNDING: Final = 1e-4
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def _alone(factor: str, own: Sequence[tuple[Group, Array]]) -> Curve:
         count = max(LEAST, int(np.ceil(POINTS * highest * turns)))
         at = np.linspace(at[0], at[-1], 1 + count)
     values = sum((group.values_about_mean(at) @ mean for group, mean in own), np.zeros(at.size))
-    return Curve(factor, tuple(at.tolist()), tuple(values.tolist()))
+    return Curve(factor, _plain(at), _plain(values))
 
 
 def _product(factor: str, shaft: str, cycles: float, group: Group, mean: Array) -> list[Curve]:
@@ -75,7 +75,13 @@ def _product(factor: str, shaft: str, cycles: float, group: Group, mean: Array) 
             continue
         sign = 1.0 if part[np.argmax(np.abs(part))] > 0.0 else -1.0
         phase = float(np.degrees(np.arctan2(sign * cosine, sign * sine)) % 360.0)
-        values = tuple((sign * size * part).tolist())
+        values = _plain(sign * size * part)
         orders = tuple(m / cycles for m in group.orders)
-        found.append(Curve(factor, tuple(group.at.tolist()), values, shaft, orders, (phase,)))
+        found.append(Curve(factor, _plain(group.at), values, shaft, orders, (round(phase, 4),)))
     return found
+
+
+def _plain(values: Array) -> tuple[float, ...]:
+    """Numbers of a file: to a millionth of the largest."""
+    digits = 6 - int(np.ceil(np.log10(max(float(np.abs(values).max()), 1e-9))))
+    return tuple(np.round(values, digits).tolist())

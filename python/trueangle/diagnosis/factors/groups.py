@@ -213,7 +213,8 @@ def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:
     kelvin = signals.temperature
     if kelvin is not None and np.ptp(kelvin) > TEMPERATURE_CHANGES:
         mean, half = float(kelvin.mean()), 0.5 * float(np.ptp(kelvin))
-        grid = np.linspace(kelvin.min(), kelvin.max(), GRID)
+        knots = _knots(kelvin)
+        grid = _grid(knots)
 
         def warm(x: Array) -> Array:
             s = (x - mean) / half
@@ -223,7 +224,7 @@ def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:
             return np.column_stack([np.ones(x.size), warm(x)])
 
         yield Axis("temperature", kelvin, warm, grid, "C"), with_mean
-        yield Axis("temperature", kelvin, _hats(kelvin), grid, "C"), None
+        yield Axis("temperature", kelvin, _hats(knots), grid, "C"), None
     for axis, _ in _signed("current", signals.current, LOAD_CHANGES, "A"):
         yield axis, None
     yield from ((axis, None) for axis in _clock(signals))
@@ -236,7 +237,8 @@ def _signed(
     top = 0.0 if x is None else float(np.abs(x).max(initial=0.0))
     if x is None or not np.ptp(x) > changes * top > 0.0:
         return
-    grid = np.linspace(x.min(), x.max(), GRID)
+    knots = _knots(x)
+    grid = _grid(knots)
     if float(np.std(np.abs(x))) < ONE_SIZE * top:
         yield Axis(factor, x, lambda x: x[:, None] / top, grid, unit), lambda x: x[:, None] / top
         return
@@ -248,11 +250,11 @@ def _signed(
         return np.hstack([lines(x), lines(x) * np.abs(x)[:, None] / top])
 
     yield Axis(factor, x, curves, grid, unit), lines
-    yield Axis(factor, x, _hats(x), grid, unit), None
+    yield Axis(factor, x, _hats(knots), grid, unit), None
 
 
-def _hats(x: Array) -> Basis:
-    """Hats at levels of what is set, and at quantiles of what moves: any function of it."""
+def _knots(x: Array) -> Array:
+    """Levels of what is set, and quantiles of what moves."""
     order = np.sort(x)
     step = 0.5 * LEVEL * float(order[-1] - order[0])
     cuts = np.flatnonzero(np.diff(order) > step)
@@ -260,7 +262,18 @@ def _hats(x: Array) -> Basis:
     knots = np.array([order[a:b].mean() for a, b in itertools.pairwise(edges)])
     if not 2 <= knots.size <= KNOTS:
         knots = np.quantile(order, np.linspace(0.0, 1.0, KNOTS))
-    knots = np.unique(knots)
+    return np.unique(knots)
+
+
+def _grid(knots: Array) -> Array:
+    """The knots, and evenly spaced values that are not next to one."""
+    even = np.linspace(knots[0], knots[-1], GRID)
+    apart = np.abs(even[:, None] - knots).min(axis=1) > 0.25 * (even[1] - even[0])
+    return np.union1d(even[apart], knots)
+
+
+def _hats(knots: Array) -> Basis:
+    """Hats at knots: any function."""
 
     def basis(values: Array) -> Array:
         return np.column_stack(
