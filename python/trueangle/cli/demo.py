@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..support.files import REPORT
 from .paths import Output
@@ -152,8 +151,7 @@ GEAR_ORDERS: Final = {8: 100, 7: 101, 16: 200, 15: 201, 14: 202, 12: 300, 4: 400
 PUBLISHED: Final = {"a": (149.53, 26.62, 82.20), "b": (101.35, 18.40, 81.85)}
 
 
-@dataclass(frozen=True)
-class PaperJoint:
+class PaperJoint(NamedTuple):
     """Error of a joint as a sum of sines: ``{order: (amplitude in arcsec, phase in deg)}``."""
 
     name: str
@@ -251,8 +249,7 @@ def simulated_groups(
     return runs
 
 
-@dataclass(frozen=True)
-class Reduction:
+class Reduction(NamedTuple):
     """Error before and after a correction, arcsec: at the positions and everywhere.
 
     ``positions`` and ``dense`` are peak-to-peak (before, after), ``dense_rms`` is rms.
@@ -310,8 +307,7 @@ def reduction(
     )
 
 
-@dataclass(frozen=True)
-class Study:
+class Study(NamedTuple):
     """The paper's study repeated, and the same with gear orders behind the aliases.
 
     Attributes

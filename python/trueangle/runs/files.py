@@ -58,7 +58,8 @@ def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationR
         kept in `CalibrationRun.columns`.
     **reading
         ``counts_per_turn``, ``counts_per_turn_reference``: counts in one turn of the output,
-        of an indicated angle or reference in counts. ``signals``: columns with other names,
+        of an indicated angle or reference in counts or without a unit of its own.
+        ``signals``: columns with other names,
         ``{"torque": "tau", "reference": ("pos act", "rad")}``; ``"-pos"`` is a reversed sensor
         (`CalibrationRun.indicated_sign`), and ``"reference_offset"`` (a list for several) is
         added to the reference. ``facets``: a file of a polygon's facets (``reference_deg``,

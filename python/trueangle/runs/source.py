@@ -33,7 +33,8 @@ class OtherReadingOptions(TypedDict, total=False):
     by
         Column whose values tell the runs apart, in place of ``run``.
     counts_per_turn, counts_per_turn_reference
-        Counts in one turn of the output, of an indicated angle or reference in counts.
+        Counts in one turn of the output, of an indicated angle or reference in counts or without
+        a unit of its own.
     topic
         JointState topic of a ROS bag (default: the only one).
     unit_from

@@ -150,7 +150,7 @@ def test_a_command_that_is_called_alone_has_its_arguments():
 
 #: Packages whose import takes longer than a small command runs; what a help must not load too.
 HEAVY = {"pyarrow", "pandas", "numpy.ma", "trueangle.effects"}
-ARRAYS = {"numpy", "statistics", "trueangle.export"}
+ARRAYS = {"numpy", "statistics", "dataclasses", "trueangle.export"}
 #: What a small fit must not load: `shutil` loads every library that packs.
 FIT_HEAVY = HEAVY | {"trueangle.export", "trueangle.joint.pattern", "shutil", "gzip", "shlex"}
 
