@@ -195,7 +195,7 @@ class OutsideSpanWarning(UserWarning):
 
 
 class UnitWarning(UserWarning):
-    """Angles look like another unit than the one they are taken for."""
+    """Angles look like another unit than the one they are taken for, or a channel is dead."""
 
 
 class NotCorrectedWarning(UserWarning):

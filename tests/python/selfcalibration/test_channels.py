@@ -125,6 +125,7 @@ def test_runs_whose_curves_differ_are_reported():
     assert any("calibrate each run alone" in note for note in found.notes)
 
 
+@pytest.mark.filterwarnings("always::trueangle.errors.UnitWarning")
 def test_the_command_writes_a_model_that_corrects_a_log_of_channels(tmp_path, capsys):
     given = log(COUNTS, 3.0)
     file = tmp_path / "adc.csv"
@@ -144,6 +145,9 @@ def test_the_command_writes_a_model_that_corrects_a_log_of_channels(tmp_path, ca
         assert step(float(sine), float(cosine)) == float(corrected)
     angle = loaded.channels.angle(given["sine"], given["cosine"])
     assert loaded.correct(angle)[5] == step(given["sine"][5], given["cosine"][5])
+    file.write_text("sine,cosine\n" + "".join(f"{s!r},0.3\n" for s in given["sine"].tolist()))
+    assert main(["correct", str(file), "-m", str(model), "-o", f"{out}.csv"]) == 0
+    assert "channel cosine stands still while sine goes from" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
