@@ -96,14 +96,20 @@ def is_told_by_factors(spot: Ambiguity, factors: Sequence[Factor]) -> bool:
     A zero of each run and a drift with the temperature may have the same columns in a few runs;
     of more, the one that needs fewer of them is told by its evidence.
     """
-    known = {
-        name
-        for factor in factors
-        if not factor.named_by
-        for name in (factor.factor, *factor.not_distinguished_from)
-    }
-    forms = [cause for cause in spot.causes if known & {*EFFECTS[cause].form_of}]
+    unnamed = [factor for factor in factors if not factor.named_by]
+    forms = {cause for factor in unnamed for cause in _forms_of(spot, factor)}
     return spot.supported and len(forms) == 1
+
+
+def _is_either(spot: Ambiguity, factor: Factor) -> bool:
+    """Every cause that is not told apart may be what a factor is."""
+    return len(_forms_of(spot, factor)) == len(spot.causes)
+
+
+def _forms_of(spot: Ambiguity, factor: Factor) -> list[str]:
+    """Causes that are forms of a factor, or of one that these runs do not distinguish from it."""
+    known = {factor.factor, *factor.not_distinguished_from}
+    return [cause for cause in spot.causes if known & {*EFFECTS[cause].form_of}]
 
 
 def chosen_by_factor(
@@ -137,9 +143,10 @@ def _named(
             findings = reconsidered_findings(chosen, findings, rest)
     held, factors = stated_factors(chosen, findings)
     # Causes that the design does not tell apart say other things of other runs: no curve does.
-    seen = [cause for spot in spots if spot.supported for cause in spot.causes]
-    forms = {form for cause in seen for form in EFFECTS[cause].form_of}
-    factors = [replace(f, effects=()) if f.factor in forms else f for f in factors]
+    seen = [spot for spot in spots if spot.supported]
+    factors = [
+        replace(f, effects=()) if any(_is_either(spot, f) for spot in seen) else f for f in factors
+    ]
     both = zip(findings, held, strict=True)
     lost = [k for one, other in both if one.confirmed and not other.confirmed for k in one.group]
     return NamedCauses(chosen, rest, held, spots, factors, lost)
