@@ -58,27 +58,19 @@ def table(verdicts: list[Verdict]) -> str:
     return "\n".join([*lines, *(str(verdict) for verdict in verdicts if verdict.wrong)])
 
 
-@pytest.mark.skipif(not LARGE, reason="TRUEANGLE_EXAM_SEEDS is not set: minutes of CPU a seed")
 @pytest.mark.timeout(7200)
-def test_all_cases() -> None:
-    verdicts = [ask(case, seed) for seed in SEEDS for case in cases()]
+def test_answers() -> None:
+    every = cases()
+    asked = every if LARGE else [every[index] for index in FEW]
+    verdicts = [ask(case, seed) for seed in SEEDS for case in asked]
     shown = table(verdicts)
     print(shown)
     forms = [v.word in TRUTHFUL for v in verdicts if v.case.group == "form"]
-    assert sum(forms) >= TRUTHFUL_FORMS * len(forms), shown
+    # Of the few forms of the ordinary run one may be silent.
+    assert sum(forms) + (not LARGE) >= TRUTHFUL_FORMS * len(forms), shown
     assert sum(bool(v.wrong) for v in verdicts) <= FALSE_NAMES * len(verdicts), shown
     assert not [v for v in verdicts if v.wrong and v.case.group == "nothing"], shown
     assert not [v for v in verdicts if v.word.startswith("error")], shown
-
-
-@pytest.mark.skipif(bool(LARGE), reason="the large run asks all cases")
-def test_a_few_cases() -> None:
-    every = cases()
-    verdicts = [ask(every[index], 4) for index in FEW]
-    shown = table(verdicts)
-    right = [v.word in TRUTHFUL | {"quiet"} for v in verdicts]
-    assert sum(right) >= len(right) - 1, shown
-    assert not any(v.wrong for v in verdicts), shown
 
 
 def test_each_group_has_its_cases() -> None:
