@@ -1,6 +1,5 @@
 """`trueangle watch`: a log or lines that arrive, a line per window, the status of an alarm."""
 
-import io
 import json
 import re
 import sys
@@ -46,8 +45,9 @@ def test_a_line_a_window_and_the_status(desk, capsys):
 def test_lines_that_arrive_say_the_same(desk, capsys, monkeypatch):
     assert main(["watch", "moved.csv", "-m", "m.json", "--json"]) == 3
     whole = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    monkeypatch.setattr(sys, "stdin", io.StringIO((desk / "moved.csv").read_text()))
-    assert main(["watch", "-", "-m", "m.json", "--json"]) == 3
+    with (desk / "moved.csv").open() as lines:
+        monkeypatch.setattr(sys, "stdin", lines)
+        assert main(["watch", "-", "-m", "m.json", "--json"]) == 3
     arrived = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert arrived == whole
     keys = {"window", "angle", "time_s", "orders", "statistic", "limit", "alarm", "because"}
@@ -104,6 +104,8 @@ def test_what_cannot_be_read_is_told_with_its_line(desk, capsys, monkeypatch):
         ("reference_deg,indicated_deg\nx,1\nx,3\n", "no line is a row of numbers, 3 lines"),
         ("a,b\n1,2\n", "reference"),
     ):
-        monkeypatch.setattr(sys, "stdin", io.StringIO(text))
-        assert main(["watch", "-", "-m", "m.json"]) == 1
+        (desk / "typed.csv").write_text(text)
+        with (desk / "typed.csv").open() as lines:
+            monkeypatch.setattr(sys, "stdin", lines)
+            assert main(["watch", "-", "-m", "m.json"]) == 1
         assert told in capsys.readouterr().err

@@ -72,6 +72,9 @@ def parameters():
         for node in ast.walk(ast.parse(source)):
             if isinstance(node, ast.FunctionDef):
                 names |= {a.arg for a in [*node.args.args, *node.args.kwonlyargs]}
+            elif isinstance(node, ast.ClassDef):
+                fields = [one.target for one in node.body if isinstance(one, ast.AnnAssign)]
+                names |= {field.id for field in fields if isinstance(field, ast.Name)}
     for target in importlib.import_module("trueangle.export.targets").TARGETS.values():
         names |= set(target.options)
     return names
