@@ -28,9 +28,12 @@ from ..joint.lines import lines_columns
 from ..joint.pattern import ARCSEC_PER_RAD, Pattern
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
-from ..support.angles import ARCSEC_PER_TURN
+from ..support.angles import ARCSEC_PER_DEG, ARCSEC_PER_TURN
 from ..support.arrays import Array, distinct
 from .confirmation import confirmation_status
+from .factors.account import BAND
+from .factors.factor import Factor, FactorCurve
+from .factors.group import GRID
 from .finding import Finding
 from .gain import measure_delay_gain
 from .goodness import Unexplained
@@ -180,5 +183,39 @@ def delay_finding(
     }
     gain = measure_delay_gain(without, chosen) if with_gain else None
     parameters = {"delay_s": quantity(seconds, std)}
-    told = confirmation_status(Latency.kind, gain, None, (), unexplained)
-    return Finding(Latency.kind, parameters, weight, gain, [], [Latency(seconds)], *told)
+    status = confirmation_status(Latency.kind, gain, None, (), unexplained)
+    return Finding(Latency.kind, parameters, weight, gain, [], [Latency(seconds)], *status)
+
+
+def delay_factor(finding: Finding, signals: Signals, total: float) -> Factor:
+    """The speed, of which the error of a delay is a straight line: ``ε = -v τ``.
+
+    Parameters
+    ----------
+    finding : Finding
+        As of `delay_finding`.
+    signals : Signals
+    total : float
+        Variance of the readings' error.
+    """
+    speed = 360.0 * signals.turns_per_s
+    seconds, std = (
+        float(x) for x in (finding.parameters["delay_s"].value, finding.parameters["delay_s"].std)
+    )
+    each = ARCSEC_PER_DEG * float(np.std(speed))
+    rms, half = each * abs(seconds), BAND * each * std
+    at = np.linspace(speed.min(), speed.max(), GRID)
+    value, apart = -ARCSEC_PER_DEG * seconds * at, BAND * ARCSEC_PER_DEG * std * np.abs(at)
+    return Factor(
+        "speed",
+        None,
+        None,
+        rms,
+        max(rms - half, 0.0),
+        rms + half,
+        rms**2 / max(total, rms**2),
+        0.5 * finding.evidence["bic_gain"],
+        (finding.cause,) if finding.confirmed else (),
+        (),
+        FactorCurve(at, "deg/s", value, value - apart, value + apart),
+    )

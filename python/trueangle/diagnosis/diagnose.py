@@ -25,7 +25,7 @@ from ..support.deadline import Deadline, current_deadline, with_deadline
 from .account import MOST_READINGS, account_of
 from .candidates import candidates_above
 from .confirmation import NOT_CONFIRMED
-from .delay import delay_finding
+from .delay import delay_factor, delay_finding
 from .discrepancy import discrepancy_of, unfolded_error
 from .drive import diagnose_drive
 from .finding import Finding
@@ -203,7 +203,13 @@ def _diagnosis(
             corrected = replace(corrected, joint=stated.joint)
     if seen.delay is not None:
         sure = regression_without(chosen, not_confirmed_terms(findings), settled=True)
-        findings.append(delay_finding(seen.delay, sure, first, gain and not at.over, rest))
+        late = delay_finding(seen.delay, sure, first, gain and not at.over, rest)
+        findings.append(late)
+        factors = [
+            *factors,
+            delay_factor(late, seen.signals, float(np.var(first.readings.residual))),
+        ]
+        factors.sort(key=lambda factor: -factor.rms)
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
     curves = named.curves
     shown = _less_curves(chosen, curves, sim) if curves else chosen

@@ -77,24 +77,24 @@ def named_causes(
         Noise that the simulation states, arcsec.
     """
     found = _named(chosen, spots, gain, sigma)
-    told = [spot for spot in found.spots if is_told_by_factors(spot, found.factors)]
-    if not (found.lost or told) or current_deadline().over:
+    decided = [spot for spot in found.spots if is_decided_by_factors(spot, found.factors)]
+    if not (found.lost or decided) or current_deadline().over:
         return found
-    alike = {cause for spot in told for cause in spot.causes}
+    alike = {cause for spot in decided for cause in spot.causes}
     doubted = [k for k, term in enumerate(chosen.terms) if term.cause in alike]
     again = chosen_by_factor(chosen, [*found.lost, *doubted], found.factors)
     if again is None:
         return found
-    open_spots = [spot for spot in spots if not any({*spot.causes} <= {*t.causes} for t in told)]
+    open_spots = [spot for spot in spots if not any({*spot.causes} <= {*t.causes} for t in decided)]
     other = _named(again, open_spots, gain, sigma)
     return other if not other.lost and other.unnamed < found.unnamed else found
 
 
-def is_told_by_factors(spot: Ambiguity, factors: Sequence[Factor]) -> bool:
+def is_decided_by_factors(spot: Ambiguity, factors: Sequence[Factor]) -> bool:
     """Whether one alone of the causes that a design does not tell apart is a form of a factor.
 
     A zero of each run and a drift with the temperature may have the same columns in a few runs;
-    of more, the one that needs fewer of them is told by its evidence.
+    of more, the evidence decides for the one that needs fewer of them.
     """
     unnamed = [factor for factor in factors if not factor.named_by]
     forms = {cause for factor in unnamed for cause in _forms_of(spot, factor)}
@@ -102,7 +102,7 @@ def is_told_by_factors(spot: Ambiguity, factors: Sequence[Factor]) -> bool:
 
 
 def _is_either(spot: Ambiguity, factor: Factor) -> bool:
-    """Every cause that is not told apart may be what a factor is."""
+    """Every cause that runs do not distinguish may be what a factor is."""
     return len(_forms_of(spot, factor)) == len(spot.causes)
 
 
@@ -142,7 +142,7 @@ def _named(
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
     held, factors = stated_factors(chosen, findings)
-    # Causes that the design does not tell apart say other things of other runs: no curve does.
+    # Causes that are not distinguished say other things of other runs: no curve does.
     seen = [spot for spot in spots if spot.supported]
     factors = [
         replace(f, effects=()) if any(_is_either(spot, f) for spot in seen) else f for f in factors

@@ -45,6 +45,11 @@ def test_a_delay_is_confirmed_where_its_gain_excludes_zero(
     assert ("exclude zero" in found.reason) == (low < 0.0)
     told = [effect.kind for effect in result.extended.effects]
     assert ("latency" in told) == (low > 0.0)
+    speed = next(one for one in result.factors if one.factor == "speed")
+    assert speed.named_by == ("latency",) * (low > 0.0)
+    # 200 deg each way in 20 s: the speed is a sine of 20 pi deg/s.
+    assert speed.low < 3600.0 * 0.025 * 20.0 * np.pi / np.sqrt(2.0) * 1.002 < 1.01 * speed.high
+    np.testing.assert_allclose(speed.curve.value, -90.0 * speed.curve.at, rtol=0.01, atol=1.0)
 
 
 # -- how large it is told ---------------------------------------------------------------
