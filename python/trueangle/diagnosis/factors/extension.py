@@ -64,7 +64,7 @@ def _alone(factor: str, own: Sequence[tuple[Group, Array]]) -> Curve:
         count = max(LEAST, int(np.ceil(POINTS * highest * turns)))
         at = np.linspace(at[0], at[-1], 1 + count)
     values = sum((group.values_about_mean(at) @ mean for group, mean in own), np.zeros(at.size))
-    return Curve(factor, _plain(at), _plain(values))
+    return Curve(factor, plain_numbers(at), plain_numbers(values))
 
 
 def _product(factor: str, shaft: str, cycles: float, group: Group, mean: Array) -> list[Curve]:
@@ -75,13 +75,15 @@ def _product(factor: str, shaft: str, cycles: float, group: Group, mean: Array) 
             continue
         sign = 1.0 if part[np.argmax(np.abs(part))] > 0.0 else -1.0
         phase = float(np.degrees(np.arctan2(sign * cosine, sign * sine)) % 360.0)
-        values = _plain(sign * size * part)
+        values = plain_numbers(sign * size * part)
         orders = tuple(m / cycles for m in group.orders)
-        found.append(Curve(factor, _plain(group.at), values, shaft, orders, (round(phase, 4),)))
+        found.append(
+            Curve(factor, plain_numbers(group.at), values, shaft, orders, (round(phase, 4),))
+        )
     return found
 
 
-def _plain(values: Array) -> tuple[float, ...]:
-    """Numbers of a file: to a millionth of the largest."""
-    digits = 6 - int(np.ceil(np.log10(max(float(np.abs(values).max()), 1e-9))))
+def plain_numbers(values: Array) -> tuple[float, ...]:
+    """Numbers of a file: to a millionth of their range."""
+    digits = 6 - int(np.ceil(np.log10(max(float(np.ptp(values)), 1e-9))))
     return tuple(np.round(values, digits).tolist())

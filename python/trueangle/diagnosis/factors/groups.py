@@ -48,8 +48,9 @@ LENGTHS: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
 #: Lengths of what rises before an event and settles after it, in shares of the longest run.
 SETTLES: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
 
-#: Share of the range within which values are one level, and hats at most.
+#: Shares of the range within which values are one level, and knots one; and hats at most.
 LEVEL: Final = 0.1
+NEXT: Final = 0.01
 KNOTS: Final = 8
 
 #: Runs up to which each may have a pattern.
@@ -213,8 +214,8 @@ def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:
     kelvin = signals.temperature
     if kelvin is not None and np.ptp(kelvin) > TEMPERATURE_CHANGES:
         mean, half = float(kelvin.mean()), 0.5 * float(np.ptp(kelvin))
-        knots = _knots(kelvin)
-        grid = _grid(knots)
+        knots = knots_of(kelvin)
+        grid = grid_of(knots)
 
         def warm(x: Array) -> Array:
             s = (x - mean) / half
@@ -237,8 +238,8 @@ def _signed(
     top = 0.0 if x is None else float(np.abs(x).max(initial=0.0))
     if x is None or not np.ptp(x) > changes * top > 0.0:
         return
-    knots = _knots(x)
-    grid = _grid(knots)
+    knots = knots_of(x)
+    grid = grid_of(knots)
     if float(np.std(np.abs(x))) < ONE_SIZE * top:
         yield Axis(factor, x, lambda x: x[:, None] / top, grid, unit), lambda x: x[:, None] / top
         return
@@ -253,8 +254,8 @@ def _signed(
     yield Axis(factor, x, _hats(knots), grid, unit), None
 
 
-def _knots(x: Array) -> Array:
-    """Levels of what is set, and quantiles of what moves."""
+def knots_of(x: Array) -> Array:
+    """Levels of what is set, and quantiles of what moves; none next to another."""
     order = np.sort(x)
     step = 0.5 * LEVEL * float(order[-1] - order[0])
     cuts = np.flatnonzero(np.diff(order) > step)
@@ -262,10 +263,11 @@ def _knots(x: Array) -> Array:
     knots = np.array([order[a:b].mean() for a, b in itertools.pairwise(edges)])
     if not 2 <= knots.size <= KNOTS:
         knots = np.quantile(order, np.linspace(0.0, 1.0, KNOTS))
-    return np.unique(knots)
+    knots = np.unique(knots)
+    return knots[np.diff(knots, prepend=-np.inf) > NEXT * (order[-1] - order[0])]
 
 
-def _grid(knots: Array) -> Array:
+def grid_of(knots: Array) -> Array:
     """The knots, and evenly spaced values that are not next to one."""
     even = np.linspace(knots[0], knots[-1], GRID)
     apart = np.abs(even[:, None] - knots).min(axis=1) > 0.25 * (even[1] - even[0])

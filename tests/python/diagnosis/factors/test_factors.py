@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.diagnosis.factors.extension import plain_numbers
+from trueangle.diagnosis.factors.groups import grid_of, knots_of
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Joint, Simulation
 
@@ -216,3 +218,21 @@ def test_a_free_path_of_the_noise_is_no_group_of_names():
     found = ta.diagnose(measured(rng, lambda theta, *_: next(paths)), EMPTY)
     assert found.complete
     assert confirmed(found) == []
+
+
+@pytest.mark.parametrize("kind", range(5))
+def test_points_of_a_curve_increase_whatever_a_factor_takes(kind):
+    """Two speeds that a velocity of noise goes round, levels, a range that is small to its size."""
+    rng = np.random.default_rng([7, kind])
+    for _ in range(200):
+        n = int(rng.integers(2, 200))
+        x = rng.standard_normal(n) * 10.0 ** rng.uniform(-6.0, 6.0)
+        made = (
+            x,
+            20.0 * np.sign(x) + rng.standard_normal(n) * 10.0 ** rng.uniform(-6.0, -2.0),
+            np.resize(x[:3], n) + 1e3,
+            np.abs(x) + 1e3,
+            rng.integers(-3, 4, n).astype(np.float64),
+        )[kind]
+        if np.ptp(made) > 1e-9 * np.abs(made).max():
+            assert (np.diff(plain_numbers(grid_of(knots_of(made)))) > 0.0).all()
