@@ -264,7 +264,7 @@ def knots_of(x: Array) -> Array:
     if not 2 <= knots.size <= KNOTS:
         knots = np.quantile(order, np.linspace(0.0, 1.0, KNOTS))
     knots = np.unique(knots)
-    return knots[np.diff(knots, prepend=-np.inf) > NEXT * (order[-1] - order[0])]
+    return np.asarray(knots[np.diff(knots, prepend=-np.inf) > NEXT * np.ptp(order)])
 
 
 def grid_of(knots: Array) -> Array:
