@@ -9,10 +9,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...effects import EFFECTS
 from ...effects.missed_counts import MissedCounts
 from ...estimation.regression import Regression
+from ...support.arrays import Array
 from ..finding import Finding
 from ..rounding import unrounded
+from ..unnamed import is_named
 from .account import MOST_READINGS, factor_account, factors_of
 from .factor import Factor
 from .group import Group
@@ -53,7 +56,7 @@ def stated_factors(
     """
     rows = _rows(chosen)
     signals = chosen.signals.take(rows)
-    error = unrounded(chosen).readings.residual[rows]
+    error = _less_what_no_factor_is(unrounded(chosen))[rows]
     groups = factor_groups(
         signals,
         error,
@@ -65,7 +68,8 @@ def stated_factors(
     places: dict[int, int] = {}
     named: list[Group] = []
     for k, finding in enumerate(findings):
-        if finding.group and (group := name_group(chosen, finding, rows)) is not None:
+        is_form = finding.group and EFFECTS[finding.cause].form_of
+        if is_form and (group := name_group(chosen, finding, rows)) is not None:
             places[k] = len(groups) + len(named)
             named.append(group)
     groups += named
@@ -93,6 +97,15 @@ def _factors(names: NamedForms, found: Sequence[Finding], shafts: dict[str, floa
     left = replace(account, tau=np.maximum(given, names.beside(sure)[1]).tolist())
     stated += [f for f in factors_of(left, shafts, given) if f.factor not in named]
     return sorted(stated, key=lambda factor: -factor.rms)
+
+
+def _less_what_no_factor_is(regression: Regression) -> Array:
+    """The error less causes that are forms of no factor: another joint's motion."""
+    error = regression.readings.residual
+    for term, coefficients in regression.fitted():
+        if is_named(term) and not EFFECTS[term.cause].form_of and term.run_effect is None:
+            error = error - term.columns @ coefficients
+    return error
 
 
 def _rows(regression: Regression) -> NDArray[np.int64]:
