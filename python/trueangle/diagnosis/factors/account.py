@@ -51,8 +51,10 @@ NAME: Final = "name"
 #: Smallest variance of readings that is distinguished from zero.
 NOTHING: Final = 1e-24
 
-#: Smallest variance of the noise, over that of the readings.
+#: Smallest variances of the noise and of a factor, over that of the readings, that sums of squares
+#: hold.
 ROUNDING: Final = 1e-9
+HELD: Final = 1e-7
 
 
 def _prior(groups: Sequence[Group]) -> list[float]:
@@ -225,6 +227,8 @@ def factors_of(
         at = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in members])
         columns = np.hstack([account.groups[k].columns for k in members])
         rms, std = _size(columns, mean[at], covariance[np.ix_(at, at)])
+        if rms**2 < HELD * account.total:
+            continue
         orders = [m for k in members for m in account.groups[k].orders]
         cycles = shafts[shaft] if shaft else 1.0
         found.append(
