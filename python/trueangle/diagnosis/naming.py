@@ -142,10 +142,12 @@ def _named(
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
     held, factors = stated_factors(chosen, findings)
-    # Causes that are not distinguished say other things of other runs: no curve does.
+    # Causes that are not distinguished, or were not tried, say other things of other runs: no
+    # curve does.
     seen = [spot for spot in spots if spot.supported]
     factors = [
-        replace(f, effects=()) if any(_is_either(spot, f) for spot in seen) else f for f in factors
+        replace(f, effects=()) if at.cut or any(_is_either(spot, f) for spot in seen) else f
+        for f in factors
     ]
     both = zip(findings, held, strict=True)
     lost = [k for one, other in both if one.confirmed and not other.confirmed for k in one.group]
