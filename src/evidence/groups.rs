@@ -84,7 +84,10 @@ impl GroupSums {
     /// Those of the errors less a function of the columns.
     pub fn less(&self, coefficients: &[f64]) -> Self {
         let mut left = self.clone();
-        let (own, sums) = (DVector::from_column_slice(coefficients), &mut left.gram.sums);
+        let (own, sums) = (
+            DVector::from_column_slice(coefficients),
+            &mut left.gram.sums,
+        );
         let taken = &sums.products * &own;
         sums.squares[(0, 0)] += own.dot(&taken) - 2.0 * own.dot(&sums.moments.column(0));
         sums.squares[(0, 0)] = sums.squares[(0, 0)].max(0.0);
