@@ -1,5 +1,6 @@
 //! `_core.Evidence`: orders, coefficients and noise of readings by their evidence.
 
+use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 
@@ -9,7 +10,7 @@ use super::release::detached;
 use crate::check::{not_negative, same_length};
 use crate::error::Error;
 use crate::evidence::{
-    CORRELATION_TIMES, Model, Noise, NoisePrior, Readings, Run, TERMS, VARIANCES,
+    CORRELATION_TIMES, Model, Noise, NoisePrior, Posterior, Readings, Run, TERMS, VARIANCES,
 };
 
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
@@ -25,7 +26,7 @@ type Given<'py> = (
 );
 
 /// Log evidence, mean and covariance of all coefficients.
-type Solution<'py> = (f64, Vector<'py>, Matrix<'py>);
+pub(super) type Solution<'py> = (f64, Vector<'py>, Matrix<'py>);
 
 /// Weight, tau and omega of a model.
 type Weighted = (f64, Vec<f64>, Vec<f64>);
@@ -105,16 +106,7 @@ impl PyEvidence {
             Some((posterior, covariance))
         })?;
         let (posterior, own) = found.ok_or_else(|| argument_error(py, LOST.into()))?;
-        let n = 2 * self.0.orders().len();
-        let (mut mean, mut covariance) = (vec![0.0; n], vec![0.0; n * n]);
-        for (i, &c) in posterior.columns.iter().enumerate() {
-            mean[c] = posterior.mean[(i, 0)];
-            for (k, &d) in posterior.columns.iter().enumerate() {
-                covariance[c * n + d] = own[(i, k)];
-            }
-        }
-        let covariance = columns(py, &covariance, &[n, n])?;
-        Ok((posterior.log_evidence, vector(py, &mean)?, covariance))
+        solution(py, &posterior, &own, 2 * self.0.orders().len())
     }
 
     /// Variances of the noise at the maximum of evidence and weak prior, whose scale is a variance.
@@ -215,6 +207,24 @@ impl PyEvidence {
         let widths = vec![2; orders];
         Ok(Model { widths, tau, omega })
     }
+}
+
+/// What a posterior says of all `n` coefficients; nothing of those that are out.
+pub(super) fn solution<'py>(
+    py: Python<'py>,
+    posterior: &Posterior,
+    own: &DMatrix<f64>,
+    n: usize,
+) -> PyResult<Solution<'py>> {
+    let (mut mean, mut covariance) = (vec![0.0; n], vec![0.0; n * n]);
+    for (i, &c) in posterior.columns.iter().enumerate() {
+        mean[c] = posterior.mean[(i, 0)];
+        for (k, &d) in posterior.columns.iter().enumerate() {
+            covariance[c * n + d] = own[(i, k)];
+        }
+    }
+    let covariance = columns(py, &covariance, &[n, n])?;
+    Ok((posterior.log_evidence, vector(py, &mean)?, covariance))
 }
 
 fn weighted(models: Vec<(f64, Model)>) -> Vec<Weighted> {

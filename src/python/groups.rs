@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArr
 use pyo3::prelude::*;
 
 use super::array::{columns, values, vector};
-use super::evidence::LOST;
+use super::evidence::{LOST, Solution, solution};
 use super::failure::argument_error;
 use super::release::detached;
 use crate::check::{not_negative, same_length};
@@ -23,9 +23,6 @@ type Given<'py> = (
     PyReadonlyArray1<'py, f64>,
     Option<PyReadonlyArray1<'py, f64>>,
 );
-
-/// Log evidence, mean and covariance of the coefficients of all columns.
-type Solution<'py> = (f64, Vector<'py>, Matrix<'py>);
 
 /// Readings of runs, and groups of columns.
 #[pyclass(name = "Groups", module = "trueangle._core", frozen)]
@@ -148,16 +145,7 @@ impl PyGroupSums {
             Some((posterior, covariance))
         })?;
         let (posterior, own) = found.ok_or_else(|| argument_error(py, LOST.into()))?;
-        let n: usize = self.0.widths().iter().sum();
-        let (mut mean, mut covariance) = (vec![0.0; n], vec![0.0; n * n]);
-        for (i, &c) in posterior.columns.iter().enumerate() {
-            mean[c] = posterior.mean[(i, 0)];
-            for (k, &d) in posterior.columns.iter().enumerate() {
-                covariance[c * n + d] = own[(i, k)];
-            }
-        }
-        let covariance = columns(py, &covariance, &[n, n])?;
-        Ok((posterior.log_evidence, vector(py, &mean)?, covariance))
+        solution(py, &posterior, &own, self.0.widths().iter().sum())
     }
 
     /// What each group's leaving takes, what its coming in gives, and that of each (columns) in
