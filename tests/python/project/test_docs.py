@@ -9,6 +9,7 @@ import pytest
 from conftest import ROOT
 from markdown_blocks import run_page
 from trueangle.cli import COMMANDS, build_parser
+from trueangle.effects import KINDS
 
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
 PAGES = [page for page in PAGES if "_build" not in page.parts and "_generated" not in page.parts]
@@ -19,7 +20,9 @@ def test_every_block_runs(page, tmp_path):
     if page.stem == "report" or page.stem == "tutorial":
         pytest.importorskip("matplotlib")
         pytest.importorskip("jinja2")
+    effects = dict(KINDS)
     run_page(page, tmp_path)
+    assert effects == KINDS  # what a page defines would be met by the tests after it
 
 
 def test_there_are_pages():
