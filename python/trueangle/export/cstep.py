@@ -1,4 +1,4 @@
-"""The C of terms at run time: a state, the signals of a reading, and one step.
+"""The C of terms at run time: its arithmetic, a state, the signals of a reading, one step.
 
 One text (``code/step.c``) in two arithmetics: whole numbers of 2^-32 turns with floats, for
 microcontrollers, and doubles in turns, for simulators.
@@ -7,11 +7,11 @@ microcontrollers, and doubles in turns, for simulators.
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 from ..model import forms
 from ..model.forms import Form
-from .carithmetic import FIXED, CArithmetic
-from .codetext import filled_code, number_rows
+from .codetext import code_parts, filled_code, float_literal, number_rows
 from .runtimeterms import RunTimeTerms, RunTimeWaves
 from .table import TURN, ratio_of_cycles
 
@@ -26,36 +26,89 @@ _UNITS = {
 _FLOAT = re.compile(r"(\d\.\d+(?:e-?\d+)?)f\b")
 
 
+@dataclass(frozen=True)
+class CArithmetic:
+    """What angles and errors are.
+
+    Attributes
+    ----------
+    name : str
+        Of its own parts of ``code/step.c``.
+    angle, real : str
+        Types.
+    suffix : str
+        Of a number of the type ``real``.
+    near : str
+        Condition under which a search ends.
+    one : float
+        A turn.
+    from_near : str
+        Ending of the name of an inverse of the series that starts at an angle nearby.
+    """
+
+    name: str
+    angle: str
+    real: str
+    suffix: str
+    near: str
+    one: float
+    from_near: str = ""
+
+    def part(self, name: str, **values: object) -> str:
+        """A part of ``code/step.c``: its own, or the one of both."""
+        parts = code_parts("step.c")
+        return filled_code(parts.get(f"{self.name} {name}") or parts[name], **values)
+
+    def number(self, value: float) -> str:
+        """A constant of the type ``real``."""
+        text = float_literal(value, 9 if self.suffix else 17) + self.suffix
+        return text if value >= 0.0 else f"({text})"
+
+    def place(self, turns: float) -> str:
+        """A constant angle."""
+        if self.one == 1.0:
+            return self.number(turns)
+        whole = round(turns * self.one)
+        return f"INT64_C({whole})" if whole >= 0 else f"(-INT64_C({-whole}))"
+
+
+_FIXED = CArithmetic("fixed", "int64_t", "float", "f", "off <= 1 && off >= -1", TURN)
+
+DOUBLE = CArithmetic(
+    "double", "double", "double", "", "fabs(off) <= 1e-13 + 4e-16 * fabs(goal)", 1.0, "_from"
+)
+
+
 def c_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -> str:
     """State, signals and step of a header; it has ``NAME_correct_unwrapped`` before."""
-    search = c_search(terms, FIXED, zero / TURN, at_indicated, FIXED.part("pattern"))
-    parts = [c_state(terms, FIXED), search]
+    search = c_search(terms, _FIXED, zero / TURN, at_indicated, _FIXED.part("pattern"))
+    parts = [c_state(terms, _FIXED), search]
     start = "@n@_pattern(reading)" if at_indicated else "reading"
     bumps = [form for form in terms.smooth if isinstance(form, forms.Bump)]
     if at_indicated and bumps:
         # The table holds them at its own angle: what is searched is what they were taken off.
         sums = [
-            line for form in bumps for line in _form(form, RunTimeWaves((), (), ()), "", FIXED)[1]
+            line for form in bumps for line in _form(form, RunTimeWaves((), (), ()), "", _FIXED)[1]
         ]
         parts.append(_function("@n@_bumps", ("@angle@ x",), sums))
         start += " + @n@_angle(@n@_bumps(@n@_pattern(reading)))"
     late = ""
     if terms.delay:
-        late = f"\n        + @n@_angle(signals->velocity * {FIXED.number(terms.delay)})"
+        late = f"\n        + @n@_angle(signals->velocity * {_FIXED.number(terms.delay)})"
     held = [
         f"state->good.{name} = @n@_good("
-        f"signals->{name}, {FIXED.number(limit)}, state->good.{name});"
+        f"signals->{name}, {_FIXED.number(limit)}, state->good.{name});"
         for name, limit in terms.limits.items()
     ]
     if held:
-        parts.append(FIXED.part("good"))
+        parts.append(_FIXED.part("good"))
         if "direction" in terms.signals:
             held.append("state->good.direction = signals->direction;")
         held.append("signals = &state->good;")
-    parts.append(FIXED.part("step unwrapped", held="\n".join(held), start=start, late=late))
+    parts.append(_FIXED.part("step unwrapped", held="\n".join(held), start=start, late=late))
     if whole:
-        parts.append(FIXED.part("step"))
-    return filled_code("\n".join(parts), angle=FIXED.angle, real=FIXED.real)
+        parts.append(_FIXED.part("step"))
+    return filled_code("\n".join(parts), angle=_FIXED.angle, real=_FIXED.real)
 
 
 def c_state(terms: RunTimeTerms, arithmetic: CArithmetic) -> str:
@@ -64,11 +117,11 @@ def c_state(terms: RunTimeTerms, arithmetic: CArithmetic) -> str:
     if terms.travels:
         held = "@n@_stretch stretch;" if terms.springs else "int8_t direction;"
         fields = ["@angle@ farthest;", held, "uint8_t known;"]
-    if arithmetic is FIXED and terms.limits:
+    if arithmetic is _FIXED and terms.limits:
         fields.append("@n@_signals good;")
     signals = []
     for name, limit in terms.limits.items():
-        most = f", up to {limit:.4g}" if arithmetic is FIXED else ""
+        most = f", up to {limit:.4g}" if arithmetic is _FIXED else ""
         signals.append(f"@real@ {name}; /* {_UNITS[name]}{most} */")
     if "direction" in terms.signals:
         signals.append("int8_t direction; /* of travel: 1, -1, 0 as before */")
@@ -133,7 +186,7 @@ def c_search(
     parts.append(find)
     parts += _travel(terms, arithmetic, zero)
     text = filled_code("\n".join(parts), angle=arithmetic.angle, real=arithmetic.real)
-    return text if arithmetic is FIXED else _FLOAT.sub(r"\1", text)
+    return text if arithmetic is _FIXED else _FLOAT.sub(r"\1", text)
 
 
 def _springs(terms: RunTimeTerms, arithmetic: CArithmetic) -> str:
@@ -180,14 +233,14 @@ def _function(name: str, arguments: tuple[str, ...], sums: list[str]) -> str:
     used = "\n".join(sums)
     names = [argument.split()[-1].lstrip("*") for argument in arguments]
     unused = [f"(void){word};" for word in names if not re.search(rf"\b{word}\b", used)]
-    return FIXED.part(
+    return _FIXED.part(
         "sum", function=name, arguments=", ".join(arguments), unused="\n".join(unused), sums=used
     )
 
 
 def wave_tables(name: str, waves: RunTimeWaves, arithmetic: CArithmetic, rated: bool) -> str:
     """Orders, phases and sizes as constants; ``rated`` orders as floats as well."""
-    fixed = arithmetic is FIXED
+    fixed = arithmetic is _FIXED
 
     def array(kind: str, ending: str, values: list[str], memory: str = " TRUEANGLE_TABLE") -> str:
         size = f"{name}_{ending}[{len(values)}]{memory if fixed else ''}"
@@ -207,7 +260,7 @@ def wave_tables(name: str, waves: RunTimeWaves, arithmetic: CArithmetic, rated: 
 
 
 def _waves_call(name: str, waves: RunTimeWaves, arithmetic: CArithmetic) -> str:
-    function = "@n@_waves" if waves.whole or arithmetic is not FIXED else "@n@_ratios"
+    function = "@n@_waves" if waves.whole or arithmetic is not _FIXED else "@n@_ratios"
     return f"{function}(x, {name}_orders, {name}_phases, {name}_sizes, {len(waves.orders)})"
 
 
@@ -215,7 +268,7 @@ def _form(
     form: Form, waves: RunTimeWaves, name: str, arithmetic: CArithmetic
 ) -> tuple[list[str], list[str]]:
     """Statements that add to the level, and to the error at ``x``."""
-    number, fixed = arithmetic.number, arithmetic is FIXED
+    number, fixed = arithmetic.number, arithmetic is _FIXED
     match form:
         case forms.Scaled():
             value = f"signals->{form.signal}"
@@ -262,7 +315,7 @@ def _filter(
 ) -> list[str]:
     if not waves.orders:
         return []
-    number, fixed = arithmetic.number, arithmetic is FIXED
+    number, fixed = arithmetic.number, arithmetic is _FIXED
 
     def read(array: str) -> str:
         return f"TRUEANGLE_F32({array} + i)" if fixed else f"{array}[i]"

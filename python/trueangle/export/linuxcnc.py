@@ -15,8 +15,14 @@ from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import table_error
-from .setpoint import ENDS, NOMINAL_DECIMALS, POSITIONS, SetpointTravel, axis_steepness
-from .setpointreading import travel_model
+from .setpoint import (
+    ENDS,
+    NOMINAL_DECIMALS,
+    POSITIONS,
+    SetpointTravel,
+    axis_steepness,
+    travel_model,
+)
 from .target import CommentBlock, Made, Option, Target
 
 #: EMCMOT_COMP_SIZE.

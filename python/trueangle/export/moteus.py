@@ -1,20 +1,21 @@
-"""moteus: the compensation table of one position source, as ``conf set`` lines."""
+"""moteus: the compensation table of one position source, or a port's common-mode value."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
+from ..runs.rawchannels import Channels
 from ..support.files import FileKind
+from .channelform import about_offsets, channels_of, made_of_channels, model_of_channels
 from .knots import rounded_knots
-from .moteuscommon import COMMON, common_mode, read_common_mode
 from .oneturn import one_turn_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
@@ -29,6 +30,16 @@ _SCALES = np.linspace(1.0, 1.05, 401)
 _LINE = re.compile(
     r"^(?:conf set )?motor_position\.sources\.(\d+)\.compensation_(?:table\.(\d+)|(scale))"
     r"\s+(\S+)\s*$"
+)
+
+#: The variant of the target ``moteus``.
+_COMMON: Final = "common"
+
+#: Counts of the port's converter.
+_COUNTS: Final = range(4096)
+
+_COMMON_LINE = re.compile(
+    r"^(?:conf set )?aux([12])\.sine_cosine\.common\s+(\S+)\s*$", re.MULTILINE
 )
 
 
@@ -48,20 +59,20 @@ class Moteus(Target):
         "source": Option(int, 0, "position source 0, 1 or 2 that reads this encoder"),
         "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
         "variant": Option(
-            ("table", COMMON), "table", "compensation table, or the offset of sine and cosine"
+            ("table", _COMMON), "table", "compensation table, or the offset of sine and cosine"
         ),
         "aux": Option(int, 1, "port 1 or 2 that reads sine and cosine"),
     }
 
     def may_be_empty(self, options: Mapping[str, Any]) -> bool:
-        return bool(options["variant"] == COMMON)
+        return bool(options["variant"] == _COMMON)
 
     def sign_of(self, options: Mapping[str, Any]) -> str:
-        return "absolute" if options["variant"] == COMMON else self.sign
+        return "absolute" if options["variant"] == _COMMON else self.sign
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
-        if options["variant"] == COMMON:
-            return common_mode(pattern, options["aux"])
+        if options["variant"] == _COMMON:
+            return _common_mode(pattern, options["aux"])
         source = options["source"]
         if source not in (0, 1, 2):
             raise ArgumentError(f"source must be 0, 1 or 2, got {source}")
@@ -93,8 +104,8 @@ class Moteus(Target):
         )
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
-        if options["variant"] == COMMON:
-            return read_common_mode(text, path, options["aux"])
+        if options["variant"] == _COMMON:
+            return _read_common_mode(text, path, options["aux"])
         source = options["source"]
         table = np.zeros(ENTRIES)
         scale, seen = 0.0, 0
@@ -190,3 +201,42 @@ def compensated(
     whole = (out / turn).astype(np.int32).astype(np.float32)
     wrapped = out - whole * turn
     return np.asarray(np.where(wrapped >= 0, wrapped, wrapped + turn), dtype=np.float64)
+
+
+def _common_mode(pattern: TurnPattern, aux: int) -> Made:
+    """One offset for both channels: the mean of theirs, which leaves least of order 1."""
+    channels = channels_of(pattern, f"moteus of variant {_COMMON}")
+    if aux not in (1, 2):
+        raise ArgumentError(f"aux must be 1 or 2, got {aux}")
+    exact = 0.5 * (channels.offset_sine + channels.offset_cosine)
+    common = round(exact)
+    if common not in _COUNTS:
+        raise ArgumentError(
+            f"moteus takes counts of a 12-bit converter, and the middle of these channels is "
+            f"{exact:.6g}: record the counts of the diagnostic protocol"
+        )
+
+    def text(header: CommentBlock) -> str:
+        return f"conf set aux{aux}.sine_cosine.common {common}\nconf write\n"
+
+    return made_of_channels(
+        pattern,
+        text,
+        about_offsets(common, common),
+        about_offsets(exact, exact),
+        entries=1,
+        notes=(
+            f"one offset for both channels, whose own differ by "
+            f"{abs(channels.offset_sine - channels.offset_cosine):.3g} counts; gain and phase "
+            "stay. What is left can go into the source's compensation table: fit its position",
+        ),
+    )
+
+
+def _read_common_mode(text: str, path: str, aux: int) -> HarmonicModel:
+    """What a port's common-mode value corrects."""
+    found = [m[2] for m in _COMMON_LINE.finditer(text) if int(m[1]) == aux]
+    if not found or not found[-1].isdigit():
+        raise table_error(path, f"has no line aux{aux}.sine_cosine.common with counts")
+    common = float(found[-1])
+    return model_of_channels(Channels(offset_sine=common, offset_cosine=common, period=360.0))

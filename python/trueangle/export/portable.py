@@ -1,12 +1,13 @@
-"""What the C and the Rust export have in common: options, sizes, tables, self-test."""
+"""What the C and the Rust export share: options, sizes, tables, self-test, and their reading."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from ..support.arrays import Array
 from .chain import Chain, make_chain, source_identifier
 from .pattern import TurnPattern
 from .proof import lost_orders
+from .reading import Function, ReadTable, function_model, table_error
 from .runtimeterms import DIRECTIONS, RunTimeTerms, is_own_signal
 from .table import METHODS, NUMBERS, TURN, Table
 from .target import CommentBlock, Made, Option, TablePart, Target
@@ -37,6 +39,16 @@ _SHARE = 1.0 / 3.0
 
 #: Readings of the self-test: spread, and none of them a knot.
 _TEST_ANGLES = tuple((i * 0x1F123BB5 + 0x01234567) % 2**32 for i in range(8))
+
+#: A knot of 16 bits counts no more than 2^31 units of an angle of 32 bits.
+_LARGEST_SHIFT: Final = 31
+
+_TABLE = re.compile(
+    r"Table (?P<shaft>\w+): (?P<entries>\d+) entries, \d+ bytes, (?P<method>linear|cubic), "
+    r"(?P<number>q15|q31|f32), shift (?P<shift>\d+), (?P<cycles>[-+.e\d]+) cycles"
+)
+_ZERO = re.compile(r"Zero: (-?\d+) ")
+_TYPES = {"q15": np.int16, "q31": np.int32, "f32": np.float32}
 
 
 class PortableTarget(Target):
@@ -121,9 +133,7 @@ class PortableTarget(Target):
         return RunTimeTerms.of(pattern.source, terms, options["direction"])
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
-        from .portablereading import portable_model
-
-        return portable_model(text, path, self)
+        return _portable_model(text, path, self)
 
 
 def table_lines(chain: Chain) -> list[str]:
@@ -242,3 +252,92 @@ def _part(chain: Chain, pattern: TurnPattern, floating: bool) -> TablePart:
         turns=turns,
         continuous=not closes,
     )
+
+
+def _portable_model(text: str, path: str, target: Target) -> HarmonicModel:
+    """Model of the tables of an exported C header or Rust module."""
+    flowing = re.sub(r"\n(?: \*|//!) ?", " ", text)
+    found = list(_TABLE.finditer(flowing))
+    zero = _ZERO.search(flowing)
+    if not found or zero is None:
+        raise table_error(path, "no export of trueangle: its comment names no table")
+    at_indicated = "all tables at the same" in flowing
+    whole = int(zero[1])
+    if abs(whole) >= 1 << 63:
+        raise table_error(path, f"its zero is beyond 64 bits: {zero[1][:30]}")
+    # Before turns were counted, the zero was written modulo one.
+    whole -= 1 << 32 if whole >= 1 << 31 else 0
+    tables, read = [], []
+    for match in found:
+        shaft, number = match["shaft"], match["number"]
+        entries, shift, cycles = _stated(match, path)
+        body = re.search(
+            rf"(?:\b(?:\w+_)?{shaft}_knots\[\d+\][^=]*|const {shaft.upper()}(?:_KNOTS)?: [^=]*)"
+            r"= [{\[](.*?)[}\]];",
+            text,
+            re.S,
+        )
+        wide = 2 if match["method"] == "cubic" else 1
+        try:
+            numbers = [float(n) for n in re.findall(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?", body[1])]  # type: ignore[index]
+            knots = np.array(numbers).astype(_TYPES[number])
+            if len(knots) != wide * (entries + 1):
+                raise ValueError
+        except (TypeError, ValueError, OverflowError):
+            raise table_error(
+                path, f"the table of shaft {shaft} does not hold {wide * (entries + 1)} numbers"
+            ) from None
+        table = Table(
+            shaft,
+            cycles,
+            match["method"],
+            number,
+            entries.bit_length() - 1,
+            shift,
+            knots.reshape(-1, 2) if wide == 2 else knots,
+        )
+        # Tables are looked up at the zeroed reading; an indicated argument is the reading.
+        move = whole / TURN * cycles if at_indicated else 0.0
+        read.append(table)
+        tables.append(ReadTable(shaft, cycles, _function(table, move), entries, table.step))
+    chain = Chain(whole, tuple(read), at_indicated)
+    computed = re.search(r"With ([\w, ]+): \w*step\(", flowing)
+    note = (
+        f"read from the tables of {target.name}; {computed[1]}, which its step computes at run "
+        "time, is not in the model"
+        if computed
+        else ""
+    )
+    return function_model(
+        tables,
+        path,
+        target,
+        chain.correction,
+        zero=whole / TURN,
+        at_indicated=at_indicated,
+        turns=chain.turns[0],
+        note=note,
+    )
+
+
+def _stated(match: re.Match[str], path: str) -> tuple[int, int, float]:
+    """Entries, shift and cycles that the comment states of a table."""
+    try:
+        entries, shift, cycles = int(match["entries"]), int(match["shift"]), float(match["cycles"])
+    except ValueError:
+        cycles = math.nan
+    if not 0.0 < cycles < 1 << 31 or shift > _LARGEST_SHIFT:
+        raise table_error(
+            path,
+            f"the table of shaft {match['shaft']} is said to have a shift of "
+            f"{match['shift'][:20]} (0 to {_LARGEST_SHIFT}) and {match['cycles'][:30]} cycles",
+        )
+    return entries, shift, cycles
+
+
+def _function(table: Table, move: float) -> Function:
+    def function(x: Array) -> Array:
+        angles = np.floor(((x - move) % 1.0) * TURN).astype(np.uint64).astype(np.uint32)
+        return table.correction(angles) / TURN
+
+    return function

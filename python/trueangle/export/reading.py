@@ -14,7 +14,7 @@ from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance, TableRecord
 from ..support.arrays import Array
 from ..support.files import InputFile, sha256_of
-from .inversion import inverse_rising
+from .pattern import inverse_rising
 from .proof import Correction
 from .table import TURN
 

@@ -15,8 +15,7 @@ from .oneturn import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import table_error
-from .setpoint import ENDS, POSITIONS, SetpointTravel
-from .setpointreading import travel_model
+from .setpoint import ENDS, POSITIONS, SetpointTravel, travel_model
 from .target import CommentBlock, Made, Option, Target
 
 #: MD38000 MM_ENC_COMP_MAX_POINTS.

@@ -1,4 +1,4 @@
-"""SimpleFOC's CalibratedSensor: the array and its length, for three versions of the library."""
+"""SimpleFOC: the array of CalibratedSensor, for three versions, or the centres of LinearHall."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
+from ..runs.rawchannels import Channels
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.files import FileKind
+from .channelform import about_offsets, channels_of, made_of_channels, model_of_channels
 from .codetext import longest_array, number_rows
 from .knots import rounded_knots
-from .linearhall import LINEAR_HALL, linear_hall, read_linear_hall
 from .oneturn import one_turn_knots, rounding_floor, without_mean
 from .pattern import TurnPattern
 from .proof import Correction, Places
@@ -44,6 +45,11 @@ _PER_RADIAN = np.float32(10430.2192)
 
 _SIZES = (16, 24, 32, 48, 64, 100, 128, 200, 256, 400, 512, 800, 1024, 2048, 4096)
 
+#: The variant of the target ``simplefoc``.
+_LINEAR_HALL: Final = "linearhall"
+
+_CALL = re.compile(r"LinearHall\s*\([^,()]+,[^,()]+,\s*(-?\d+)\s*,\s*(-?\d+)\s*,\s*(\d+)\s*\)")
+
 
 class SimpleFoc(Target):
     """Target ``simplefoc``: lines to paste above ``CalibratedSensor``."""
@@ -60,7 +66,7 @@ class SimpleFoc(Target):
     )
     options = {
         "variant": Option(
-            (*VARIANTS, LINEAR_HALL),
+            (*VARIANTS, _LINEAR_HALL),
             "minus-u16",
             "version of the library, or the LinearHall sensor",
         ),
@@ -69,20 +75,20 @@ class SimpleFoc(Target):
     }
 
     def sizes(self, options: Mapping[str, Any]) -> Sequence[int]:
-        return () if options["variant"] in ("plus-float", LINEAR_HALL) else _SIZES
+        return () if options["variant"] in ("plus-float", _LINEAR_HALL) else _SIZES
 
     def may_be_empty(self, options: Mapping[str, Any]) -> bool:
-        return bool(options["variant"] == LINEAR_HALL)
+        return bool(options["variant"] == _LINEAR_HALL)
 
     def sign_of(self, options: Mapping[str, Any]) -> str:
-        if options["variant"] == LINEAR_HALL:
+        if options["variant"] == _LINEAR_HALL:
             return "absolute"
         return "add" if options["variant"] == "plus-float" else "subtract"
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         variant = options["variant"]
-        if variant == LINEAR_HALL:
-            return linear_hall(pattern)
+        if variant == _LINEAR_HALL:
+            return _linear_hall(pattern)
         old = variant == "plus-float"
         entries = _FIXED if old else options["entries"]
         if not 4 <= entries <= _MOST:
@@ -167,8 +173,8 @@ class SimpleFoc(Target):
         return "\n".join(lines) + "\n"
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
-        if options["variant"] == LINEAR_HALL:
-            return read_linear_hall(text, path)
+        if options["variant"] == _LINEAR_HALL:
+            return _read_linear_hall(text, path)
         said = re.search(r"variant (plus-float|minus-float|minus-u16)", text)
         variant = said[1] if said else options["variant"]
         numbers, line, decimals = longest_array(text, path, self.name)
@@ -267,3 +273,33 @@ def corrected_short(raw: Single, table: NDArray[np.uint16], contracted: bool = F
     out = raw - offset
     out = np.where(out < 0, out + _2PI, out)
     return np.asarray(np.where(out >= _2PI, out - _2PI, out), dtype=np.float32)
+
+
+def _linear_hall(pattern: TurnPattern) -> Made:
+    """The constructor with whole centres: gain and phase of the channels stay."""
+    channels = channels_of(pattern, f"simplefoc of variant {_LINEAR_HALL}")
+    exact = (channels.offset_sine, channels.offset_cosine)
+    sine, cosine = (round(value) for value in exact)
+
+    def text(header: CommentBlock) -> str:
+        own = "Centres in counts of analogRead; gain and phase of the channels are not corrected."
+        call = f"LinearHall(PIN_SINE, PIN_COSINE, {sine}, {cosine}, {channels.periods_per_turn})"
+        lines = header.comment("// ", own)
+        return "\n".join([*lines, f"LinearHall sensor = {call};", ""])
+
+    return made_of_channels(
+        pattern, text, about_offsets(sine, cosine), about_offsets(*exact), entries=2
+    )
+
+
+def _read_linear_hall(text: str, path: str) -> HarmonicModel:
+    """What a constructor's centres correct."""
+    found = _CALL.search(text)
+    if found is None:
+        raise table_error(path, "has no LinearHall(pin, pin, centre, centre, pole pairs)")
+    sine, cosine, periods = map(int, found.groups())
+    return model_of_channels(
+        Channels(
+            offset_sine=sine, offset_cosine=cosine, periods_per_turn=periods or 1, period=360.0
+        )
+    )

@@ -12,7 +12,7 @@ import trueangle as ta
 from trueangle import terms as T
 from trueangle.cli import main
 from trueangle.errors import FileError
-from trueangle.export.fmufiles import variables_of
+from trueangle.export.fmu import variables_of
 from trueangle.simulation import RunDesign
 
 fmpy = pytest.importorskip("fmpy")

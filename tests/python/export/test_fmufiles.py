@@ -8,7 +8,7 @@ import pytest
 
 import trueangle as ta
 from trueangle import terms as T
-from trueangle.export.fmufiles import fmu_source, model_description, variables_of
+from trueangle.export.fmu import fmu_source, model_description, variables_of
 
 SHAFTS = {
     "one line": ta.Shaft("output", 1, (9,), (0.003,), (-0.004,)),

@@ -8,7 +8,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main
-from trueangle.export.inversion import inverse_rising
+from trueangle.export.pattern import inverse_rising
 
 from .test_bounds import AT_READINGS, existing, random_model, wrapped
 

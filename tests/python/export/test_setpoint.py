@@ -12,8 +12,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.export import TARGETS
-from trueangle.export.setpoint import axis_steepness
-from trueangle.export.setpointreading import _closed, travel_model
+from trueangle.export.setpoint import _closed, axis_steepness, travel_model
 
 DIGIT = 1e-4
 

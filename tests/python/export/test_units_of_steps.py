@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.export.fmufiles import fmu_source, variables_of
+from trueangle.export.fmu import fmu_source, variables_of
 
 #: Of powers of two, so that no number is rounded on the way.
 PERIODS = (1.0, 64.0, 4096.0)
