@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 
 from .._core import thread_count
 from ..errors import FileError
+from .csvcells import LONGEST_LINE
 from .csvheader import Header
-from .csvlines import LONGEST_LINE
 from .csvrows import BLOCK, QuotedBlock, line_too_long, quoted_blocks
 from .format import Addition, Batch, Contents, CopyTask, Selection, refuse_corrected
-from .messages import warn_of_messages
-from .textfile import create_text, open_text
+from .textfile import create_text, open_text, warn_of_messages
 
 if TYPE_CHECKING:
     from .csvblocks import PlainBlock

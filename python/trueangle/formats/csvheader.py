@@ -12,20 +12,31 @@ from ..errors import FileError
 from .csvcells import (
     COMMA,
     POINT,
+    TextLine,
     are_readings,
     cell_number,
     decimal_of,
     delimiter_of,
+    first_lines,
     holds_number,
     is_blank_between_commas,
     is_comment,
     line_cells,
 )
-from .csvlines import TextLine, first_lines
-from .csvunits import SCOPE, names_with_units, units_of
 
 #: Lines looked at to tell readings from a preamble.
 _LOOKED_AT = 4
+
+#: A name at the head of a time column of TwinCAT's exports, before the names it is for.
+_SCOPE = "Name"
+#: What a line of units holds: units in brackets, or short words without digits.
+_UNIT = r"[\[(].*[\])]|[^\d\s]{0,8}(?:/[^\d\s]{1,4}\d?)?|-"
+# Compiled where a line asks for it: that takes longer than to read a small file.
+_KNOWN_UNITS = (
+    r"[\[(]?(deg(rees?)?|rad(ians?)?|turns?|rev(olutions?)?|counts?|arcsec|arcmin|[°\u2032\u2033\"']|"
+    r"m?s|us|µs|ns|sec(onds?)?|volts?|m?v|m?a|[mc]?nm|n·?m|°?c|k|rpm|(deg|rad|turn|°)/s)[\])]?"
+)
+_BRACKETED = r"[\[(][^\])]*[\])]\s*$"
 
 
 class Header:
@@ -76,7 +87,7 @@ class Header:
             cells = [f"column{i + 1}" for i in range(len(cells))]
         self._is_open = len(cells) > 1 and not cells[-1]
         between = lines[first + 1 : data] if first >= 0 else []
-        self.names = names_with_units(
+        self.names = _names_with_units(
             cells[:-1] if self._is_open else cells, [self._cells(line.text) for line in between]
         )
         self.trailing = self._trailing(lines[data : data + 1])
@@ -117,7 +128,7 @@ class Header:
 
     def _is_units(self, raw: bytes) -> bool:
         cells = self._cells(raw.decode(self.encoding, "replace"))
-        return units_of(cells, len(self.names)) is not None
+        return _units_of(cells, len(self.names)) is not None
 
     def _found(self, lines: list[TextLine]) -> tuple[int, int]:
         """Index of the line of names, -1 without, and of the first line of readings."""
@@ -147,7 +158,7 @@ class Header:
                 off = abs(len(cells) - width)  # blanks say nothing of an end of the line
                 if off > (delimiter != " ") or self._is_talk(cells, lines[begin]):
                     continue
-                if units_of(cells, width) is None:
+                if _units_of(cells, width) is None:
                     return self._scope(lines, before, width, i), begin
                 units = i
             return units, begin  # names that look like units are names where nothing else is
@@ -198,7 +209,7 @@ class Header:
         rows = {j: self._cells(lines[j].text) for j in before}
         if not any(cells[0] == "Data-Type" for cells in rows.values()):
             return last
-        names = [j for j, cells in rows.items() if cells[0] == SCOPE and len(cells) == width]
+        names = [j for j, cells in rows.items() if cells[0] == _SCOPE and len(cells) == width]
         return names[-1] if names else last
 
     def _after_units(self, lines: list[TextLine], first: int) -> int:
@@ -206,7 +217,7 @@ class Header:
         for i in range(first + 1, len(lines)):
             text = lines[i].text
             if text.strip() and not is_comment(text):
-                return i + 1 if units_of(self._cells(text), width) is not None else first + 1
+                return i + 1 if _units_of(self._cells(text), width) is not None else first + 1
         return first + 1
 
     def _first_reading(self, lines: list[TextLine], plain: list[int], delimiter: str) -> int | None:
@@ -262,3 +273,42 @@ class Header:
 
 #: Names that this package gives its columns: a line with one is the line of names.
 _STANDARD = re.compile(r"(reference|indicated|corrected)_(deg|rad|turn|count)\b|\btime_s\b")
+
+
+def _units_of(cells: Sequence[str], width: int) -> list[str] | None:
+    """Units of a line of units under so many names, or None for another line."""
+    if abs(len(cells) - width) > 1 or not any(
+        re.fullmatch(_KNOWN_UNITS, cell, re.IGNORECASE) for cell in cells
+    ):
+        return None
+    if not all(re.fullmatch(_UNIT, cell) for cell in cells):
+        return None
+    return [cell.strip("[]() ") for cell in cells]
+
+
+def _names_with_units(names: list[str], between: Sequence[Sequence[str]]) -> list[str]:
+    """Names with the units in brackets that lines between them and the readings state."""
+    if names[0] == _SCOPE and len(names) > 1:
+        return _scope_names(names, {cells[0]: cells for cells in between}.get("Unit", ()))
+    for cells in between:
+        units = _units_of(cells, len(names))
+        if units is not None:
+            names = [
+                f"{name} [{unit}]" if unit and not re.search(_BRACKETED, name) else name
+                for name, unit in zip(names, units, strict=False)
+            ] + names[len(units) :]
+    return names
+
+
+def _scope_names(cells: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Names of TwinCAT's exports: a time column before each group of channels."""
+    names, times = [], 0
+    for i, cell in enumerate(cells):
+        if cell == _SCOPE:
+            times += 1
+            names.append("time [ms]" if times == 1 else f"time {times} [ms]")
+        else:
+            unit = units[i].partition(" ")[0] if i < len(units) else ""
+            known = unit if unit not in ("", "(None)") else ""
+            names.append(f"{cell} [{known}]" if known else cell)
+    return names

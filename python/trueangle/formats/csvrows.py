@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .csvcells import cell_number, cut_rows, is_comment, not_cut
+from .csvcells import LONGEST_LINE, cell_number, cut_rows, is_comment, not_cut, western_text
 from .csvheader import Header
-from .csvlines import LONGEST_LINE, western_text
 from .format import Labels, row_labels
 
 #: Numbers in lines, all without an exponent.

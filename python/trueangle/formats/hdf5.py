@@ -17,8 +17,16 @@ from .budget import FileExtent
 from .checksum import Checksum
 from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, note
-from .hdf5places import Hdf5Places
-from .hdf5sets import cached, data_sets, is_elsewhere, is_number, is_number_or_text, part, put
+from .hdf5sets import (
+    Hdf5Places,
+    cached,
+    data_sets,
+    is_elsewhere,
+    is_number,
+    is_number_or_text,
+    part,
+    put,
+)
 from .stored import ROWS
 
 #: Readings taken together: what is read of them stays in the cache of the processor.

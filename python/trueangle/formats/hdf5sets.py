@@ -1,11 +1,12 @@
-"""Data sets of an HDF5 file: whether their values may be read, and stretches of them."""
+"""Data sets of an HDF5 file: whether and where their values may be read, and stretches of them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from io import FileIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import h5py
 import numpy as np
@@ -14,12 +15,24 @@ from numpy.typing import NDArray
 from ..errors import FileError
 from . import budget
 from .format import check_lengths, row_labels
-from .hdf5filters import check_filters
+from .stored import stored_values
 
 #: Places of HDF5's table of chunks in memory; a prime.
 _SLOTS = 521
 #: Share of a data set beyond the budget that must be stored.
 _LEAST_STORED = 0.5
+
+_NBIT: Final = 5
+_SCALE_OFFSET: Final = 6
+#: Parameters of a plain number: their count, whether nothing is packed, values in a chunk, its
+#: class, bytes, order, bits and the first of them.
+_PLAIN: Final = 8
+_NUMBER: Final = 1
+#: Parameters of scale and offset: the third is the values in a chunk, the fifth their bytes.
+_SCALED: Final = 20
+
+#: Rows of a chunk from which it is worth while to ask where it lies.
+_LEAST_CHUNK = 1 << 13
 
 
 def data_sets(path: Path, file: h5py.File, names: Sequence[str]) -> dict[str, h5py.Dataset]:
@@ -69,7 +82,7 @@ def _check_stored(path: Path, data: h5py.Dataset, name: str) -> None:
         share = 1.0 if data.id.get_storage_size() else 0.0
     else:
         budget.check_part(path, math.prod(data.chunks) * data.dtype.itemsize, "chunk", name)
-        check_filters(path, data, name)
+        _check_filters(path, data, name)
         most = math.prod(-(-n // c) for n, c in zip(data.shape, data.chunks, strict=True))
         share = data.id.get_num_chunks() / most if size > budget.DECODED_BYTES else 1.0
     if size > budget.DECODED_BYTES and share < _LEAST_STORED:
@@ -92,7 +105,7 @@ def cached(file: h5py.File, name: str) -> h5py.Dataset:
         raise _elsewhere(Path(file.filename), name)
     if data.chunks is None:
         return data
-    check_filters(Path(file.filename), data, name)
+    _check_filters(Path(file.filename), data, name)
     chunk = math.prod(data.chunks) * data.dtype.itemsize
     packed = data.id.get_create_plist().get_nfilters() > 0
     access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
@@ -132,3 +145,85 @@ def put(data: h5py.Dataset, start: int, stop: int, values: NDArray[Any]) -> None
         stop - start if s.start is not None else n for s, n in zip(place, data.shape, strict=True)
     )
     data[place] = values.reshape(shape)
+
+
+def _check_filters(path: Path, data: Any, name: str) -> None:
+    """Refuse a data set whose filters do not fit it.
+
+    Raises
+    ------
+    FileError
+        Names the data set and the filter.
+    """
+    properties = data.id.get_create_plist()
+    size = data.dtype.itemsize
+    count = math.prod(data.chunks)
+    for i in range(properties.get_nfilters()):
+        number, _flags, given, _name = properties.get_filter(i)
+        fits = True
+        if number == _NBIT:
+            fits = len(given) == _PLAIN and given[0] == _PLAIN and given[2] == count
+            fits = fits and given[3] == _NUMBER and given[4] == size
+            fits = fits and given[6] > 0 and given[6] + given[7] <= 8 * size
+        elif number == _SCALE_OFFSET:
+            fits = len(given) == _SCALED and given[2] == count and given[4] == size
+        if not fits:
+            kind = "n-bit" if number == _NBIT else "scale-offset"
+            raise FileError(
+                path,
+                f"is damaged: parameters of its {kind} filter do not fit its {count} values of "
+                f"{size} bytes to a chunk; write it without that filter (h5repack -f NONE)",
+                column=name,
+            )
+
+
+class Hdf5Places(NamedTuple):
+    """Where the values of a data set lie in the file, which stores them as they are."""
+
+    dtype: np.dtype[Any]
+    chunk: int
+    #: Of every chunk from the one that holds row ``first``.
+    bytes: Sequence[int]
+    first: int
+
+    @classmethod
+    def of(cls, data: h5py.Dataset, rows: range) -> Hdf5Places | None:
+        """Those of some rows; None where HDF5 has to look at them.
+
+        It has where they are packed, converted, filled in, in other files, in small chunks or
+        behind a user block, from which some versions count and others do not.
+        """
+        properties = data.id.get_create_plist()
+        if (
+            data.ndim != 1
+            or data.dtype.kind not in "fiu"
+            or data.file.userblock_size
+            or data.is_virtual
+            or data.external
+            or properties.get_nfilters()
+            or not data.id.get_type().equal(h5py.h5t.py_create(data.dtype))
+        ):
+            return None
+        if properties.get_layout() == h5py.h5d.CONTIGUOUS:
+            place = data.id.get_offset()
+            return None if place is None else cls(data.dtype, data.size, [place], 0)
+        if properties.get_layout() != h5py.h5d.CHUNKED or data.chunks[0] < _LEAST_CHUNK:
+            return None
+        chunk = data.chunks[0]
+        first = rows.start - rows.start % chunk
+        places = [
+            data.id.get_chunk_info_by_coord((row,)).byte_offset
+            for row in range(first, rows.stop, chunk)
+        ]
+        return None if None in places else cls(data.dtype, chunk, places, first)
+
+    def read(self, file: FileIO, start: int, stop: int) -> NDArray[Any]:
+        """The rows from ``start`` to ``stop``."""
+        parts = []
+        while start < stop:
+            number, within = divmod(start - self.first, self.chunk)
+            count = min(self.chunk - within, stop - start)
+            place = self.bytes[number] + within * self.dtype.itemsize
+            parts.append(stored_values(file, place, self.dtype, count))
+            start += count
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)

@@ -16,8 +16,7 @@ import numpy as np
 
 from ..errors import FileError
 from .format import Batch, Contents, CopyTask, Selection
-from .messages import warn_of_messages
-from .textfile import TextFile, create_text, open_text
+from .textfile import TextFile, create_text, open_text, warn_of_messages
 
 # Each has one way to match, and a name begins where a word does: a long line of rubbish costs its
 # length, not the square of it.

@@ -6,11 +6,17 @@ import io
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, Any
 
-from ..errors import FileError, MissingExtraError, OtherSheetsWarning, level_of_caller
+from ..errors import (
+    FileError,
+    MessageLinesWarning,
+    MissingExtraError,
+    OtherSheetsWarning,
+    level_of_caller,
+)
 from .budget import FileExtent
 from .damage import damage_told
 
@@ -25,6 +31,9 @@ _NAME = 30
 _BUFFER = 1 << 16
 #: Bytes of a text that tell how long its lines are; of a packed one more, for it is read in parts.
 _HEAD, _HEAD_PACKED = 1 << 16, 1 << 22
+
+#: Characters of a message that are shown.
+_SHOWN = 60
 
 
 class TextFile(io.BufferedReader):
@@ -188,3 +197,17 @@ def _opener(kind: str) -> Callable[..., Any]:
             f"zstd files need {cause.name}: pip install 'trueangle[zstd]'"
         ) from None
     return zstd.open
+
+
+def warn_of_messages(path: Path, messages: Sequence[tuple[int, str]]) -> None:
+    """Say how many lines hold no readings, and the first of them, by its number and words."""
+    if messages:
+        line, text = min(messages)
+        one = len(messages) == 1
+        warnings.warn(
+            f"{path}: {len(messages)} line{'' if one else 's'} of words "
+            f"{'is' if one else 'are'} no reading{'' if one else 's'} and left out, the first at "
+            f"line {line}: {text[:_SHOWN]!r}",
+            MessageLinesWarning,
+            stacklevel=9,
+        )

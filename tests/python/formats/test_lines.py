@@ -6,7 +6,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import EmptyCellsWarning, FileError
-from trueangle.formats import camonitor, csvfile, csvlines, csvrows, seriallog
+from trueangle.formats import camonitor, csvcells, csvfile, csvrows, seriallog
 from trueangle.formats.format import Selection
 
 ROWS = 60
@@ -58,7 +58,7 @@ def test_of_a_table(which, talk, quoted, cut, tmp_path):
 )
 def test_of_a_name_that_is_no_text(which, column, cut, monkeypatch, tmp_path):
     """Among the lines that the header is looked for in, and behind them."""
-    monkeypatch.setattr(csvlines, "_LINES", 20)
+    monkeypatch.setattr(csvcells, "_LINES", 20)
     lines = [line.encode() for line in rows(False, False)]
     lines[1 + which] = lines[1 + which].replace(b"a,", b"\xff\xfe,")
     path = tmp_path / "runs.csv"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from trueangle.errors import FileError
-from trueangle.formats.mdfblocks import check_chains
+from trueangle.formats.openmdf import check_chains
 
 #: Where the second block stands: behind the header block with its links.
 SECOND = 0x40 + 24 + 8 * 6

@@ -12,9 +12,9 @@ from trueangle.formats.format import Selection
 h5py = pytest.importorskip("h5py")
 pa = pytest.importorskip("pyarrow")
 from trueangle.formats import arrow, hdf5  # noqa: E402
-from trueangle.formats.arrowplaces import placed_batch  # noqa: E402
+from trueangle.formats.arrow import placed_batch  # noqa: E402
 from trueangle.formats.arrowvalues import arrow_numbers  # noqa: E402
-from trueangle.formats.hdf5places import Hdf5Places  # noqa: E402
+from trueangle.formats.hdf5sets import Hdf5Places  # noqa: E402
 
 ROWS = 30_001
 PARTS = 3
@@ -134,7 +134,7 @@ def arrow_read(path: Path, names: list[str], parts: int) -> dict[str, np.ndarray
 def test_columns_are_those_of_pyarrow(
     compression: str | None, nulls: bool, parts: int, tmp_path: Path, monkeypatch
 ):
-    monkeypatch.setattr("trueangle.formats.arrowplaces.ROWS", 997)
+    monkeypatch.setattr("trueangle.formats.arrow.ROWS", 997)
     path = tmp_path / "log.arrow"
     table = made_arrow(path, nulls=nulls, options=pa.ipc.IpcWriteOptions(compression=compression))
     names = ["short", "a", "count"]
@@ -173,7 +173,7 @@ def test_a_column_that_is_there_twice_is_left_to_pyarrow(tmp_path: Path):
 
 
 def test_an_arrow_file_that_is_cut_short_while_it_is_read_is_told(tmp_path: Path, monkeypatch):
-    monkeypatch.setattr("trueangle.formats.arrowplaces.ROWS", 997)
+    monkeypatch.setattr("trueangle.formats.arrow.ROWS", 997)
     path = tmp_path / "log.arrow"
     made_arrow(path)
     batches = arrow.read(path, Selection(["a"], stretch=arrow.BatchRange(range(3))))

@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import FileError, MissingExtraError
-from trueangle.formats import csvfile, csvlines, csvrows
+from trueangle.formats import csvcells, csvfile, csvrows
 from trueangle.formats.format import Format, Selection
 from trueangle.formats.formats import find_format
 
@@ -126,7 +126,7 @@ def test_the_file_the_place_and_what_to_do(case, tmp_path):
 
 
 def test_a_line_that_is_too_long(monkeypatch, tmp_path):
-    for module in (csvlines, csvfile, csvrows):
+    for module in (csvcells, csvfile, csvrows):
         monkeypatch.setattr(module, "LONGEST_LINE", 2 << 20, raising=False)
     path = tmp_path / "a.csv"
     path.write_text("reference_deg,indicated_deg\n0,0\n1," + "1" * (5 << 20))
