@@ -1,4 +1,4 @@
-"""ROS 1 and ROS 2 bags: joint states corrected on a topic of their own, all else copied as it was."""
+"""ROS 1 and ROS 2 bags: joint states corrected on a topic of their own, all else copied."""
 
 from __future__ import annotations
 

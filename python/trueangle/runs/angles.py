@@ -1,9 +1,11 @@
-"""What the two angles of a run are made of: columns, their units, and what is added to them."""
+"""The two angles of a run: their columns and units, what is added to them, and where they lie apart."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from ..errors import FileError
 from ..formats.columns import listed_columns
@@ -12,6 +14,9 @@ from ..support.arrays import Array
 from ..support.roles import RoleColumn, offsets_of, role_code
 from ..support.suggestions import did_you_mean
 from .facets import Facets
+
+if TYPE_CHECKING:
+    from .readings import FileReadings
 
 #: Unit of the run's angles where the reference has none that a run may be in.
 _PERIOD = 360.0
@@ -199,3 +204,32 @@ def _refuse_missing(path: object, header: Sequence[str], role: str) -> None:
         f"{role_code(role)}){guess}; {listed_columns(header)}",
         line=1,
     )
+
+
+def two_channels(
+    table: FileReadings, counts: Mapping[str, float | None], reference: Array, indicated: Array
+) -> str:
+    """The command that joins two angles with rows of their own; empty for others.
+
+    ``counts`` are those of a turn, by the option that states them.
+    """
+    both = np.isfinite(reference) & np.isfinite(indicated)
+    roles = table.roles
+    if both.any() or not {"reference", "indicated", "time"} <= roles.keys():
+        return ""
+    import shlex
+
+    words = ["trueangle", "join", str(table.path), str(table.path), "-o", "joined.csv"]
+    for role, log in (("indicated", "a."), ("reference", "b."), ("time", "")):
+        if log or roles[role].is_asked:
+            words += ["--signal", f"{log}{role}={_typed(roles[role])}"]
+    for option, count in counts.items():
+        if count is not None:
+            words += [option, f"{count:.17g}"]
+    return f": the two angles have rows of their own; run: {shlex.join(words)}"
+
+
+def _typed(column: RoleColumn) -> str:
+    """A column as the option --signal has it."""
+    unit = f":{column.unit}" if column.unit else ""
+    return f"{'-' if column.is_reversed else ''}{column.name}{unit}"

@@ -255,7 +255,7 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
                 "--counts-per-turn": given.counts,
                 "--counts-per-turn-reference": given.reference_counts,
             }
-            from .channels import two_channels
+            from .angles import two_channels
 
             raise FileError(path, problem + two_channels(table, counts, reference, indicated))
         groups.append((found, present))

@@ -18,7 +18,7 @@ PACKAGE = Path(trueangle.__file__).parent
 #: and the fault of data whose columns are at another ratio.
 WORDS = {
     ("outliers", "certificate/document.py"),
-    ("outliers", "runs/checks/outliers.py"),
+    ("outliers", "runs/checks/jumps.py"),
     ("missed_counts", "runs/checks/jumps.py"),
     ("wrong_gear_ratio", "runs/checks/angles.py"),
     ("wrong_gear_ratio", "runs/checks/fault.py"),

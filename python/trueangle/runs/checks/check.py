@@ -19,8 +19,7 @@ from .angles import (
 )
 from .copies import duplicate_rows, duplicate_runs
 from .fault import DataFault
-from .jumps import missed_counts
-from .outliers import outliers
+from .jumps import missed_counts, outliers
 from .record import Record, read_records, records_of
 from .still import stuck_readings
 
@@ -63,8 +62,7 @@ def check(data: Any, **reading: Unpack[ReadingOptions]) -> Check:
     >>> [fault.fault for fault in check(run).data_faults]
     ['wrong_sign']
     """
-    from .extent import extent_of, extent_verdicts
-    from .result import Check
+    from .result import Check, extent_of, extent_verdicts
 
     records = _records(data, reading)
     if not records:

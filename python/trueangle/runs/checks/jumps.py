@@ -1,4 +1,4 @@
-"""Steps of the error that stay to the end of a run: counts or motor steps that were lost."""
+"""Readings off the rest: isolated outliers, and steps that stay to the end of a run."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...support.angles import wrap
 from ...support.arrays import Array
 from ...support.display_units import brief_number
 from ...support.quantiles import median, quantile
-from ..outliers import WILD, robust_scale
-from .fault import DataFault
+from ..outliers import WILD, robust_scale, spikes
+from .fault import REPEATS, DataFault
 from .record import Record
 
 #: Readings on either side of a step that show whether it stays.
@@ -140,3 +141,36 @@ def _lost(
         return size
     apart = wrap((error[new] - error[then] - gone)[again], 360.0)
     return size + float(median(apart)) if median(np.abs(apart)) <= 0.5 * abs(size) else None
+
+
+def outliers(records: Iterable[Record], faults: Iterable[DataFault]) -> Iterator[DataFault]:
+    """Rows that are isolated outliers, of runs in which no other fault explains them."""
+    unsure = {label for fault in faults if fault.fault not in REPEATS for label in fault.runs}
+    for record in records:
+        if record.label in unsure or len(record) < 2:
+            continue
+        far, distance = _isolated(record)
+        rows = record.rows[far]
+        if rows.size:
+            most = int(np.argmax(np.where(far, distance, 0.0)))
+            yield DataFault.of(
+                "outliers",
+                [record.label],
+                rows.tolist(),
+                f"{rows.size} reading{'s' * (rows.size > 1)} of run {record.label} "
+                f"{'are' if rows.size > 1 else 'is'} far off the neighbours in angle: row "
+                f"{record.rows[most]} by {brief_number(float(distance[most]))} deg",
+                "check the rows; `fit` and `diagnose` reject them",
+            )
+
+
+def _isolated(record: Record) -> tuple[NDArray[np.bool_], Array]:
+    """Which readings are isolated outliers, and how far each is off its neighbours, deg."""
+    far, distance = spikes(record.run.centred_error, record.reference, 360.0)
+    if far.any():
+        # A sensor that rounds differs from its neighbours by its counts.
+        steps = np.diff(np.unique(record.indicated[~far]))
+        far &= distance > 2.0 * steps.min(initial=360.0, where=steps > 0.0)
+        # What several readings in a row show is an effect, not an outlier.
+        far &= np.convolve(far, np.ones(7), "same") < 1.5
+    return far, distance

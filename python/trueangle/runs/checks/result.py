@@ -1,4 +1,4 @@
-"""What a check of data found."""
+"""What a check of data found: faults, what was moved and measured, what such data can show."""
 
 from __future__ import annotations
 
@@ -6,10 +6,183 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from ...support.arrays import Array
 from ...support.layout import counted, laid_out, wrapped_lines
 from ...support.plainresult import PlainResult
-from .extent import Extent
+from ...support.quantiles import median, quantile
 from .fault import DataFault
+from .record import LEAST_READINGS, Record
+
+#: Levels are apart by this share of their range, and by so much at least.
+_GAP = 0.1
+_LEAST_GAP = {"speed": 0.5, "load": 0.05, "temperature": 1.0, "mount": 0.5}
+
+#: Share of the widest gap within which readings are of one place, and of a turn that all such
+#: gaps together may have.
+_WITHIN_PLACE = 0.01
+#: Degrees of step beyond which an angle is not followed from reading to reading.
+_FOLLOWED = 90.0
+
+
+@dataclass(frozen=True)
+class Extent:
+    """The design of the runs as the readings show it.
+
+    Attributes
+    ----------
+    readings, runs : int
+    span_deg : float
+        Width of the places visited, at most 360.
+    turns : float
+        Largest travel of a run between its ends.
+    directions : tuple of int
+        Of -1 and +1 those that were travelled.
+    speeds, loads, temperatures, mounts : tuple of float
+        Levels, also within a run: deg/s, Nm, Celsius, degrees; empty where not recorded.
+    timed : bool
+    """
+
+    readings: int
+    runs: int
+    span_deg: float
+    turns: float
+    directions: tuple[int, ...]
+    speeds: tuple[float, ...]
+    loads: tuple[float, ...]
+    temperatures: tuple[float, ...]
+    mounts: tuple[float, ...]
+    timed: bool
+
+
+def extent_of(records: list[Record]) -> Extent:
+    """Extent of some records."""
+    places = np.concatenate([np.mod(record.reference, 360.0) for record in records])
+    travels, directions, speeds = [], set(), []
+    for record in records:
+        reference, _ = record.unwrapped
+        travels.append(float(np.ptp(reference)) / 360.0)
+        steps = np.diff(reference)
+        moving = (
+            steps[np.abs(steps) > 0.25 * float(quantile(np.abs(steps), 0.9, axis=0))]
+            if (steps.size)
+            else steps
+        )
+        for sign in (-1, 1):
+            if np.mean(np.sign(moving) == sign) > 0.05 if moving.size else False:
+                directions.add(sign)
+        if record.velocity is not None:
+            speeds.append(float(median(np.abs(record.velocity))))
+        elif record.time is not None and np.ptp(record.time) > 0.0:
+            speeds.append(float(np.abs(steps).sum() / np.ptp(record.time)))
+    return Extent(
+        sum(len(record) for record in records),
+        len(records),
+        _span(places),
+        max(travels, default=0.0),
+        tuple(sorted(directions)),
+        _levels_of(speeds, "speed"),
+        _signal_levels([record.torque for record in records], "load"),
+        _signal_levels([record.temperature for record in records], "temperature"),
+        _signal_levels([record.mount for record in records], "mount"),
+        all(record.time is not None for record in records),
+    )
+
+
+def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
+    """What can be known from such data; what cannot, why, and which measurement tells it."""
+    can = ["the periodic error at the places visited"]
+    cannot: list[dict[str, str]] = []
+
+    def no(what: str, because: str, measure: str) -> None:
+        cannot.append({"what": what, "because": because, "measure": measure})
+
+    if extent.span_deg >= 350.0:
+        can.append("integer orders of a whole turn")
+    else:
+        no(
+            "orders apart from each other over a whole turn",
+            f"{extent.span_deg:.0f} deg of travel",
+            "a whole turn, or a correction for this travel alone",
+        )
+    if len(extent.directions) == 2:
+        can.append("reversal error")
+    else:
+        no("reversal error", "one direction of travel", "runs in both directions")
+    if not extent.timed:
+        no("delay, drift and lines in time", "no time stamps", "log time_s")
+    elif len(extent.speeds) > 1:
+        can.append("delay and filters (several speeds)")
+    else:
+        no("delay apart from reversal error or zero", "one speed", "runs at another speed")
+    for name, what, levels, measure in (
+        ("torque", "compliance", extent.loads, "runs at several loads, torque_Nm logged"),
+        (
+            "temperature",
+            "thermal drift",
+            extent.temperatures,
+            "runs at several temperatures, temperature_C logged",
+        ),
+        (
+            "mount of the reference",
+            "the reference's own error apart from the joint's",
+            extent.mounts,
+            "runs with the reference turned on its mount, mount_deg logged",
+        ),
+    ):
+        if len(levels) > 1:
+            can.append(what)
+        else:
+            no(what, f"{'one' if levels else 'no'} {name}", measure)
+    if extent.runs > 2:
+        can.append("how far the zero and the pattern repeat from run to run")
+    else:
+        no("what changes from run to run", counted(extent.runs, "run"), "more runs")
+    return can, cannot
+
+
+def _signal_levels(signals: list[Array | None], kind: str) -> tuple[float, ...]:
+    """Levels of a signal over all runs, of which one run may hold several."""
+    found: list[float] = []
+    for values in signals:
+        if values is not None:
+            groups = _groups(values, kind)
+            # Single readings apart from the others are noise, not a level.
+            held = [group for group in groups if group.size >= LEAST_READINGS]
+            found += [float(np.mean(group)) for group in held or [values]]
+    return _levels_of(found, kind)
+
+
+def _levels_of(values: list[float], kind: str) -> tuple[float, ...]:
+    """Means of groups of values."""
+    return tuple(float(f"{np.mean(group):.4g}") for group in _groups(np.array(values), kind))
+
+
+def _groups(values: Array, kind: str) -> list[Array]:
+    """Values that are closer together than the gaps between groups."""
+    if not values.size:
+        return []
+    ordered = np.sort(values)
+    gap = max(_GAP * float(np.ptp(ordered)), _LEAST_GAP[kind])
+    return np.split(ordered, np.flatnonzero(np.diff(ordered) > gap) + 1)
+
+
+def _span(places: Array) -> float:
+    """360 less the widest gap between places."""
+    ordered = np.sort(places)
+    if ordered.size < 2:
+        return 0.0
+    gaps = np.diff(np.append(ordered, ordered[0] + 360.0))
+    widest = float(gaps.max())
+    # A place is left by a little from one reading to the next: that is no step.
+    within = gaps < _WITHIN_PLACE * widest
+    if gaps[within].sum() < _WITHIN_PLACE * 360.0:
+        gaps = gaps[~within]
+    if gaps.size < 2:  # all readings are of one place
+        return 360.0 - widest
+    # Evenly spaced places leave no gap but their step.
+    return 360.0 if widest < 3.0 * float(median(gaps[gaps > 0.0])) else 360.0 - widest
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from trueangle.runs.checks.angles import (
     wrong_ratio,
 )
 from trueangle.runs.checks.check import duplicate_rows, duplicate_runs, unsorted_time
-from trueangle.runs.checks.extent import Extent, extent_of, extent_verdicts
 from trueangle.runs.checks.fault import DataFault
 from trueangle.runs.checks.record import Record
+from trueangle.runs.checks.result import Extent, extent_of, extent_verdicts
 
 SWEEP = np.linspace(3.0, 303.0, 160)
 
