@@ -1,4 +1,4 @@
-"""The two angles of a run: their columns and units, what is added to them, and where they lie apart."""
+"""The two angles of a run: their columns and units, what is added to them, rows of their own."""
 
 from __future__ import annotations
 
