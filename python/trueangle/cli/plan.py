@@ -230,7 +230,7 @@ def _of_self(args: argparse.Namespace, orders: tuple[float, ...] | None) -> Self
     }
     given = {name: value for name, value in told.items() if value is not None}
     if args.simulation is not None:
-        from ..planning.selfdesigns import designed_selfplan
+        from ..planning.selfplan import designed_selfplan
         from ..simulation import load_simulation
 
         given = designed_selfplan(load_simulation(args.simulation), args.self_method) | given

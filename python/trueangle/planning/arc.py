@@ -13,8 +13,7 @@ from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.layout import counted
 from .arcplan import ArcPlan
-from .counts import exchanged, rounded
-from .doptimal import ArcDesign, OrthonormalColumns, d_optimal
+from .doptimal import ArcDesign, OrthonormalColumns, d_optimal, exchanged, rounded
 from .noisefactors import noise_factors
 from .plan import check_readings, check_sizes, readings_needed
 

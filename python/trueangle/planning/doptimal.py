@@ -1,4 +1,4 @@
-"""D-optimal designs of Fourier series over an arc: where readings tell all coefficients best."""
+"""D-optimal designs of Fourier series over an arc, and their whole readings."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import ArgumentError
-from ..support.arrays import Array
+from ..support.arrays import Array, first_largest
 
 #: Places of the grid, to a cycle of the highest order and at least.
 _PER_CYCLE = 48
@@ -32,6 +33,12 @@ _ROUNDING = 1e-10
 #: Share of the largest singular value of the columns below which an arc does not tell them: the
 #: variance of what it is lost in grows with the square of its inverse.
 _SINGULAR = 1e-7
+
+#: Passes of exchanges of single readings.
+_PASSES = 20
+
+#: Relative gain of the determinant below which readings are not exchanged.
+_GAIN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -236,3 +243,43 @@ def _excess(columns: OrthonormalColumns, places: Array, weights: Array) -> float
     rows = columns.at(columns.grid)
     variances = np.einsum("ij,ij->i", rows @ np.linalg.inv(information), rows)
     return float(variances.max()) / columns.count - 1.0
+
+
+def exchanged(columns: OrthonormalColumns, places: Array) -> Array:
+    """Places of single readings, each exchanged for a better one of the grid while one is.
+
+    Fedorov's exchange: taking reading i out and x in multiplies the determinant by
+    ``(1 + d_xx)(1 - d_ii) + d_ix²``.
+    """
+    grid = columns.at(columns.grid)
+    places = places.copy()
+    for _ in range(_PASSES):
+        before = columns.log_det(places, np.ones(places.size))
+        for i in range(places.size):
+            rows = columns.at(places)
+            inverse = np.linalg.inv(rows.T @ rows)
+            mixed = grid @ (inverse @ rows[i])
+            own = float(rows[i] @ inverse @ rows[i])
+            gains = (1.0 + np.einsum("ij,ij->i", grid @ inverse, grid)) * (1.0 - own) + mixed**2
+            k = first_largest(gains)
+            if gains[k] > 1.0 + _GAIN:
+                places[i] = columns.grid[k]
+        if columns.log_det(places, np.ones(places.size)) < before + 1e-4:
+            break
+    return np.sort(places)
+
+
+def rounded(weights: Array, readings: int) -> NDArray[np.int64]:
+    """Whole numbers of readings that lose the least (Pukelsheim and Rieder 1992).
+
+    Examples
+    --------
+    >>> rounded(np.array([0.5, 0.3, 0.2]), 7).tolist()
+    [3, 2, 2]
+    """
+    counts = np.ceil((readings - 0.5 * weights.size) * weights).astype(np.int64)
+    while counts.sum() < readings:
+        counts[np.argmin(counts / weights)] += 1
+    while counts.sum() > readings:
+        counts[np.argmax((counts - 1) / weights)] -= 1
+    return np.asarray(counts)

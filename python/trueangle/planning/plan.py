@@ -17,8 +17,13 @@ from ..runs.aliasing import fold
 from ..support.argumentkinds import told_kinds
 from ..support.distributions import random_numbers
 from .mountplan import CalibrationPlan
-from .mountsearch import offset_tolerance, search_offsets, search_shifts
-from .noisefactors import mount_noise_factors, noise_factors
+from .noisefactors import (
+    mount_noise_factors,
+    noise_factors,
+    offset_tolerance,
+    search_offsets,
+    search_shifts,
+)
 
 __all__ = [
     "HIGHEST_LOW_ORDER",

@@ -1,9 +1,11 @@
-"""`next_runs`: those within limits that are expected to tell rival causes apart."""
+"""`next_runs`: the search for runs within limits that are expected to tell rival causes apart."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 from ..effects.ambiguity import Ambiguity
 from ..joint.signals import Signals
@@ -12,14 +14,44 @@ from ..simulation.simulation import Simulation
 from ..support.blas import one_blas_thread
 from ..support.deadline import with_deadline
 from .evidence import ReadingNoise
-from .further import run_seconds
+from .further import (
+    count_of_changes,
+    dialled_number,
+    plainest_run,
+    run_amounts,
+    run_choices,
+    run_seconds,
+)
 from .limits import Limits
 from .nextruns import NextRuns, RivalEvidence
 from .scales import DesignScales
-from .search import RunSearch
+from .worth import NOTHING, Worth, barely
 
 #: Readings whose diagnosis may take as much work by default as a plan may.
 WORK = 20_000
+
+#: Runs in a row that open nothing, after which no further one is tried; by themselves the first
+#: open nothing, whatever they are.
+_IN_VAIN = 3
+
+#: Passes over all choices of a run: the last one rarely changes anything.
+_PASSES = 3
+
+#: Steps of a level (speed, temperature, load ...), as shares of its range.
+_STEPS = (0.25, 0.1)
+
+#: Readings of a run at least: held out, one of 12 tells its zero and lines so coarsely that one
+#: diagnosis in ten does not confirm what it finds.
+LEAST = 18
+
+#: Factor within which the fewest readings are found, and that by which they are lowered before
+#: other runs are tried.
+NEAR, _FEWER = 1.1, 0.5
+
+_Designs: TypeAlias = "list[RunDesign]"
+
+#: What a run may be of one kind, as fields that change.
+_Options: TypeAlias = "list[dict[str, Any]]"
 
 
 def next_runs(
@@ -152,3 +184,182 @@ def _beyond(designs: Sequence[RunDesign], seen: Limits) -> Iterator[str]:
         else:
             outside = sorted(v for v in values if not low <= v <= high)
         yield from (f"{value:g} {unit}" for value in outside)
+
+
+@dataclass(frozen=True)
+class RunSearch:
+    """Runs within limits that tell most, with as few readings as serve.
+
+    Attributes
+    ----------
+    scales : Scales
+    limits : Limits
+    """
+
+    scales: DesignScales
+    limits: Limits
+
+    def best(self, start: Signals | None) -> tuple[_Designs, Worth]:
+        """The best runs beside earlier ones, or by themselves."""
+        self.scales.afresh()
+        designs, worth = self._built(start)
+        designs, worth = self._without_idle(designs, worth, start)
+        if worth.told and self.scales.all_seen:
+            designs, worth = self._lean(designs, worth, start)
+        if worth.told and not self.scales.repeated(designs, start):
+            designs, worth = self._shared_out(designs, worth, start)
+        return designs, worth
+
+    def repeated(self, designs: _Designs, worth: Worth) -> tuple[_Designs, Worth]:
+        """The first run several times: levels that need runs of their own are told so."""
+        for count in range(2, self.limits.runs + 1 if designs else 0):
+            again = [replace(designs[0], label=_label(k)) for k in range(count)]
+            found = self.scales.weighed(again, None)
+            if found.opened:
+                return again, found
+        return designs, worth
+
+    def _built(self, start: Signals | None) -> tuple[_Designs, Worth]:
+        """Run after run, until all is told, nothing is gained, or there are enough."""
+        designs: _Designs = []
+        kept: _Designs = []
+        best = NOTHING
+        while len(designs) < self.limits.runs and not self.scales.over:
+            design = plainest_run(self.limits, _label(len(designs)))
+            if self.scales.needs_current and (start is None or start.current is not None):
+                low, _ = self.limits.current_A
+                design = replace(design, current_A=low)  # told where every run recorded it
+            designs, worth = self._improved([*designs, design], len(designs), start)
+            if worth.gained > best.gained or not kept:
+                best, kept = worth, [*designs]
+            # Zeros of the runs' own are told by several at once: one that opens nothing may help.
+            done = self._tells_all(best) and (best.foretold or start is not None)
+            if done or len(designs) - len(kept) == _IN_VAIN:
+                break
+        return kept, best
+
+    def _tells_all(self, worth: Worth) -> bool:
+        return worth.told == len(self.scales.questions)
+
+    def _improved(self, designs: _Designs, k: int, start: Signals | None) -> tuple[_Designs, Worth]:
+        """Run k changed to the best there is: choices, and levels where these do not tell all."""
+        kinds = [*run_choices(self.limits, self.scales.needs_current, designs[k].samples)]
+        best = self.scales.weighed(designs, start, count_of_changes(designs[k], kinds))
+        for _ in range(_PASSES):
+            before = best
+            for options in kinds:
+                designs, best = self._picked(designs, k, start, best, options, kinds)
+            if best == before:
+                break
+        for step in () if self._tells_all(best) else _STEPS:
+            for name, at in [*run_amounts(designs[k], self.limits)]:
+                options = [{name: at(step)}, {name: at(-step)}]
+                designs, best = self._picked(designs, k, start, best, options, kinds)
+        return designs, best
+
+    def _picked(
+        self,
+        designs: _Designs,
+        k: int,
+        start: Signals | None,
+        best: Worth,
+        options: _Options,
+        kinds: Sequence[_Options],
+    ) -> tuple[_Designs, Worth]:
+        """The best of some changes of run k, and of none."""
+        picked = designs
+        for option in options:
+            design = replace(designs[k], **option)
+            if design == designs[k] or self.scales.over:
+                continue
+            tried = [*designs[:k], design, *designs[k + 1 :]]
+            worth = self.scales.weighed(tried, start, count_of_changes(design, kinds), best)
+            if worth > best:
+                best, picked = worth, tried
+        return picked, best
+
+    def _without_idle(
+        self, designs: _Designs, worth: Worth, start: Signals | None
+    ) -> tuple[_Designs, Worth]:
+        """The runs without those that tell nothing beside the later ones."""
+        for design in designs[:-1]:
+            fewer = [other for other in designs if other is not design]
+            found = self.scales.weighed(fewer, start, 0, barely(worth.reached))
+            if found.reached >= worth.reached and worth.told:
+                designs, worth = fewer, found
+        return [replace(d, label=_label(k)) for k, d in enumerate(designs)], worth
+
+    def _lean(
+        self, designs: _Designs, worth: Worth, start: Signals | None
+    ) -> tuple[_Designs, Worth]:
+        """The runs with the fewest readings that tell as much, and others that need fewer still."""
+        goal = worth.reached
+        designs, worth = self._fewest(designs, worth, goal, start)
+        while not self.scales.over:
+            tried = _with_readings(designs, _FEWER)
+            if tried == designs:
+                break
+            found = NOTHING
+            for k in range(len(tried)):
+                tried, found = self._improved(tried, k, start)
+            if found.reached < goal:
+                break
+            tried, found = self._without_idle(tried, found, start)
+            designs, worth = self._fewest(tried, found, goal, start)
+        return designs, worth
+
+    def _shared_out(
+        self, designs: _Designs, worth: Worth, start: Signals | None
+    ) -> tuple[_Designs, Worth]:
+        """The same readings in runs so many and unlike that held-out ones confirm them."""
+        for times in range(1, self.limits.runs // len(designs) + 1):
+            again = [one for one in _with_readings(designs, 1.0 / times) for _ in range(times)]
+            again = [replace(one, label=_label(k)) for k, one in enumerate(again)]
+            for tried in (again, _at_more_speeds(again)):
+                if not self.scales.repeated(tried, start):
+                    continue
+                found = self.scales.weighed(tried, start, 0, barely(worth.reached))
+                if found.reached >= worth.reached:
+                    return tried, found
+        return designs, worth
+
+    def _fewest(
+        self,
+        designs: _Designs,
+        worth: Worth,
+        goal: tuple[int, int, bool, int],
+        start: Signals | None,
+    ) -> tuple[_Designs, Worth]:
+        """The same runs with the fewest readings that reach the goal."""
+        least, most = LEAST / max(design.samples for design in designs), 1.0
+        share = least
+        while most / least > NEAR and not self.scales.over:
+            fewer = _with_readings(designs, share)
+            found = self.scales.weighed(fewer, start, 0, barely(goal))
+            if found.reached >= goal:
+                best, worth, most = fewer, found, share
+            else:
+                least = share
+            share = math.sqrt(least * most)
+        return (designs if most == 1.0 else best), worth
+
+
+def _with_readings(designs: _Designs, share: float) -> _Designs:
+    """Runs with this share of their readings."""
+    return [
+        replace(d, samples=min(max(round(share * d.samples), LEAST), d.samples)) for d in designs
+    ]
+
+
+def _at_more_speeds(designs: _Designs) -> _Designs:
+    """Every other run between the slowest and the fastest."""
+    speeds = [design.speed_deg_s for design in designs]
+    between = dialled_number(math.sqrt(min(speeds) * max(speeds)))
+    return [
+        replace(design, speed_deg_s=between) if k % 2 and design.speed_end_deg_s is None else design
+        for k, design in enumerate(designs)
+    ]
+
+
+def _label(k: int) -> str:
+    return f"next-{k + 1}"

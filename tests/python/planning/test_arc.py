@@ -10,8 +10,7 @@ import trueangle as ta
 from trueangle.cli import main
 from trueangle.cli.values import angle as typed_angle
 from trueangle.errors import ArgumentError
-from trueangle.planning.counts import rounded
-from trueangle.planning.doptimal import OrthonormalColumns, d_optimal
+from trueangle.planning.doptimal import OrthonormalColumns, d_optimal, rounded
 from trueangle.planning.noisefactors import noise_factors
 
 SEED = 32_700

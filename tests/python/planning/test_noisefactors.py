@@ -11,8 +11,8 @@ import pytest
 from trueangle.planning import plan_arc, plan_encoder, plan_mounts, plan_tilts
 from trueangle.planning.doptimal import OrthonormalColumns
 from trueangle.planning.further import run_seconds, run_steps
-from trueangle.planning.mountsearch import TOLERATED_FACTOR
 from trueangle.planning.noisefactors import (
+    TOLERATED_FACTOR,
     facet_noise_factor,
     mount_noise_factors,
     noise_factors,

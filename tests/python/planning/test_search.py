@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from trueangle.planning.search import LEAST, NEAR, RunSearch
+from trueangle.planning.planner import LEAST, NEAR, RunSearch
 from trueangle.planning.worth import Worth
 from trueangle.simulation import RunDesign
 
