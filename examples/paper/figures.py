@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from trueangle.cli.demo import JOINT_A, POSITIONS, lifted, simulated_groups
-from trueangle.plots.orderaxis import OrderAxis
+from trueangle.plots.amplitudespectrum import OrderAxis
 from trueangle.plots.palette import AFTER, BEFORE, MARKERS, MUTED, run_colour
 
 Array = NDArray[np.float64]

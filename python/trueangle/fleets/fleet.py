@@ -6,17 +6,25 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ..errors import ArgumentError
+from ..fitting.fit import ROUNDING
+from ..fitting.prior import Prior
 from ..joint.joint import Joint
 from ..joint.shafts import resolve_orders
 from ..runs.files import each_runs
-from ..support.angles import ARCSEC_PER_TURN
+from ..support.angles import ARCSEC_PER_TURN, arcsec
 from ..support.argumentkinds import told_kinds
 from ..support.suggestions import check_choice
-from .judgement import judged_fleet
-from .result import Fleet
+from .calibration import Calibration
+from .history import Change, changes_of
+from .outliers import Deviates
+from .result import BetweenOrder, CommonOrder, Fleet
 from .sums import FleetSums
-from .units import Units
+from .tolerance import tolerance_of
+from .unit import VERDICTS, FleetUnit, UnitOrder, Verdict
+from .units import FEWEST, SharedPattern, Units, shared_pattern
 
 
 @told_kinds
@@ -125,9 +133,217 @@ def fleet(
     joint = Joint(gear_ratio or 1.0, fixed_member if gear_ratio else "none")
     turn = found.period / ARCSEC_PER_TURN
     permitted = None if permitted_arcsec is None else permitted_arcsec * turn
-    return judged_fleet(found, joint, share, confidence, permitted, notes)
+    return _judged_fleet(found, joint, share, confidence, permitted, notes)
 
 
 def _listed(names: Sequence[str]) -> str:
     more = f" and {len(names) - 5} more" if len(names) > 5 else ""
     return f"{', '.join(names[:5])}{more}"
+
+
+def _judged_fleet(
+    units: Units,
+    joint: Joint,
+    share: float,
+    confidence: float,
+    permitted: float | None,
+    notes: list[str],
+) -> Fleet:
+    """Verdicts, and what the fleet is like."""
+    n = len(units.last)
+    chosen = shared_pattern(units)
+    if n < FEWEST:
+        those = "One unit does" if n == 1 else f"{n} units do"
+        notes.append(f"{those} not tell which of them is an outlier: {FEWEST} are needed.")
+    again = [dates for dates in units.dated if len(dates) > 1]
+    spread = np.array([one.variance for one in chosen.between])
+    changes = {
+        change.unit: change
+        for change in changes_of(again, units.orders, units.period, spread, permitted)
+    }
+    if again and not changes:
+        notes.append(
+            f"{len(again)} units calibrated again do not tell what an ordinary change is: "
+            "4 are needed."
+        )
+    belong = chosen.belong
+    # Below rounding the logarithms are of nothing.
+    least = ROUNDING * units.period
+    sizes, left = (np.maximum(v[belong], least) for v in (units.peak_to_peak, units.left))
+    bound = tolerance_of(sizes, left, share, confidence)
+    if not belong.all():
+        notes.append(
+            f"Common pattern, spread and tolerance limits are those of the {int(belong.sum())} "
+            "units that are no outliers."
+        )
+    elif chosen.deviates.outlying.any():
+        notes.append(
+            f"{int(chosen.deviates.outlying.sum())} of {n} units are outliers, more than damage "
+            "explains: is the fleet of several designs? They are counted in its spread and limits."
+        )
+    names = [(shaft.name, k) for shaft in units.shafts for k in shaft.orders]
+    repeats = _repeatability(units)
+    rows = zip(units.orders.tolist(), names, chosen.between, strict=True)
+    ranked = sorted(
+        (_unit_row(units, u, chosen.deviates, changes, joint) for u in range(n)),
+        key=lambda unit: (VERDICTS.index(unit.verdict), unit.p),
+    )
+    return Fleet(
+        tuple(ranked),
+        tuple(
+            CommonOrder(
+                order,
+                shaft,
+                float(one.mean[0]),
+                float(one.mean[1]),
+                math.sqrt(float(np.trace(one.covariance)) / 2.0),
+            )
+            for order, (shaft, _), one in rows
+        ),
+        tuple(
+            BetweenOrder(order, math.sqrt(one.variance), again)
+            for order, one, again in zip(
+                units.orders.tolist(), chosen.between, repeats, strict=True
+            )
+        ),
+        bound,
+        tuple(row for dates in again for row in _rows(dates, changes)),
+        chosen.aligned,
+        _prior(units, chosen),
+        tuple(notes),
+    )
+
+
+def _rows(dates: Sequence[tuple[Calibration, float]], changes: Mapping[str, Change]) -> Any:
+    change = changes.get(dates[0][0].unit)
+    return () if change is None else change.rows
+
+
+def _prior(units: Units, chosen: SharedPattern) -> Prior:
+    """The predictive distribution of a further unit."""
+    kept = int(chosen.belong.sum())
+    mean = np.concatenate([one.mean for one in chosen.between])
+    variance = np.concatenate(
+        [np.full(2, one.variance) + np.diag(one.covariance) for one in chosen.between]
+    )
+    return Prior(
+        units.period,
+        tuple(units.shafts),
+        mean,
+        variance,
+        max(2.0 * (kept - float(chosen.aligned)), 1.0),
+        max(units.noise.variance, 1e-30 * units.period**2),
+        units.noise.freedom,
+        kept,
+        units.run_variance,
+    )
+
+
+def _repeatability(units: Units) -> list[float | None]:
+    """Standard deviation of one run's coefficients about its unit's, by order."""
+    freedom = sum(one.repeat_freedom for dates in units.dated for one, _ in dates)
+    if not freedom:
+        return [None] * units.orders.size
+    squares = np.sum([one.repeat_squares for dates in units.dated for one, _ in dates], axis=0)
+    return [math.sqrt(float(square) / freedom) for square in squares]
+
+
+def _unit_row(
+    units: Units, u: int, found: Deviates, changes: Mapping[str, Change], joint: Joint
+) -> FleetUnit:
+    """One unit's row."""
+    calibration, noise = units.last[u]
+    pairs = calibration.coefficients.reshape(-1, 2)
+    stds = np.sqrt(noise * np.einsum("kii->k", calibration.blocks()) / 2.0)
+    change = changes.get(calibration.unit)
+    outlying = bool(found.outlying[u])
+    verdict: Verdict = "fine"
+    p, limit, because = float(found.unit[u]), found.limit, ""
+    if change is not None and (change.moved or change.zero_moved):
+        p, limit = change.chance, change.level
+        verdict, because = _moved(units, u, change, joint)
+    elif outlying:
+        verdict, because = "outlier", _outlying(units, u, found, joint)
+    elif p <= limit:
+        because = _among_tails(len(units.last))
+    return FleetUnit(
+        calibration.unit,
+        verdict,
+        because,
+        tuple(
+            UnitOrder(
+                order,
+                math.hypot(a, b),
+                math.degrees(math.atan2(a, b)) % 360.0,
+                float(std),
+                float(z),
+            )
+            for order, (a, b), std, z in zip(
+                units.orders.tolist(), pairs.tolist(), stds, found.size[u], strict=True
+            )
+        ),
+        float(units.peak_to_peak[u]),
+        float(units.left[u]),
+        p,
+        limit,
+    )
+
+
+def _among_tails(count: int) -> str:
+    """Why a unit that is far from the others is no outlier."""
+    if count < FEWEST:
+        return f"far from the others, which are too few to tell damage by: {FEWEST} are needed"
+    return (
+        "far from the others, as a quarter of the units are before it: a wide design, or several "
+        "designs, and not damage of one"
+    )
+
+
+def _outlying(units: Units, u: int, found: Deviates, joint: Joint) -> str:
+    """Which orders, and what they are likely to be."""
+    places = found.orders(u)
+    told = [
+        f"order {units.orders[k]:g} is {found.size[u, k]:.1f} standard deviations from the others"
+        for k in places[:3]
+    ]
+    cause = joint.explanations(float(units.orders[places[0]]))[0]
+    return f"{', '.join(told)}: {cause}"
+
+
+def _moved(units: Units, u: int, change: Change, joint: Joint) -> tuple[Verdict, str]:
+    """The verdict of a unit that is not what it was."""
+    scale = arcsec(1.0, units.period)
+    first, last = units.dated[u][0][0].when, units.dated[u][-1][0].when
+    since = f"from {first} to {last}"
+    if not change.moved:
+        return "zero_moved", f"the zero moved by {scale * change.zero:.4g} arcsec {since}"
+    twin = _twin(units, u, change)
+    if twin is not None:
+        return "changed", f"its pattern is now that of {twin} before: are the labels exchanged?"
+    pairs = np.hypot(*change.pattern.reshape(-1, 2).T)
+    told = ", ".join(
+        f"order {units.orders[k]:g} by {scale * pairs[k]:.3g} arcsec" for k in change.orders[:3]
+    )
+    told = f"moved {since}: {told}{' and the zero' if change.zero_moved else ''}"
+    cause = joint.explanations(float(units.orders[change.orders[0]]))[0]
+    if change.grows is False:
+        return "changed", f"{told}, in a step: {cause}"
+    if change.grows is None and change.leaps:
+        return "changed", f"{told}, more than units differ by: {cause}"
+    if change.grows is None and 2 * len(change.orders) > max(units.orders.size, 2):
+        return "changed", f"{told}, all together: was a part replaced or turned?"
+    slow = "it grows slowly" if change.grows else "two dates do not tell a drift from a step"
+    return "recalibrate", f"{told}; {slow}"
+
+
+def _twin(units: Units, u: int, change: Change) -> str | None:
+    """Another unit whose first pattern is this one's last, as near as ordinary changes are."""
+    now = units.coefficients[u]
+    limit = np.repeat(np.hypot(*change.pattern.reshape(-1, 2).T), 2)
+    moved = float(limit @ limit) / 2.0
+    best, name = 0.05 * moved, None
+    for v, dates in enumerate(units.dated):
+        apart = dates[0][0].coefficients - now
+        if v != u and float(apart @ apart) < best:
+            best, name = float(apart @ apart), dates[0][0].unit
+    return name

@@ -15,7 +15,6 @@ from ..support.distributions import f_quantile
 from ..support.runlength import chart_limit
 from ..support.times import parsed_time
 from .calibration import Calibration, order_columns
-from .charts import ALLOWANCE, LENGTH, charted
 from .outliers import LEVEL, Deviates, deviates, level_by_order
 
 #: Units with a second date from which their changes tell what an ordinary change is.
@@ -26,6 +25,12 @@ _PLACES: Final = 360
 
 #: Quantile of the normal distribution for a one-sided bound of 95 %.
 _BOUND: Final = 1.6448536269514722
+
+#: Half of the shift that is looked for, in standard deviations of a calibration.
+_ALLOWANCE: Final = 0.5
+
+#: Dates until a unit's charts together alarm where nothing moves, on average (h = 5 for one chart).
+_LENGTH: Final = 465.44
 
 
 class HistoryOrder(NamedTuple):
@@ -129,7 +134,7 @@ def changes_of(
     zero = deviates([zeros], [zero_own], aligned=True, level=0.5 * LEVEL)
     limit = f_quantile(1.0 - 0.5 * LEVEL / pattern.chance.size, 2.0, 2.0 * (len(dated) - 1.0)) * 2.0
     zero_limit = f_quantile(1.0 - 0.5 * LEVEL / len(dated), 1.0, len(dated) - 2.0)
-    sum_limit = chart_limit(ALLOWANCE, LENGTH * 2 * orders.size)
+    sum_limit = chart_limit(_ALLOWANCE, _LENGTH * 2 * orders.size)
     found = []
     for u, calibrations in enumerate(dated):
         moved, zero_moved = bool(pattern.outlying[u]), bool(zero.outlying[u])
@@ -275,3 +280,36 @@ def next_calibration(
     until = permitted / bound * days
     due: datetime = end if until <= days else start + timedelta(days=min(until, 36500.0))
     return due.date().isoformat(), until > 2.0 * days
+
+
+def charted(calibrations: Sequence[tuple[Calibration, float]], changes: Array) -> Array:
+    """The larger sum of every order on every further date, shape (dates - 1, K).
+
+    ::
+
+        z_t = (b_t - b̄_{t-1}) / √(V_t + V̄_{t-1} / t),
+        C±_t = max(0, C±_{t-1} ± z_t - 1/2)
+
+    against the mean of the t dates before, so that the z are independent where nothing moves;
+    V is the noise of a date and half of the variance of an ordinary change between two.
+
+    Parameters
+    ----------
+    calibrations : sequence of (Calibration, float)
+        In the order of their dates, with the variance of a reading.
+    changes : ndarray, shape (K,)
+        Variance of an ordinary change of each order's cosine and sine.
+    """
+    values = np.array([one.coefficients for one, _ in calibrations])
+    own = np.array(
+        [noise * np.diagonal(one.blocks(), axis1=1, axis2=2).ravel() for one, noise in calibrations]
+    )
+    spread = own + 0.5 * np.repeat(changes, 2) + 1e-300
+    sums = np.zeros((2, values.shape[1]))
+    found = []
+    for t in range(1, len(values)):
+        before = spread[:t].mean(axis=0) / t
+        z = (values[t] - values[:t].mean(axis=0)) / np.sqrt(spread[t] + before)
+        sums = np.maximum(0.0, sums + np.array([z, -z]) - _ALLOWANCE)
+        found.append(sums.max(axis=0).reshape(-1, 2).max(axis=1))
+    return np.array(found)

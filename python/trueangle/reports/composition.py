@@ -21,7 +21,7 @@ from ..support.deadline import current_deadline
 from ..support.display_units import ErrorsIn
 from ..support.files import CERTIFICATE, PDF, REPORT, FileKind, check_output
 from .diagnosed import diagnosis_content
-from .figures import figures_of_diagnosis, figures_of_runs
+from .figures import error_scale, figures_of_diagnosis, figures_of_runs
 from .fitted import (
     extended_correction,
     fit_or_reason,
@@ -34,7 +34,6 @@ from .linenames import line_names
 from .measured import measured_content
 from .modelled import given_model, model_content, order_content
 from .page import Page, print_pdf, rendered_report
-from .scale import error_scale
 from .unknowns import unknown_content
 
 if TYPE_CHECKING:

@@ -1,9 +1,9 @@
-"""Figures of a page: errors, before and after, residuals, phases, and those of a diagnosis."""
+"""Figures of a page and the unit of their errors: before and after, residuals, diagnosis."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
@@ -27,18 +27,17 @@ from ..plots.readingpictures import (
     residual_picture,
 )
 from ..plots.simulatedcurves import error_left_of, simulated_points
+from ..runs.run import CalibrationRun
 from ..support.arrays import Array
-from ..support.display_units import significant_digits
+from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, significant_digits, sine_of_rms
 from ..support.layout import counted
 from .linenames import LineNames
-from .scale import ErrorScale
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
     from ..fitting.heldout import HeldOut
     from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
-    from ..runs.run import CalibrationRun
     from ..simulation import Simulation
 
 #: A figure of the report: its alternative text, its charts, and how these are arranged.
@@ -56,6 +55,59 @@ _MOST_PHASES: Final = 12
 _MOST_FACTORS: Final = 9
 #: Part of the measured error that a simulation must expect to be drawn with it.
 _FLAT: Final = 1e-3
+
+
+@dataclass(frozen=True)
+class ErrorScale:
+    """One unit for every error of a page; results are in arcsec, what is drawn in it.
+
+    Attributes
+    ----------
+    unit : ErrorUnit
+    turn : float or None
+        Counts of a turn where the unit is a count.
+    """
+
+    unit: ErrorUnit
+    turn: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The unit's name."""
+        return self.unit.name
+
+    @property
+    def factor(self) -> float:
+        """How many of the unit one second of arc is."""
+        return self.unit.per_arcsec
+
+    @property
+    def defined(self) -> str:
+        """What the unit is, for those who do not know it."""
+        return {
+            "arcsec": "in seconds of arc (1 arcsec = 1/3600 degree)",
+            "deg": "in degrees",
+            "mrad": "in thousandths of a radian (1 mrad = 0.0573 degree)",
+            "count": f"in counts of {self.turn:g} to a turn" if self.turn else "in counts",
+        }[self.name]
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the content: the unit of the page, beside numbers that stay in arcsec."""
+        return {"unit": self.name, "per_arcsec": self.factor, "defined": self.defined}
+
+
+def error_scale(asked: ErrorsIn, rms: float, runs: Sequence[CalibrationRun]) -> ErrorScale:
+    """The scale asked for; counts are those of the runs where no number says otherwise.
+
+    Raises
+    ------
+    ArgumentError
+        Another word; counts where nothing says how many a turn has.
+    """
+    period = runs[0].period
+    unit = error_unit(asked, sine_of_rms(rms), period)
+    turn = None if unit.name != "count" else period if isinstance(asked, str) else float(asked)
+    return ErrorScale(unit, turn)
 
 
 def figures_of_runs(

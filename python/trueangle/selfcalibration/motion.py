@@ -22,13 +22,13 @@ from .projected import Projected, Unknown
 from .splines import (
     DriftPenalty,
     Knots,
+    MotionSums,
     banded_product,
     coarser_bands,
     coarser_rows,
     finer_coefficients,
     smooth_trends,
 )
-from .sums import MotionSums
 
 #: Stiffness looked at, as a power of ten relative to the readings per knot.
 _STIFFEST, _SOFTEST = 7.0, -5.0

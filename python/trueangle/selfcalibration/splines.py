@@ -1,4 +1,4 @@
-"""Cubic B-splines on uniform knots in time over several segments: drift penalty, coarser grids.
+"""Cubic B-splines on uniform knots in time over several segments, and sums over readings of them.
 
 All stretches share one list of coefficients; a stretch of ``N`` intervals takes ``N + 3``
 of them. A reading touches four neighbours, so everything is banded.
@@ -6,9 +6,11 @@ of them. A reading touches four neighbours, so everything is banded.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +25,9 @@ _MASK = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 8.0
 
 _DIFFERENCE = np.array([-1.0, 3.0, -3.0, 1.0])
 _SECOND = np.array([1.0, -2.0, 1.0])
+
+#: Readings whose columns are made at once: some MB, so that they stay in cache.
+_CHUNK = 4096
 
 
 @dataclass(frozen=True)
@@ -248,3 +253,85 @@ def spline_values(
     for k in range(1, 4):
         total += weights[k] * coefficients[index + k]
     return total
+
+
+class MotionSums(NamedTuple):
+    """Normal equations of splines (banded) and common columns, for one target."""
+
+    knots: Knots
+    bands: Array
+    """``S^T S``, shape (size, 4)."""
+    cross: Array
+    """``S^T X``, shape (size, m)."""
+    spline_right: Array
+    """``S^T e``."""
+    common: Array
+    """``X^T X``."""
+    common_right: Array
+    """``X^T e``."""
+    squares: float
+    """``e^T e``."""
+    weighty: float
+    """Readings of weight."""
+
+    @property
+    def bare(self) -> MotionSums:
+        """The splines alone, as if the patterns were settled."""
+        return self._replace(
+            cross=self.cross[:, :0], common=self.common[:0, :0], common_right=self.common_right[:0]
+        )
+
+
+def ordered_motion_sums(
+    knots: Knots,
+    index: NDArray[np.int64],
+    place: Array,
+    target: Array,
+    weight: Array,
+    columns: Callable[[slice, Array], None],
+    width: int,
+    valid: NDArray[np.bool_] | None = None,
+) -> MotionSums:
+    """Sums over readings in order of time.
+
+    ``index`` and ``place`` are those of `Knots.place`, the index not decreasing; ``target`` is what
+    is left of each reading, ``weight`` the factor of the splines in its row, ``1 + error'``.
+    ``columns`` writes the ``width`` common columns of a slice of readings into an array; only
+    ``valid`` readings count.
+    """
+    size, n = knots.size, target.size
+    bands, cross = np.zeros((size, BAND)), np.zeros((size, width + 1))
+    common = np.zeros((width + 1, width + 1))
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(index)) + 1, [n]])
+    chunk_edges = np.unique(
+        np.concatenate([edges[np.searchsorted(edges, np.arange(0, n, _CHUNK))], [n]])
+    )
+    upper = [(p, q) for p in range(4) for q in range(p, 4)]
+    for a, b in itertools.pairwise(chunk_edges):
+        rows = np.empty((width + 5, b - a))
+        columns(slice(a, b), rows[:width])
+        rows[width] = target[a:b]
+        rows[width + 1 :] = spline_basis(place[a:b]) * weight[a:b]
+        if valid is not None:
+            rows *= valid[a:b]
+        x = rows[: width + 1]
+        common += x @ x.T
+        splines = rows[width + 1 :]
+        inner = edges[np.searchsorted(edges, a) : np.searchsorted(edges, b) + 1] - a
+        for i, j in itertools.pairwise(inner):
+            first = int(index[a + i])
+            block = splines[:, i:j] @ rows[:, i:j].T
+            cross[first : first + 4] += block[:, : width + 1]
+            square = block[:, width + 1 :]
+            for p, q in upper:
+                bands[first + p, q - p] += square[p, q]
+    return MotionSums(
+        knots,
+        bands,
+        cross[:, :width],
+        cross[:, width],
+        common[:width, :width],
+        common[:width, width],
+        float(common[width, width]),
+        float(n if valid is None else valid.sum()),
+    )

@@ -8,8 +8,7 @@ import pytest
 from scipy.stats import t as student
 
 import trueangle as ta
-from trueangle.fleets.charts import charted
-from trueangle.fleets.history import changes_of
+from trueangle.fleets.history import changes_of, charted
 from trueangle.support.runlength import chart_limit
 
 from .made import alone, units

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fleets.orders import candidate_orders, worth_keeping
+from trueangle.fleets.sums import candidate_orders, worth_keeping
 
 SEED = 52_700
 PLACES = np.arange(0.0, 360.0, 3.0)

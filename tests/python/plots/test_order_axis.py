@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from trueangle.plots.orderaxis import OrderAxis
+from trueangle.plots.amplitudespectrum import OrderAxis
 
 #: Share of a group's width left to each side of its orders, least width, and what is between.
 MARGIN, LEAST, GAP = 0.06, 2.5, 1.0

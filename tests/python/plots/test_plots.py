@@ -14,7 +14,7 @@ from trueangle.errors import ArgumentError, MissingExtraError, RankError
 from trueangle.fitting.phases import run_phases
 from trueangle.planning import plan_mounts, plan_tilts
 from trueangle.plots import curves, palette
-from trueangle.plots.orderaxis import OrderAxis
+from trueangle.plots.amplitudespectrum import OrderAxis
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 from trueangle.support.display_units import significant_digits
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.reports.figures import phase_figure
+from trueangle.reports.figures import ErrorScale, phase_figure
 from trueangle.reports.linenames import line_names
-from trueangle.reports.scale import ErrorScale
 from trueangle.support.display_units import error_unit
 
 SEED = 44

@@ -5,9 +5,9 @@ import pytest
 
 import trueangle as ta
 from trueangle.model.alarm import WatchedOrder, WatchedWindow
+from trueangle.reports.figures import error_scale
 from trueangle.reports.numbers import Numbers
 from trueangle.reports.robot import JointRank, ranking_text
-from trueangle.reports.scale import error_scale
 from trueangle.reports.unknowns import unknown_content
 from trueangle.reports.watched import WatchReport
 

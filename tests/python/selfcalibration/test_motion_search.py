@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from trueangle.selfcalibration.motion import MotionFit, MotionSearch
-from trueangle.selfcalibration.splines import Knots
-from trueangle.selfcalibration.sums import ordered_motion_sums
+from trueangle.selfcalibration.splines import Knots, ordered_motion_sums
 
 SEED = 61_310
 INTERVALS, SPACING, PER_KNOT = 512, 0.25, 4

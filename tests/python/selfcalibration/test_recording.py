@@ -10,8 +10,7 @@ import pytest
 
 from trueangle import CalibrationRun
 from trueangle.errors import FileError, NoModelError
-from trueangle.selfcalibration.clampings import clampings_of
-from trueangle.selfcalibration.recording import Recording, as_recordings
+from trueangle.selfcalibration.recording import Recording, as_recordings, clampings_of
 
 TURN = 2.0 * math.pi
 UNITS = {"deg": 360.0, "rad": TURN, "turn": 1.0}

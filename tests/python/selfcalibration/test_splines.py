@@ -12,15 +12,16 @@ from trueangle.selfcalibration.projected import harmonic_unknowns
 from trueangle.selfcalibration.splines import (
     DriftPenalty,
     Knots,
+    MotionSums,
     banded_product,
     coarser_bands,
     coarser_rows,
     finer_coefficients,
+    ordered_motion_sums,
     smooth_trends,
     spline_basis,
     spline_values,
 )
-from trueangle.selfcalibration.sums import MotionSums, ordered_motion_sums
 
 KNOTS = Knots((1.0, 30.0), (16, 8), 0.5)
 

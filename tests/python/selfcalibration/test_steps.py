@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from selfcalibration.test_segments import TURN, segment
-from trueangle.selfcalibration import steps as module
+from trueangle.selfcalibration import steady as module
 from trueangle.selfcalibration.projected import Unknown
 from trueangle.selfcalibration.readings import SegmentReadings
-from trueangle.selfcalibration.steps import GaussNewtonSteps
+from trueangle.selfcalibration.steady import GaussNewtonSteps
 
 SEED = 69_000
 ORDERS, RIPPLE = (1.0, 3.0), (1.0, 2.0)
@@ -33,17 +33,17 @@ def work(sets: int, extra: bool) -> tuple[GaussNewtonSteps, np.ndarray]:
 @pytest.mark.parametrize("sets", [1, 2])
 def test_slopes_are_those_of_the_error_at_the_corrected_angle(sets: int) -> None:
     """Corrected readings lead back: r = theta + e(theta), and dr / dtheta = 1 + slope."""
-    steps, unknowns = work(sets, False)
-    angle, rows = steps.readings.angle, slice(None)
-    theta, slope = steps.true_angle(angle, unknowns, rows)
+    steady, unknowns = work(sets, False)
+    angle, rows = steady.readings.angle, slice(None)
+    theta, slope = steady.true_angle(angle, unknowns, rows)
     error = np.zeros(angle.size)
     for i in range(sets):
-        mask = slice(None) if steps.groups is None else steps.groups == i
+        mask = slice(None) if steady.groups is None else steady.groups == i
         for j, k in enumerate(ORDERS):
             a, b = unknowns[4 * i + 2 * j : 4 * i + 2 * j + 2]
             error[mask] += a * np.cos(k * theta[mask]) + b * np.sin(k * theta[mask])
     np.testing.assert_allclose(theta + error, angle, atol=1e-9)
-    ahead, behind = (steps.true_angle(angle + h, unknowns, rows)[0] for h in (1e-4, -1e-4))
+    ahead, behind = (steady.true_angle(angle + h, unknowns, rows)[0] for h in (1e-4, -1e-4))
     np.testing.assert_allclose(2e-4 / (ahead - behind), 1.0 + slope, rtol=1e-6)
 
 
@@ -53,11 +53,11 @@ def test_columns_are_what_each_unknown_takes_of_what_is_left(
     sets: int, extra: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Left is weight times (true angle less motion): columns are its slopes, negated."""
-    steps, unknowns = work(sets, extra)
+    steady, unknowns = work(sets, extra)
     # Of a ripple that is there the place would move with the pattern, a small product.
     unknowns[4 * sets : 4 * sets + 4] = 0.0
-    knots = steps.readings.knots(40)
-    spline = steps.readings.first_spline(knots)
+    knots = steady.readings.knots(40)
+    spline = steady.readings.first_spline(knots)
 
     class CaughtError(Exception):
         pass
@@ -69,11 +69,11 @@ def test_columns_are_what_each_unknown_takes_of_what_is_left(
 
     monkeypatch.setattr(module, "ordered_motion_sums", caught)
     with pytest.raises(CaughtError) as raised:
-        steps.step(knots, spline, unknowns, np.ones(600, bool), 1)
+        steady.step(knots, spline, unknowns, np.ones(600, bool), 1)
     weight, out = raised.value.args
 
     def away(values: np.ndarray) -> np.ndarray:
-        _, _, _, w, left = steps.state(knots, spline, values, slice(None))
+        _, _, _, w, left = steady.state(knots, spline, values, slice(None))
         return left / w
 
     for k in range(unknowns.size):
@@ -84,22 +84,22 @@ def test_columns_are_what_each_unknown_takes_of_what_is_left(
 
 
 def test_a_step_is_halved_until_no_angle_would_be_read_twice() -> None:
-    steps, _ = work(1, False)
+    steady, _ = work(1, False)
     start, step = np.zeros(8), np.zeros(8)
     step[2] = 1.0  # of order 3: a slope of 3
-    found = steps.damped(start, step)
+    found = steady.damped(start, step)
     assert found[2] == 0.25
-    np.testing.assert_array_equal(steps.damped(start, 0.3 * step), 0.3 * step)
+    np.testing.assert_array_equal(steady.damped(start, 0.3 * step), 0.3 * step)
 
 
 @pytest.mark.parametrize("sets", [1, 2])
 def test_little_is_left_of_a_motion_without_error(sets: int) -> None:
     """The first spline is near to an even deceleration, but where it ends; turns are not."""
-    steps, unknowns = work(sets, False)
-    knots = steps.readings.knots(40)
-    spline = steps.readings.first_spline(knots)
-    left = steps.residuals(knots, spline, np.zeros_like(unknowns))
-    assert left.shape == steps.readings.angle.shape
+    steady, unknowns = work(sets, False)
+    knots = steady.readings.knots(40)
+    spline = steady.readings.first_spline(knots)
+    left = steady.residuals(knots, spline, np.zeros_like(unknowns))
+    assert left.shape == steady.readings.angle.shape
     assert 0.0 < np.abs(left[100:-100]).max() < 0.01
-    moved = steps.residuals(knots, spline, unknowns) - left
+    moved = steady.residuals(knots, spline, unknowns) - left
     assert 1e-3 < np.abs(moved).max() < 0.1
