@@ -15,8 +15,7 @@ from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.files import FileKind
 from .channelform import about_offsets, channels_of, made_of_channels, model_of_channels
-from .knots import rounded_knots
-from .oneturn import one_turn_knots, rounding_floor
+from .knots import one_turn_knots, rounded_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import sampled_model, table_error

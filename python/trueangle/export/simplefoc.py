@@ -18,8 +18,7 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.files import FileKind
 from .channelform import about_offsets, channels_of, made_of_channels, model_of_channels
 from .codetext import longest_array, number_rows
-from .knots import rounded_knots
-from .oneturn import one_turn_knots, rounding_floor, without_mean
+from .knots import one_turn_knots, rounded_knots, rounding_floor, without_mean
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import sampled_model, table_error

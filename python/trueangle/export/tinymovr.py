@@ -12,8 +12,7 @@ from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.files import FileKind
 from .codetext import longest_array, number_rows
-from .knots import rounded_knots
-from .oneturn import one_turn_knots, rounding_floor
+from .knots import one_turn_knots, rounded_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
 from .reading import sampled_model, table_error

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import ArgumentError
 from ..model.model import HarmonicModel
 from ..support.files import FileKind
-from .oneturn import rounding_floor
+from .knots import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
 from .reading import table_error

@@ -7,7 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import ArgumentError
-from trueangle.export.leftout import ranges_of, run_time_bound, term_sizes
+from trueangle.export.exported import ranges_of, run_time_bound, term_sizes
 from trueangle.export.pattern import TurnPattern
 from trueangle.model.records import FitRecord
 

@@ -9,7 +9,7 @@ import pytest
 
 from trueangle.errors import ArgumentError
 from trueangle.export import proof as room
-from trueangle.export.oneturn import rounding_floor
+from trueangle.export.knots import rounding_floor
 from trueangle.export.proof import Proof, enough_bits, lost_orders, prove_export, rounded_up
 from trueangle.export.table import make_table
 
