@@ -19,10 +19,9 @@ from ..support.argumentkinds import told_kinds
 from ..support.decoding import Decoder, Entries, json_value, read_text
 from ..support.files import RUNS_BYTES
 from .history import HistoryOrder, HistoryRow
-from .result import BetweenOrder, CommonOrder, Fleet
+from .result import FORMAT, VERSION, BetweenOrder, CommonOrder, Fleet
 from .tolerance import Tolerance
 from .unit import VERDICTS, FleetUnit, UnitOrder
-from .writing import FORMAT, VERSION
 
 __all__ = ["FORMAT", "load_fleet"]
 

@@ -1,21 +1,21 @@
-"""The result of looking at a fleet: verdicts, the common pattern, and a prior for further units."""
+"""The result of looking at a fleet, and its file: verdicts, common pattern, a prior."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from ..fitting.prior import Prior
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.files import FLEET, written_atomically
 from ..support.layout import counted, laid_out
-from ..support.plainresult import PlainResult, finite_or_none, result_picture
+from ..support.plainresult import PlainResult, finite_or_none, pretty_json, result_picture
 from .history import HistoryRow
 from .tolerance import Tolerance
 from .unit import FleetUnit
-from .writing import save_fleet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +27,9 @@ _TESTED = (
 
 #: Units that are fine of which the sizes are listed.
 _LISTED = 12
+
+FORMAT: Final = "trueangle-fleet"
+VERSION: Final = 1
 
 
 class CommonOrder(NamedTuple):
@@ -170,7 +173,7 @@ class Fleet(PlainResult):
         FileError
             The ending names another format.
         """
-        save_fleet(self.prior, self.to_dict(), path)
+        _save_fleet(self.prior, self.to_dict(), path)
 
     def plot(self, kind: str = "overview", **options: Any) -> Axes:
         """A picture of the fleet (needs matplotlib).
@@ -285,3 +288,26 @@ def _calendar(fleet: Fleet, shown: ErrorUnit, scale: float, width: int) -> list[
             "extrapolated beyond twice the time seen"
         )
     return lines
+
+
+def _save_fleet(prior: Prior, told: dict[str, Any], path: str | PathLike[str]) -> None:
+    """Write a fleet: its prior, and what it tells as plain values; see `Fleet.save`."""
+    runs = prior.run_variance
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "prior": {
+            "period": prior.period,
+            "shafts": [{**s._asdict(), "orders": list(s.orders)} for s in prior.shafts],
+            "mean": prior.mean.tolist(),
+            "variance": prior.variance.tolist(),
+            "freedom": prior.freedom,
+            "noise_variance": prior.noise_variance,
+            "noise_freedom": None if math.isinf(prior.noise_freedom) else prior.noise_freedom,
+            "units": prior.units,
+            **({} if runs is None else {"run_variance": runs.tolist()}),
+        },
+        **told,
+    }
+    with written_atomically(path, kind=FLEET) as file:
+        file.write(pretty_json(content) + "\n")

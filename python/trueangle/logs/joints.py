@@ -32,9 +32,8 @@ from .columns import (
     find_channel_columns,
     find_joint_signal,
 )
-from .statistics import CorrectionStatistics
+from .statistics import CorrectionStatistics, UnitEvidence
 from .turns import TurnCounter, TurnState
-from .unitevidence import UnitEvidence
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 #: Range of a channel, in its largest size, that goes round; and in that, of one that stands still.

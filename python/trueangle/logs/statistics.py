@@ -1,14 +1,27 @@
-"""What was done to the readings of a joint: counts and the size of the correction."""
+"""The readings of a joint in a log: counts, the size of the correction, the unit they are in."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..support.angles import arcsec
+from ..support.angles import UNIT_PERIODS, arcsec, unit_name
+
+#: Readings that fill a turn of another unit, and no more, to this share ...
+_FILLED: Final = 0.9
+#: ... and jump over its border by as much, while a usual step is below a tenth.
+_WRAPPED: Final = 0.8
+_STEP: Final = 0.1
+
+#: Turns from which whole numbers or angles of one turn at most are likelier another unit.
+_MANY: Final = 10.0
+
+#: Readings from which something can be said.
+_FEWEST: Final = 20
 
 
 @dataclass
@@ -75,3 +88,99 @@ def _squares(values: NDArray[np.float64]) -> float:
     """Sum of squares by one thread: that of BLAS wakes threads that fight for the cores."""
     flat = values.ravel()
     return float(np.einsum("i,i->", flat, flat))
+
+
+class UnitEvidence:
+    """Extent of the readings of one column whose unit nobody stated.
+
+    A joint that moves little near zero is no evidence, nor is one that makes many turns.
+
+    ``period`` is one turn in the unit that the readings are taken for.
+
+    Examples
+    --------
+    >>> seen = UnitEvidence(360.0)
+    >>> seen.update(np.linspace(-3.1, 3.1, 500))
+    >>> seen.unit(None)
+    'rad'
+    >>> resting = UnitEvidence(360.0)
+    >>> resting.update(np.full(500, 1.2))
+    >>> resting.unit(None) is None
+    True
+    """
+
+    def __init__(self, period: float) -> None:
+        self.period = period
+        self.readings = 0
+        self.low, self.high = math.inf, -math.inf
+        self._travel = self._jump = 0.0
+        self._whole = True
+        self._last: float | None = None
+
+    def update(self, angle: NDArray[np.generic]) -> None:
+        """Take in the next readings."""
+        known = np.asarray(angle, dtype=np.float64)
+        known = known[np.isfinite(known)]
+        if not known.size:
+            return
+        self.low = min(self.low, float(known.min()))
+        self.high = max(self.high, float(known.max()))
+        first = known[:1] if self._last is None else np.array([self._last])
+        steps = np.abs(np.diff(known, prepend=first))
+        self._travel += float(steps.sum())
+        self._jump = max(self._jump, float(steps.max()))
+        self._whole = self._whole and bool((known == np.floor(known)).all())
+        self._last = float(known[-1])
+        self.readings += known.size
+
+    def unit(self, span: tuple[float, float] | None) -> str | None:
+        """The unit that the readings look like, where it is another; ``span`` was calibrated."""
+        if self.readings < _FEWEST:
+            return None
+        extent = self.high - self.low
+        largest = max(abs(self.low), abs(self.high))
+        for unit, turn in UNIT_PERIODS.items():
+            if math.isclose(turn, self.period, rel_tol=1e-6):
+                continue
+            within = _FILLED * turn <= extent <= 1.001 * turn
+            usual = self._travel / self.readings
+            if within and self._jump >= _WRAPPED * turn and usual <= _STEP * turn:
+                return unit
+            if unit == "turn":
+                continue
+            if turn < self.period and largest <= 1.001 * turn and extent >= 0.5 * _FILLED * turn:
+                return unit
+            if turn > self.period and _MANY * self.period < largest <= 1.001 * turn:
+                return unit
+            if span is not None and self._fits(span, self.period / turn):
+                return unit
+        if self._whole and largest > _MANY * self.period:
+            return "count"
+        return None
+
+    def _fits(self, span: tuple[float, float], factor: float) -> bool:
+        """Whether the readings lie beside the span, and in it where they are another unit."""
+        if self.high - self.low <= 0.0:
+            return False
+
+        def outside(low: float, high: float) -> bool:
+            # By whole turns the span is any.
+            start = math.floor((low - span[0]) / self.period) * self.period
+            return low - start < span[0] or high - start > span[1]
+
+        apart = self.high < span[0] or self.low > span[1]
+        turn = [(self.low + k * self.period, self.high + k * self.period) for k in (-1, 1)]
+        apart = apart and all(high < span[0] or low > span[1] for low, high in turn)
+        return apart and not outside(self.low * factor, self.high * factor)
+
+    def sentence(self, column: str, span: tuple[float, float] | None) -> str | None:
+        """What to tell, or None."""
+        unit = self.unit(span)
+        if unit is None:
+            return None
+        more = " and `counts_per_turn=N`" if unit == "count" else ""
+        return (
+            f"the readings of column '{column}' go from {self.low:.6g} to {self.high:.6g} and are "
+            f"taken for {unit_name(self.period)}, the model's unit: they look like {unit}; if so, "
+            f"give `unit={unit!r}`{more} (else `unit={unit_name(self.period)!r}`)"
+        )

@@ -20,21 +20,21 @@ from ..support.blas import one_blas_thread
 from ..support.deadline import current_deadline
 from ..support.display_units import ErrorsIn
 from ..support.files import CERTIFICATE, PDF, REPORT, FileKind, check_output
-from .diagnosed import diagnosis_content
-from .figures import error_scale, figures_of_diagnosis, figures_of_runs
-from .fitted import (
+from .diagnosed import diagnosis_content, unknown_content
+from .figures import error_scale, figures_of_diagnosis, figures_of_runs, line_names
+from .measured import measured_content
+from .modelled import (
     extended_correction,
     fit_or_reason,
     gain_content,
     gain_or_reason,
+    given_model,
     known_gear,
     known_joint,
+    model_content,
+    order_content,
 )
-from .linenames import line_names
-from .measured import measured_content
-from .modelled import given_model, model_content, order_content
 from .page import Page, print_pdf, rendered_report
-from .unknowns import unknown_content
 
 if TYPE_CHECKING:
     from ..certificate import Certificate, Identity

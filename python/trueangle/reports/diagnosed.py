@@ -1,14 +1,21 @@
-"""The diagnosis as plain values."""
+"""The diagnosis as plain values, and what these runs cannot tell."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
+from ..plots.orderlines import likely_aliases
 from ..plots.simulatedcurves import finding_names
+from ..runs.run import CalibrationRun
+from ..support.display_units import ErrorUnit
 from .numbers import shortened_list
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
+    from ..fitting.orders.select import OrderSelection
 
 #: Units by the end of a parameter's name, the longer ones first.
 _UNITS: Final = {
@@ -27,6 +34,13 @@ _UNITS: Final = {
 
 #: Parameters that the name of a finding says already.
 _NAMED: Final = ("shaft", "order", "carrier")
+
+#: Speeds (relative), temperatures (K) and torques (Nm) that differ by less are one.
+_SPEED, _TEMPERATURE, _TORQUE = 0.05, 1.0, 0.1
+
+#: Aliases told of an order, and orders told of.
+_MOST_ALIASES: Final = 3
+_MOST_FOLDED: Final = 4
 
 
 def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -111,3 +125,127 @@ def _text(value: Any) -> str:
     if isinstance(value, list):
         return "; ".join(_text(item) for item in value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def unknown_content(
+    runs: Sequence[CalibrationRun],
+    selection: OrderSelection | None,
+    diagnosis: dict[str, Any] | None,
+) -> list[dict[str, str]]:
+    """``{what, because, measure}``: from the diagnosis where there is one.
+
+    A diagnosis works out itself what the conditions of the runs leave open; without one
+    the usual conditions are gone through.
+    """
+    if diagnosis is None:
+        return _folded(selection) + _conditions(runs) + _held(runs)
+    found = [
+        _entry(
+            " or ".join(cause.replace("_", " ") for cause in entry["causes"])
+            + (" (something is seen)" if entry["supported"] else ""),
+            "; ".join([entry["because"], *_estimates(entry)]),
+            entry["measure"],
+        )
+        for entry in sorted(diagnosis["not_identifiable"], key=lambda e: not e["supported"])
+    ]
+    return found + _folded(selection) + _held(runs)
+
+
+def _estimates(entry: dict[str, Any]) -> list[str]:
+    """What each cause in doubt would amount to, where something is seen."""
+    return [
+        f"if {cause.replace('_', ' ')}: "
+        + ", ".join(
+            _estimate(name, q["value"], q["std"])
+            for name, q in parameters.items()
+            if isinstance(q["value"], float) and isinstance(q["std"], float)
+        )
+        for cause, parameters in entry.get("estimates", {}).items()
+    ]
+
+
+def _estimate(name: str, value: float, std: float) -> str:
+    """Sizes with their unit behind each number, as `ErrorUnit.spoken` finds them."""
+    stem = name.removesuffix("_arcsec")
+    unit = "" if stem == name and name != "amplitudes" else " arcsec"
+    shown, spread = ErrorUnit("", 1.0).pair(value, std)
+    return f"{stem.replace('_', ' ')} {shown}{unit} +- {spread}{unit}"
+
+
+def _held(runs: Sequence[CalibrationRun]) -> list[dict[str, str]]:
+    if len(runs) > 1:
+        return []
+    return [
+        _entry(
+            "repeatability, and the gain on new data",
+            "there is one run only",
+            "repeat the run, on another day if possible",
+        )
+    ]
+
+
+def _conditions(runs: Sequence[CalibrationRun]) -> list[dict[str, str]]:
+    entries = []
+    ways = {float(d) for run in runs for d in np.unique(run.direction) if d}
+    if len(ways) < 2:
+        entries.append(
+            _entry(
+                "reversal error: backlash, hysteresis",
+                "all readings were approached from one direction",
+                "repeat the runs backwards",
+            )
+        )
+    speeds = [np.median(np.abs(run.speed)) for run in runs if run.speed is not None]
+    if not speeds or np.ptp(speeds) <= _SPEED * max(speeds):
+        entries.append(
+            _entry(
+                "latency and filters",
+                "there is one speed only" if speeds else "no time was recorded",
+                "measure at a second speed at least three times as high, in both directions",
+            )
+        )
+    for name, unit, least, what, measure in (
+        ("temperature", "temperature", _TEMPERATURE, "thermal drift", "10 K warmer or colder"),
+        ("torque", "load", _TORQUE, "compliance and load-dependent gear error", "under two loads"),
+    ):
+        values = [getattr(r, name) for r in runs if getattr(r, name) is not None]
+        if not values or np.ptp(np.concatenate(values)) < least:
+            because = f"there is one {unit} only" if values else f"no {unit} was recorded"
+            verb = "repeat a run" if name == "temperature" else "repeat a run in both directions"
+            entries.append(_entry(what, because, f"{verb} {measure}"))
+    mounts = [run.mount for run in runs if run.mount is not None]
+    if not mounts or float(np.ptp(np.concatenate(mounts))) == 0.0:
+        entries.append(
+            _entry(
+                "the reference's own errors, which look like the joint's",
+                "the reference was never turned on its mount",
+                "remount it as the command trueangle plan proposes (three mounts do well)",
+            )
+        )
+    return entries
+
+
+def _folded(selection: OrderSelection | None) -> list[dict[str, str]]:
+    """Retained orders that these positions cannot tell from others."""
+    if selection is None:
+        return []
+    folded = [row for row in selection.table if row.retained and row.aliases]
+    if not folded:
+        return []
+    told = [
+        f"order {row.order:g} is really "
+        + " or ".join(f"{m:g}" for m in likely_aliases(row)[:_MOST_ALIASES])
+        for row in sorted(folded, key=lambda row: -row.amplitude)
+    ]
+    more = f", and {len(told) - _MOST_FOLDED} more orders alike" if len(told) > _MOST_FOLDED else ""
+    return [
+        _entry(
+            f"whether {', '.join(told[:_MOST_FOLDED])}{more}",
+            "at these positions they are one and the same column of numbers",
+            "repeat a run with the positions shifted as the command trueangle plan proposes",
+        )
+    ]
+
+
+def _entry(what: str, because: str, measure: str) -> dict[str, str]:
+    return {"what": what, "because": because, "measure": measure}

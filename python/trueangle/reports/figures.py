@@ -1,8 +1,8 @@
-"""Figures of a page and the unit of their errors: before and after, residuals, diagnosis."""
+"""Figures of a page, the unit of their errors and the names of their lines."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -31,13 +31,13 @@ from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, significant_digits, sine_of_rms
 from ..support.layout import counted
-from .linenames import LineNames
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis
     from ..fitting.heldout import HeldOut
     from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
+    from ..joint.joint import Joint
     from ..simulation import Simulation
 
 #: A figure of the report: its alternative text, its charts, and how these are arranged.
@@ -55,6 +55,32 @@ _MOST_PHASES: Final = 12
 _MOST_FACTORS: Final = 9
 #: Part of the measured error that a simulation must expect to be drawn with it.
 _FLAT: Final = 1e-3
+
+#: What a line of an output order is called.
+LineNames: TypeAlias = Callable[[float], str]
+
+
+def line_names(joint: Joint | None) -> LineNames:
+    """Names by output order: of the shaft of ``joint`` that it is a whole order of.
+
+    Without a joint, and for orders that are none of its shafts', the output's own.
+
+    Examples
+    --------
+    >>> from trueangle.simulation import Joint
+    >>> name = line_names(Joint(100.0, "circular_spline", "motor"))
+    >>> name(100.0), name(202.0), name(5.0), line_names(None)(100.0)
+    ('motor 1', 'wave generator 2', 'output 5', 'output 100')
+    """
+
+    def name(order: float) -> str:
+        found = None if joint is None else joint.name_order(order)
+        if found is None:
+            return f"output {order:g}"
+        shaft, k = found
+        return f"{shaft.replace('_', ' ')} {k}"
+
+    return name
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import NotCorrectedWarning, UnitWarning
-from trueangle.logs.unitevidence import UnitEvidence
+from trueangle.logs.statistics import UnitEvidence
 
 DEG, RAD, TURN = 360.0, 2.0 * np.pi, 1.0
 

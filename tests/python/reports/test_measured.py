@@ -7,10 +7,9 @@ import pytest
 
 import trueangle as ta
 from trueangle.fitting.heldout import hold_out
-from trueangle.reports.fitted import gain_content
+from trueangle.reports.diagnosed import unknown_content
 from trueangle.reports.measured import error_size, measured_content
-from trueangle.reports.modelled import given_model
-from trueangle.reports.unknowns import unknown_content
+from trueangle.reports.modelled import gain_content, given_model
 
 PERIODS = (360.0, 2.0 * np.pi, 1.0)
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.reports.figures import ErrorScale, phase_figure
-from trueangle.reports.linenames import line_names
+from trueangle.reports.figures import ErrorScale, line_names, phase_figure
 from trueangle.support.display_units import error_unit
 
 SEED = 44

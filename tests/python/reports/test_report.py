@@ -17,7 +17,7 @@ from trueangle.cli import main
 from trueangle.errors import ArgumentError, MissingExtraError
 from trueangle.fitting.heldout import hold_out
 from trueangle.joint.shafts import shaft_cycles
-from trueangle.reports.fitted import known_gear, known_joint
+from trueangle.reports.modelled import known_gear, known_joint
 from trueangle.reports.numbers import formatted_number, lookup
 from trueangle.reports.page import find_browser, print_pdf
 

@@ -5,10 +5,10 @@ import pytest
 
 import trueangle as ta
 from trueangle.model.alarm import WatchedOrder, WatchedWindow
+from trueangle.reports.diagnosed import unknown_content
 from trueangle.reports.figures import error_scale
 from trueangle.reports.numbers import Numbers
 from trueangle.reports.robot import JointRank, ranking_text
-from trueangle.reports.unknowns import unknown_content
 from trueangle.reports.watched import WatchReport
 
 SEED = 66_200
