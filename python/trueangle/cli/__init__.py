@@ -168,7 +168,7 @@ def _failed(
         if isinstance(error, BrokenPipeError):
             return 141
     if isinstance(error, TrueAngleError):
-        from .remedy import command_that_helps
+        from .wording import command_that_helps
 
         said = wording.of_error(str(error)) if isinstance(error, ArgumentError) else str(error)
         _say(f"error: {said}{command_that_helps(error, args, build_parser)}")

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from ..selfcalibration.methods import PLANNED
-from .nextplan import add_after_arguments, refuse_without_after, run_after
+from ..support.files import SIMULATION
 from .options import refuse_given
-from .paths import Input
-from .values import angle, arc, parse_orders
+from .paths import Input, Output
+from .signal_options import add_signals
+from .values import angle, arc, names, parse_orders, seconds
 
 if TYPE_CHECKING:
     from ..fleets.unitplan import UnitPlan
@@ -29,6 +30,14 @@ OF_TURNS = ("positions", "mounts", "reference", "tilts", "tilt_arcsec")
 
 #: Degrees over which an uncertainty is wanted where no arc is stated.
 WHOLE_TURN = (0.0, 360.0)
+
+#: What is of other plans.
+_OTHERS = (
+    *("gear_ratio", "positions", "mounts", "reference", "tilts", "tilt_arcsec", "orders"),
+    *("noise_arcsec", "std_arcsec", "arc", "readings", "runs", "both_directions", "apart"),
+    *("uncertainty", "prior", "self_method", "count", "angles", "speed_ratio", "start_speed"),
+    "rate",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -118,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the plan."""
     orders = None if args.orders is None else parse_orders(args.orders)
     if args.after is not None:
-        return run_after(args)
+        return _run_after(args)
     refuse_without_after(args)
     if args.self_method is None:
         of_self = ("count", "angles", "speed_ratio", "start_speed", "rate", "simulation")
@@ -245,3 +254,84 @@ def _angles(text: str) -> list[float]:
     if len(found) < 2 or not all(map(math.isfinite, found)):
         raise ArgumentError(f"--angles: two angles or more in degrees, such as 0,90, got {text!r}")
     return found
+
+
+def add_after_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of ``--after``."""
+    add = parser.add_argument_group("after a diagnosis that could not tell").add_argument
+    add(
+        "--after",
+        nargs="+",
+        type=Input,
+        metavar="RUNS",
+        help="the runs measured so far: which to measure next, with --simulation what is believed",
+    )
+    add(
+        "--between",
+        type=names,
+        metavar="A,B",
+        help="causes to tell apart (default: all that the diagnosis could not)",
+    )
+    add(
+        "--limits",
+        type=Input,
+        metavar="FILE",
+        help="what a run may be: TOML, table [limits] with arc_deg, speed_deg_s, temperature_C, "
+        "torque_Nm, gravity_Nm, mount_deg, current_A, samples, runs, reversals (default: one turn "
+        "or the arc measured so far, 1 to 60 deg/s, loads and temperatures as seen)",
+    )
+    add(
+        "--seeds",
+        type=int,
+        metavar="N",
+        help="simulated diagnoses of each cause in question (default: 10)",
+    )
+    add("--within", type=seconds, metavar="TIME", help="time that it may take (default: 10s)")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Output.of(SIMULATION),
+        metavar="FILE",
+        help="write the runs as a simulation file, ready for simulate",
+    )
+    add_signals(parser)
+
+
+def _run_after(args: argparse.Namespace) -> int:
+    """Print the runs that tell what those there are could not, and write them."""
+    from ..planning.limits import load_limits
+    from ..rehearsal.after import SEEDS, WITHIN, plan_after
+    from ..simulation import load_simulation
+    from .run_lists import read_checked_runs
+
+    if args.simulation is None:
+        raise ArgumentError("--after needs what is believed: add --simulation FILE")
+    refuse_given(args, _OTHERS, "does not go with --after; leave one of them out")
+    args.runs = args.after
+    plan = plan_after(
+        read_checked_runs(args),
+        load_simulation(args.simulation),
+        between=args.between,
+        limits=None if args.limits is None else load_limits(args.limits),
+        seeds=SEEDS if args.seeds is None else args.seeds,
+        within=WITHIN if args.within is None else args.within,
+        progress="auto",
+    )
+    print(plan.to_json() if args.json else plan.summary(), flush=True)
+    if args.output is not None:
+        if not plan.runs:
+            raise ArgumentError(
+                f"no run within the limits tells more: {args.output} is not written"
+            )
+        plan.save(args.output)
+    return 0
+
+
+def refuse_without_after(args: argparse.Namespace) -> None:
+    """Refuse options that are of ``--after`` only."""
+    after = [
+        *("between", "limits", "seeds", "within", "output"),
+        *("signal", "counts_per_turn", "counts_per_turn_reference"),
+        *("topic", "facets", "unit_from", "periods_per_turn"),
+    ]
+    refuse_given(args, after, "is of plans after a diagnosis: add --after RUNS")

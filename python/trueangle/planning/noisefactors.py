@@ -195,12 +195,12 @@ def search_offsets(positions: int, mounts: int, orders: Sequence[float]) -> list
     if mounts == 1:
         return [0.0]
     pitch = 360.0 / positions
-    even: Array = np.arange(mounts) * (pitch / mounts)
+    even = np.arange(mounts, dtype=np.float64) * (pitch / mounts)
     if float(_worst(positions, even[None], orders)[0]) <= 1.0 + _IDEAL:
         return [round(float(o), 9) for o in even]
-    steps: Array = np.arange(1, _STEPS) * (pitch / _STEPS)
+    steps = np.arange(1, _STEPS, dtype=np.float64) * (pitch / _STEPS)
     if mounts == 2:
-        trial: Array = np.stack([np.zeros_like(steps), steps], axis=1)
+        trial = np.stack([np.zeros_like(steps), steps], axis=1)
         # Mirror images are equally good: take the smaller offset.
         best = [trial[first_largest(-_worst(positions, trial, orders))]]
     else:

@@ -9,7 +9,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli import main, onepass
-from trueangle.cli.nextplan import add_after_arguments, refuse_without_after
+from trueangle.cli.plan import add_after_arguments, refuse_without_after
 from trueangle.logs.keeping import KEPT, SAMPLE
 
 
