@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from ..errors import ArgumentError
 from ..support.plainresult import json_text
+from .parser import declare
 
 HELP = "measure steps, batches and fits on this machine against numpy"
 EXAMPLE = "trueangle bench --json"
@@ -24,9 +25,9 @@ _CALLS: Final = 10_000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("--samples", type=int, default=100_000, metavar="N", help="batch size")
-    parser.add_argument("--rounds", type=int, default=5, help="rounds of each measurement")
-    parser.add_argument("--json", action="store_true", help="print the medians as JSON")
+    declare(parser, "--samples N", int, "batch size", default=100_000)
+    declare(parser, "--rounds", int, "rounds of each measurement", default=5)
+    declare(parser, "--json", bool, "print the medians as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

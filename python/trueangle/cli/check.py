@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FileError, NoModelError
 from ..support.plainresult import json_text
+from .parser import declare
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, robot_messages
 from .signal_options import add_signals, of_joint, reading_options
@@ -20,11 +22,11 @@ EXAMPLE = "trueangle check runs.csv"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
-    add("files", nargs="+", type=Input, metavar="FILES", help="calibration runs of any format")
+    add = partial(declare, parser)
+    add("files FILES...", Input, "calibration runs of any format")
     add_signals(parser)
     add_robot(parser)
-    add("--json", action="store_true", help="print the result as JSON")
+    add("--json", bool, "print the result as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from ..support.plainresult import json_text
-from .options import add_errors_in, errors_in
+from .options import add_shared, errors_in
+from .parser import declare
 from .paths import Input
 from .robotmodel import model_asked, refuse_joint
 
@@ -15,22 +17,12 @@ EXAMPLE = "trueangle compare present.json joint_a.json"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
-    add(
-        "first",
-        type=Input,
-        metavar="A",
-        help="model file: today's table, or the joint before a repair",
-    )
-    add(
-        "second",
-        type=Input,
-        metavar="B",
-        help="model file: the new calibration; B less A is printed",
-    )
-    add("--joint", metavar="NAME", help="of the file of a robot, this joint")
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print the result as JSON")
+    add = partial(declare, parser)
+    add("first A", Input, "model file: today's table, or the joint before a repair")
+    add("second B", Input, "model file: the new calibration; B less A is printed")
+    add("--joint NAME", str, "of the file of a robot, this joint")
+    add_shared(parser, "errors in")
+    add("--json", bool, "print the result as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

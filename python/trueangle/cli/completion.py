@@ -8,7 +8,7 @@ import shlex
 from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
-from .parser import Parser
+from .parser import Parser, declare
 
 HELP = "print a script with which bash, zsh or fish completes commands and options"
 EXAMPLE = "trueangle completion bash >~/.local/share/bash-completion/completions/trueangle"
@@ -16,7 +16,7 @@ EXAMPLE = "trueangle completion bash >~/.local/share/bash-completion/completions
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("shell", choices=tuple(SHELLS), help="of which the script is")
+    declare(parser, "shell", tuple(SHELLS), "of which the script is")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError, TrueAngleError
@@ -11,7 +12,8 @@ from ..support.display_units import ErrorsIn, error_unit
 from ..support.plainresult import json_text
 from ..support.suggestions import did_you_mean, listed_names
 from .ending import own_interrupts
-from .options import add_errors_in, errors_in
+from .options import add_shared, errors_in
+from .parser import declare
 from .paths import Input, ModelInput
 from .robots import add_robot, joints_asked
 from .signal_options import add_signals, signals_by_joint
@@ -28,63 +30,54 @@ EXAMPLE = "trueangle correct logs/*.parquet -m joint_a.json -o corrected/"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
+    add = partial(declare, parser)
     add(
-        "logs",
-        nargs="+",
-        type=Input,
-        metavar="LOG",
-        help="logs or folders of them: Parquet, Arrow, CSV, HDF5, MATLAB v7.3, ROS bags, "
-        "MCAP, MDF4",
+        "logs LOG...",
+        Input,
+        "logs or folders of them: Parquet, Arrow, CSV, HDF5, MATLAB v7.3, ROS bags, MCAP, MDF4",
     )
     add(
-        "-m",
-        "--model",
-        action="append",
-        required=True,
-        type=ModelInput,
-        metavar="[JOINT=]FILE",
-        help="model file written by trueangle fit, also of a whole robot; with several joints one "
+        "-m --model [JOINT=]FILE",
+        ModelInput,
+        "model file written by trueangle fit, also of a whole robot; with several joints one "
         "of each, or one of all",
+        required=True,
+        many=True,
     )
-    add("-o", "--output", metavar="OUT", help="file to write; a folder for several")
+    add("-o --output OUT", str, "file to write; a folder for several")
+    add("--in-place", bool, "replace every log by its corrected copy once that is verified")
     add(
-        "--in-place",
-        action="store_true",
-        help="replace every log by its corrected copy once that is verified",
-    )
-    add(
-        "--column",
-        action="append",
-        metavar="[JOINT=]NAME",
-        help="of the angle (default: indicated_*, of a joint JOINT_indicated_* or the like)",
+        "--column [JOINT=]NAME",
+        str,
+        "of the angle (default: indicated_*, of a joint JOINT_indicated_* or the like)",
+        many=True,
     )
     add(
         "--unit",
-        choices=("deg", "rad", "turn", "count", "arcsec", "arcmin"),
-        help="of the angle (default: the ending of its name, else the model's)",
+        ("deg", "rad", "turn", "count", "arcsec", "arcmin"),
+        "of the angle (default: the ending of its name, else the model's)",
     )
-    add("--counts-per-turn", type=float, metavar="N", help="of an angle in counts")
+    add("--counts-per-turn N", float, "of an angle in counts")
     add_signals(parser, counts=False, runs=False, reference=False, channels=False)
     add(
-        "--output-topic",
-        metavar="NAME",
-        help="topic that takes the corrected positions (default: TOPIC_corrected; the topic "
+        "--output-topic NAME",
+        str,
+        "topic that takes the corrected positions (default: TOPIC_corrected; the topic "
         "itself replaces them)",
     )
     add(
-        "--scheduler",
-        metavar="tcp://HOST:PORT",
-        help="Dask scheduler whose workers share the files: every log on one of them",
+        "--scheduler tcp://HOST:PORT",
+        str,
+        "Dask scheduler whose workers share the files: every log on one of them",
     )
     add(
         "--progress",
-        choices=("auto", "text", "json", "none"),
+        ("auto", "text", "json", "none"),
+        "on stderr (default: text on a terminal; one JSON object a line with --json)",
         default="auto",
-        help="on stderr (default: text on a terminal; one JSON object a line with --json)",
     )
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print the result as JSON")
+    add_shared(parser, "errors in")
+    add("--json", bool, "print the result as JSON")
     add_robot(parser)
 
 

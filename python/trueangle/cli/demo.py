@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..support.files import REPORT
+from .parser import declare
 from .paths import Output
 
 if TYPE_CHECKING:
@@ -28,13 +29,8 @@ EXAMPLE = "trueangle demo --report demo.html"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("--seed", type=int, default=0, help="of the simulated noise (default: 0)")
-    parser.add_argument(
-        "--report",
-        type=Output.of(REPORT),
-        metavar="FILE",
-        help="also write a report of the diagnosis",
-    )
+    declare(parser, "--seed", int, "of the simulated noise (default: 0)", default=0)
+    declare(parser, "--report FILE", Output.of(REPORT), "also write a report of the diagnosis")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator
+from functools import partial
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
@@ -12,14 +13,8 @@ from ..errors import ArgumentError, FileError, NoModelError, TrueAngleError
 from ..support.deadline import ending_early
 from ..support.files import MODEL, SENSOR, SIMULATION
 from ..support.plainresult import json_text
-from .options import (
-    add_argument_choice,
-    add_errors_in,
-    add_joint,
-    add_progress,
-    errors_in,
-    refuse_given,
-)
+from .options import add_joint, add_shared, errors_in, refuse_given
+from .parser import declare
 from .paths import Input, Output
 from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
 from .signal_options import of_joint, reading_options, signals_by_joint
@@ -41,77 +36,65 @@ EXAMPLE = "trueangle diagnose runs.csv --simulation joint.toml --extend better.t
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
-    add("runs", nargs="+", type=Input, metavar="RUNS", help="calibration runs (CSV or Parquet)")
-    add("--simulation", type=Input, metavar="FILE", help="simulation file (TOML)")
+    add = partial(declare, parser)
+    add("runs RUNS...", Input, "calibration runs (CSV or Parquet)")
+    add("--simulation FILE", Input, "simulation file (TOML)")
     add(
-        "--simulated",
-        type=Input,
-        metavar="LOG",
-        help="what another simulator (MuJoCo, Isaac, Gazebo, Simulink ...) says of the same "
+        "--simulated LOG",
+        Input,
+        "what another simulator (MuJoCo, Isaac, Gazebo, Simulink ...) says of the same "
         "motion: its true angle as reference, its encoder as indicated; the simulation and its "
         "extension stand on top of it. --signal simulated.ROLE=NAME[:UNIT] names its columns",
     )
     add(
         "--simulated-by",
-        choices=BY,
-        help="what joins the log to the readings (default: time where the motions are the same)",
+        BY,
+        "what joins the log to the readings (default: time where the motions are the same)",
     )
     add(
-        "--extend",
-        type=Output.of(SIMULATION),
-        metavar="FILE",
-        help="write the simulation extended by the findings; where it states none, with the noise "
+        "--extend FILE",
+        Output.of(SIMULATION),
+        "write the simulation extended by the findings; where it states none, with the noise "
         "found and designs of the runs, so that simulate repeats them",
     )
     add(
-        "--extend-into",
-        type=Output.of(SENSOR),
-        metavar="FILE",
-        help="write what the simulator lacks as the sensor of a joint: a fragment of MuJoCo's XML "
+        "--extend-into FILE",
+        Output.of(SENSOR),
+        "write what the simulator lacks as the sensor of a joint: a fragment of MuJoCo's XML "
         "(.xml) or a functional mock-up unit (.fmu)",
     )
+    add("--into-joint NAME", str, "name of the joint in MuJoCo (default: joint)")
     add(
-        "--into-joint",
-        metavar="NAME",
-        help="name of the joint in MuJoCo (default: joint)",
-    )
-    add(
-        "--plan",
-        type=Output.of(SIMULATION),
-        metavar="FILE",
-        help="write the runs to measure next, which distinguish what these cannot, as a "
+        "--plan FILE",
+        Output.of(SIMULATION),
+        "write the runs to measure next, which distinguish what these cannot, as a "
         "simulation file (trueangle plan --after has limits and rehearses them)",
     )
     add(
-        "--corrected-model",
-        type=Output.of(MODEL),
-        metavar="FILE",
-        help="write the correction model of what is confirmed; exit status 1 where nothing is",
+        "--corrected-model FILE",
+        Output.of(MODEL),
+        "write the correction model of what is confirmed; exit status 1 where nothing is",
     )
     add(
-        "--model",
-        type=Input,
-        metavar="FILE",
-        help="a correction model to extend by what is confirmed, in place of a new one",
+        "--model FILE",
+        Input,
+        "a correction model to extend by what is confirmed, in place of a new one",
     )
-    add_argument_choice(parser)
+    add_shared(parser, "argument")
     add_joint(parser)
     add_robot(parser)
     add(
-        "--within",
-        type=seconds,
-        metavar="TIME",
-        help="the best account in that time, as 10s, 2min or seconds; it says what is missing "
+        "--within TIME",
+        seconds,
+        "the best account in that time, as 10s, 2min or seconds; it says what is missing "
         "(default: as much work as ordinary readings take three times over, on any machine)",
     )
-    add_progress(parser)
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print the diagnosis as JSON")
+    add_shared(parser, "progress", "errors in")
+    add("--json", bool, "print the diagnosis as JSON")
     add(
         "--verbose",
-        action="store_true",
-        help="say why each cause that is not seen could not be in such runs, and what to measure",
+        bool,
+        "say why each cause that is not seen could not be in such runs, and what to measure",
     )
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..support.plainresult import json_text
-from .options import add_errors_in, errors_in
+from .options import add_shared, errors_in
+from .parser import declare
 from .paths import Input, Output
 from .robotmodel import model_asked
 
@@ -22,24 +24,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     from ..export.targets import TARGETS
 
-    add = parser.add_argument
+    add = partial(declare, parser)
+    add("model MODEL", Input, "model file written by trueangle fit, also of a robot (--joint)")
+    add("--to TARGET", tuple(TARGETS), _targets(), required=True)
+    add("-o --output FILE", Output.of(None), "file to write", required=True)
     add(
-        "model",
-        type=Input,
-        metavar="MODEL",
-        help="model file written by trueangle fit, also of a robot (--joint)",
-    )
-    add("--to", required=True, choices=tuple(TARGETS), metavar="TARGET", help=_targets())
-    add("-o", "--output", required=True, type=Output.of(None), metavar="FILE", help="file to write")
-    add(
-        "--max-arcsec",
-        type=float,
-        metavar="E",
-        help="take the smallest table that differs from the model by at most this",
+        "--max-arcsec E",
+        float,
+        "take the smallest table that differs from the model by at most this",
     )
     add_target_options(parser, {"joint": "of the file of a robot, the joint to write"})
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print the result as JSON")
+    add_shared(parser, "errors in")
+    add("--json", bool, "print the result as JSON")
 
 
 def add_target_options(

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from ..support.plainresult import json_text
 from .onepass import add_one_pass, log_options, refuse_robot, wants_one_pass
-from .options import (
-    add_argument_choice,
-    add_covariance,
-    add_errors_in,
-    add_joint,
-    add_labels,
-    add_model_output,
-    add_nuisance,
-    errors_in,
-)
+from .options import add_joint, add_shared, errors_in
+from .parser import declare
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
 from .values import declared_shafts, orders_by_shaft, parse_orders
@@ -34,47 +27,39 @@ EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
+    add = partial(declare, parser)
     add(
-        "runs",
-        nargs="+",
-        type=Input,
-        metavar="RUNS",
-        help="files of readings: CSV, Excel, Parquet, HDF5, MATLAB, numpy, ROS bags and others",
+        "runs RUNS...",
+        Input,
+        "files of readings: CSV, Excel, Parquet, HDF5, MATLAB, numpy, ROS bags and others",
     )
-    add_model_output(parser)
+    add_shared(parser, "model output")
     add(
         "--orders",
+        str,
+        "auto (default: by evidence), 1-17, 1,4,8, or per shaft: output:1-3;motor:1,2",
         default="auto",
-        help="auto (default: by evidence), 1-17, 1,4,8, or per shaft: output:1-3;motor:1,2",
     )
     add_joint(parser)
     add_robot(parser)
-    add_argument_choice(parser)
-    add_covariance(parser)
-    add_nuisance(parser)
+    add_shared(parser, "argument", "covariance", "nuisance", "reference orders")
     add(
         "--loss",
-        choices=("auto", "linear", "huber", "tukey"),
+        ("auto", "linear", "huber", "tukey"),
+        "auto (default): least squares with outliers set aside and reported",
         default="auto",
-        help="auto (default): least squares with outliers set aside and reported",
     )
-    add_labels(parser)
+    add_shared(parser, "run")
     add(
-        "--prior",
-        type=Input,
-        metavar="FLEET",
-        help="fleet file (`trueangle fleet -o`): what units of the same design are like, so that "
+        "--prior FLEET",
+        Input,
+        "fleet file (`trueangle fleet -o`): what units of the same design are like, so that "
         "ten readings may do",
     )
     add_one_pass(parser)
-    add(
-        "--checksums",
-        action="store_true",
-        help="keep the sha256 of the files in the model, also of a fit in one pass",
-    )
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print the result as JSON")
+    add("--checksums", bool, "keep the sha256 of the files in the model, also of a fit in one pass")
+    add_shared(parser, "errors in")
+    add("--json", bool, "print the result as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..support.files import FLEET
-from .options import add_errors_in, add_joint, errors_in
+from .options import add_joint, add_shared, errors_in
+from .parser import declare
 from .paths import Input, Output
 from .signal_options import reading_options
 from .values import declared_shafts, orders_by_shaft
@@ -20,45 +22,35 @@ EXAMPLE = "trueangle fleet spring/ autumn/ -o fleet.json"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
-    add("runs", nargs="+", type=Input, metavar="RUNS", help="files or folders of readings")
+    add = partial(declare, parser)
+    add("runs RUNS...", Input, "files or folders of readings")
     add(
         "--by",
-        choices=("unit", "run"),
+        ("unit", "run"),
+        "what tells the units apart (default: the column unit; without one, the runs)",
         default="unit",
-        help="what tells the units apart (default: the column unit; without one, the runs)",
     )
-    add("--orders", metavar="1-4", help="orders looked at (default: those above the noise)")
+    add("--orders 1-4", str, "orders looked at (default: those above the noise)")
     add(
-        "--share",
-        type=float,
+        "--share P",
+        float,
+        "of the units that the tolerance limits bound (default: %(default)s)",
         default=0.95,
-        metavar="P",
-        help="of the units that the tolerance limits bound (default: %(default)s)",
     )
+    add("--confidence G", float, "of the tolerance limits (default: %(default)s)", default=0.95)
     add(
-        "--confidence",
-        type=float,
-        default=0.95,
-        metavar="G",
-        help="of the tolerance limits (default: %(default)s)",
-    )
-    add(
-        "--permitted-arcsec",
-        type=float,
-        metavar="E",
-        help="error from which a calibration is due: gives the day of the next",
+        "--permitted-arcsec E",
+        float,
+        "error from which a calibration is due: gives the day of the next",
     )
     add_joint(parser)
     add(
-        "-o",
-        "--output",
-        type=Output.of(FLEET),
-        metavar="FLEET",
-        help="fleet file to write: a prior for further units (fit --prior)",
+        "-o --output FLEET",
+        Output.of(FLEET),
+        "fleet file to write: a prior for further units (fit --prior)",
     )
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print the result as JSON")
+    add_shared(parser, "errors in")
+    add("--json", bool, "print the result as JSON")
 
 
 def _orders(text: str, shafts: dict[str, float]) -> Any:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from ..support.display_units import error_unit
 from ..support.layout import counted, laid_out
 from ..support.plainresult import json_text
 from .export import add_target_options, target_options
-from .options import add_errors_in, add_model_output, errors_in
+from .options import add_shared, errors_in
+from .parser import declare
 from .paths import Input
 
 HELP = "read a table that firmware has, as a model: what does my present table do?"
@@ -19,19 +21,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     from ..export.targets import TARGETS
 
-    add = parser.add_argument
+    add = partial(declare, parser)
+    add("file FILE", Input, "source, configuration or registers that hold the table")
     add(
-        "file",
-        type=Input,
-        metavar="FILE",
-        help="source, configuration or registers that hold the table",
+        "--from TARGET",
+        tuple(TARGETS),
+        f"what it is of: {', '.join(TARGETS)}",
+        required=True,
+        dest="source",
     )
-    add("--from", required=True, dest="source", choices=tuple(TARGETS), metavar="TARGET",
-        help=f"what it is of: {', '.join(TARGETS)}")  # fmt: skip
-    add_model_output(parser)
+    add_shared(parser, "model output")
     add_target_options(parser)
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print what the table corrects as JSON")
+    add_shared(parser, "errors in")
+    add("--json", bool, "print what the table corrects as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from ..support.plainresult import json_text
-from .options import add_errors_in, add_runs_output, errors_in
+from .options import add_shared, errors_in
+from .parser import declare
 from .paths import Input
 from .signal_options import add_signals, signals_of_both
 
@@ -15,28 +17,26 @@ EXAMPLE = "trueangle join joint.csv laser.csv -o runs.csv --signal b.reference='
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
-    add("first", type=Input, metavar="A", help="log of the indicated angle (or the reference)")
-    add("second", type=Input, metavar="B", help="log of the other; both with their times")
-    add_runs_output(parser)
+    add = partial(declare, parser)
+    add("first A", Input, "log of the indicated angle (or the reference)")
+    add("second B", Input, "log of the other; both with their times")
+    add_shared(parser, "runs output")
     add(
-        "--offset",
-        type=float,
-        metavar="S",
-        help="seconds to add to the time of the indicated log to get that of the reference "
+        "--offset S",
+        float,
+        "seconds to add to the time of the indicated log to get that of the reference "
         "(default: from the motion; 0 for one clock)",
     )
-    add("--rate", type=float, metavar="PPM", help="of the reference's clock against the other")
+    add("--rate PPM", float, "of the reference's clock against the other")
     add(
-        "--max-gap",
-        type=float,
-        metavar="S",
-        help="longest pause of the reference that is interpolated over "
+        "--max-gap S",
+        float,
+        "longest pause of the reference that is interpolated over "
         "(default: five times its typical step, and longer where it moves on a line)",
     )
     add_signals(parser, runs=False, channels=False)
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print the result as JSON")
+    add_shared(parser, "errors in")
+    add("--json", bool, "print the result as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

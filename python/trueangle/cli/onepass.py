@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import Any, Final
 
 from ..errors import ArgumentError
 from .ending import own_interrupts
+from .parser import declare
 from .signal_options import reading_options
 from .values import declared_shafts
 
@@ -16,23 +18,23 @@ _READINGS: Final = (256 << 20) // 16
 
 def add_one_pass(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of fits in one pass."""
-    add = parser.add_argument
+    add = partial(declare, parser)
     add(
         "--one-pass",
-        action="store_true",
-        help="constant memory: sums of all readings and some 65 000 of them as they are, where "
+        bool,
+        "constant memory: sums of all readings and some 65 000 of them as they are, where "
         "there are more than 2^20; so by itself for more than 2^24, and with a --scheduler",
     )
     add(
-        "--scheduler",
-        metavar="tcp://HOST:PORT",
-        help="Dask scheduler whose workers share the files: a log on each",
+        "--scheduler tcp://HOST:PORT",
+        str,
+        "Dask scheduler whose workers share the files: a log on each",
     )
     add(
         "--progress",
-        choices=("auto", "text", "json", "none"),
+        ("auto", "text", "json", "none"),
+        "of a fit in one pass, on stderr (default: text on a terminal)",
         default="auto",
-        help="of a fit in one pass, on stderr (default: text on a terminal)",
     )
 
 

@@ -4,137 +4,107 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from typing import Any, Final
 
 from ..errors import ArgumentError
+from ..joint.members import FIXED_MEMBERS
 from ..support.deadline import STYLES
 from ..support.display_units import ERROR_UNITS, ErrorsIn
 from ..support.files import MODEL, RUNS
+from .parser import Kind, declare
 from .paths import Output
 from .signal_options import add_signals
 
+#: Options that several commands share, by the names under which commands take them.
+_SHARED: Final[dict[str, tuple[str, Kind, str, dict[str, Any]]]] = {
+    "model output": (
+        "-o --output MODEL",
+        Output.of(MODEL),
+        "model file to write",
+        {"required": True},
+    ),
+    "runs output": ("-o --output RUNS", Output.of(RUNS), "CSV file to write", {"required": True}),
+    "gear ratio": ("--gear-ratio R", float, "motor turns per output turn", {}),
+    "fixed member": (
+        "--fixed-member",
+        FIXED_MEMBERS,
+        "of the strain wave gear (default: circular_spline)",
+        {"default": "circular_spline"},
+    ),
+    "shaft": (
+        "--shaft NAME=CYCLES",
+        str,
+        "further shaft and its turns per output turn, as worm=144 (may be repeated)",
+        {"many": True},
+    ),
+    "argument": (
+        "--argument",
+        ("auto", "reference", "indicated"),
+        "angle that the error is a function of (default: the true one, unless the "
+        "reference has an arbitrary zero in every run)",
+        {"default": "auto"},
+    ),
+    "nuisance": (
+        "--nuisance auto|none|LIST",
+        str,
+        "fit jointly with the pattern, and keep out of the model: ramp, direction, velocity, "
+        "drift (a list with commas), or those that lower the held-out error (auto); default: none",
+        {"default": "none"},
+    ),
+    "reference orders": (
+        "--reference-orders 50,100",
+        str,
+        "orders that the reference itself makes: fitted jointly with the pattern, not "
+        "retained; with a phase of their own in every run where it was mounted anew",
+        {},
+    ),
+    "covariance": (
+        "--covariance",
+        ("auto", "white", "cluster", "hac"),
+        "standard errors of independent readings (white), by the scatter between runs "
+        "(cluster) or between segments of readings (hac); default: white unless correlation "
+        "is found",
+        {"default": "auto"},
+    ),
+    "orders": (
+        "--orders",
+        str,
+        "auto (default: by evidence), 1-17, output:1-3;motor:1,2",
+        {"default": "auto"},
+    ),
+    "run": (
+        "--run GLOB",
+        str,
+        "use the runs of this label only, or of those that match (fwd-*)",
+        {"many": True},
+    ),
+    "progress": (
+        "--progress",
+        STYLES,
+        "on stderr after one second (default: text on a terminal, nothing elsewhere)",
+        {"default": "auto"},
+    ),
+    "errors in": (
+        "--errors-in",
+        ERROR_UNITS,
+        "unit of errors in what is printed for people (default: arcsec, or deg where "
+        "errors are that large; JSON is in arcsec always)",
+        {"default": "auto"},
+    ),
+}
 
-def add_model_output(parser: argparse.ArgumentParser) -> None:
-    """The model that a command writes."""
-    parser.add_argument(
-        "-o",
-        "--output",
-        required=True,
-        type=Output.of(MODEL),
-        metavar="MODEL",
-        help="model file to write",
-    )
 
-
-def add_runs_output(parser: argparse.ArgumentParser) -> None:
-    """The runs that a command writes."""
-    parser.add_argument(
-        "-o",
-        "--output",
-        required=True,
-        type=Output.of(RUNS),
-        metavar="RUNS",
-        help="CSV file to write",
-    )
+def add_shared(parser: argparse.ArgumentParser, *names: str) -> None:
+    """Declare options that several commands share, in this order."""
+    for name in names:
+        spelled, kind, told, more = _SHARED[name]
+        declare(parser, spelled, kind, told, **more)
 
 
 def add_joint(parser: argparse.ArgumentParser) -> None:
-    """Options that tell what joint the readings are of; shared by several commands."""
-    from ..joint.members import FIXED_MEMBERS
-
-    parser.add_argument("--gear-ratio", type=float, metavar="R", help="motor turns per output turn")
-    parser.add_argument(
-        "--fixed-member",
-        choices=FIXED_MEMBERS,
-        default="circular_spline",
-        help="of the strain wave gear (default: circular_spline)",
-    )
-    parser.add_argument(
-        "--shaft",
-        action="append",
-        metavar="NAME=CYCLES",
-        help="further shaft and its turns per output turn, as worm=144 (may be repeated)",
-    )
+    """Options that tell what joint the readings are of, and where they are."""
+    add_shared(parser, "gear ratio", "fixed member", "shaft")
     add_signals(parser)
-
-
-def add_argument_choice(parser: argparse.ArgumentParser) -> None:
-    """The angle that errors are a function of; shared by several commands."""
-    parser.add_argument(
-        "--argument",
-        choices=("auto", "reference", "indicated"),
-        default="auto",
-        help="angle that the error is a function of (default: the true one, unless the "
-        "reference has an arbitrary zero in every run)",
-    )
-
-
-def add_nuisance(parser: argparse.ArgumentParser) -> None:
-    """What is fitted jointly with the pattern; shared by several commands."""
-    parser.add_argument(
-        "--nuisance",
-        default="none",
-        metavar="auto|none|LIST",
-        help="fit jointly with the pattern, and keep out of the model: ramp, direction, velocity, "
-        "drift (a list with commas), or those that lower the held-out error (auto); default: none",
-    )
-    parser.add_argument(
-        "--reference-orders",
-        metavar="50,100",
-        help="orders that the reference itself makes: fitted jointly with the pattern, not "
-        "retained; with a phase of their own in every run where it was mounted anew",
-    )
-
-
-def add_covariance(parser: argparse.ArgumentParser) -> None:
-    """How standard errors are taken; shared by several commands."""
-    parser.add_argument(
-        "--covariance",
-        choices=("auto", "white", "cluster", "hac"),
-        default="auto",
-        help="standard errors of independent readings (white), by the scatter between runs "
-        "(cluster) or between segments of readings (hac); default: white unless correlation "
-        "is found",
-    )
-
-
-def add_orders(parser: argparse.ArgumentParser) -> None:
-    """Orders of a fit."""
-    parser.add_argument(
-        "--orders",
-        default="auto",
-        help="auto (default: by evidence), 1-17, output:1-3;motor:1,2",
-    )
-
-
-def add_labels(parser: argparse.ArgumentParser) -> None:
-    """Which runs of the files are used."""
-    parser.add_argument(
-        "--run",
-        action="append",
-        metavar="GLOB",
-        help="use the runs of this label only, or of those that match (fwd-*)",
-    )
-
-
-def add_progress(parser: argparse.ArgumentParser) -> None:
-    """How work that takes its time says where it is."""
-    parser.add_argument(
-        "--progress",
-        choices=STYLES,
-        default="auto",
-        help="on stderr after one second (default: text on a terminal, nothing elsewhere)",
-    )
-
-
-def add_errors_in(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--errors-in``; shared by every command that prints errors."""
-    parser.add_argument(
-        "--errors-in",
-        choices=ERROR_UNITS,
-        default="auto",
-        help="unit of errors in what is printed for people (default: arcsec, or deg where "
-        "errors are that large; JSON is in arcsec always)",
-    )
 
 
 def errors_in(args: argparse.Namespace) -> ErrorsIn:

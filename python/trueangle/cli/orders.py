@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from ..support.plainresult import json_text
 from .onepass import add_one_pass, log_options, refuse_robot, wants_one_pass
-from .options import (
-    add_argument_choice,
-    add_covariance,
-    add_errors_in,
-    add_joint,
-    add_labels,
-    add_nuisance,
-    errors_in,
-)
+from .options import add_joint, add_shared, errors_in
+from .parser import declare
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked
 from .values import declared_shafts, parse_orders
@@ -31,25 +25,23 @@ EXAMPLE = "trueangle orders joint_a.csv --gear-ratio 100"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
-    add("runs", nargs="+", type=Input, metavar="RUNS", help="files of readings")
-    add("--orders", metavar="1-17,202", help="candidates (default: low orders and the gear's own)")
+    add = partial(declare, parser)
+    add("runs RUNS...", Input, "files of readings")
+    add("--orders 1-17,202", str, "candidates (default: low orders and the gear's own)")
     add_joint(parser)
     add_robot(parser)
-    add_argument_choice(parser)
-    add_covariance(parser)
+    add_shared(parser, "argument", "covariance")
     add(
         "--method",
-        choices=("evidence", "paper"),
-        default="evidence",
-        help="evidence (default): significance and held-out error; paper: amplitude and phase "
+        ("evidence", "paper"),
+        "evidence (default): significance and held-out error; paper: amplitude and phase "
         "range over the runs",
+        default="evidence",
     )
-    add_nuisance(parser)
-    add_labels(parser)
+    add_shared(parser, "nuisance", "reference orders", "run")
     add_one_pass(parser)
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print the table as JSON")
+    add_shared(parser, "errors in")
+    add("--json", bool, "print the table as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Sequence
-from typing import Any, Final, NoReturn
+from collections.abc import Callable, Sequence
+from typing import Any, Final, NoReturn, TypeAlias
 
 from ..support.suggestions import did_you_mean
 from .paths import Input
@@ -30,6 +30,9 @@ _INPUT: Final = (
 _OUTPUT: Final = (
     "--output --output-topic --in-place --json --errors-in --progress --title --checksums"
 )
+
+#: What an argument takes: nothing (``bool``), one of some words, or a text and what it becomes.
+Kind: TypeAlias = type[bool] | tuple[str, ...] | Callable[[str], Any]
 
 
 class Parser(argparse.ArgumentParser):
@@ -115,6 +118,38 @@ class Parser(argparse.ArgumentParser):
             if a.required
         ]
         return f"{' '.join([self.prog, *needed])} [options]; {self.prog} --help lists them"
+
+
+def declare(
+    parser: argparse._ActionsContainer, spelled: str, kind: Kind, told: str, **more: Any
+) -> argparse.Action:
+    """Declare an argument in the form of its help, as ``"-o --output FILE"`` or ``"runs RUNS..."``.
+
+    ``told`` is its help, ``many=True`` lets an option be repeated, and ``more`` is what
+    `argparse.ArgumentParser.add_argument` takes besides.
+
+    Examples
+    --------
+    >>> parser = Parser()
+    >>> _ = declare(parser, "--rate HZ", float, "readings per second")
+    >>> _ = declare(parser, "--reference", ("polygon", "encoder"), "the artefact")
+    >>> parser.parse_args(["--rate", "20"])
+    Namespace(rate=20.0, reference=None)
+    """
+    names = spelled.split()
+    if len(names) > 1 and not names[-1].startswith("-"):
+        more["metavar"] = names.pop()
+        if more["metavar"].endswith("..."):
+            more |= {"metavar": more["metavar"][:-3], "nargs": "+"}
+    if kind is bool:
+        more["action"] = "store_true"
+    elif isinstance(kind, tuple):
+        more["choices"] = kind
+    elif kind is not str:
+        more["type"] = kind
+    if more.pop("many", False):
+        more["action"] = "append"
+    return parser.add_argument(*names, help=told, **more)
 
 
 def _group(names: Sequence[str], options: dict[str, Any]) -> str:

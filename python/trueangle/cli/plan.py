@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from ..selfcalibration.methods import PLANNED
 from ..support.files import SIMULATION
 from .options import refuse_given
+from .parser import declare
 from .paths import Input, Output
 from .signal_options import add_signals
 from .values import angle, arc, names, parse_orders, seconds
@@ -42,85 +44,73 @@ _OTHERS = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
-    add("--gear-ratio", type=float, metavar="R", help="motor turns per output turn")
+    add = partial(declare, parser)
+    add("--gear-ratio R", float, "motor turns per output turn")
     add(
         "--fixed-member",
-        choices=("circular_spline", "flexspline", "none"),
+        ("circular_spline", "flexspline", "none"),
+        "the member of the gear that stands still (default: %(default)s)",
         default="circular_spline",
-        help="the member of the gear that stands still (default: %(default)s)",
     )
-    add("--positions", type=int, metavar="N", help="positions per mount (default: 36)")
-    add("--mounts", type=int, metavar="J", help="mounts of the artefact (default: 2)")
+    add("--positions N", int, "positions per mount (default: 36)")
+    add("--mounts J", int, "mounts of the artefact (default: 2)")
     add(
         "--reference",
-        choices=("polygon", "off-null", "encoder"),
-        help="polygon: remount it; off-null: read the autocollimator at tilts instead; "
+        ("polygon", "off-null", "encoder"),
+        "polygon: remount it; off-null: read the autocollimator at tilts instead; "
         "encoder: a free reference encoder (default: polygon)",
     )
-    add(
-        "--tilt-arcsec",
-        type=float,
-        metavar="U",
-        help=f"off-null: largest tilt to both sides (default: {TILT:g})",
-    )
-    add("--tilts", type=int, metavar="T", help="off-null: tilts per facet (default: 2)")
-    add("--orders", metavar="1-17,202", help="orders wanted (default: 1-17 and the gear's own)")
-    add("--noise-arcsec", type=float, metavar="S", help="scatter of one reading")
-    add("--std-arcsec", type=float, metavar="U", help="standard error wanted: gives the readings")
-    of_arc = parser.add_argument_group("a joint that cannot turn once").add_argument
+    add("--tilt-arcsec U", float, f"off-null: largest tilt to both sides (default: {TILT:g})")
+    add("--tilts T", int, "off-null: tilts per facet (default: 2)")
+    add("--orders 1-17,202", str, "orders wanted (default: 1-17 and the gear's own)")
+    add("--noise-arcsec S", float, "scatter of one reading")
+    add("--std-arcsec U", float, "standard error wanted: gives the readings")
+    of_arc = partial(declare, parser.add_argument_group("a joint that cannot turn once"))
     of_arc(
-        "--arc",
-        type=arc,
-        metavar="START:STOP",
-        help="degrees; where to read on this arc (--arc=-135:135 where it starts below zero)",
+        "--arc START:STOP",
+        arc,
+        "degrees; where to read on this arc (--arc=-135:135 where it starts below zero)",
     )
-    of_arc("--readings", type=int, metavar="N", help="readings to spend (default: 60)")
-    of_arc("--runs", type=int, metavar="R", help="runs, each with a zero of its own (default: 1)")
-    of_arc("--both-directions", action="store_true", help="read every place from either side")
+    of_arc("--readings N", int, "readings to spend (default: 60)")
+    of_arc("--runs R", int, "runs, each with a zero of its own (default: 1)")
+    of_arc("--both-directions", bool, "read every place from either side")
+    of_arc("--apart DEG", float, "least distance of two places (default: none)")
     of_arc(
-        "--apart", type=float, metavar="DEG", help="least distance of two places (default: none)"
-    )
-    of_arc(
-        "--uncertainty",
-        type=angle,
-        metavar="U",
-        help="wanted at every place (k = 2), such as 2arcsec or 0.01deg: gives the readings "
+        "--uncertainty U",
+        angle,
+        "wanted at every place (k = 2), such as 2arcsec or 0.01deg: gives the readings "
         "(without --arc, over the whole turn)",
     )
     of_arc(
-        "--prior",
-        type=Input,
-        metavar="FLEET.json",
-        help="a unit like those of this fleet: how few readings are enough for --uncertainty, or "
+        "--prior FLEET.json",
+        Input,
+        "a unit like those of this fleet: how few readings are enough for --uncertainty, or "
         "what --readings are enough for",
     )
-    add("--json", action="store_true", help="print the plan as JSON")
+    add("--json", bool, "print the plan as JSON")
     add_after_arguments(parser)
     _add_self_arguments(parser)
 
 
 def _add_self_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of ``--self``."""
-    add = parser.add_argument_group("without a reference").add_argument
+    add = partial(declare, parser.add_argument_group("without a reference"))
     add(
-        "--self",
+        "--self METHOD",
+        PLANNED,
+        f"plan a calibration without a reference: {', '.join(PLANNED)}",
         dest="self_method",
-        choices=PLANNED,
-        metavar="METHOD",
-        help=f"plan a calibration without a reference: {', '.join(PLANNED)}",
     )
     add(
-        "--simulation",
-        type=Input,
-        metavar="FILE",
-        help="simulation file whose heads, shifts, coast and noise are planned with",
+        "--simulation FILE",
+        Input,
+        "simulation file whose heads, shifts, coast and noise are planned with",
     )
-    add("--count", type=int, metavar="N", help="heads or shifts (default: 3)")
-    add("--angles", metavar="0,90,180", help="angles of heads or shifts that are there")
-    add("--speed-ratio", type=float, metavar="R", help="start over end speed (5)")
-    add("--start-speed", type=float, metavar="F", help="turns per second at the start")
-    add("--rate", type=float, metavar="HZ", help="readings per second")
+    add("--count N", int, "heads or shifts (default: 3)")
+    add("--angles 0,90,180", str, "angles of heads or shifts that are there")
+    add("--speed-ratio R", float, "start over end speed (5)")
+    add("--start-speed F", float, "turns per second at the start")
+    add("--rate HZ", float, "readings per second")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -258,41 +248,27 @@ def _angles(text: str) -> list[float]:
 
 def add_after_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of ``--after``."""
-    add = parser.add_argument_group("after a diagnosis that could not tell").add_argument
+    add = partial(declare, parser.add_argument_group("after a diagnosis that could not tell"))
     add(
-        "--after",
-        nargs="+",
-        type=Input,
-        metavar="RUNS",
-        help="the runs measured so far: which to measure next, with --simulation what is believed",
+        "--after RUNS...",
+        Input,
+        "the runs measured so far: which to measure next, with --simulation what is believed",
     )
+    add("--between A,B", names, "causes to tell apart (default: all that the diagnosis could not)")
     add(
-        "--between",
-        type=names,
-        metavar="A,B",
-        help="causes to tell apart (default: all that the diagnosis could not)",
-    )
-    add(
-        "--limits",
-        type=Input,
-        metavar="FILE",
-        help="what a run may be: TOML, table [limits] with arc_deg, speed_deg_s, temperature_C, "
+        "--limits FILE",
+        Input,
+        "what a run may be: TOML, table [limits] with arc_deg, speed_deg_s, temperature_C, "
         "torque_Nm, gravity_Nm, mount_deg, current_A, samples, runs, reversals (default: one turn "
         "or the arc measured so far, 1 to 60 deg/s, loads and temperatures as seen)",
     )
-    add(
-        "--seeds",
-        type=int,
-        metavar="N",
-        help="simulated diagnoses of each cause in question (default: 10)",
-    )
-    add("--within", type=seconds, metavar="TIME", help="time that it may take (default: 10s)")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Output.of(SIMULATION),
-        metavar="FILE",
-        help="write the runs as a simulation file, ready for simulate",
+    add("--seeds N", int, "simulated diagnoses of each cause in question (default: 10)")
+    add("--within TIME", seconds, "time that it may take (default: 10s)")
+    declare(
+        parser,
+        "-o --output FILE",
+        Output.of(SIMULATION),
+        "write the runs as a simulation file, ready for simulate",
     )
     add_signals(parser)
 

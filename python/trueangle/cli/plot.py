@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from ..support.files import PICTURE
 from ..support.layout import laid_out
 from ..support.plainresult import json_text
-from .options import add_errors_in, add_joint, add_orders, errors_in, refuse_given
+from .options import add_joint, add_shared, errors_in, refuse_given
+from .parser import declare
 from .paths import Input, Output
 from .pictures import save_picture
 from .robotmodel import model_asked, refuse_joint
@@ -24,34 +26,26 @@ EXAMPLE = "trueangle plot joint_a.csv -o joint_a.png"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
+    add = partial(declare, parser)
+    add("files MODEL|RUNS...", Input, "a model file (.json), or files of readings")
     add(
-        "files",
-        nargs="+",
-        type=Input,
-        metavar="MODEL|RUNS",
-        help="a model file (.json), or files of readings",
-    )
-    add(
-        "-o",
-        "--output",
+        "-o --output FILE",
+        Output.of(PICTURE),
+        "the picture to write: PNG, SVG or PDF, by its ending",
         required=True,
-        type=Output.of(PICTURE),
-        metavar="FILE",
-        help="the picture to write: PNG, SVG or PDF, by its ending",
     )
     add(
         "--kind",
-        choices=("errors", "spectrum", "phases", "residuals"),
-        default="errors",
-        help="of runs: errors over the angle (default), amplitudes of the orders, phases over the "
+        ("errors", "spectrum", "phases", "residuals"),
+        "of runs: errors over the angle (default), amplitudes of the orders, phases over the "
         "runs, or what the fit leaves",
+        default="errors",
     )
-    add_orders(parser)
+    add_shared(parser, "orders")
     add_joint(parser)
-    add("--joint", metavar="NAME", help="of the model file of a robot, this joint")
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print what was drawn as JSON")
+    add("--joint NAME", str, "of the model file of a robot, this joint")
+    add_shared(parser, "errors in")
+    add("--json", bool, "print what was drawn as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

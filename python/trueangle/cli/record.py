@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import math
+from functools import partial
 from pathlib import Path
 
 from .ending import put_off_ending
-from .options import add_errors_in, add_runs_output, errors_in
+from .options import add_shared, errors_in
+from .parser import declare
 from .signal_options import add_signals, signals_of_both
 from .source_options import (
     SOURCES,
@@ -26,35 +28,33 @@ ENDED = 3
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
+    add = partial(declare, parser)
     add(
-        "sources",
-        nargs="+",
-        type=source_argument,
-        metavar="SOURCE",
-        help=f"{SOURCES}, or a file that grows; two, of the indicated angle and of the "
+        "sources SOURCE...",
+        source_argument,
+        f"{SOURCES}, or a file that grows; two, of the indicated angle and of the "
         "reference, are joined by the time of arrival",
     )
-    add_runs_output(parser)
-    add("--append", action="store_true", help="add a run to an output that is there")
-    add("--label", metavar="NAME", help="label of the run (default: the next number)")
-    add("--for", dest="seconds", type=seconds, metavar="60s", help="end after so long")
+    add_shared(parser, "runs output")
+    add("--append", bool, "add a run to an output that is there")
+    add("--label NAME", str, "label of the run (default: the next number)")
+    add("--for 60s", seconds, "end after so long", dest="seconds")
     add(
         "--until",
-        choices=("orders", "coverage"),
-        help="end when a turn has changed no order by more than its standard error, or when "
+        ("orders", "coverage"),
+        "end when a turn has changed no order by more than its standard error, or when "
         "the whole turn has been read",
     )
-    add("--rate", type=float, metavar="HZ", help="readings per second to keep, at most")
+    add("--rate HZ", float, "readings per second to keep, at most")
     add_source_options(parser)
     add_signals(parser, runs=False, topic=False, channels=False)
     add(
         "--progress",
-        choices=("auto", "text", "json", "none"),
+        ("auto", "text", "json", "none"),
+        "on stderr (default: a screen of text on a terminal)",
         default="auto",
-        help="on stderr (default: a screen of text on a terminal)",
     )
-    add_errors_in(parser)
+    add_shared(parser, "errors in")
 
 
 def run(args: argparse.Namespace) -> int:

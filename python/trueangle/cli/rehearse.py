@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from ..support.deadline import ending_early
 from ..support.files import PICTURE
-from .options import add_progress
+from .options import add_shared
+from .parser import declare
 from .paths import Input, Output
 from .pictures import save_picture
 from .values import names, seconds
@@ -17,31 +19,20 @@ EXAMPLE = "trueangle rehearse joint.toml --within 5min --plot detection.png"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
+    add = partial(declare, parser)
     add(
-        "simulation",
-        type=Input,
-        metavar="SIMULATION",
-        help="simulation file (TOML) with the joint, its noise and the planned runs",
+        "simulation SIMULATION",
+        Input,
+        "simulation file (TOML) with the joint, its noise and the planned runs",
     )
-    add(
-        "--causes",
-        type=names,
-        metavar="A,B",
-        help="causes to hide (default: all)",
-    )
-    add("--seeds", type=int, default=20, metavar="N", help="trials of a cause at most (default 20)")
-    add("--seed", type=int, default=0, metavar="N", help="of the random numbers (default 0)")
-    add(
-        "--within",
-        type=seconds,
-        metavar="TIME",
-        help="give what was found in that time, as 60s, 5min or seconds",
-    )
-    add("--workers", type=int, metavar="N", help="processes side by side (default: every core)")
-    add("--plot", type=Output.of(PICTURE), metavar="FILE", help="write the picture as well")
-    add_progress(parser)
-    add("--json", action="store_true", help="print the result as JSON")
+    add("--causes A,B", names, "causes to hide (default: all)")
+    add("--seeds N", int, "trials of a cause at most (default 20)", default=20)
+    add("--seed N", int, "of the random numbers (default 0)", default=0)
+    add("--within TIME", seconds, "give what was found in that time, as 60s, 5min or seconds")
+    add("--workers N", int, "processes side by side (default: every core)")
+    add("--plot FILE", Output.of(PICTURE), "write the picture as well")
+    add_shared(parser, "progress")
+    add("--json", bool, "print the result as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from ..support.deadline import with_deadline
 from ..support.files import PDF, REPORT
 from ..support.plainresult import json_text
-from .options import (
-    add_errors_in,
-    add_joint,
-    add_orders,
-    add_progress,
-    errors_in,
-    refuse_given,
-)
+from .options import add_joint, add_shared, errors_in, refuse_given
+from .parser import declare
 from .paths import Input, Output
 from .robots import add_robot, each_joint, joints_asked
 from .values import declared_shafts, orders_by_shaft
@@ -30,67 +25,47 @@ EXAMPLE = "trueangle report joint_a.csv --simulation joint.toml -o report.html"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
-    add("runs", nargs="+", type=Input, metavar="RUNS", help="calibration runs, CSV or Parquet")
+    add = partial(declare, parser)
+    add("runs RUNS...", Input, "calibration runs, CSV or Parquet")
     add(
-        "-o",
-        "--output",
+        "-o --output FILE",
+        Output.of(REPORT),
+        "the report to write: HTML, or PDF where the name ends so",
         required=True,
-        type=Output.of(REPORT),
-        metavar="FILE",
-        help="the report to write: HTML, or PDF where the name ends so",
     )
-    add(
-        "--simulation",
-        type=Input,
-        metavar="FILE",
-        help="say what this simulation gets wrong, and why",
-    )
-    add_orders(parser)
+    add("--simulation FILE", Input, "say what this simulation gets wrong, and why")
+    add_shared(parser, "orders")
     add_joint(parser)
     add_robot(parser)
-    add("--title", help="heading of the report")
+    add("--title", str, "heading of the report")
     add(
-        "--model",
-        type=Input,
-        metavar="MODEL",
-        help="say of this model how it was made, what it cannot see and what it leaves of the "
+        "--model MODEL",
+        Input,
+        "say of this model how it was made, what it cannot see and what it leaves of the "
         "runs; in a certificate the values as left, after those as found",
     )
     add(
-        "--certificate",
-        type=Input,
-        metavar="IDENTITY",
-        help="write a calibration certificate (PDF) with what this TOML file says of the item, "
+        "--certificate IDENTITY",
+        Input,
+        "write a calibration certificate (PDF) with what this TOML file says of the item, "
         "the laboratory and the type B uncertainties",
     )
-    add("--positions", type=int, metavar="N", help="nominal positions of a certificate (36)")
+    add("--positions N", int, "nominal positions of a certificate (36)")
     add(
         "--fleet",
-        action="store_true",
-        help="of the units against each other, as the command fleet judges them: one page",
+        bool,
+        "of the units against each other, as the command fleet judges them: one page",
     )
     add(
         "--by",
-        choices=("unit", "run"),
-        help="what tells the units of --fleet apart (default: the column unit; without one, the "
-        "runs)",
+        ("unit", "run"),
+        "what tells the units of --fleet apart (default: the column unit; without one, the runs)",
     )
-    add(
-        "--permitted-arcsec",
-        type=float,
-        metavar="E",
-        help="with --fleet: error from which a calibration is due",
-    )
-    add_errors_in(parser)
-    add(
-        "--pdf",
-        type=Output.of(PDF),
-        metavar="FILE",
-        help="print it to a PDF too, by an installed browser",
-    )
-    add_progress(parser)
-    add("--json", action="store_true", help="print the report's numbers as JSON")
+    add("--permitted-arcsec E", float, "with --fleet: error from which a calibration is due")
+    add_shared(parser, "errors in")
+    add("--pdf FILE", Output.of(PDF), "print it to a PDF too, by an installed browser")
+    add_shared(parser, "progress")
+    add("--json", bool, "print the report's numbers as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from ..support.files import SIMULATION
 from ..support.plainresult import json_text
+from .parser import declare
 from .paths import Input, Output
 
 HELP = "write a robot file: names and gear ratios of the joints of a URDF"
@@ -14,24 +16,21 @@ EXAMPLE = "trueangle robot --from-urdf arm.urdf -o robot.toml"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
+    add = partial(declare, parser)
     add(
-        "--from-urdf",
-        type=Input,
-        required=True,
-        metavar="URDF",
-        help="robot description: its revolute and continuous joints, in their order, and the "
+        "--from-urdf URDF",
+        Input,
+        "robot description: its revolute and continuous joints, in their order, and the "
         "mechanicalReduction of their transmissions",
+        required=True,
     )
     add(
-        "-o",
-        "--output",
+        "-o --output FILE",
+        Output.of(SIMULATION),
+        "robot file to write (TOML); add the columns of the reference there",
         required=True,
-        type=Output.of(SIMULATION),
-        metavar="FILE",
-        help="robot file to write (TOML); add the columns of the reference there",
     )
-    add("--json", action="store_true", help="print the joints as JSON")
+    add("--json", bool, "print the joints as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import ArgumentError, NoModelError, NotInvertibleError, RankError, TrueAngleError
 from ..support.display_units import ErrorsIn
+from .parser import declare
 from .signal_options import of_joint, signal_option, signals_by_joint
 
 if TYPE_CHECKING:
@@ -45,18 +46,15 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments that name joints."""
     from .paths import Input
 
-    parser.add_argument(
-        "--robot",
-        type=Input,
-        metavar="FILE",
-        help="robot file (TOML) with the gear and the columns of every joint: the command is "
+    declare(
+        parser,
+        "--robot FILE",
+        Input,
+        "robot file (TOML) with the gear and the columns of every joint: the command is "
         "about each of them; `trueangle robot` writes one. --signal JOINT.ROLE=NAME does as well",
     )
-    parser.add_argument(
-        "--joint",
-        action="append",
-        metavar="NAME",
-        help="of the robot, this joint only (may be repeated)",
+    declare(
+        parser, "--joint NAME", str, "of the robot, this joint only (may be repeated)", many=True
     )
 
 

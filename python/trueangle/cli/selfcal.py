@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from ..selfcalibration.methods import LOOPS, METHODS
 from ..support.plainresult import json_text
-from .options import add_errors_in, add_model_output, errors_in
+from .options import add_shared, errors_in
+from .parser import declare
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, save_models
 from .signal_options import add_signals, reading_options
@@ -25,44 +27,40 @@ EXAMPLE = "trueangle selfcal coast.csv -o joint.json --loop open"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
-    add("logs", nargs="+", type=Input, metavar="LOGS", help="CSV or Parquet logs of the joint")
-    add_model_output(parser)
+    add = partial(declare, parser)
+    add("logs LOGS...", Input, "CSV or Parquet logs of the joint")
+    add_shared(parser, "model output")
     add(
         "--method",
-        choices=("auto", *METHODS),
-        default="auto",
-        help="auto (default) looks at the columns: time_s, head1_deg, shift_deg, motor_deg, sine "
+        ("auto", *METHODS),
+        "auto (default) looks at the columns: time_s, head1_deg, shift_deg, motor_deg, sine "
         "and cosine",
+        default="auto",
     )
-    add("--orders", default="auto", help="auto (default: those that stand out), 1-24 or 1,4,8")
+    add("--orders", str, "auto (default: those that stand out), 1-24 or 1,4,8", default="auto")
     add(
         "--loop",
-        choices=LOOPS,
+        LOOPS,
+        "was the speed held by a loop closed on this encoder? (default: %(default)s)",
         default="unknown",
-        help="was the speed held by a loop closed on this encoder? (default: %(default)s)",
     )
-    add("--loop-bandwidth", type=float, metavar="HZ", help="of that loop")
-    add("--gear-ratio", type=float, metavar="R", help="motor turns per output turn: stays as given")
+    add("--loop-bandwidth HZ", float, "of that loop")
+    add("--gear-ratio R", float, "motor turns per output turn: stays as given")
+    add("--fit-ratio", bool, "estimate the gear ratio jointly with orders 1 and 2 of the output")
     add(
-        "--fit-ratio",
-        action="store_true",
-        help="estimate the gear ratio jointly with orders 1 and 2 of the output",
-    )
-    add(
-        "--ripple",
+        "--ripple auto|none|1-4",
+        str,
+        "orders at which the speed may ripple (default: all, weighed by the evidence)",
         default="auto",
-        metavar="auto|none|1-4",
-        help="orders at which the speed may ripple (default: all, weighed by the evidence)",
     )
     add(
-        "--head-angles",
-        metavar="0,119.2,203.7",
-        help="where the heads stand, degrees, if their readings share one zero",
+        "--head-angles 0,119.2,203.7",
+        str,
+        "where the heads stand, degrees, if their readings share one zero",
     )
     add_signals(parser, runs=False)
-    add_errors_in(parser)
-    add("--json", action="store_true", help="print the result as JSON")
+    add_shared(parser, "errors in")
+    add("--json", bool, "print the result as JSON")
     add_robot(parser)
 
 

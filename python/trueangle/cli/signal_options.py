@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from ..errors import ArgumentError
+from .parser import declare
 from .paths import Input
 
 #: The roles, as every help names them.
@@ -27,54 +29,46 @@ def add_signals(
     channels: bool = True,
 ) -> None:
     """Declare ``--signal`` and what belongs to it; of ``runs``, what their reference is made of."""
-    add = parser.add_argument
+    add = partial(declare, parser)
     signal = add(
-        "--signal",
-        action="append",
-        type=signal_option,
-        metavar="[JOINT.]ROLE=NAME[:UNIT]",
-        help=f"column that holds a role, and its unit (deg, rad, turn, count, arcsec, arcmin; "
+        "--signal [JOINT.]ROLE=NAME[:UNIT]",
+        signal_option,
+        f"column that holds a role, and its unit (deg, rad, turn, count, arcsec, arcmin; "
         f"s, ms, us, ns; deg/s, rad/s, turn/s); may be repeated; -NAME is a reversed sensor. "
         f"Roles: {ROLES}. Without it "
         "columns are found by their names: reference_deg, time_s, 'pos act [rad]'",
+        many=True,
     )
     signal.words = tuple(  # type: ignore[attr-defined]  # what a shell completes
         f"{role.removesuffix(' ...')}=" for role in ROLES.split(", ")
     )
     if counts:
-        add("--counts-per-turn", type=float, metavar="N", help="of an indicated angle in counts")
+        add("--counts-per-turn N", float, "of an indicated angle in counts")
     if reference:
-        add(
-            "--counts-per-turn-reference",
-            type=float,
-            metavar="N",
-            help="of a reference in counts",
-        )
+        add("--counts-per-turn-reference N", float, "of a reference in counts")
     if channels:
         add(
-            "--periods-per-turn",
-            type=int,
-            metavar="P",
-            help="periods in a turn of the channels sine and cosine, of which the angle is made",
+            "--periods-per-turn P",
+            int,
+            "periods in a turn of the channels sine and cosine, of which the angle is made",
         )
     if topic:
         add(
-            "--topic",
-            metavar="NAME",
-            help="JointState topic of a ROS bag (default: the only one); join takes two, A,B",
+            "--topic NAME",
+            str,
+            "JointState topic of a ROS bag (default: the only one); join takes two, A,B",
         )
     if runs:
         add(
-            "--facets",
-            type=Input,
-            metavar="FILE",
-            help="calibrated deviations of a polygon's facets, added to the reference at its "
+            "--facets FILE",
+            Input,
+            "calibrated deviations of a polygon's facets, added to the reference at its "
             "nominal angles: columns reference_deg and deviation_arcsec",
         )
         add(
-            "--unit-from",
-            metavar="REGEX",
-            help="what this finds in the path of a file (its first group) is the unit that its "
+            "--unit-from REGEX",
+            str,
+            "what this finds in the path of a file (its first group) is the unit that its "
             "runs belong to",
         )
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from ..support.layout import counted
 from ..support.plainresult import json_text
-from .options import add_runs_output
+from .options import add_shared
+from .parser import declare
 from .paths import Input
 
 HELP = "measure a simulated joint: calibration runs from a simulation file"
@@ -15,16 +17,11 @@ EXAMPLE = "trueangle simulate joint.toml -o runs.csv --seed 1"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
-    add(
-        "simulation",
-        type=Input,
-        metavar="FILE",
-        help="simulation file (TOML) with at least one [[run]]",
-    )
-    add_runs_output(parser)
-    add("--seed", type=int, default=0, metavar="N", help="seed of the noise (default: 0)")
-    add("--json", action="store_true", help="print what was written as JSON")
+    add = partial(declare, parser)
+    add("simulation FILE", Input, "simulation file (TOML) with at least one [[run]]")
+    add_shared(parser, "runs output")
+    add("--seed N", int, "seed of the noise (default: 0)", default=0)
+    add("--json", bool, "print what was written as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import os
+from functools import partial
 from typing import TYPE_CHECKING
 
+from .parser import declare
 from .paths import Input
 
 if TYPE_CHECKING:
@@ -28,25 +30,24 @@ def source_argument(text: str) -> str:
 
 def add_source_options(parser: argparse.ArgumentParser) -> None:
     """Declare what sources are opened with, and how their lines are read."""
-    add = parser.add_argument
-    add("--baud", type=int, metavar="N", help="of a serial port (default: 115200)")
+    add = partial(declare, parser)
+    add("--baud N", int, "of a serial port (default: 115200)")
     add(
-        "--dbc",
-        type=Input,
-        metavar="FILE",
-        help="description of a CAN bus; without one signals are ID:byte:length:scale, as "
+        "--dbc FILE",
+        Input,
+        "description of a CAN bus; without one signals are ID:byte:length:scale, as "
         "--signal indicated=0x101:0:2:0.02197:deg (length 2s is signed, 2b big-endian)",
     )
     add(
-        "--pattern",
-        metavar="REGEX",
-        help="a row's columns as named groups, as 'S(?P<step>\\d+) R(?P<raw>\\d+)' "
+        "--pattern REGEX",
+        str,
+        "a row's columns as named groups, as 'S(?P<step>\\d+) R(?P<raw>\\d+)' "
         "(default: CSV, name:value pairs, numbers or JSON, found by the first lines)",
     )
     add(
-        "--send",
-        metavar="TEXT",
-        help="line to send to the device at the start (a frame ID#DATA on CAN); without it "
+        "--send TEXT",
+        str,
+        "line to send to the device at the start (a frame ID#DATA on CAN); without it "
         "nothing is sent",
     )
 

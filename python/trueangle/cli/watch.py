@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from ..support.files import PAGE, PICTURE
 from ..support.plainresult import json_text
-from .options import add_errors_in, errors_in, refuse_given
+from .options import add_shared, errors_in, refuse_given
+from .parser import declare
 from .paths import Input, Output
 from .pictures import save_picture
 from .robotmodel import joint_asked, refuse_joint
@@ -39,60 +41,47 @@ ALARMED = 3
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add = parser.add_argument
+    add = partial(declare, parser)
     add(
-        "log",
-        type=source_argument,
-        metavar="SOURCE",
-        help="log with a reference and an indicated angle, or with the error; or lines as they "
+        "log SOURCE",
+        source_argument,
+        "log with a reference and an indicated angle, or with the error; or lines as they "
         f"arrive, from {SOURCES}",
     )
+    add("-m --model MODEL", Input, "model file, also of a robot (--joint)", required=True)
     add(
-        "-m",
-        "--model",
-        required=True,
-        type=Input,
-        metavar="MODEL",
-        help="model file, also of a robot (--joint)",
-    )
-    add(
-        "--every",
-        type=turns,
+        "--every 1turn",
+        turns,
+        "travel of a window, in turns of the output (default: 1turn)",
         default=1.0,
-        metavar="1turn",
-        help="travel of a window, in turns of the output (default: 1turn)",
     )
     add(
-        "--shift",
-        type=float,
+        "--shift S",
+        float,
+        "shift looked for, in standard deviations of a window (default: %(default)g)",
         default=1.0,
-        metavar="S",
-        help="shift looked for, in standard deviations of a window (default: %(default)g)",
     )
     add(
-        "--run-length",
-        type=float,
+        "--run-length N",
+        float,
+        "windows until a false alarm, on average (default: %(default)g)",
         default=465.0,
-        metavar="N",
-        help="windows until a false alarm, on average (default: %(default)g)",
     )
     add_source_options(parser)
     add_signals(parser)
     add_robot(parser)
-    add_errors_in(parser)
+    add_shared(parser, "errors in")
     add(
-        "--plot",
-        type=Output.of(PICTURE),
-        metavar="FILE",
-        help="draw the charts of all windows, at the end (needs trueangle[plot])",
+        "--plot FILE",
+        Output.of(PICTURE),
+        "draw the charts of all windows, at the end (needs trueangle[plot])",
     )
     add(
-        "--report",
-        type=Output.of(PAGE),
-        metavar="FILE",
-        help="write a page with the alarms and charts of all windows, at the end",
+        "--report FILE",
+        Output.of(PAGE),
+        "write a page with the alarms and charts of all windows, at the end",
     )
-    add("--json", action="store_true", help="print one object per window and line")
+    add("--json", bool, "print one object per window and line")
 
 
 def run(args: argparse.Namespace) -> int:
