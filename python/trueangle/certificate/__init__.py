@@ -8,11 +8,10 @@ texts, `typesetting` makes the PDF.
 
 from __future__ import annotations
 
-from .budget import Budget, Contribution
+from .budget import Budget, Contribution, Estimates, propagated
 from .conformity import Specification, conformance_probability, conformity
 from .document import Certificate, certify
 from .identity import Identity, load_identity
-from .propagation import Estimates, propagated
 
 __all__ = [
     "Budget",

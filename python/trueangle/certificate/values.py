@@ -21,8 +21,7 @@ from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.distributions import f_tail
-from .budget import LEVEL, Contribution
-from .propagation import propagated
+from .budget import LEVEL, Contribution, propagated
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult

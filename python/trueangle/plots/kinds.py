@@ -8,12 +8,12 @@ from ..errors import TrueAngleError
 from ..support.suggestions import check_choice
 from .amplitudespectrum import amplitude_spectrum
 from .canvas import as_image, small_pictures
-from .detection import detection
 from .diagnosispictures import gains
 from .drawnreadings import error_curves, residuals
 from .fleetpictures import fleet_plot
 from .modelerror import model_error
 from .phasesoverruns import phases_over_runs
+from .planpictures import detection
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

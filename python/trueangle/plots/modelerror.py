@@ -10,7 +10,7 @@ from ..support.display_units import ErrorsIn, error_unit, significant_digits, si
 from ..support.layout import counted
 from .canvas import described, legend, new_axes, turn_axis
 from .curves import fitted_degrees, model_curve, strong_gear_order
-from .drawnpanel import draw_panel_curve
+from .drawnreadings import draw_panel_curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,6 +1,7 @@
 """Panels of a picture of readings: clouds of dots, medians, a magnified segment; draws nothing.
 
-A picture is described once and drawn by `trueangle.plots.drawnpanel`, for a figure and for a page.
+A picture is described once and drawn by `trueangle.plots.drawnreadings`, for a figure and for
+a page.
 """
 
 from __future__ import annotations

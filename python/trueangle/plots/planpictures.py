@@ -1,4 +1,4 @@
-"""A calibration plan: where to read, and which orders those positions separate."""
+"""Pictures of plans and rehearsals: where to read, which orders and causes that tells apart."""
 
 from __future__ import annotations
 
@@ -7,13 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import ArgumentError
 from . import palette
-from .canvas import described, grid, new_axes
+from .canvas import described, grid, new_axes, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from ..planning.mountplan import CalibrationPlan
+    from ..rehearsal import Rehearsal, RehearsedCause
+
+#: Small pictures side by side.
+_COLUMNS = 4
+#: Numbers at a size axis.
+_TICKS = 4
 
 
 def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
@@ -103,3 +111,86 @@ def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     )
     text = f"Noise factor of {len(orders)} wanted orders: {told}."
     return described(ax, text, "Noise factor of every wanted order")
+
+
+def detection(rehearsal: Rehearsal) -> Figure:
+    """Share of the trials in which each cause was named, against its size.
+
+    Points are the sizes tried with 95 % binomial intervals, the line the chance they speak for,
+    dashed verticals the sizes named in 50 and 95 %. Causes that were never hidden are left out.
+
+    Parameters
+    ----------
+    rehearsal : Rehearsal
+
+    Returns
+    -------
+    matplotlib Figure
+        It has a small picture for every cause, and so takes no axes.
+
+    Raises
+    ------
+    ArgumentError
+        No cause was hidden: there is nothing to draw.
+    """
+    causes = [cause for cause in rehearsal.causes if cause.trials]
+    if not causes:
+        raise ArgumentError("nothing was hidden in this rehearsal: there is nothing to draw")
+    columns = min(_COLUMNS, len(causes))
+    rows = -(-len(causes) // columns)
+    figure, axes = new_figure(rows, columns, width=2.6 * columns + 0.6, height=2.1 * rows + 0.4)
+    for ax, cause in zip(axes, causes, strict=False):
+        _draw(ax, cause)
+    for ax in axes[::columns]:
+        ax.set_ylabel("share named", fontsize="small")
+    for ax in axes[len(causes) :]:
+        ax.remove()
+    return figure
+
+
+def _size_ticks(ax: Axes) -> None:
+    """At most `_TICKS` plain numbers: those of matplotlib run into each other here."""
+    low, high = sorted(ax.get_xlim())
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for marks in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
+        ticks = [m * 10.0**d for d in decades for m in marks if low <= m * 10.0**d <= high]
+        if len(ticks) <= _TICKS:
+            break
+    ticks = ticks[:: -(-len(ticks) // _TICKS)] if ticks else [math.sqrt(low * high)]
+    ax.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
+    ax.minorticks_off()
+
+
+def _draw(ax: Axes, cause: RehearsedCause) -> None:
+    size = np.array([*cause.tried])
+    entries = cause.to_dict()["tried"]
+    share = np.array([entry["named"] / entry["trials"] for entry in entries])
+    ends = np.array([entry["interval"] for entry in entries]).T
+    spread = np.abs(ends - share)
+    ax.errorbar(
+        size, share, yerr=spread, fmt="o", color=palette.AFTER, markersize=4.0, linewidth=1.0
+    )
+    if cause.curve:
+        x, y = np.array(cause.curve).T
+        ax.plot(x, y, color=palette.ink(ax), linewidth=1.2)
+    for value in (cause.named_50, cause.named_95):
+        if value is not None:
+            ax.axvline(value, color=palette.WARNING, linestyle="--", linewidth=1.0)
+    ax.set_xscale("log")
+    if size.size == 1:
+        ax.set_xlim(size[0] / 2.0, size[0] * 2.0)
+    if not cause.grows:
+        ax.invert_xaxis()
+    _size_ticks(ax)
+    ax.set_ylim(-0.05, 1.05)
+    ax.set_title(cause.cause, fontsize="small")
+    ax.set_xlabel(cause.size_name, fontsize="small")
+    ax.tick_params(labelsize="x-small")
+    grid(ax)
+    named = ", ".join(
+        f"{share} at {'no size tried' if value is None else f'{value:.3g}'}"
+        for share, value in (("50 %", cause.named_50), ("95 %", cause.named_95))
+    )
+    described(
+        ax, f"Share of trials in which {cause.cause} was named by {cause.size_name}: {named}."
+    )

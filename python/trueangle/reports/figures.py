@@ -13,9 +13,8 @@ from ..fitting.phases import run_phases
 from ..plots import curves
 from ..plots.amplitudespectrum import draw_spectrum, spectrum_text
 from ..plots.curves import Points
-from ..plots.diagnosispictures import draw_error_left
-from ..plots.drawnpanel import draw_panel
-from ..plots.factorpictures import draw_factor, factor_title
+from ..plots.diagnosispictures import draw_error_left, draw_factor, factor_title
+from ..plots.drawnreadings import draw_panel
 from ..plots.orderlines import order_lines
 from ..plots.pagechart import page_axes, page_chart
 from ..plots.panel import PanelPicture

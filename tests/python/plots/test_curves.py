@@ -15,8 +15,8 @@ from trueangle.certificate.typesetting import certified_errors
 from trueangle.fitting.phases import run_phases
 from trueangle.plots import curves
 from trueangle.plots.curves import Points
-from trueangle.plots.detection import _size_ticks, detection
 from trueangle.plots.diagnosispictures import error_left, gains
+from trueangle.plots.planpictures import _size_ticks, detection
 from trueangle.plots.readingpictures import before_after_picture, residual_picture
 from trueangle.rehearsal.cause import RehearsedCause
 from trueangle.support.display_units import error_unit

@@ -72,7 +72,7 @@ FORBIDDEN = {
     "drawing": ("model/corrector.py", "from ..plots import curves", "plots stands above model"),
     "drawing, by the full name": ("model/model.py", "import trueangle.plots.palette", "above"),
     "reports": ("diagnosis/levels.py", "from ..reports import page", "reports stands above"),
-    "a fit by a picture": ("plots/detection.py", "from ..fitting import fit", "do not fit"),
+    "a fit by a picture": ("plots/planpictures.py", "from ..fitting import fit", "do not fit"),
     "a format and a model": ("formats/__init__.py", "from ..model import model", "above formats"),
     "an effect and a diagnosis": ("effects/backlash.py", "from .. import diagnosis", "above"),
     "a fit and a diagnosis": ("fitting/fit.py", "from ..diagnosis import gain", "above fitting"),
