@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import FileError
 from ..fitting.prior import Prior
-from ..joint.shafts import ShaftOrders
+from ..joint.shafts import MOST_ORDERS, ShaftOrders
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.argumentkinds import told_kinds
 from ..support.decoding import Decoder, Entries, json_value, read_text
@@ -37,9 +37,8 @@ _SHAFT = ("name", "cycles_per_turn", "orders")
 _TOLERANCE = ("share", "confidence", "factor", "method", "peak_to_peak_arcsec", "left_arcsec")
 _HISTORY = (*(name for name in HistoryRow._fields if name != "bound"), "bound_arcsec")
 
-#: Units, and orders of each, at most.
+#: Units, at most.
 _MOST_UNITS = 2_000_000
-_MOST_ORDERS = 4096
 
 
 @told_kinds
@@ -88,7 +87,7 @@ class _FleetReader(Decoder):
             tuple(self.each(content["notes"], "notes", self.text)),
         )
 
-    def each(self, value: Any, key: str, read: Any, most: int = _MOST_ORDERS) -> list[Any]:
+    def each(self, value: Any, key: str, read: Any, most: int = MOST_ORDERS) -> list[Any]:
         entries = self.items(value, key, "entries", most)
         return [read(entry, f"{key}[{i}]") for i, entry in enumerate(entries)]
 
@@ -146,7 +145,7 @@ class _FleetReader(Decoder):
         )
 
     def coefficients(self, value: Any, key: str) -> tuple[float, ...]:
-        return self.numbers(value, key, 2 * _MOST_ORDERS)
+        return self.numbers(value, key, 2 * MOST_ORDERS)
 
     def shaft(self, value: Any, key: str) -> ShaftOrders:
         of = self.entries(value, _SHAFT, key)

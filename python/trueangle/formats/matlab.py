@@ -17,10 +17,7 @@ from .budget import FileExtent
 from .damage import damage_told
 from .format import Batch, Contents, CopyTask, Selection, check_lengths, note, row_labels
 from .matlab4 import NOTE, count_of_added, note_name
-from .matlabelements import array_places, check_elements
-
-#: Bytes of the header of a file, whose last two tell the order of bytes.
-_HEADER = 128
+from .matlabelements import HEADER, array_places, check_elements
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -55,7 +52,7 @@ def copy(task: CopyTask) -> Contents:
     The bytes of the source stay as they are.
     """
     data = task.source.read_bytes()
-    if data[_HEADER - 2 : _HEADER] != b"IM":
+    if data[HEADER - 2 : HEADER] != b"IM":
         raise FileError(
             task.source,
             "has a damaged header or its bytes the other way round; save it with -v7 or -v7.3",
@@ -80,7 +77,7 @@ def copy(task: CopyTask) -> Contents:
     savemat(extra, {**made, **made_note}, do_compression=False, long_field_names=True)
     with task.target.open("wb") as file:
         file.write(data)
-        file.write(extra.getvalue()[_HEADER:])
+        file.write(extra.getvalue()[HEADER:])
     sums = {"source": f"{zlib.crc32(data):08x}:{len(data)}"}
     return Contents(rows, sums | {name: _sum(values) for name, values in made.items()})
 

@@ -16,7 +16,8 @@ from typing import Final, NamedTuple
 
 from . import budget
 
-_HEADER: Final = 128
+#: Bytes of the header of a file, whose last two tell the order of bytes.
+HEADER: Final = 128
 #: Bytes of a value by the type of an element.
 _SIZES: Final = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED = 1, 5, 6, 14, 15
@@ -47,11 +48,11 @@ def check_elements(data: bytes) -> None:
         An element that ends beyond its parent, or an array that its elements cannot fill; names
         the byte where it begins.
     """
-    order = {b"IM": "<", b"MI": ">"}.get(data[_HEADER - 2 : _HEADER])
+    order = {b"IM": "<", b"MI": ">"}.get(data[HEADER - 2 : HEADER])
     if order is None or data[:4].find(b"\0") >= 0:
         return
     left = budget.DECODED_BYTES
-    for element in _elements(data, _HEADER, len(data), order):
+    for element in _elements(data, HEADER, len(data), order):
         if element.kind == _COMPRESSED:
             whole = _inflated(data[element.start : element.stop], left)
             left -= len(whole)
@@ -62,9 +63,9 @@ def check_elements(data: bytes) -> None:
 
 def array_places(data: bytes) -> list[tuple[str, int]]:
     """Name and first byte of every array of a whole file; packed ones go without their name."""
-    order = "<" if data[_HEADER - 2 : _HEADER] == b"IM" else ">"
-    found, start = [], _HEADER
-    for element in _elements(data, _HEADER, len(data), order):
+    order = "<" if data[HEADER - 2 : HEADER] == b"IM" else ">"
+    found, start = [], HEADER
+    for element in _elements(data, HEADER, len(data), order):
         name = ""
         if element.kind == _MATRIX:
             parts = [*islice(_elements(data, element.start, element.stop, order), 3)]

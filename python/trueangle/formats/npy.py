@@ -18,7 +18,7 @@ from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, refuse_corrected, row_labels
 
 #: Readings taken together.
-_BLOCK = 1 << 18
+BLOCK = 1 << 18
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -36,8 +36,8 @@ def extent(path: Path, names: Sequence[str] = (), topic: str | None = None) -> F
 def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Columns ``names`` in batches; see `format.FormatModule`."""
     with _opened(path) as array:
-        for start in range(0, len(array), _BLOCK):
-            part = array[start : start + _BLOCK]
+        for start in range(0, len(array), BLOCK):
+            part = array[start : start + BLOCK]
             yield {name: _values(part, array, name) for name in wanted.names}
 
 
@@ -53,8 +53,8 @@ def copy(task: CopyTask) -> Contents:
         shape = (len(array),) if kind.names else (len(array), width + len(additions))
         write_header(output, kind, shape)
         check = 0
-        for start in range(0, len(array), _BLOCK):
-            part = array[start : start + _BLOCK]
+        for start in range(0, len(array), BLOCK):
+            part = array[start : start + BLOCK]
             put = np.empty((len(part), *shape[1:]), kind)
             if kind.names:
                 for name in array.dtype.names or ():
@@ -78,8 +78,8 @@ def contents(path: Path, topic: str | None = None) -> Contents:
     """Rows and a checksum of the array as it reads back."""
     check = 0
     with _opened(path) as array:
-        for start in range(0, len(array), _BLOCK):
-            part = np.ascontiguousarray(array[start : start + _BLOCK])
+        for start in range(0, len(array), BLOCK):
+            part = np.ascontiguousarray(array[start : start + BLOCK])
             check = zlib.crc32(part.tobytes(), check)
         return Contents(len(array), {"bytes": f"{check:08x}"})
 

@@ -19,10 +19,8 @@ from ..errors import FileError
 from .budget import FileExtent, check_part
 from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, check_lengths, note, row_labels
-from .npy import read_header, write_header
+from .npy import BLOCK, read_header, write_header
 
-#: Readings taken together.
-_BLOCK = 1 << 18
 #: Member of a copy that tells how its arrays were made.
 _NOTE = "trueangle.json"
 
@@ -167,13 +165,13 @@ def _batches(path: Path, archive: zipfile.ZipFile, names: Sequence[str]) -> Iter
             given = stack.enter_context(archive.open(f"{name}.npy"))
             column = _header(given)
             assert column is not None  # `columns` lists no other
-            check_part(path, column.kind.itemsize * min(column.size, _BLOCK), "array", name)
+            check_part(path, column.kind.itemsize * min(column.size, BLOCK), "array", name)
             streams[name] = (given, column)
         sizes = {name: column.size for name, (_given, column) in streams.items()}
         check_lengths(path, "arrays", sizes)
         size = next(iter(sizes.values()), 0)
-        for start in range(0, size, _BLOCK):
-            count = min(_BLOCK, size - start)
+        for start in range(0, size, BLOCK):
+            count = min(BLOCK, size - start)
             yield {name: _part(path, name, *stream, count) for name, stream in streams.items()}
 
 

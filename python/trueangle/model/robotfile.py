@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from ..errors import ArgumentError, ModelFileError
+from ..joint.description import MAX_JOINTS
 from ..support.argumentkinds import told_kinds
 from ..support.decoding import Decoder
 from .file import model_file_content, model_of_part
 from .robot import Robot
 from .writing import ROBOT_FORMAT
-
-#: Joints of one robot, at most.
-MAX_JOINTS: Final = 256
 
 _KEYS = {"format": True, "version": True, "name": False, "joints": True, "signals": False}
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Side of the box that vectors are drawn in; pages zoom into it.
 SIDE: Final = 10_000.0
+#: Height of the smaller charts of a page.
+LOW: Final = "height:11rem"
 #: Ends of strokes of no length that are dots, squares and diamonds, and their signs in legends.
 _ENDS: Final = {"o": "round", "s": "square", "D": "diamond"}
 _SIGNS: Final = {"o": "●", "s": "■", "D": "◆", "ring": "○"}

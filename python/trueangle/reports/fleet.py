@@ -13,7 +13,7 @@ from ..fleets.result import CommonOrder, Fleet
 from ..fleets.unit import FleetUnit
 from ..plots.controlcharts import draw_sums
 from ..plots.fleetpictures import draw_pattern, draw_phasor_plane, turn_pattern
-from ..plots.pagechart import page_axes, page_chart
+from ..plots.pagechart import LOW, page_axes, page_chart
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from .page import Page, filled_template
@@ -22,9 +22,8 @@ from .page import Page, filled_template
 _DRAWN: Final = 24
 #: Orders whose phasors are drawn: those in which units differ most.
 _PHASORS: Final = 3
-#: Width of a chart, inches, and its height on the page.
+#: Width of a chart, inches.
 _WIDTH: Final = 2.8
-_LOW: Final = "height:11rem"
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +118,7 @@ class FleetReport(Page):
         ax.set_ylabel("cumulative sum")
         title = f"{unit}: cumulative sums of its orders"
         alt = f"{title} on {len(rows)} further dates, limit {rows[-1].cusum_limit:.3g}"
-        return page_chart(ax, title=title, height=_LOW) | {"alt": alt}
+        return page_chart(ax, title=title, height=LOW) | {"alt": alt}
 
     def _pattern(self, unit: FleetUnit) -> dict[str, Any]:
         """The error of a unit over a turn; the same axis for all, so that sizes compare."""
@@ -130,7 +129,7 @@ class FleetReport(Page):
         ax.set_ylabel(f"error / {self.unit.name}")
         title = f"{unit.unit}: {unit.verdict.replace('_', ' ')}"
         ptp = self.unit.text(self._scale * unit.peak_to_peak)
-        chart = page_chart(ax, title=title, height=_LOW)
+        chart = page_chart(ax, title=title, height=LOW)
         return chart | {"alt": f"error of {title}, {ptp} peak-to-peak"}
 
     def _phasor(self, at: int) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from ..errors import ArgumentError
 from ..model.alarm import WatchedWindow
 from ..plots import palette
 from ..plots.controlcharts import draw_sums
-from ..plots.pagechart import page_axes, page_chart
+from ..plots.pagechart import LOW, page_axes, page_chart
 from ..support.angles import arcsec
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 
 #: Orders whose windows are drawn at most: those whose sums rose highest.
 _DRAWN: Final = 12
-#: Widths of charts, inches, and the height of the smaller ones on the page.
+#: Widths of charts, inches.
 _WIDE, _HALF = 7.5, 3.7
-_LOW: Final = "height:11rem"
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +157,7 @@ class WatchReport(Page):
         draw_sums(ax, self._number, self._sums[:, k : k + 1], self.windows[-1].limit)
         title = f"{order}: cumulative sum"
         alt = f"{title}, {float(self._sums[:, k].max()):.3g} at most"
-        sums = page_chart(ax, title=title, height=_LOW) | {"alt": alt}
+        sums = page_chart(ax, title=title, height=LOW) | {"alt": alt}
         size = self._scale * self._sizes[:, k]
         shown = self.unit.per_arcsec * size
         ax = self._axes(_HALF, f"size / {self.unit.name}")
@@ -166,4 +165,4 @@ class WatchReport(Page):
         ax.set_ylim(0.0, 1.1 * float(shown.max()) or 1.0)
         title = f"{order}: less the model"
         alt = f"{title}, {self.unit.text(float(size.max()))} at most"
-        return sums, page_chart(ax, title=title, height=_LOW) | {"alt": alt}
+        return sums, page_chart(ax, title=title, height=LOW) | {"alt": alt}

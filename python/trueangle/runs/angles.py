@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .readings import FileReadings
 
 #: Unit of the run's angles where the reference has none that a run may be in.
-_PERIOD = 360.0
+PERIOD = 360.0
 
 
 class _Part(NamedTuple):
@@ -147,7 +147,7 @@ def find_run_angles(
         raise error(
             f"{name} is added to a reference, and there is none beside the error", first.name
         )
-    period = UNIT_PERIODS.get(first.unit or "", _PERIOD)
+    period = UNIT_PERIODS.get(first.unit or "", PERIOD)
 
     def part(column: RoleColumn | None) -> _Part | None:
         if column is None:

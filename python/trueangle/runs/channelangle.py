@@ -13,14 +13,13 @@ from ..formats.columns import listed_columns
 from ..support.angles import UNIT_PERIODS, circular_mean, wrap
 from ..support.arrays import Array
 from ..support.roles import RoleColumn, role_code
+from .angles import PERIOD
 from .rawchannels import Channels
 from .readings import FileReadings
 from .run import CalibrationRun
 
 #: The column that is made.
 _MADE: Final = "angle of sine and cosine"
-
-_PERIOD: Final = 360.0
 
 #: Part of a period from reading to reading up to which its periods are counted, and how far the
 #: count may be off a whole number.
@@ -68,7 +67,7 @@ def with_channel_angle(
             )
     reference = roles["reference"]
     unit = reference.unit or table.format.unit or "deg"
-    period = UNIT_PERIODS.get(unit, _PERIOD)
+    period = UNIT_PERIODS.get(unit, PERIOD)
     true = table.values(reference._replace(unit=unit), period, reference_counts)
     sine, cosine = (table.raw(roles[role]) for role in ("sine", "cosine"))
     present = np.isfinite(true) & np.isfinite(sine) & np.isfinite(cosine)

@@ -16,7 +16,7 @@ from ..support.layout import counted
 from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, unit_in_name
 from ..support.signals import FIELDS
 from ..support.times import local_day
-from .angles import find_run_angles
+from .angles import PERIOD, find_run_angles
 from .facets import Facets, read_facets
 from .rawchannels import Channels
 from .readings import FileReadings
@@ -34,9 +34,6 @@ class _RunLabels(NamedTuple):
 
 #: Labels and rows of every run.
 Groups: TypeAlias = list[tuple[_RunLabels, NDArray[np.intp]]]
-
-#: Unit of the run's angles where the reference has none that a run may be in.
-_PERIOD = 360.0
 
 
 @told_kinds
@@ -287,8 +284,8 @@ def _entries(table: FileReadings, counts: float | None) -> _RunColumns:
             "unit), or `counts_per_turn=`; or name the file's reference column",
             name,
         )
-    indicated = column._replace(unit=unit).values(table.raw(column), _PERIOD, counts)
-    reference = np.linspace(0.0, _PERIOD, indicated.size, endpoint=False, dtype=np.float64)
+    indicated = column._replace(unit=unit).values(table.raw(column), PERIOD, counts)
+    reference = np.linspace(0.0, PERIOD, indicated.size, endpoint=False, dtype=np.float64)
     rows = np.flatnonzero(~np.isnan(indicated))
     if not rows.size:
         raise FileError(table.path, "has a header but no readings", line=1)
@@ -296,7 +293,7 @@ def _entries(table: FileReadings, counts: float | None) -> _RunColumns:
     _warn_of_empty(table, np.isnan(indicated), {"indicated": indicated})
     groups: Groups = [(_RunLabels(), rows)]
     return _RunColumns(
-        table, _PERIOD, reference, indicated, {}, groups, [left_out], table.source, column.sign
+        table, PERIOD, reference, indicated, {}, groups, [left_out], table.source, column.sign
     )
 
 

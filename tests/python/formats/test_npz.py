@@ -12,7 +12,7 @@ THETA = np.linspace(0.0, 720.0, 5001)
 
 @pytest.fixture(autouse=True)
 def small_blocks(monkeypatch):
-    monkeypatch.setattr("trueangle.formats.npz._BLOCK", 777)
+    monkeypatch.setattr("trueangle.formats.npz.BLOCK", 777)
 
 
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])

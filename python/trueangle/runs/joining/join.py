@@ -21,10 +21,7 @@ from ..readings import FileReadings, read_readings
 from ..run import CalibrationRun
 from .clocks import Clocks, estimated_clocks
 from .result import Gap, Joined
-from .stream import Stream
-
-#: FileReadings that a run is made of, at least.
-_LEAST = 4
+from .stream import LEAST, Stream
 
 
 @told_kinds
@@ -135,8 +132,8 @@ class _Log(NamedTuple):
         angle = table.values(column, 360.0, counts)
         time = roles["time"].values(table.raw(roles["time"]), 360.0)
         known = np.isfinite(time) & np.isfinite(angle)
-        if np.count_nonzero(known) < _LEAST:
-            raise table.error(f"fewer than {_LEAST} readings", column.name)
+        if np.count_nonzero(known) < LEAST:
+            raise table.error(f"fewer than {LEAST} readings", column.name)
         signals = {
             name: found.values(table.raw(found), 360.0)[known]
             for name, found in roles.items()
@@ -209,7 +206,7 @@ def _joined(
         Gap(float(start), float(end), int(np.count_nonzero((there > start) & (there < end))))
         for start, end in true.gaps(longest)
     ]
-    if np.count_nonzero(inside) < _LEAST:
+    if np.count_nonzero(inside) < LEAST:
         raise ArgumentError(
             f"{np.count_nonzero(inside)} readings have a reference at their time: the logs last "
             f"from {indicated.time[0]:g} to {indicated.time[-1]:g} s and from "

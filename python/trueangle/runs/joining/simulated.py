@@ -19,7 +19,7 @@ from ...support.signals import FIELDS
 from ..files import runs_of
 from ..run import CalibrationRun
 from .clocks import estimated_clocks
-from .stream import Stream
+from .stream import LEAST, Stream
 from .travel import TravelledError
 
 #: How a log may be brought to the readings.
@@ -32,8 +32,6 @@ COVERED = 0.5
 NEARER = 2.0
 #: Times the median of second differences, six standard deviations, beyond which they are no noise.
 _USUAL = 6.0 / 0.6745
-#: Readings that a run is made of, at least.
-_LEAST = 4
 
 
 @dataclass(frozen=True)
@@ -179,7 +177,7 @@ def minus_simulated(
     found, kept = [], []
     for run, log in zip(measured, logs, strict=True):
         expected = _expected(run, log, by, source)
-        if np.count_nonzero(expected.known) < _LEAST:
+        if np.count_nonzero(expected.known) < LEAST:
             raise ArgumentError(
                 f"{source} says nothing of {np.count_nonzero(~expected.known)} of the {len(run)} "
                 f"readings of run {run.label or '1'}: its {expected.by} is another"
@@ -292,14 +290,14 @@ def _apart(own: Stream, other: Stream, offset: float) -> float:
     """How far two motions differ (rms, degrees) beyond a constant; infinite with no common time."""
     there = own.time + offset
     inside = other.covers(there)
-    if np.count_nonzero(inside) < max(_LEAST, COVERED * inside.size):
+    if np.count_nonzero(inside) < max(LEAST, COVERED * inside.size):
         return math.inf
     difference = own.angle[inside] - other.at(there[inside])[0]
     return float(np.sqrt(np.mean((difference - np.median(difference)) ** 2)))
 
 
 def _each_once(logs: Sequence[CalibrationRun]) -> Iterable[CalibrationRun]:
-    return {id(log): log for log in logs if len(log) >= _LEAST}.values()
+    return {id(log): log for log in logs if len(log) >= LEAST}.values()
 
 
 def _each_time_once(time: Array, values: Array) -> tuple[Array, Array]:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ...support.arrays import Array
 from ...support.quantiles import quantile
 
+#: Readings that a run is made of, at least.
+LEAST = 4
 #: Times the typical step in time from which on a pause is a gap.
 GAP = 5.0
 #: Readings off a line, in their own roughness, up to which a line is as good; times that are
