@@ -50,7 +50,7 @@ def messages():
 #: Commands that are printed whole, to be typed.
 TYPED = [
     PACKAGE / "runs" / name
-    for name in ("checks/columns.py", "channels.py", "channelangle.py", "files.py")
+    for name in ("checks/columns.py", "angles.py", "channelangle.py", "files.py")
 ]
 TYPED += [PACKAGE / "export" / "channelform.py"]
 
