@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError
 from ..fitting.summary import fit_error_unit
 from ..runs.checks import check
-from ..runs.provenance import provenance
 from ..runs.run import CalibrationRun, as_runs
+from ..runs.writing import provenance
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.argumentkinds import told_kinds
 from ..support.display_units import ErrorsIn

@@ -9,7 +9,7 @@ from ..support.plainresult import json_text
 from .options import add_shared, errors_in
 from .parser import declare
 from .paths import Input
-from .robotmodel import model_asked, refuse_joint
+from .robots import model_asked, refuse_joint
 
 HELP = "difference of two models per order and over the turn"
 EXAMPLE = "trueangle compare present.json joint_a.json"

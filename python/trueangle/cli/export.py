@@ -11,7 +11,7 @@ from ..support.plainresult import json_text
 from .options import add_shared, errors_in
 from .parser import declare
 from .paths import Input, Output
-from .robotmodel import model_asked
+from .robots import model_asked
 
 if TYPE_CHECKING:
     from ..export.target import Option

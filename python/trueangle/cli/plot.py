@@ -14,7 +14,7 @@ from .options import add_joint, add_shared, errors_in, refuse_given
 from .parser import declare
 from .paths import Input, Output
 from .pictures import save_picture
-from .robotmodel import model_asked, refuse_joint
+from .robots import model_asked, refuse_joint
 from .values import declared_shafts, orders_by_shaft
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _of_model(args: argparse.Namespace) -> Axes:
-    from ..plots.modelerror import model_error
+    from ..plots.drawnreadings import model_error
 
     if len(args.files) > 1 or args.kind != "errors":
         raise ArgumentError(

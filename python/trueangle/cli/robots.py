@@ -1,14 +1,15 @@
-"""Commands about every joint of a robot: which joints are meant, and the table in front."""
+"""Commands about a robot: the joints that are meant, the model of one, the table in front."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import ArgumentError, NoModelError, NotInvertibleError, RankError, TrueAngleError
 from ..support.display_units import ErrorsIn
+from ..support.suggestions import did_you_mean
 from .parser import declare
 from .signal_options import of_joint, signal_option, signals_by_joint
 
@@ -191,3 +192,48 @@ def robot_messages(
     parts = [ranking_text(title, ranking, errors_in)]
     parts += [f"--- {joint} ---\n{text}" for joint, text in texts.items()]
     return "\n\n".join(parts)
+
+
+def model_asked(path: str, joint: str | None = None) -> HarmonicModel:
+    """The model of a file, or that of one joint of a robot's file; errors as `joint_asked`."""
+    return joint_asked(path, joint)[0]
+
+
+def refuse_joint(joint: str | None, paths: Sequence[str]) -> None:
+    """Refuse the name of a joint where no file is that of a robot.
+
+    Raises
+    ------
+    ArgumentError
+        Every file holds the model of one joint, which has no name.
+    """
+    from ..model.robotfile import is_robot_file
+
+    if joint is not None and not any(map(is_robot_file, paths)):
+        raise ArgumentError(f"--joint {joint}: {paths[0]} is the model of one joint")
+
+
+def joint_asked(path: str, joint: str | None) -> tuple[HarmonicModel, dict[str, Any]]:
+    """`model_asked`, and the columns by role to which a robot's joint was fitted.
+
+    Raises
+    ------
+    ArgumentError
+        The file holds several joints and none is named, or one that it does not have.
+    """
+    from ..model.file import load_model
+    from ..model.robotfile import is_robot_file, load_robot
+
+    if not is_robot_file(path):
+        return load_model(path), {}
+    robot = load_robot(path)
+    if joint is None and len(robot) == 1:
+        (joint,) = robot
+    known = ", ".join(robot)
+    if joint is None:
+        raise ArgumentError(f"{path} holds the models of {known}: say which with --joint NAME")
+    if joint not in robot:
+        raise ArgumentError(
+            f"--joint {joint}: {path} holds the models of {known}{did_you_mean(joint, list(robot))}"
+        )
+    return robot[joint], dict(robot.signals.get(joint, {}))

@@ -16,8 +16,7 @@ from .options import add_shared, errors_in, refuse_given
 from .parser import declare
 from .paths import Input, Output
 from .pictures import save_picture
-from .robotmodel import joint_asked, refuse_joint
-from .robots import add_robot, joints_asked
+from .robots import add_robot, joint_asked, joints_asked, refuse_joint
 from .signal_options import add_signals, reading_options
 from .source_options import (
     SOURCES,

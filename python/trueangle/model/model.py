@@ -16,9 +16,8 @@ from ..support.argumentkinds import of_type, told_kinds
 from ..support.display_units import error_unit, sine_of_rms
 from ..support.layout import counted, laid_out, wrapped_lines
 from ..support.plainresult import result_picture
-from .corrector import Corrector
+from .corrector import Corrector, ExchangeableStep, Step, exchangeable_step
 from .errormodel import Argument, ErrorModel
-from .step import ExchangeableStep, Step, exchangeable_step
 from .validity import check_invertible
 from .writing import save_model
 

@@ -19,8 +19,8 @@ from ..support.layout import counted, laid_out
 from ..support.plainresult import ShownResult
 from ..support.roles import wanted_columns
 from ..support.signals import GivenSignals, check_signal_names, coupled_joint
+from .corrector import JointsStep, exchangeable_step
 from .model import HarmonicModel
-from .step import JointsStep, exchangeable_step
 from .writing import save_robot
 
 #: Columns of a log by role, each with its unit where its name does not tell it.

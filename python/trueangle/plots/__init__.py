@@ -14,12 +14,17 @@ from .amplitudespectrum import amplitude_spectrum
 from .canvas import text_alternative
 from .controlcharts import fleet_history, watched_windows
 from .diagnosispictures import error_left, factors, gains
-from .drawnreadings import before_after, error_curves, measured_and_simulated, residuals
+from .drawnreadings import (
+    before_after,
+    error_curves,
+    measured_and_simulated,
+    model_error,
+    residuals,
+)
 from .fleetpictures import fleet_overview, fleet_patterns, fleet_phasors, fleet_sizes
 from .kinds import drawn as drawn
 from .kinds import fit_plot
 from .kinds import thumbnail as thumbnail
-from .modelerror import model_error
 from .phasesoverruns import phases_over_runs
 from .planpictures import detection, plan_factors, plan_positions
 

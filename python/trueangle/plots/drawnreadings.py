@@ -1,4 +1,4 @@
-"""Pictures of readings: errors of all runs, before and after, residuals, beside a simulation."""
+"""Pictures of readings and of what a model corrects: all runs, before and after, residuals."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from ..fitting.summary import fit_error_unit
 from ..runs.run import CalibrationRun, as_runs
-from ..support.display_units import ErrorsIn, error_unit
+from ..support.display_units import ErrorsIn, error_unit, significant_digits, sine_of_rms
+from ..support.layout import counted
 from . import palette
 from .canvas import described, grid, legend, marked, new_axes, turn_axis
 from .curves import (
@@ -21,7 +22,9 @@ from .curves import (
     curve_envelope,
     fitted_degrees,
     held_out_points,
+    model_curve,
     rms_amplitude,
+    strong_gear_order,
     thinned_points,
 )
 from .panel import Cloud, Panel, PanelPicture
@@ -281,4 +284,56 @@ def draw_panel_curve(ax: Axes, curve: ModelCurve, dense: bool) -> None:
         linewidth=0.0,
         zorder=0.5,
         label="95 % band",
+    )
+
+
+def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
+    """Error of a model over the angle, less its constant, with its 95 % band.
+
+    What depends on more than the angle (backlash, lag and other terms) is named in the text
+    alternative and not drawn; gear orders, which would fill the picture, are drawn as envelope.
+
+    Parameters
+    ----------
+    model : HarmonicModel
+    ax : matplotlib Axes, optional
+    errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
+        Unit of the errors, as for summaries.
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Raises
+    ------
+    MissingExtraError
+        matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import trueangle as ta
+    >>> model = ta.HarmonicModel((ta.Shaft("output", 1.0, (2,), (0.01,), (0.0,)),), period=360.0)
+    >>> ta.plots.text_alternative(model.plot())
+    'Error of the model over the angle: 72.0 arcsec peak-to-peak in 1 order.'
+    """
+    ax = new_axes(ax)
+    pattern = model.replace(terms=())
+    curve = model_curve(pattern)
+    unit = error_unit(errors_in, sine_of_rms(float(np.std(curve.error))), model.period)
+    curve = curve.scaled(unit.per_arcsec)
+    low, high = fitted_degrees(model)
+    dense = strong_gear_order(pattern.orders, pattern.amplitudes, high - low) is not None
+    draw_panel_curve(ax, curve, dense)
+    turn_axis(ax, low, high)
+    ax.set_xlabel(f"{model.argument} angle / deg")
+    ax.set_ylabel(f"error / {unit.name}")
+    legend(ax)
+    terms = ", ".join(term.kind for term in model.terms)
+    return described(
+        ax,
+        f"Error of the model over the angle: {significant_digits(float(np.ptp(curve.error)), 3)} "
+        f"{unit.name} peak-to-peak in {counted(len(model.orders), 'order')}"
+        + (f"; not drawn: {terms}" if terms else "")
+        + ".",
+        "Error of the model",
     )

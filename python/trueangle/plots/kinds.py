@@ -9,9 +9,8 @@ from ..support.suggestions import check_choice
 from .amplitudespectrum import amplitude_spectrum
 from .canvas import as_image, small_pictures
 from .diagnosispictures import gains
-from .drawnreadings import error_curves, residuals
+from .drawnreadings import error_curves, model_error, residuals
 from .fleetpictures import fleet_plot
-from .modelerror import model_error
 from .phasesoverruns import phases_over_runs
 from .planpictures import detection
 

@@ -12,9 +12,9 @@ from ..model.model import HarmonicModel
 from ..runs.checks.check import data_faults
 from ..runs.checks.record import records_of
 from ..runs.files import runs_of
-from ..runs.provenance import provenance
 from ..runs.run import CalibrationRun
 from ..runs.source import ReadingOptions
+from ..runs.writing import provenance
 from ..support.argumentkinds import of_type, told_kinds
 from ..support.blas import one_blas_thread
 from ..support.deadline import current_deadline

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..support.angles import power_sums
 from ..support.arrays import Array
-from ..support.powersums import power_sums
 from ..support.quantiles import median
 from .run import CalibrationRun, as_runs
 

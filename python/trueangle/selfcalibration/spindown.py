@@ -18,8 +18,7 @@ from ..support.arrays import Array
 from ..support.layout import counted
 from .loop import followed_orders, followed_share, widened_by_loop
 from .model import reference_free_model
-from .noisespectrum import noise_spectrum_at
-from .orderchoice import choose_selfcal_orders, highest_order
+from .orderchoice import choose_selfcal_orders, highest_order, noise_spectrum_at
 from .pattern import ENCODER
 from .readings import SegmentReadings
 from .recording import Recording

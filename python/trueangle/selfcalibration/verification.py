@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, f_tail
 from .dense import DenseFit
-from .noisespectrum import noise_spectrum_at
+from .orderchoice import noise_spectrum_at
 from .readings import SegmentReadings
 from .result import ARCSEC, HeldOutPattern
 from .steady import SteadyFit, fit_steady

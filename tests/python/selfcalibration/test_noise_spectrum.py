@@ -8,7 +8,7 @@ import pytest
 import trueangle as ta
 from selfcalibration.rotor import ARCSEC
 from selfcalibration.test_pulls import LINES, coasting
-from trueangle.selfcalibration import noisespectrum, spindown, steady
+from trueangle.selfcalibration import orderchoice, spindown, steady
 
 SEED = 71_000
 ORDERS = (1.0, 3.0, 5.0)
@@ -21,7 +21,7 @@ def fitted(monkeypatch: pytest.MonkeyPatch, seed: int, memory: float) -> steady.
 
     def asked(fit: steady.SteadyFit, orders: tuple[float, ...]) -> np.ndarray:
         fits.append(fit)
-        return noisespectrum.noise_spectrum_at(fit, orders)
+        return orderchoice.noise_spectrum_at(fit, orders)
 
     monkeypatch.setattr(spindown, "noise_spectrum_at", asked)
     log = coasting(np.random.default_rng(seed), memory, size=SIZE)
@@ -43,7 +43,7 @@ def test_it_is_the_noise_of_all_readings_where_orders_pass(
         fit = fitted(monkeypatch, seed, memory)
         passing = np.multiply.outer(ORDERS, fit.readings.speed * np.diff(fit.readings.time).mean())
         shape = (1.0 - memory**2) / np.abs(1.0 - memory * np.exp(-2j * np.pi * passing)) ** 2
-        said = noisespectrum.noise_spectrum_at(fit, ORDERS) * fit.projected.variance
+        said = orderchoice.noise_spectrum_at(fit, ORDERS) * fit.projected.variance
         ratios.append(said / ((SIZE * ARCSEC) ** 2 * shape.mean(axis=1)))
     first, *others = np.mean(ratios, axis=0)
     # One of 1600 readings scatters by 7 %. Order 1 passes where motion takes noise, too: there it
@@ -58,8 +58,8 @@ def test_parts_make_the_whole_and_slow_ones_are_louder_in_slow_noise(
     print("seed", SEED + 20)
     fit = fitted(monkeypatch, SEED + 20, 0.7)
     slow = (fit.readings.speed < np.median(fit.readings.speed)).astype(np.int64)
-    whole = noisespectrum.noise_spectrum_at(fit, ORDERS)
-    fast_part, slow_part = noisespectrum.noise_spectrum_at(fit, ORDERS, slow)
+    whole = orderchoice.noise_spectrum_at(fit, ORDERS)
+    fast_part, slow_part = orderchoice.noise_spectrum_at(fit, ORDERS, slow)
     share = slow.mean()
     assert (1.0 - share) * fast_part + share * slow_part == pytest.approx(whole, rel=1e-9)
     assert (slow_part > fast_part).all()
@@ -71,4 +71,4 @@ def test_parts_of_white_noise_are_alike(monkeypatch: pytest.MonkeyPatch) -> None
     print("seed", SEED + 30)
     fit = fitted(monkeypatch, SEED + 30, 0.0)
     halves = np.arange(fit.readings.size) % 2
-    assert noisespectrum.noise_spectrum_at(fit, ORDERS, halves).tolist() == [[1.0] * 3] * 2
+    assert orderchoice.noise_spectrum_at(fit, ORDERS, halves).tolist() == [[1.0] * 3] * 2

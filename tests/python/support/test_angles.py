@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trueangle.support.angles import arcsec, circular_mean, unit_name, wrap, zero_text
-from trueangle.support.powersums import power_sums
+from trueangle.support.angles import arcsec, circular_mean, power_sums, unit_name, wrap, zero_text
 
 PERIODS = {360.0: "deg", 2.0 * np.pi: "rad", 1.0: "turn", 4096.0: "count"}
 

@@ -33,7 +33,7 @@ DOORS = (
     "rehearsal.rehearse", "reports.report", "fleets.fleet.fleet", "export.export_model",
     "export.import_model", "selfcalibration.calibrate.selfcal", "model.monitor.Monitor",
     "model.batches.read_batches", "plots.kinds.fit_plot",
-    "plots.modelerror.model_error",
+    "plots.drawnreadings.model_error",
 )  # fmt: skip
 
 #: These hold a state, are read once or write: made anew, not kept.

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
+from ...support.angles import power_sums
 from ...support.arrays import Array
-from ...support.powersums import power_sums
 from .unitgroups import GROUPS, MOST_UNITS, sums_of_unit_means, units_in_groups
 from .zerogroups import ZeroGroupReadings
 

@@ -9,6 +9,7 @@ from .inputs import (
     partition_keys,
     partition_name,
     read_whole,
+    same_file,
     sha256_of,
 )
 from .kinds import (
@@ -29,9 +30,7 @@ from .kinds import (
     promised_format,
     refuse_own,
 )
-from .named import named_output
-from .outputs import check_output, external_output, publish, written_atomically
-from .samefile import same_file
+from .outputs import check_output, external_output, named_output, publish, written_atomically
 from .workplace import remove_leftovers, restore
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Writing files: only regular ones, never an input; published atomically, or not there at all."""
+"""Writing files: only regular ones, never an input; published at once, errors by their own name."""
 
 from __future__ import annotations
 
@@ -12,10 +12,8 @@ from pathlib import Path
 from typing import IO
 
 from ...errors import FileError, KindError
-from .inputs import is_null_device, sha256_of
+from .inputs import irregular_file_kind, is_null_device, named_again, sha256_of
 from .kinds import FileKind, log_endings
-from .named import named_by, named_output
-from .samefile import irregular_file_kind, named_again
 from .workplace import (
     PARTIAL,
     hidden_name,
@@ -34,6 +32,12 @@ __all__ = [
     "sync_to_disk",
     "written_atomically",
 ]
+
+#: What the system says of writing only.
+_OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+#: Bytes that a file must take for its disk not to be full.
+_ROOM = 1 << 16
 
 
 def check_output(
@@ -196,7 +200,7 @@ def publish(aside: str | PathLike[str], target: str | PathLike[str]) -> None:
             return
         if stat.S_ISREG(found.st_mode):
             os.chmod(aside, stat.S_IMODE(found.st_mode) & 0o777)
-    with named_by(aside):
+    with _named_by(aside):
         for inside in Path(aside).rglob("*"):
             sync_to_disk(inside)
         sync_to_disk(aside)
@@ -229,3 +233,58 @@ def _is_printed_into(found: os.stat_result) -> bool:
         if stat.S_ISREG(printed.st_mode) and os.path.samestat(found, printed):
             return True
     return False
+
+
+@contextlib.contextmanager
+def named_output(
+    path: str | PathLike[str],
+    making: contextlib.AbstractContextManager[Path],
+    read: str | PathLike[str] | None = None,
+) -> Iterator[Path]:
+    """What ``making`` makes, in which ``path`` is written; errors of the system are told by name.
+
+    Libraries tell of a full disk in words of their own, or as damage of what they read: whether
+    that is the cause is asked of the disk. An error without a name, and not of writing alone, is
+    one of reading ``read`` (default: of ``path``).
+    """
+    try:
+        with making as place:
+            try:
+                yield place
+            except Exception:
+                _check_room(place)
+                raise
+    except OSError as error:
+        named = None if error.filename is None else os.fsdecode(error.filename)
+        if not error.errno or not (named is None or PARTIAL in named):
+            raise
+        of_reading = named is None and error.errno not in _OF_WRITING
+        told = path if read is None or not of_reading else read
+        raise OSError(error.errno, error.strerror, os.fspath(told)) from None
+
+
+def _check_room(place: Path) -> None:
+    """Write on at the end of every file of a place that is given up, and of a new one.
+
+    Raises
+    ------
+    OSError
+        Of the first that takes nothing more.
+    """
+    aside = place.parent if place.parent.name.endswith(PARTIAL) else None
+    found = [place] if aside is None else [p for p in aside.rglob("*") if p.is_file()]
+    for file in found if aside is None else [*found, aside / "more"]:
+        with _named_by(file), open(file, "ab", buffering=0) as more:
+            block = memoryview(bytes(_ROOM))
+            while block:
+                block = block[more.write(block) :]
+            os.fsync(more.fileno())
+
+
+@contextlib.contextmanager
+def _named_by(path: str | PathLike[str]) -> Iterator[None]:
+    """Errors of the system without a name, or with another, told by this one."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, os.fspath(path)) from None
