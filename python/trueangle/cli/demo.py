@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ..fitting.orders.result import OrderSelection
-    from ..planning.mountplan import CalibrationPlan
+    from ..planning.result import CalibrationPlan
     from ..runs.run import CalibrationRun
     from ..support.arrays import Array
 

@@ -15,7 +15,7 @@ from ..fitting.prior import Prior, fleet_prior
 from ..joint.shafts import limited_orders
 from ..planning.arc import COVERAGE, check_arc, plan_arc
 from ..planning.plan import check_readings, check_sizes
-from ..planning.tables import place_table, plain_arc_plan
+from ..planning.result import place_table, plain_arc_plan
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array, first_largest

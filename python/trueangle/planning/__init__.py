@@ -1,9 +1,7 @@
 """Where to measure so that the wanted orders can be told apart."""
 
 from .arc import plan_arc
-from .arcplan import ArcPlan
 from .limits import Limits, load_limits
-from .mountplan import CalibrationPlan
 from .nextruns import NextRuns
 from .plan import (
     HIGHEST_LOW_ORDER,
@@ -14,6 +12,7 @@ from .plan import (
     wanted_orders,
 )
 from .referencefree import SelfPlan
+from .result import ArcPlan, CalibrationPlan
 from .selfplan import plan_self
 
 __all__ = [

@@ -12,10 +12,10 @@ from ..joint.shafts import limited_orders
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.layout import counted
-from .arcplan import ArcPlan
 from .doptimal import ArcDesign, OrthonormalColumns, d_optimal, exchanged, rounded
 from .noisefactors import noise_factors
 from .plan import check_readings, check_sizes, readings_needed
+from .result import ArcPlan
 
 #: Readings where neither their number nor what they are for is given.
 READINGS = 60

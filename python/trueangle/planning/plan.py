@@ -16,7 +16,6 @@ from ..joint.shafts import limited_orders
 from ..runs.aliasing import fold
 from ..support.argumentkinds import told_kinds
 from ..support.distributions import random_numbers
-from .mountplan import CalibrationPlan
 from .noisefactors import (
     mount_noise_factors,
     noise_factors,
@@ -24,6 +23,7 @@ from .noisefactors import (
     search_offsets,
     search_shifts,
 )
+from .result import CalibrationPlan
 
 __all__ = [
     "HIGHEST_LOW_ORDER",

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..support.layout import counted, laid_out
 from ..support.plainresult import PlainResult
-from .tables import factor_table, plain_plan
+from .result import factor_table, plain_plan
 
 
 @dataclass(frozen=True)

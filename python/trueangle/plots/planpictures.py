@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ..planning.mountplan import CalibrationPlan
+    from ..planning.result import CalibrationPlan
     from ..rehearsal import Rehearsal, RehearsedCause
 
 #: Small pictures side by side.

@@ -1,0 +1,235 @@
+"""Plans of places on an arc and of mounts: their tables, words and JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..support.layout import counted, laid_out
+from ..support.plainresult import PlainResult, finite_or_none
+
+
+@dataclass(frozen=True)
+class ArcPlan(PlainResult):
+    """Places on an arc and readings at each of them.
+
+    Attributes
+    ----------
+    start_deg, stop_deg : float
+    orders : tuple of float
+        Output orders, fitted together with a zero of each run.
+    places_deg : tuple of float
+        Increasing; the same in every run.
+    counts : tuple of int
+        Readings at each place in one run; half of them from either side with
+        ``both_directions``.
+    runs : int
+    both_directions : bool
+    d_efficiency : float
+        ``(det M / det M^*)^(1/p)``, M the information of these readings, M* the most that
+        as many can have.
+    efficiency_of_even_spacing : float
+        The same for as many places spread evenly, both ends among them.
+    noise_factors : dict of order to float
+        How many times a coefficient scatters more than one of as many readings over whole turns.
+    even_noise_factors : dict of order to float
+        The same for even spacing.
+    uncertainty_arcsec : float or None
+        Expanded uncertainty (k = 2) of the curve, with its zero, at the worst place of the arc;
+        None without the noise of a reading.
+    notes : tuple of str
+    """
+
+    start_deg: float
+    stop_deg: float
+    orders: tuple[float, ...]
+    places_deg: tuple[float, ...]
+    counts: tuple[int, ...]
+    runs: int
+    both_directions: bool
+    d_efficiency: float
+    efficiency_of_even_spacing: float
+    noise_factors: dict[float, float]
+    even_noise_factors: dict[float, float]
+    uncertainty_arcsec: float | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def readings(self) -> int:
+        """All readings of all runs."""
+        return self.runs * sum(self.counts)
+
+    @property
+    def worst_noise_factor(self) -> float:
+        """The largest factor."""
+        return max(self.noise_factors.values())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object that ``trueangle plan`` prints as JSON for an arc."""
+        return plain_arc_plan(self, "arc")
+
+    def summary(self) -> str:
+        """The plan as text: a table to follow at the rig."""
+        each = f": {sum(self.counts)} in each of {self.runs} runs" if self.runs > 1 else ""
+        way = ", half from either side" if self.both_directions else ""
+        lines = [
+            f"{self.readings} readings over {self.start_deg:g} to {self.stop_deg:g} deg{each}{way}",
+            *place_table(self.places_deg, self.counts),
+            f"  D-efficiency           {self.d_efficiency:.3f} of the best possible",
+            f"  of even spacing        {self.efficiency_of_even_spacing:.3f}",
+            "  order  noise factor  with even spacing",
+        ]
+        for order, factor in self.noise_factors.items():
+            even = self.even_noise_factors[order]
+            lines.append(f"  {order:5g}  {_factor(factor):>12}  {_factor(even):>17}")
+        if self.uncertainty_arcsec is not None:
+            lines.append(
+                f"  uncertainty (k = 2)    {self.uncertainty_arcsec:.3g} arcsec at the worst place"
+            )
+        lines += [f"  note: {note}" for note in self.notes]
+        return laid_out(lines)
+
+    def _brief(self) -> str:
+        return (
+            f"{self.readings} readings at {counted(self.places_deg, 'place')}, "
+            f"worst factor {self.worst_noise_factor:.3g}"
+        )
+
+
+def _factor(factor: float) -> str:
+    """A noise factor, or that the places do not show the order."""
+    return f"{factor:.3g}" if math.isfinite(factor) else "not seen"
+
+
+@dataclass(frozen=True)
+class CalibrationPlan(PlainResult):
+    """Where to read, and how well each order will be known.
+
+    Attributes
+    ----------
+    kind : str
+        ``"mounts"``, ``"encoder"`` or ``"tilts"``.
+    positions : int
+        Positions per mount (or in all, for a free reference encoder).
+    mount_offsets_deg : tuple of float
+        How far the joint stands from the first mount's positions, per mount or tilt.
+    facet_shifts : tuple of int
+        By how many facets to turn the artefact at each mount, so that its own errors
+        separate from the joint's.
+    facet_noise_factor : float
+        Worst factor of an order of the joint when the artefact's errors are fitted too,
+        relative to one mount with a perfect artefact; infinite where they stay mixed.
+    noise_factors : dict of order to float
+        Factor of each wanted order; infinite for an order that no zero-free reading at
+        these positions shows.
+    tolerance_deg : float
+        Every offset may be off by this much with all factors below 2; it must be known
+        to about 0.01 degree (2 degrees of phase at order 202).
+    readings : int or None
+        Readings that reach the wanted standard error, in whole rounds.
+    notes : tuple of str
+    """
+
+    kind: str
+    positions: int
+    mount_offsets_deg: tuple[float, ...]
+    facet_shifts: tuple[int, ...]
+    facet_noise_factor: float
+    noise_factors: dict[float, float]
+    tolerance_deg: float
+    readings: int | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def worst_noise_factor(self) -> float:
+        """The largest factor of the orders that can be seen at all."""
+        return max((f for f in self.noise_factors.values() if math.isfinite(f)), default=math.inf)
+
+    @property
+    def invisible_orders(self) -> tuple[float, ...]:
+        """Wanted orders that fold onto the constant: every zero absorbs them."""
+        return tuple(m for m, f in self.noise_factors.items() if not math.isfinite(f))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object that ``trueangle plan`` prints as JSON."""
+        return {
+            "kind": self.kind,
+            "positions": self.positions,
+            "mount_offsets_deg": list(self.mount_offsets_deg),
+            "facet_shifts": list(self.facet_shifts),
+            "facet_noise_factor": finite_or_none(self.facet_noise_factor),
+            "worst_noise_factor": finite_or_none(self.worst_noise_factor),
+            "noise_factors": plain_plan(self.noise_factors),
+            "invisible_orders": list(self.invisible_orders),
+            "tolerance_deg": self.tolerance_deg,
+            "readings": self.readings,
+            "notes": list(self.notes),
+        }
+
+    def summary(self) -> str:
+        """The plan as text."""
+        offsets = ", ".join(f"{o:.4g}" for o in self.mount_offsets_deg)
+        if self.kind == "encoder":
+            lines = [
+                f"{self.positions} jittered positions of a free reference encoder",
+                f"  clamp it at            {offsets} deg",
+            ]
+        else:
+            what = "mounts" if self.kind == "mounts" else "tilts"
+            lines = [
+                f"{len(self.mount_offsets_deg)} {what} of {self.positions} positions",
+                f"  offsets                {offsets} deg",
+                f"  tolerance              {self.tolerance_deg:.2g} deg, known to 0.01 deg",
+            ]
+        if self.kind == "mounts":
+            shifts = ", ".join(str(s) for s in self.facet_shifts)
+            facet = self.facet_noise_factor
+            factor = f"{facet:.2f}" if math.isfinite(facet) else "impossible with one mount"
+            lines += [
+                f"  facet shifts           {shifts} facets",
+                f"  artefact fitted too    factor {factor}",
+            ]
+        lines += [
+            f"  worst noise factor     {self.worst_noise_factor:.2f}",
+            "  noise factor per order",
+            *factor_table(self.noise_factors),
+        ]
+        if self.readings is not None:
+            lines.append(f"  readings needed        {self.readings}")
+        lines += [f"  note: {note}" for note in self.notes]
+        return laid_out(lines)
+
+    def _brief(self) -> str:
+        mounts = counted(self.mount_offsets_deg, "mount")
+        return f"{self.positions} positions, {mounts}, worst factor {self.worst_noise_factor:.3g}"
+
+
+def place_table(places_deg: Sequence[float], counts: Sequence[int]) -> list[str]:
+    """Readings at each place, a line a place under their heads."""
+    rows = zip(places_deg, counts, strict=True)
+    return ["  place/deg  readings", *(f"  {place:9.3f}  {count:8d}" for place, count in rows)]
+
+
+def factor_table(factors: dict[float, float]) -> list[str]:
+    """Noise factors by order, six on a line."""
+    entries = [f"{m:>5g} {f:5.2f}" for m, f in factors.items()]
+    return ["  " + "  ".join(entries[i : i + 6]) for i in range(0, len(entries), 6)]
+
+
+def plain_arc_plan(plan: Any, kind: str) -> dict[str, Any]:
+    """The JSON object of a plan of readings at places: lists, and orders as the keys of objects."""
+    return {"kind": kind, **plain_plan(vars(plan)), "readings": plan.readings}
+
+
+def plain_plan(value: Any) -> Any:
+    """Orders as keys of an object, tuples as lists; what is not finite is None."""
+    if isinstance(value, dict):
+        return {
+            (f"{k:g}" if isinstance(k, (int, float)) else k): plain_plan(v)
+            for k, v in value.items()
+        }
+    if isinstance(value, list | tuple):
+        return [plain_plan(entry) for entry in value]
+    return finite_or_none(value) if isinstance(value, float) else value
