@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import io
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO, cast
 
 from ..errors import ArgumentError
-from ..support.files import PICTURE
+from ..support.files import PICTURE, written_atomically
 from ..support.layout import laid_out
 from ..support.plainresult import json_text
 from .options import add_joint, add_shared, errors_in, refuse_given
 from .parser import declare
 from .paths import Input, Output
-from .pictures import save_picture
 from .robots import model_asked, refuse_joint
 from .values import declared_shafts, orders_by_shaft
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 HELP = "draw the error over the angle, of a model or of runs with their fit"
 EXAMPLE = "trueangle plot joint_a.csv -o joint_a.png"
@@ -96,3 +98,15 @@ def _of_runs(args: argparse.Namespace) -> Axes:
         shafts=declared_shafts(args.shaft),
     )
     return fit_plot(found, args.kind, errors_in=errors_in(args))
+
+
+def save_picture(drawn: Axes | Figure, path: str) -> None:
+    """Write a picture whole or not at all, as its ending says (PNG where it says none)."""
+    ending = Path(path).suffix.lower()
+    kind = ending[1:] if ending in PICTURE.endings else "png"
+    figure = drawn if hasattr(drawn, "savefig") else drawn.get_figure(root=True)
+    assert figure is not None
+    written = io.BytesIO()
+    figure.savefig(written, format=kind)
+    with written_atomically(path, kind=PICTURE) as file:
+        cast(TextIO, file).buffer.write(written.getvalue())

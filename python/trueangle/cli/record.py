@@ -10,10 +10,11 @@ from pathlib import Path
 from .ending import put_off_ending
 from .options import add_shared, errors_in
 from .parser import declare
-from .signal_options import add_signals, signals_of_both
-from .source_options import (
+from .signal_options import (
     SOURCES,
+    add_signals,
     add_source_options,
+    signals_of_both,
     source_argument,
     source_options,
 )

@@ -10,7 +10,7 @@ from ..support.files import PICTURE
 from .options import add_shared
 from .parser import declare
 from .paths import Input, Output
-from .pictures import save_picture
+from .plot import save_picture
 from .values import names, seconds
 
 HELP = "tell from which size on a diagnosis of planned runs would name each cause"

@@ -15,12 +15,13 @@ from ..support.plainresult import json_text
 from .options import add_shared, errors_in, refuse_given
 from .parser import declare
 from .paths import Input, Output
-from .pictures import save_picture
+from .plot import save_picture
 from .robots import add_robot, joint_asked, joints_asked, refuse_joint
-from .signal_options import add_signals, reading_options
-from .source_options import (
+from .signal_options import (
     SOURCES,
+    add_signals,
     add_source_options,
+    reading_options,
     source_argument,
     source_options,
 )

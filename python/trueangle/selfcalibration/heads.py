@@ -20,9 +20,8 @@ from ..support.angles import wrap
 from ..support.arrays import Array
 from .dense import DenseFit, dense_fixed_point, fit_dense, patterns_apart
 from .densetriangle import DenseRows
-from .model import reference_free_model
+from .model import ENCODER, pattern_model, reference_free_model
 from .orderchoice import significant_orders
-from .pattern import ENCODER, pattern_model
 from .projected import harmonic_rows, harmonic_unknowns
 from .recording import Recording
 from .result import (

@@ -1,11 +1,14 @@
-"""The model of a calibration without a reference, and what its record says of it."""
+"""The model of a calibration without a reference, its pattern over the angle, and its record."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Final
 
 import numpy as np
+
+import trueangle._core as _core
 
 from .._core import __version__
 from ..errors import NotInvertibleError
@@ -14,8 +17,12 @@ from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
 from ..runs.rawchannels import Channels
 from ..support.angles import common_sign
+from ..support.arrays import Array
 from .recording import Recording
 from .result import ARCSEC, OrderEstimate
+
+ENCODER: Final = "the encoder"
+RIPPLE: Final = "the speed ripple"
 
 
 def reference_free_model(
@@ -93,3 +100,31 @@ def reference_free_model(
             "and are their unit and period right? `check` shows both",
             error.slope,
         ) from None
+
+
+def pattern_model(orders: Sequence[float], coefficients: Array) -> HarmonicModel:
+    """The pattern as a model in radians; its constant is zero, since nothing shows it."""
+    whole = tuple(int(k) for k in orders)
+    return HarmonicModel(
+        (Shaft("output", 1.0, whole, tuple(coefficients[0::2]), tuple(coefficients[1::2])),)
+        if whole
+        else (),
+        period=2.0 * math.pi,
+    )
+
+
+def pattern_steepness(orders: Sequence[float], coefficients: Array) -> float:
+    """The greatest ``|d error / d angle|``."""
+    whole = [int(k) for k in orders]
+    parts = [list(coefficients[0::2])], [list(coefficients[1::2])]
+    return _core.Series(2.0 * math.pi, 0.0, [1.0], [whole], *parts, "indicated").slope_bound
+
+
+def pattern_series(orders: Sequence[float], coefficients: Array, theta: Array) -> Array:
+    """Sum of the harmonics at ``theta``, by the compiled core where orders are whole."""
+    if not len(orders):
+        return np.zeros_like(theta)
+    whole = tuple(int(k) for k in orders)
+    shaft = Shaft("output", 1.0, whole, tuple(coefficients[0::2]), tuple(coefficients[1::2]))
+    model = HarmonicModel((shaft,), period=2.0 * math.pi, argument="indicated")
+    return np.asarray(model.error(theta))

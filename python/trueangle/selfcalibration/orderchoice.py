@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_quantile, chi_squared_tail
 from .correlation import correlation_above
-from .pattern import ENCODER, pattern_series
+from .model import ENCODER, pattern_series
 from .projected import Projected, harmonic_rows
-from .readings import SegmentReadings
+from .segments import SegmentReadings
 from .steady import SteadyFit, fit_steady
 
 #: Highest order looked for.

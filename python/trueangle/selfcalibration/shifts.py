@@ -22,9 +22,8 @@ from ..support.arrays import Array
 from ..support.distributions import f_tail
 from .dense import DenseFit, dense_fixed_point, fit_dense
 from .densetriangle import DenseRows
-from .model import reference_free_model
+from .model import ENCODER, pattern_model, reference_free_model
 from .orderchoice import significant_orders
-from .pattern import ENCODER, pattern_model
 from .projected import NOT_SEEN, Unknown, harmonic_rows, harmonic_unknowns
 from .recording import Clampings, Recording, clampings_of
 from .result import (

@@ -17,10 +17,8 @@ from ..errors import NoModelError
 from ..support.arrays import Array
 from ..support.layout import counted
 from .loop import followed_orders, followed_share, widened_by_loop
-from .model import reference_free_model
+from .model import ENCODER, reference_free_model
 from .orderchoice import choose_selfcal_orders, highest_order, noise_spectrum_at
-from .pattern import ENCODER
-from .readings import SegmentReadings
 from .recording import Recording
 from .result import (
     ARCSEC,
@@ -32,7 +30,7 @@ from .result import (
     order_ranges,
 )
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
-from .segments import cut_stretches
+from .segments import SegmentReadings, cut_stretches
 from .steady import SteadyFit, fit_steady
 from .verification import held_out_patterns
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..support.arrays import Array
+from .model import ENCODER, RIPPLE, pattern_model, pattern_series, pattern_steepness
 from .motion import MotionFit, MotionSearch
-from .pattern import ENCODER, RIPPLE, pattern_model, pattern_series, pattern_steepness
 from .projected import Projected, Unknown, harmonic_rows, harmonic_sum, harmonic_unknowns
-from .readings import PER_KNOT, SegmentReadings
+from .segments import PER_KNOT, SegmentReadings
 from .splines import Knots, ordered_motion_sums, spline_basis, spline_values
 
 #: Readings that the first iterations look at: enough to come close.

@@ -13,8 +13,8 @@ from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, f_tail
 from .dense import DenseFit
 from .orderchoice import noise_spectrum_at
-from .readings import SegmentReadings
 from .result import ARCSEC, HeldOutPattern
+from .segments import SegmentReadings
 from .steady import SteadyFit, fit_steady
 
 #: Speeds that differ by less than this ratio test nothing.

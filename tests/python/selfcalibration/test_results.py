@@ -15,9 +15,13 @@ from trueangle.selfcalibration.loop import (
     followed_share,
     widened_by_loop,
 )
-from trueangle.selfcalibration.model import reference_free_model
+from trueangle.selfcalibration.model import (
+    pattern_model,
+    pattern_series,
+    pattern_steepness,
+    reference_free_model,
+)
 from trueangle.selfcalibration.orderchoice import louder_beside, spectrum_at
-from trueangle.selfcalibration.pattern import pattern_model, pattern_series, pattern_steepness
 from trueangle.selfcalibration.projected import harmonic_rows, harmonic_sum
 from trueangle.selfcalibration.recording import Recording
 from trueangle.selfcalibration.result import (

@@ -9,9 +9,8 @@ import pytest
 
 from trueangle.errors import FileError, NoModelError
 from trueangle.selfcalibration.orderchoice import highest_order
-from trueangle.selfcalibration.readings import SegmentReadings
 from trueangle.selfcalibration.recording import Recording
-from trueangle.selfcalibration.segments import Segment, cut_stretches, ripple_lead
+from trueangle.selfcalibration.segments import Segment, SegmentReadings, cut_stretches, ripple_lead
 from trueangle.selfcalibration.verification import _turn_numbers
 
 TURN = 2.0 * math.pi

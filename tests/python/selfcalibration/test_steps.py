@@ -8,7 +8,7 @@ import pytest
 from selfcalibration.test_segments import TURN, segment
 from trueangle.selfcalibration import steady as module
 from trueangle.selfcalibration.projected import Unknown
-from trueangle.selfcalibration.readings import SegmentReadings
+from trueangle.selfcalibration.segments import SegmentReadings
 from trueangle.selfcalibration.steady import GaussNewtonSteps
 
 SEED = 69_000
