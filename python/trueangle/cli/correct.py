@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "on stderr (default: text on a terminal; one JSON object a line with --json)",
         default="auto",
     )
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add("--json", bool, "print the result as JSON")
     add_robot(parser)
 

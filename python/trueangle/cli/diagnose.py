@@ -89,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the best account in that time, as 10s, 2min or seconds; it says what is missing "
         "(default: as much work as ordinary readings take three times over, on any machine)",
     )
-    add_shared(parser, "progress", "errors in")
+    add_shared(parser, "progress", "errors-in")
     add("--json", bool, "print the diagnosis as JSON")
     add(
         "--verbose",

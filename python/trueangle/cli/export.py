@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "take the smallest table that differs from the model by at most this",
     )
     add_target_options(parser, {"joint": "of the file of a robot, the joint to write"})
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add("--json", bool, "print the result as JSON")
 
 

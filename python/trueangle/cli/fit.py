@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         Input,
         "files of readings: CSV, Excel, Parquet, HDF5, MATLAB, numpy, ROS bags and others",
     )
-    add_shared(parser, "model output")
+    add_shared(parser, "model-output")
     add(
         "--orders",
         str,
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_joint(parser)
     add_robot(parser)
-    add_shared(parser, "argument", "covariance", "nuisance", "reference orders")
+    add_shared(parser, "argument", "covariance", "nuisance", "reference-orders")
     add(
         "--loss",
         ("auto", "linear", "huber", "tukey"),
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_one_pass(parser)
     add("--checksums", bool, "keep the sha256 of the files in the model, also of a fit in one pass")
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add("--json", bool, "print the result as JSON")
 
 

@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         Output.of(FLEET),
         "fleet file to write: a prior for further units (fit --prior)",
     )
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add("--json", bool, "print the result as JSON")
 
 

@@ -30,9 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         dest="source",
     )
-    add_shared(parser, "model output")
+    add_shared(parser, "model-output")
     add_target_options(parser)
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add("--json", bool, "print what the table corrects as JSON")
 
 

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = partial(declare, parser)
     add("first A", Input, "log of the indicated angle (or the reference)")
     add("second B", Input, "log of the other; both with their times")
-    add_shared(parser, "runs output")
+    add_shared(parser, "runs-output")
     add(
         "--offset S",
         float,
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(default: five times its typical step, and longer where it moves on a line)",
     )
     add_signals(parser, runs=False, channels=False)
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add("--json", bool, "print the result as JSON")
 
 

@@ -17,15 +17,15 @@ from .signal_options import add_signals
 
 #: Options that several commands share, by the names under which commands take them.
 _SHARED: Final[dict[str, tuple[str, Kind, str, dict[str, Any]]]] = {
-    "model output": (
+    "model-output": (
         "-o --output MODEL",
         Output.of(MODEL),
         "model file to write",
         {"required": True},
     ),
-    "runs output": ("-o --output RUNS", Output.of(RUNS), "CSV file to write", {"required": True}),
-    "gear ratio": ("--gear-ratio R", float, "motor turns per output turn", {}),
-    "fixed member": (
+    "runs-output": ("-o --output RUNS", Output.of(RUNS), "CSV file to write", {"required": True}),
+    "gear-ratio": ("--gear-ratio R", float, "motor turns per output turn", {}),
+    "fixed-member": (
         "--fixed-member",
         FIXED_MEMBERS,
         "of the strain wave gear (default: circular_spline)",
@@ -51,7 +51,7 @@ _SHARED: Final[dict[str, tuple[str, Kind, str, dict[str, Any]]]] = {
         "drift (a list with commas), or those that lower the held-out error (auto); default: none",
         {"default": "none"},
     ),
-    "reference orders": (
+    "reference-orders": (
         "--reference-orders 50,100",
         str,
         "orders that the reference itself makes: fitted jointly with the pattern, not "
@@ -84,7 +84,7 @@ _SHARED: Final[dict[str, tuple[str, Kind, str, dict[str, Any]]]] = {
         "on stderr after one second (default: text on a terminal, nothing elsewhere)",
         {"default": "auto"},
     ),
-    "errors in": (
+    "errors-in": (
         "--errors-in",
         ERROR_UNITS,
         "unit of errors in what is printed for people (default: arcsec, or deg where "
@@ -103,7 +103,7 @@ def add_shared(parser: argparse.ArgumentParser, *names: str) -> None:
 
 def add_joint(parser: argparse.ArgumentParser) -> None:
     """Options that tell what joint the readings are of, and where they are."""
-    add_shared(parser, "gear ratio", "fixed member", "shaft")
+    add_shared(parser, "gear-ratio", "fixed-member", "shaft")
     add_signals(parser)
 
 

@@ -38,9 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "range over the runs",
         default="evidence",
     )
-    add_shared(parser, "nuisance", "reference orders", "run")
+    add_shared(parser, "nuisance", "reference-orders", "run")
     add_one_pass(parser)
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add("--json", bool, "print the table as JSON")
 
 

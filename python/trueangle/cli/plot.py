@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_shared(parser, "orders")
     add_joint(parser)
     add("--joint NAME", str, "of the model file of a robot, this joint")
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add("--json", bool, "print what was drawn as JSON")
 
 

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f"{SOURCES}, or a file that grows; two, of the indicated angle and of the "
         "reference, are joined by the time of arrival",
     )
-    add_shared(parser, "runs output")
+    add_shared(parser, "runs-output")
     add("--append", bool, "add a run to an output that is there")
     add("--label NAME", str, "label of the run (default: the next number)")
     add("--for 60s", seconds, "end after so long", dest="seconds")
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "on stderr (default: a screen of text on a terminal)",
         default="auto",
     )
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
 
 
 def run(args: argparse.Namespace) -> int:

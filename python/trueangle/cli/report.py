@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "what tells the units of --fleet apart (default: the column unit; without one, the runs)",
     )
     add("--permitted-arcsec E", float, "with --fleet: error from which a calibration is due")
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add("--pdf FILE", Output.of(PDF), "print it to a PDF too, by an installed browser")
     add_shared(parser, "progress")
     add("--json", bool, "print the report's numbers as JSON")

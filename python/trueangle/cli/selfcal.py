@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = partial(declare, parser)
     add("logs LOGS...", Input, "CSV or Parquet logs of the joint")
-    add_shared(parser, "model output")
+    add_shared(parser, "model-output")
     add(
         "--method",
         ("auto", *METHODS),
@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "where the heads stand, degrees, if their readings share one zero",
     )
     add_signals(parser, runs=False)
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add("--json", bool, "print the result as JSON")
     add_robot(parser)
 

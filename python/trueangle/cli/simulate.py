@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = partial(declare, parser)
     add("simulation FILE", Input, "simulation file (TOML) with at least one [[run]]")
-    add_shared(parser, "runs output")
+    add_shared(parser, "runs-output")
     add("--seed N", int, "seed of the noise (default: 0)", default=0)
     add("--json", bool, "print what was written as JSON")
 

@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_source_options(parser)
     add_signals(parser)
     add_robot(parser)
-    add_shared(parser, "errors in")
+    add_shared(parser, "errors-in")
     add(
         "--plot FILE",
         Output.of(PICTURE),

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import shlex
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -219,6 +218,8 @@ def command_that_helps(error: TrueAngleError, args: argparse.Namespace, build: _
     Files, signals and the joint are those of the command that was refused; ``build`` makes the
     parser of commands.
     """
+    from shlex import join
+
     words = _words(error, args, build)
     if not words:
         return ""
@@ -226,7 +227,7 @@ def command_that_helps(error: TrueAngleError, args: argparse.Namespace, build: _
     if isinstance(error, NoOrderError):
         more = f"; take {_LEAST_READINGS} readings or more"
         perhaps = _PERHAPS if words[0] == "diagnose" else more
-    return f"{perhaps}; run: {shlex.join(['trueangle', *words])}"
+    return f"{perhaps}; run: {join(['trueangle', *words])}"
 
 
 def _words(error: TrueAngleError, args: argparse.Namespace, build: _Build) -> list[str]:

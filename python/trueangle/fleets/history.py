@@ -48,7 +48,7 @@ class HistoryRow(NamedTuple):
     what it stays below in 99 % of fleets in which nothing moved. ``bound`` is that of 95 % of the
     greatest change over a turn since the first date, in the unit of the period; the day at which
     it reaches the permitted error, growing straight in time, is ``next_calibration``. ``orders``
-    has the charts of all orders (`trueangle.fleets.charts`), which pass ``cusum_limit`` once in
+    has the charts of all orders (`charted`), which pass ``cusum_limit`` once in
     465 dates where nothing moves, those of a unit together.
     """
 

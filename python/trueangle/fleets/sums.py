@@ -50,7 +50,7 @@ class FleetSums:
     ----------
     by : {"unit", "run"}
     shafts : list of ShaftOrders or None
-        Orders; None chooses them by the first units (`trueangle.fleets.orders`), whose runs are
+        Orders; None chooses them by the first units (`candidate_orders`), whose runs are
         kept until then.
     joint : tuple
         Gear ratio or None, fixed member, and further shafts.

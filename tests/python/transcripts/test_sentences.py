@@ -28,8 +28,11 @@ LONG = 10
 #: What is between sentences: fields of `%`, Python in backquotes, which commands tell otherwise.
 _PARTS = re.compile(r"%\(\w+\)\w+|`[^`]*`")
 
-#: What is no sentence: patterns, marks of HTML, lists of options.
-_SIGNS = re.compile(r"\(\?P?|\\[bdw]|[<>]|\" ?[a-z-]+=\"|^ ?transform=|^--\S+ --")
+#: What is no sentence: patterns, marks of HTML, arguments as they are declared, lists of options.
+_SIGNS = re.compile(
+    r"\(\?P?|\\[bdw]|[<>]|\" ?[a-z-]+=\"|^ ?transform=|^--\S+ --"
+    r"|^-\S+( --\S+)? \S+$|^\w+ [A-Z]+\.{3}$"
+)
 
 #: Said to nobody.
 UNSAID = ("no value of an option", "has no attribute", "holding runs out")
