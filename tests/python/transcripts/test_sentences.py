@@ -31,7 +31,7 @@ _PARTS = re.compile(r"%\(\w+\)\w+|`[^`]*`")
 #: What is no sentence: patterns, marks of HTML, arguments as they are declared, lists of options.
 _SIGNS = re.compile(
     r"\(\?P?|\\[bdw]|[<>]|\" ?[a-z-]+=\"|^ ?transform=|^--\S+ --"
-    r"|^-\S+( --\S+)? \S+$|^\w+ [A-Z]+\.{3}$"
+    r"|^-\S+( --\S+)? \S+$|^\w+ [A-Z|]+\.{3}$"
 )
 
 #: Said to nobody.
