@@ -15,8 +15,8 @@ from ..support.arrays import Array
 from ..support.signals import GivenSignals, check_signal_names
 from .errormodel import ErrorModel
 
-_Model_contra = TypeVar("Model_contra", contravariant=True)
-_Robot_contra = TypeVar("Robot_contra", contravariant=True)
+Model_contra = TypeVar("Model_contra", contravariant=True)
+Robot_contra = TypeVar("Robot_contra", contravariant=True)
 
 
 class Step(Protocol):
@@ -36,14 +36,14 @@ class Step(Protocol):
         """The true angle of an indicated one."""
 
 
-class ExchangeableStep(Step, Protocol[_Model_contra]):
+class ExchangeableStep(Step, Protocol[Model_contra]):
     """A step that goes on with another model."""
 
-    def swap(self, model: _Model_contra) -> None:
+    def swap(self, model: Model_contra) -> None:
         """Correct by another model from the next step on (`HarmonicModel.compensator`)."""
 
 
-class JointsStep(Protocol[_Robot_contra]):
+class JointsStep(Protocol[Robot_contra]):
     """The corrected angles of all joints of a robot for their indicated ones."""
 
     def __call__(
@@ -55,7 +55,7 @@ class JointsStep(Protocol[_Robot_contra]):
     ) -> NDArray[np.float64]:
         """The true angles, in the order of the joints; in ``out`` where it is given."""
 
-    def swap(self, robot: _Robot_contra) -> None:
+    def swap(self, robot: Robot_contra) -> None:
         """Correct by another robot's models from the next step on (`Robot.compensator`)."""
 
 

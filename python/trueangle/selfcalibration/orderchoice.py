@@ -87,12 +87,12 @@ def _limit(tried: int) -> float:
     return chi_squared_quantile(1.0 - _CHANCE / max(tried, 1), 2.0)
 
 
-def _series(fit: SteadyFit, rows: Array) -> Array:
+def _series(fit: SteadyFit, rows: NDArray[np.intp]) -> Array:
     angle = fit.readings.angle[rows]
     return pattern_series(fit.orders, fit.pattern, angle)
 
 
-def _runs(valid: Array) -> Array:
+def _runs(valid: NDArray[np.bool_]) -> NDArray[np.intp]:
     """A hundred pieces of a thousand neighbours, over the whole log."""
     starts = np.linspace(0, valid.size - 1000, 100).astype(np.int64)
     rows = (starts[:, None] + np.arange(1000)).ravel()
