@@ -26,7 +26,7 @@ from trueangle.effects.blindspots import blind_spots
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.planning import Limits
-from trueangle.planning.questions import effect_of_size
+from trueangle.planning.worth import effect_of_size
 from trueangle.rehearsal.trial import trial_outcome
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, simulate
 

@@ -1,18 +1,19 @@
-"""``trueangle fit``: calibration runs in, a model file out."""
+"""``trueangle fit``: calibration runs in, a model file out; logs of any size in one pass."""
 
 from __future__ import annotations
 
 import argparse
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from ..errors import ArgumentError
 from ..support.plainresult import json_text
-from .onepass import add_one_pass, log_options, refuse_robot, wants_one_pass
+from .ending import own_interrupts
 from .options import add_joint, add_shared, errors_in
 from .parser import declare
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
+from .signal_options import reading_options
 from .values import declared_shafts, orders_by_shaft, parse_orders
 
 if TYPE_CHECKING:
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 HELP = "fit a harmonic model to calibration runs and save it"
 EXAMPLE = "trueangle fit joint_a.csv -o joint_a.json --gear-ratio 100"
+
+#: Readings, two numbers of 8 bytes each, that are read into runs: 256 MiB of them.
+_READINGS: Final = (256 << 20) // 16
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -147,3 +151,92 @@ def _fleet(path: str) -> Fleet:
     from ..fleets.file import load_fleet
 
     return load_fleet(path)
+
+
+def add_one_pass(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of fits in one pass."""
+    add = partial(declare, parser)
+    add(
+        "--one-pass",
+        bool,
+        "constant memory: sums of all readings and some 65 000 of them as they are, where "
+        "there are more than 2^20; so by itself for more than 2^24, and with a --scheduler",
+    )
+    add(
+        "--scheduler tcp://HOST:PORT",
+        str,
+        "Dask scheduler whose workers share the files: a log on each",
+    )
+    add(
+        "--progress",
+        ("auto", "text", "json", "none"),
+        "of a fit in one pass, on stderr (default: text on a terminal)",
+        default="auto",
+    )
+
+
+def wants_one_pass(args: argparse.Namespace) -> bool:
+    """Whether the readings must or should not all be in memory.
+
+    Raises
+    ------
+    ArgumentError
+        An option that needs all readings.
+    """
+    asked = bool(args.one_pass or args.scheduler) or _is_large(args)
+    if asked and (args.nuisance != "none" or args.reference_orders):
+        raise ArgumentError(
+            "--nuisance and --reference-orders need all readings: they do not go with logs in "
+            "one pass"
+        )
+    if asked and (args.run or getattr(args, "loss", "auto") not in ("auto", "linear")):
+        raise ArgumentError(
+            "--run and the losses huber and tukey need all readings: they do not go with logs in "
+            "one pass"
+        )
+    return asked
+
+
+def refuse_robot(args: argparse.Namespace) -> None:
+    """Refuse one pass over the logs of several joints.
+
+    Raises
+    ------
+    ArgumentError
+        It was asked for.
+    """
+    if args.one_pass or args.scheduler:
+        raise ArgumentError("--one-pass and --scheduler go with one joint: leave --robot out")
+
+
+def _is_large(args: argparse.Namespace) -> bool:
+    from ..runs.paths import find_logs, matched_paths
+
+    paths = matched_paths(args.runs)
+    if not all(path.is_file() or path.is_dir() for path in paths):
+        return False  # a pipe is read once
+    from ..logs.sources import logs_hold_at_most
+
+    found = [path for path, _ in find_logs(paths)]
+    return not logs_hold_at_most(found, _READINGS, args.topic)
+
+
+def log_options(args: argparse.Namespace) -> dict[str, Any]:
+    """Keywords of `trueangle.fit_logs` from the options of a command."""
+    own_interrupts()
+    reading = reading_options(args)
+    if reading.pop("periods_per_turn") is not None:
+        raise ArgumentError(
+            "--periods-per-turn is for sine and cosine channels, which need all readings: leave "
+            "--one-pass out"
+        )
+    return {
+        "gear_ratio": args.gear_ratio,
+        "fixed_member": args.fixed_member,
+        "argument": args.argument,
+        "covariance": args.covariance,
+        **reading,
+        "shafts": declared_shafts(args.shaft),
+        "scheduler": args.scheduler,
+        "progress": args.progress,
+    }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from ..support.plainresult import json_text
-from .onepass import add_one_pass, log_options, refuse_robot, wants_one_pass
+from .fit import add_one_pass, log_options, refuse_robot, wants_one_pass
 from .options import add_joint, add_shared, errors_in
 from .parser import declare
 from .paths import Input

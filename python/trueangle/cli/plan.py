@@ -18,8 +18,7 @@ from .values import angle, arc, names, parse_orders, seconds
 
 if TYPE_CHECKING:
     from ..fleets.unitplan import UnitPlan
-    from ..planning.referencefree import SelfPlan
-    from ..planning.result import ArcPlan, CalibrationPlan
+    from ..planning.result import ArcPlan, CalibrationPlan, SelfPlan
 
 HELP = "propose calibration positions that keep the wanted orders apart"
 EXAMPLE = "trueangle plan --gear-ratio 100 --positions 36 --mounts 2"

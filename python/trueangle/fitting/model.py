@@ -15,9 +15,8 @@ from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
 from ..runs.channelangle import common_channels
-from ..runs.checks.copies import duplicate_rows, duplicate_runs
-from ..runs.checks.jumps import missed_counts
 from ..runs.checks.record import records_of
+from ..runs.checks.rows import duplicate_rows, duplicate_runs, missed_counts
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import student_quantile

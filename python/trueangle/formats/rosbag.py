@@ -25,8 +25,18 @@ from .jointstates import JointStateBlock
 from .mcapchunks import ChunkedBagWriter as Writer
 from .mcapchunks import ChunkReader
 from .mcaprows import RecordRows
-from .openbag import BLOCK, FIELDS, TIME, MessageGroup, OpenBag, opened_bag
-from .rosbagmarks import KEY, caller_note, made_note, refuse_again
+from .openbag import (
+    BLOCK,
+    FIELDS,
+    KEY,
+    TIME,
+    MessageGroup,
+    OpenBag,
+    caller_note,
+    made_note,
+    opened_bag,
+    refuse_again,
+)
 
 _TIMES = struct.Struct("<q")
 

@@ -11,8 +11,7 @@ from .plan import (
     readings_needed,
     wanted_orders,
 )
-from .referencefree import SelfPlan
-from .result import ArcPlan, CalibrationPlan
+from .result import ArcPlan, CalibrationPlan, SelfPlan
 from .selfplan import plan_self
 
 __all__ = [

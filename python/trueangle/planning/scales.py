@@ -26,14 +26,15 @@ from .evidence import (
 )
 from .further import plainest_run, run_choices, run_seconds
 from .limits import Limits
-from .questions import Question, question_of
 from .worth import (
     ALIKE,
     MOST_EVIDENCE,
     NOTHING,
     Answer,
+    Question,
     Worth,
     is_strong_answer,
+    question_of,
     run_is_foretold,
     worth_of_evidence,
 )

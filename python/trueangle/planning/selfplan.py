@@ -18,7 +18,7 @@ from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
 from .plan import readings_needed
-from .referencefree import SelfPlan
+from .result import SelfPlan
 
 #: Ratios of start to end speed whose costs are told.
 _RATIOS: Final = (1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0)

@@ -1,16 +1,19 @@
-"""What designs of further runs are worth: questions opened, answers and the evidence they add."""
+"""What designs of further runs are worth: questions that are open, answers, evidence."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..effects import EFFECTS, Effect
+from ..effects.ambiguity import Ambiguity
 from ..estimation.regression import Regression
-from .evidence import ExpectedEvidence
-from .questions import Question
+from ..joint.pattern import JointPattern
+from ..joint.signals import Signals
+from .evidence import ExpectedEvidence, Hypothesis
 
 #: Chance of a strong difference of evidence that is wanted.
 WANTED = 0.95
@@ -27,6 +30,121 @@ ALIKE = 1.5
 
 #: Such factors of evidence at most: of the causes in question, and of the least of all.
 MOST_EVIDENCE = round(2.0 * math.log(ENOUGH) / math.log(ALIKE))
+
+#: Rounds in which the size of an effect is brought to that of the noise, and how near.
+_ROUNDS, _NEAR = 12, 0.02
+
+#: Draws of a cause that has no estimate: whatever it is, it is to be told.
+_DRAWS = 4
+
+#: Draws of an effect before a cause counts as one that such a joint cannot have.
+_TRIES = 4
+
+#: Share of the size asked for below which a cause of bounded size is too small to be what is seen.
+_REACHED = 0.5
+
+
+@dataclass(frozen=True)
+class Question:
+    """Causes to be told apart, or from none, each as it would be.
+
+    Attributes
+    ----------
+    causes : tuple of str
+    hypotheses : tuple of Hypothesis
+        Of those that can be in readings of this joint, and so large.
+    seen : bool
+        Something is seen that one of them explains: the hypotheses are estimates of it.
+    draws : tuple of Hypothesis
+        Of causes that have no estimate, others that are drawn: another place, frequency, order.
+    """
+
+    causes: tuple[str, ...]
+    hypotheses: tuple[Hypothesis, ...]
+    seen: bool
+    draws: tuple[Hypothesis, ...] = ()
+
+
+def question_of(spot: Ambiguity, rich: Signals, around: JointPattern, rms: float) -> Question:
+    """What an entry of ``not_identifiable`` asks.
+
+    Parameters
+    ----------
+    spot : Blindness
+    rich : Signals
+        Of a run in which every cause shows that limits allow to show.
+    around : Surroundings
+    rms : float
+        Of the error of a cause that has no estimate, arcsec over ``rich``.
+    """
+    known: Mapping[str, Sequence[Effect]] = spot.hypotheses
+    if known and not all(cause in known for cause in spot.causes):
+        errors = [Hypothesis(c, tuple(e)).errors(rich, around)[0] for c, e in known.items()]
+        rms = max(float(np.sqrt(np.mean(error**2))) for error in errors) or rms
+    found, draws = [], []
+    for cause in spot.causes:
+        effects = tuple(known.get(cause, ())) or _alike(cause, known, around)
+        if any(special.kind in spot.causes for special in EFFECTS[cause].contains):
+            effects = ()  # its estimate is the special case, where the runs do not tell them
+        if not effects:
+            made = [effect_of_size(cause, rms, rich, around, k * _TRIES) for k in range(_DRAWS)]
+            drawn = [Hypothesis(cause, (one,)) for one in made if one is not None]
+            effects = drawn[0].effects if drawn else ()
+            draws += drawn[1:]
+        if effects:
+            found.append(Hypothesis(cause, effects))
+    large = {
+        one.cause for one in found if one.cause in known or _rms(one, rich, around) > _REACHED * rms
+    }
+    if large:  # the others cannot be it, as the argument's error of a joint with small lines
+        found, draws = ([one for one in some if one.cause in large] for some in (found, draws))
+    return Question(spot.causes, tuple(found), spot.supported, tuple(draws))
+
+
+def _rms(one: Hypothesis, rich: Signals, around: JointPattern) -> float:
+    """Of its error over these readings, without the mean."""
+    return float(np.std(one.errors(rich, around)[0]))
+
+
+def _alike(
+    cause: str, known: Mapping[str, Sequence[Effect]], around: JointPattern
+) -> tuple[Effect, ...]:
+    """The error of another cause that is estimated from this one, where it has such a form."""
+    for effects in known.values():
+        made = tuple(EFFECTS[cause].alike(effect, around) for effect in effects)
+        if made and None not in made:
+            return tuple(effect for effect in made if effect is not None)
+    return ()
+
+
+def effect_of_size(
+    cause: str, rms: float, signals: Signals, around: JointPattern, first: int = 0
+) -> Effect | None:
+    """An effect of this cause whose error has this rms; None where the runs cannot have it.
+
+    ``first`` is the number of its draw, of all but its size.
+    """
+    effect = EFFECTS[cause]
+    most = math.log(effect.size_most)
+    for number in range(first, first + _TRIES):
+        log_size, one = min(0.0, most), None
+        for _ in range(_ROUNDS):
+            size = math.exp(log_size if effect.size_grows else -log_size)
+            one = effect.drawn(size, signals, around, np.random.default_rng(number))
+            if one is None:
+                break
+            error = one.signal(signals, around, np.random.default_rng(0))
+            found = float(np.sqrt(np.mean((error - error.mean()) ** 2)))
+            if found == 0.0:
+                one = None
+                break
+            move = max(min(math.log(rms / found), 8.0), -8.0)
+            if abs(move) < _NEAR or log_size + move > most:
+                break
+            log_size += move
+        if one is not None:
+            return one
+    return None
 
 
 @dataclass(frozen=True, order=True)

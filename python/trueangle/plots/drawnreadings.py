@@ -27,8 +27,10 @@ from .curves import (
     strong_gear_order,
     thinned_points,
 )
-from .panel import Cloud, Panel, PanelPicture
 from .readingpictures import (
+    Cloud,
+    Panel,
+    PanelPicture,
     before_after_picture,
     comparison_picture,
     errors_picture,

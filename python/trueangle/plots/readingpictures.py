@@ -1,27 +1,24 @@
-"""Pictures of readings: errors, before and after, residuals, measured and simulated; described."""
+"""Pictures of readings as panels: errors, before and after, residuals, simulated; draws nothing.
+
+A picture is described once and drawn by `trueangle.plots.drawnreadings`, for a figure and for
+a page.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
 
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, wrap
+from ..support.arrays import Array
 from ..support.display_units import ErrorUnit, significant_digits
 from ..support.layout import counted
 from . import curves
-from .curves import Points, Signal
-from .panel import (
-    ANGLE,
-    Cloud,
-    Panel,
-    PanelPicture,
-    binned_medians,
-    magnified_segment,
-    segment_span,
-)
+from .curves import ModelCurve, Points, Signal
 
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
@@ -31,6 +28,124 @@ if TYPE_CHECKING:
 _MOST_OF_A_TURN: Final = 300.0
 #: Part of the way between two directions over which the runs stand beside each other.
 _BESIDE: Final = 0.8
+
+#: What the colour of readings stands for: their run, or what was done to them.
+_Role: TypeAlias = Literal["run", "before", "after", "measured", "simulated"]
+
+#: Title of an axis of angles.
+ANGLE: Final = "reference angle / deg"
+
+#: Periods of the segment that is shown beside an envelope.
+_PERIODS: Final = 4.0
+#: Bins of a running median, and the readings that make it worth its line.
+_BINS, _ENOUGH = 36, 360
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Readings of one run as dots.
+
+    Attributes
+    ----------
+    points : Points
+        Errors in the unit of the picture.
+    run : int
+        Number of the run, from 0.
+    role : {"run", "before", "after", "measured", "simulated"}
+    name : str
+        For the legend, which has each name once.
+    """
+
+    points: Points
+    run: int
+    role: _Role = "run"
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes.
+
+    Attributes
+    ----------
+    x, y : str
+        Titles of the axes, with units.
+    clouds : tuple of Cloud
+    span : (float, float), optional
+        What the x axis shows; by default what the readings cover.
+    angles : bool
+        The x axis has ticks at whole parts of a turn.
+    model : ModelCurve, optional
+        In the unit of the picture; ``dense`` where only its envelope can be drawn.
+    medians : (ndarray, ndarray), optional
+        Places and medians of the readings about them.
+    zero : bool
+        A line marks no error.
+    title : str
+        Of a segment that is shown larger.
+    """
+
+    x: str
+    y: str
+    clouds: tuple[Cloud, ...]
+    span: tuple[float, float] | None = None
+    angles: bool = True
+    model: ModelCurve | None = None
+    dense: bool = False
+    medians: tuple[Array, Array] | None = None
+    zero: bool = False
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class PanelPicture:
+    """Panels, the main one first, and a sentence for who does not see them."""
+
+    panels: tuple[Panel, ...]
+    told: str
+
+
+def _magnified_segment(whole: Panel, order: float, model: ModelCurve | None = None) -> Panel:
+    """A few periods of an order as large as they are, in the middle: both ends may be thin."""
+    low, high = _segment_span(whole, order)
+    clouds = []
+    for cloud in whole.clouds:
+        points = cloud.points
+        inside = (points.x >= low) & (points.x <= high)
+        part = Points(points.label, points.x[inside], points.y[inside])
+        clouds.append(replace(cloud, points=part))
+    return replace(
+        whole,
+        clouds=tuple(clouds),
+        span=(low, high),
+        model=model,
+        dense=False,
+        title=f"A segment of {high - low:.3g}°: {_PERIODS:g} periods of order {order:g}",
+    )
+
+
+def _segment_span(whole: Panel, order: float) -> tuple[float, float]:
+    """First and last angle of `_magnified_segment`."""
+    assert whole.span is not None
+    low, high = whole.span
+    half = 0.5 * min(_PERIODS * 360.0 / order, high - low)
+    return 0.5 * (low + high) - half, 0.5 * (low + high) + half
+
+
+def _binned_medians(parts: Sequence[Points]) -> tuple[Array, Array] | None:
+    """Medians of readings in bins of x; None of few readings."""
+    x = np.concatenate([part.x for part in parts])
+    y = np.concatenate([part.y for part in parts])
+    low, high = float(x.min()), float(x.max())
+    if x.size < _ENOUGH or high <= low:
+        return None
+    edges = np.linspace(low, high, _BINS + 1)
+    index = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, _BINS - 1)
+    filled = [b for b in range(_BINS) if np.count_nonzero(index == b) >= _ENOUGH // _BINS // 2]
+    return (
+        np.array([float(x[index == b].mean()) for b in filled]),
+        np.array([float(np.median(y[index == b])) for b in filled]),
+    )
 
 
 def errors_picture(
@@ -60,8 +175,8 @@ def errors_picture(
     )
     if strong is None:
         return PanelPicture((whole,), told)
-    near = curves.model_curve(fit.model, segment_span(whole, strong)).scaled(unit.per_arcsec)
-    return PanelPicture((whole, magnified_segment(whole, strong, near)), told)
+    near = curves.model_curve(fit.model, _segment_span(whole, strong)).scaled(unit.per_arcsec)
+    return PanelPicture((whole, _magnified_segment(whole, strong, near)), told)
 
 
 def _measured(runs: Sequence[CalibrationRun]) -> list[Points]:
@@ -126,7 +241,7 @@ def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> PanelP
         tuple(Cloud(p, numbers[p.label], name=f"run {p.label}") for p in scaled),
         span,
         angles=against == "angle",
-        medians=binned_medians(scaled),
+        medians=_binned_medians(scaled),
         zero=True,
     )
     rest = np.concatenate([part.y for part in scaled])
@@ -161,7 +276,7 @@ def comparison_picture(
     whole = Panel(ANGLE, f"error / {unit.name}", tuple(both), span)
     panels = [whole]
     if known is not None and (strong := _gear_order(known, span[1] - span[0])) is not None:
-        panels.append(magnified_segment(whole, strong))
+        panels.append(_magnified_segment(whole, strong))
     panels.append(Panel(ANGLE, f"difference / {unit.name}", tuple(rest), span, zero=True))
     deviation = float(np.concatenate([cloud.points.y for cloud in rest]).std())
     told = (

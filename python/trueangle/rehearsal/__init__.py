@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from .after import plan_after
-from .cause import RehearsedCause
 from .rehearse import rehearse
-from .result import Rehearsal
+from .result import Rehearsal, RehearsedCause
 
 __all__ = ["Rehearsal", "RehearsedCause", "plan_after", "rehearse"]

@@ -11,7 +11,7 @@ from ..plots.orderlines import likely_aliases
 from ..plots.simulatedcurves import finding_names
 from ..runs.run import CalibrationRun
 from ..support.display_units import ErrorUnit
-from .numbers import shortened_list
+from .wording import shortened_list
 
 if TYPE_CHECKING:
     from ..diagnosis import Diagnosis

@@ -17,9 +17,9 @@ from ..plots.diagnosispictures import draw_error_left, draw_factor, factor_title
 from ..plots.drawnreadings import draw_panel
 from ..plots.orderlines import order_lines
 from ..plots.pagechart import page_axes, page_chart
-from ..plots.panel import PanelPicture
 from ..plots.phasesoverruns import draw_phase_of_order
 from ..plots.readingpictures import (
+    PanelPicture,
     before_after_picture,
     comparison_picture,
     errors_picture,

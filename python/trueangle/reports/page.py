@@ -16,7 +16,7 @@ from ..plots.pagechart import run_swatch
 from ..support.files import PAGE, PDF, FileKind, check_output, external_output, written_atomically
 from ..support.plainresult import ShownResult
 from . import wording
-from .numbers import Numbers
+from .wording import Numbers
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 import trueangle as ta
-from trueangle.cli import main, onepass
+from trueangle.cli import fit, main
 from trueangle.cli.plan import add_after_arguments, refuse_without_after
 from trueangle.logs.keeping import KEPT, SAMPLE
 
@@ -58,7 +58,7 @@ def test_readings_from_which_on_one_pass_is_made_are_those_that_the_help_tells(
         one_pass=False, scheduler=None, runs=["."], topic=None, nuisance="none",
         reference_orders=None, run=None,
     )  # fmt: skip
-    assert not onepass.wants_one_pass(args)
+    assert not fit.wants_one_pass(args)
     assert limits == [1 << by_itself]
 
 
@@ -70,7 +70,7 @@ def test_a_pipe_is_read_once_and_into_memory(tmp_path):
         one_pass=False, scheduler=None, runs=[str(tmp_path / "pipe")], topic=None, nuisance="none",
         reference_orders=None, run=None,
     )  # fmt: skip
-    assert not onepass.wants_one_pass(args)
+    assert not fit.wants_one_pass(args)
 
 
 def test_values_that_a_command_cannot_take(tmp_path, monkeypatch, capsys):

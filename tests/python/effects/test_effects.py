@@ -18,8 +18,8 @@ PACKAGE = Path(trueangle.__file__).parent
 #: and the fault of data whose columns are at another ratio.
 WORDS = {
     ("outliers", "certificate/document.py"),
-    ("outliers", "runs/checks/jumps.py"),
-    ("missed_counts", "runs/checks/jumps.py"),
+    ("outliers", "runs/checks/rows.py"),
+    ("missed_counts", "runs/checks/rows.py"),
     ("wrong_gear_ratio", "runs/checks/angles.py"),
     ("wrong_gear_ratio", "runs/checks/fault.py"),
 }

@@ -16,7 +16,7 @@ from trueangle.planning.evidence import (
     evidence_between,
     is_doubted,
 )
-from trueangle.planning.questions import effect_of_size, question_of
+from trueangle.planning.worth import effect_of_size, question_of
 from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulation, simulate
 
 SIM = Simulation(

@@ -18,7 +18,7 @@ from trueangle.plots.curves import Points
 from trueangle.plots.diagnosispictures import error_left, gains
 from trueangle.plots.planpictures import _size_ticks, detection
 from trueangle.plots.readingpictures import before_after_picture, residual_picture
-from trueangle.rehearsal.cause import RehearsedCause
+from trueangle.rehearsal.result import RehearsedCause
 from trueangle.support.display_units import error_unit
 
 matplotlib = pytest.importorskip("matplotlib")

@@ -12,7 +12,7 @@ import trueangle as ta
 from trueangle import plots
 from trueangle.certificate.typesetting import certified_errors
 from trueangle.planning import wanted_orders
-from trueangle.rehearsal.cause import rehearsed_cause
+from trueangle.rehearsal.result import rehearsed_cause
 from trueangle.rehearsal.trial import TrialOutcome
 from trueangle.rehearsal.visibility import SizeRange
 

@@ -22,7 +22,7 @@ from trueangle.formats.columns import listed_columns
 from trueangle.model.records import Provenance
 from trueangle.plots.orderlines import OrderLine, largest_orders_text
 from trueangle.reports.diagnosed import unknown_content
-from trueangle.reports.numbers import shortened_list
+from trueangle.reports.wording import shortened_list
 from trueangle.support.display_units import ErrorUnit
 from trueangle.support.files import InputFile
 from trueangle.support.suggestions import listed_names

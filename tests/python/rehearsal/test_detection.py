@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from statsmodels.stats.proportion import proportion_confint
 
-from trueangle.rehearsal.cause import SHARES, rehearsed_cause
 from trueangle.rehearsal.detection import HIGH, LAPSES, LOW, WIDTHS, Chance, binomial_interval
+from trueangle.rehearsal.result import SHARES, rehearsed_cause
 from trueangle.rehearsal.trial import TrialOutcome
 from trueangle.rehearsal.visibility import STEPS, SizeRange
 

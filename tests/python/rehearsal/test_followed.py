@@ -18,7 +18,7 @@ import trueangle as ta
 from trueangle.effects.argument_error import ArgumentShift
 from trueangle.joint.signals import join_runs
 from trueangle.planning import Limits
-from trueangle.planning.questions import effect_of_size
+from trueangle.planning.worth import effect_of_size
 from trueangle.rehearsal.trial import trial_outcome
 from trueangle.simulation import (
     Harmonic,

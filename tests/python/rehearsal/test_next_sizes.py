@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from trueangle.rehearsal.search import next_sizes
+from trueangle.rehearsal.rehearse import next_sizes
 
 LOWEST, HIGHEST = -16, 20
 

@@ -8,7 +8,7 @@ import pytest
 from trueangle.effects import EFFECTS
 from trueangle.effects.ambiguity import Ambiguity
 from trueangle.rehearsal.detection import Chance
-from trueangle.rehearsal.search import SizeSearch, next_sizes
+from trueangle.rehearsal.rehearse import SizeSearch, next_sizes
 from trueangle.rehearsal.trial import NAMED, NOTHING, Trial, TrialOutcome
 from trueangle.rehearsal.visibility import SizeRange
 

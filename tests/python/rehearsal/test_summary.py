@@ -8,11 +8,17 @@ from typing import Any
 
 import pytest
 
-from trueangle.rehearsal.cause import RehearsedCause, rehearsed_cause
 from trueangle.rehearsal.detection import binomial_interval
-from trueangle.rehearsal.rehearse import _notes
-from trueangle.rehearsal.result import Rehearsal, _else, _never, _size, _table
-from trueangle.rehearsal.search import SizeSearch
+from trueangle.rehearsal.rehearse import SizeSearch, _notes
+from trueangle.rehearsal.result import (
+    Rehearsal,
+    RehearsedCause,
+    _else,
+    _never,
+    _size,
+    _table,
+    rehearsed_cause,
+)
 from trueangle.rehearsal.trial import FAILED, TrialOutcome
 from trueangle.rehearsal.visibility import SizeRange
 

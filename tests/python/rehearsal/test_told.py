@@ -13,10 +13,8 @@ import trueangle as ta
 from trueangle.planning.evidence import ReadingNoise
 from trueangle.planning.nextruns import NextRuns, RivalEvidence
 from trueangle.rehearsal.after import _FurtherTrials
-from trueangle.rehearsal.cause import RehearsedCause
-from trueangle.rehearsal.rehearse import _notes, _still
-from trueangle.rehearsal.result import Rehearsal, _never, _size
-from trueangle.rehearsal.search import SizeSearch
+from trueangle.rehearsal.rehearse import SizeSearch, _notes, _still
+from trueangle.rehearsal.result import Rehearsal, RehearsedCause, _never, _size
 from trueangle.rehearsal.trial import FAILED, NAMED, TrialOutcome, trial_outcome
 from trueangle.support.layout import counted as in_words
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from trueangle.reports.numbers import formatted_number, lookup
 from trueangle.reports.page import find_browser
+from trueangle.reports.wording import formatted_number, lookup
 
 from .scripts import (
     CARDS_BURST,

@@ -5,7 +5,7 @@ import numpy as np
 import trueangle as ta
 from plots.strokes import strokes
 from trueangle.plots.curves import Points, thinned_points
-from trueangle.plots.panel import ANGLE, Cloud, Panel, PanelPicture
+from trueangle.plots.readingpictures import ANGLE, Cloud, Panel, PanelPicture
 from trueangle.reports.figures import panel_figure
 
 #: Bytes of a page at most.

@@ -14,7 +14,7 @@ from trueangle.plots.pagechart import page_axes, page_chart
 from trueangle.plots.phasesoverruns import draw_phase_of_order
 from trueangle.reports.figures import error_scale, line_names
 from trueangle.reports.modelled import model_content, order_content
-from trueangle.reports.numbers import shortened_list
+from trueangle.reports.wording import shortened_list
 from trueangle.support.display_units import error_unit
 
 SEED = 56_100

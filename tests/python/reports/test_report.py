@@ -18,8 +18,8 @@ from trueangle.errors import ArgumentError, MissingExtraError
 from trueangle.fitting.heldout import hold_out
 from trueangle.joint.shafts import shaft_cycles
 from trueangle.reports.modelled import known_gear, known_joint
-from trueangle.reports.numbers import formatted_number, lookup
 from trueangle.reports.page import find_browser, print_pdf
+from trueangle.reports.wording import formatted_number, lookup
 
 from .conftest import ORDERS
 

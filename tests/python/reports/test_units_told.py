@@ -7,9 +7,9 @@ import trueangle as ta
 from trueangle.model.alarm import WatchedOrder, WatchedWindow
 from trueangle.reports.diagnosed import unknown_content
 from trueangle.reports.figures import error_scale
-from trueangle.reports.numbers import Numbers
 from trueangle.reports.robot import JointRank, ranking_text
 from trueangle.reports.watched import WatchReport
+from trueangle.reports.wording import Numbers
 
 SEED = 66_200
 TURNS = {"deg": 360.0, "rad": 2.0 * np.pi, "turn": 1.0, "count": 4096.0}

@@ -17,10 +17,9 @@ from .angles import (
     swapped_channels,
     told_ratio,
 )
-from .copies import duplicate_rows, duplicate_runs
 from .fault import DataFault
-from .jumps import missed_counts, outliers
 from .record import Record, read_records, records_of
+from .rows import duplicate_rows, duplicate_runs, missed_counts, outliers
 from .still import stuck_readings
 
 if TYPE_CHECKING:

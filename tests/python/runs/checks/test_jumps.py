@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.runs.checks.jumps import missed_counts
 from trueangle.runs.checks.record import records_of
+from trueangle.runs.checks.rows import missed_counts
 
 SEED = 61_300
 

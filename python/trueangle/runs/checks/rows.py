@@ -1,4 +1,4 @@
-"""Readings off the rest: isolated outliers, and steps that stay to the end of a run."""
+"""Rows that are no readings of the rest: repeated ones, isolated outliers, steps that stay."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...support.display_units import brief_number
 from ...support.quantiles import median, quantile
 from ..outliers import WILD, robust_scale, spikes
 from .fault import REPEATS, DataFault
-from .record import Record
+from .record import LEAST_READINGS, Record
 
 #: Readings on either side of a step that show whether it stays.
 _BESIDE: Final = 7
@@ -31,6 +31,9 @@ _ROUNDING: Final = 1e-9
 
 #: Of more readings every second, third ... is looked at.
 _LOOKED_AT: Final = 8192
+
+#: Readings that are looked for before all are: where one is alone, not all are copied.
+_TRIED: Final = 8
 
 
 def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
@@ -174,3 +177,72 @@ def _isolated(record: Record) -> tuple[NDArray[np.bool_], Array]:
         # What several readings in a row show is an effect, not an outlier.
         far &= np.convolve(far, np.ones(7), "same") < 1.5
     return far, distance
+
+
+def duplicate_runs(records: list[Record]) -> Iterator[DataFault]:
+    """Runs whose readings are equal to the last digit."""
+    if len(records) < 2:
+        return
+    import hashlib
+
+    same: dict[bytes, list[str]] = {}
+    for record in records:
+        if len(record) >= LEAST_READINGS and np.ptp(record.indicated) > 0.0:
+            data = np.concatenate([record.reference, record.indicated]).tobytes()
+            same.setdefault(hashlib.sha256(data).digest(), []).append(record.label)
+    for labels in same.values():
+        if len(labels) > 1:
+            yield DataFault.of(
+                "duplicate_runs",
+                labels,
+                (),
+                f"runs {_listed(labels)} hold the same readings, to the last digit: "
+                "noise and repeatability would come out too good",
+                "keep one of them",
+            )
+
+
+def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
+    """Rows with one time stamp and the same readings; without times, all rows several times.
+
+    Some equal readings without times are those of a coarse scale.
+    """
+    for record in records:
+        timed = record.time is not None
+        columns = [record.reference, record.indicated, *([record.time] if timed else [])]
+        table = np.stack([column for column in columns if column is not None])
+        if np.all(np.diff(table[-1]) > 0.0) if timed else _is_alone(table):
+            continue
+        order = np.lexsort(table)
+        again = np.append(False, (np.diff(table[:, order]) == 0.0).all(axis=0))
+        rows = np.sort(record.rows[order[again]])
+        if timed and rows.size:
+            yield DataFault.of(
+                "duplicate_rows",
+                [record.label],
+                rows.tolist(),
+                f"{rows.size} row{'s' * (rows.size > 1)} of run {record.label} (first: row "
+                f"{rows[0]}) are there twice, time stamp and readings",
+                "drop the second of each",
+            )
+        counts = np.diff(np.append(np.flatnonzero(~again), again.size))
+        times = int(np.gcd.reduce(counts))
+        if not timed and times > 1 and counts.size >= LEAST_READINGS:
+            yield DataFault.of(
+                "duplicate_rows",
+                [record.label],
+                rows.tolist(),
+                f"every reading of run {record.label} is there {times} times, to the last digit "
+                f"(first again: row {rows[0]}): uncertainties would come out too small",
+                "drop the copies",
+            )
+
+
+def _is_alone(table: Array) -> bool:
+    """Whether one of the first readings is there once."""
+    first = table[:, :_TRIED].T
+    return any(np.count_nonzero((one == table.T).all(axis=1)) < 2 for one in first)
+
+
+def _listed(labels: list[str]) -> str:
+    return f"{', '.join(labels[:-1])} and {labels[-1]}"
