@@ -43,7 +43,7 @@ from .gearlines import (
     motion_varies,
     slope_ratio,
 )
-from .model import reference_free_model
+from .model import reference_free_calibration
 from .projected import harmonic_unknowns
 from .recording import Recording
 from .result import (
@@ -135,33 +135,24 @@ def dual(
     notes = [note for note in (found.note, _arc_note(span, kept, period)) if note]
     notes += _notes(fit, ratio, channels)
     pairs_ = list(zip(kept, table, strict=True))
-    model = reference_free_model(
-        [o for line, o in pairs_ if line.output],
+    return reference_free_calibration(
+        table,
         "dual",
-        [f"{blind_words(b.orders)}: {b.because}" for b in blind],
+        blind,
         notes,
         recordings,
         readings=count,
         noise=noise,
         period=period,
+        turns=turns,
+        held_out=_held_out(channels, ratio, fit),
+        beside=_beside(fit, found, channels),
+        modelled=[o for line, o in pairs_ if line.output],
         motor=(
             abs(ratio),
             [_at_output(o, line, fit.zeros[0]) for line, o in pairs_ if not line.output],
         ),
         span=(span.start - room, span.stop + room),
-    )
-    return SelfCalibration(
-        method="dual",
-        model=model,
-        orders=tuple(table),
-        sums=(),
-        blind=tuple(blind),
-        held_out=_held_out(channels, ratio, fit),
-        notes=tuple(notes),
-        noise_arcsec=noise * ARCSEC,
-        readings=count,
-        turns=turns,
-        beside=_beside(fit, found, channels),
     )
 
 

@@ -20,17 +20,15 @@ from ..support.angles import wrap
 from ..support.arrays import Array
 from .dense import DenseFit, dense_fixed_point, fit_dense, patterns_apart
 from .densetriangle import DenseRows
-from .model import ENCODER, pattern_model, reference_free_model
+from .model import ENCODER, pattern_model, reference_free_calibration
 from .orderchoice import significant_orders
 from .projected import harmonic_rows, harmonic_unknowns
 from .recording import Recording
 from .result import (
-    ARCSEC,
     Blind,
     HeldOutPattern,
     OrderEstimate,
     SelfCalibration,
-    blind_words,
     order_estimates,
 )
 from .verification import chance_of_parts, judged_patterns
@@ -87,29 +85,18 @@ def head_patterns(
     turns = sum(float(np.ptp(np.unwrap(h[0]))) for h in readings) / (2.0 * math.pi)
     notes = _notes(fit, readings, numbers, turns, table)
     blind.insert(0, Blind.zero("no reading without a reference shows it"))
-    model = reference_free_model(
+    return reference_free_calibration(
         table,
         "heads",
-        [f"{blind_words(b.orders)}: {b.because}" for b in blind],
+        blind,
         notes,
         recordings,
         readings=count,
         noise=noise,
         period=period,
-    )
-    angle = _angles(readings)
-    return SelfCalibration(
-        method="heads",
-        model=model,
-        orders=tuple(table),
-        sums=(),
-        blind=tuple(blind),
-        held_out=_held_out(readings, kept, fit),
-        notes=tuple(notes),
-        noise_arcsec=noise * ARCSEC,
-        readings=count,
         turns=turns,
-        beside={"head_angles_deg": [math.degrees(a) % 360.0 for a in angle]},
+        held_out=_held_out(readings, kept, fit),
+        beside={"head_angles_deg": [math.degrees(a) % 360.0 for a in _angles(readings)]},
     )
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import Final
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ..runs.rawchannels import Channels
 from ..support.angles import common_sign
 from ..support.arrays import Array
 from .recording import Recording
-from .result import ARCSEC, OrderEstimate
+from .result import ARCSEC, Blind, HeldOutPattern, OrderEstimate, SelfCalibration, blind_words
 
 ENCODER: Final = "the encoder"
 RIPPLE: Final = "the speed ripple"
@@ -100,6 +100,53 @@ def reference_free_model(
             "and are their unit and period right? `check` shows both",
             error.slope,
         ) from None
+
+
+def reference_free_calibration(
+    orders: Sequence[OrderEstimate],
+    method: str,
+    blind: Sequence[Blind],
+    notes: Sequence[str],
+    recordings: Sequence[Recording],
+    *,
+    readings: int,
+    noise: float,
+    period: float,
+    turns: float,
+    held_out: Mapping[str, HeldOutPattern],
+    beside: Mapping[str, Any],
+    sums: Sequence[OrderEstimate] = (),
+    modelled: Iterable[OrderEstimate] | None = None,
+    **of_model: Any,
+) -> SelfCalibration:
+    """The result of a method with the model of its ``orders``, or of those ``modelled`` alone.
+
+    ``noise`` is in radians; ``of_model`` and errors are those of `reference_free_model`.
+    """
+    model = reference_free_model(
+        orders if modelled is None else modelled,
+        method,
+        [f"{blind_words(b.orders)}: {b.because}" for b in blind],
+        notes,
+        recordings,
+        readings=readings,
+        noise=noise,
+        period=period,
+        **of_model,
+    )
+    return SelfCalibration(
+        method=method,
+        model=model,
+        orders=tuple(orders),
+        sums=tuple(sums),
+        blind=tuple(blind),
+        held_out=held_out,
+        notes=tuple(notes),
+        noise_arcsec=noise * ARCSEC,
+        readings=readings,
+        turns=turns,
+        beside=beside,
+    )
 
 
 def pattern_model(orders: Sequence[float], coefficients: Array) -> HarmonicModel:

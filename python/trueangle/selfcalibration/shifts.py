@@ -22,7 +22,7 @@ from ..support.arrays import Array
 from ..support.distributions import f_tail
 from .dense import DenseFit, dense_fixed_point, fit_dense
 from .densetriangle import DenseRows
-from .model import ENCODER, pattern_model, reference_free_model
+from .model import ENCODER, pattern_model, reference_free_calibration
 from .orderchoice import significant_orders
 from .projected import NOT_SEEN, Unknown, harmonic_rows, harmonic_unknowns
 from .recording import Clampings, Recording, clampings_of
@@ -31,7 +31,6 @@ from .result import (
     Blind,
     HeldOutPattern,
     SelfCalibration,
-    blind_words,
     order_estimates,
     order_ranges,
 )
@@ -118,29 +117,18 @@ def shift_patterns(
             )
         )
     notes = [*design.notes, *_notes(design, fit)]
-    beside = _beside(design, fit, lost, limit)
-    model = reference_free_model(
+    return reference_free_calibration(
         table,
         "shifts",
-        [f"{blind_words(b.orders)}: {b.because}" for b in blind],
+        blind,
         notes,
         recordings,
         readings=count,
         noise=noise,
         period=period,
-    )
-    return SelfCalibration(
-        method="shifts",
-        model=model,
-        orders=tuple(table),
-        sums=(),
-        blind=tuple(blind),
-        held_out=_held_out(design, tuple(sorted({*kept, *lost})), fit),
-        notes=tuple(notes),
-        noise_arcsec=noise * ARCSEC,
-        readings=count,
         turns=sum(float(np.ptp(np.unwrap(a))) for a in design.joint) / (2.0 * math.pi),
-        beside=beside,
+        held_out=_held_out(design, tuple(sorted({*kept, *lost})), fit),
+        beside=_beside(design, fit, lost, limit),
     )
 
 

@@ -17,15 +17,13 @@ from ..errors import NoModelError
 from ..support.arrays import Array
 from ..support.layout import counted
 from .loop import followed_orders, followed_share, widened_by_loop
-from .model import ENCODER, reference_free_model
+from .model import ENCODER, reference_free_calibration
 from .orderchoice import choose_selfcal_orders, highest_order, noise_spectrum_at
 from .recording import Recording
 from .result import (
-    ARCSEC,
     Blind,
     OrderEstimate,
     SelfCalibration,
-    blind_words,
     order_estimates,
     order_ranges,
 )
@@ -127,28 +125,20 @@ def spin_down(
         if sums:
             summed = order_ranges([o.order for o in sums])
             notes.append(f"the model corrects the sum of encoder and ripple at orders {summed}")
-    model = reference_free_model(
-        in_model,
+    return reference_free_calibration(
+        given,
         "spin-down",
-        [*(f"{blind_words(b.orders)}: {b.because}" for b in blind)],
+        blind,
         notes,
         recordings,
         readings=readings.size,
         noise=noise,
         period=period,
-    )
-    return SelfCalibration(
-        method="spin-down",
-        model=model,
-        orders=tuple(given),
-        sums=tuple(sums),
-        blind=tuple(blind),
-        held_out=tests,
-        notes=tuple(notes),
-        noise_arcsec=noise * ARCSEC,
-        readings=readings.size,
         turns=sum(s.turns for s in stretches),
+        held_out=tests,
         beside=beside,
+        sums=sums,
+        modelled=in_model,
     )
 
 
