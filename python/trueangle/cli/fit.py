@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ..errors import ArgumentError
 from ..support.plainresult import json_text
 from .ending import own_interrupts
-from .options import add_joint, add_shared, errors_in
+from .options import add_joint, add_shared, errors_in, show
 from .parser import declare
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
@@ -73,11 +73,7 @@ def run(args: argparse.Namespace) -> int:
         return _robot(*asked, args)
     result = _fitted(args)
     result.model.save(args.output)
-    if args.json:
-        print(json_text({"model": args.output, **result.to_dict()}))
-    else:
-        print(result.summary(errors_in(args)))
-        print(f"\nsaved {args.output}")
+    show(args, result, args.output, named="model")
     return 0
 
 

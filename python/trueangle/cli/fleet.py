@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..support.files import FLEET
-from .options import add_joint, add_shared, errors_in
+from .options import add_joint, add_shared, show
 from .parser import declare
 from .paths import Input, Output
 from .signal_options import reading_options
@@ -85,10 +85,5 @@ def run(args: argparse.Namespace) -> int:
     )
     if args.output is not None:
         found.save(args.output)
-    if args.json:
-        print(found.to_json())
-    else:
-        print(found.summary(errors_in(args)))
-        if args.output is not None:
-            print(f"\nsaved {args.output}")
+    show(args, found, args.output)
     return 0

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from ..support.plainresult import json_text
-from .options import add_shared, errors_in
+from .options import add_shared, show
 from .parser import declare
 from .paths import Input
 from .signal_options import add_signals, signals_of_both
@@ -55,9 +54,5 @@ def run(args: argparse.Namespace) -> int:
         topic=args.topic,
     )
     found.save(args.output)
-    if args.json:
-        print(json_text({"output": args.output, **found.to_dict()}))
-    else:
-        print(found.summary(errors_in(args)))
-        print(f"\nsaved {args.output}")
+    show(args, found, args.output, named="output")
     return 0

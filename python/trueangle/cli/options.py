@@ -11,6 +11,7 @@ from ..joint.members import FIXED_MEMBERS
 from ..support.deadline import STYLES
 from ..support.display_units import ERROR_UNITS, ErrorsIn
 from ..support.files import MODEL, RUNS
+from ..support.plainresult import json_text
 from .parser import Kind, declare
 from .paths import Output
 from .signal_options import add_signals
@@ -113,6 +114,23 @@ def errors_in(args: argparse.Namespace) -> ErrorsIn:
     if args.errors_in == "count" and counts is not None:
         return counts
     return str(args.errors_in)
+
+
+def show(
+    args: argparse.Namespace, result: Any, saved: str | None = None, named: str | None = None
+) -> None:
+    """Print a result for people, and where it was saved, or as JSON for ``--json``.
+
+    JSON on one line names the file as ``named``; without a name it is indented.
+    """
+    if not args.json:
+        print(result.summary(errors_in(args)))
+        if saved is not None:
+            print(f"\nsaved {saved}")
+    elif named is not None:
+        print(json_text({named: saved, **result.to_dict()}))
+    else:
+        print(result.to_json())
 
 
 def refuse_given(args: argparse.Namespace, options: Sequence[str], because: str) -> None:

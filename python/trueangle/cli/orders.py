@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..errors import ArgumentError
 from ..support.plainresult import json_text
 from .fit import add_one_pass, log_options, refuse_robot, wants_one_pass
-from .options import add_joint, add_shared, errors_in
+from .options import add_joint, add_shared, errors_in, show
 from .parser import declare
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked
@@ -56,11 +56,7 @@ def run(args: argparse.Namespace) -> int:
             unit = errors_in(args)
             print("\n\n".join(f"--- {j} ---\n{t.summary(unit)}" for j, t in tables.items()))
         return 0
-    selection = _in_one_pass(args) if wants_one_pass(args) else _in_memory(args)
-    if args.json:
-        print(selection.to_json())
-    else:
-        print(selection.summary(errors_in(args)))
+    show(args, _in_one_pass(args) if wants_one_pass(args) else _in_memory(args))
     return 0
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ..errors import ArgumentError
 from ..selfcalibration.methods import LOOPS, METHODS
 from ..support.plainresult import json_text
-from .options import add_shared, errors_in
+from .options import add_shared, errors_in, show
 from .parser import declare
 from .paths import Input
 from .robots import add_robot, each_joint, joints_asked, save_models
@@ -77,11 +77,7 @@ def run(args: argparse.Namespace) -> int:
             "nothing",
             file=sys.stderr,
         )
-    if args.json:
-        print(json_text({"model": args.output, **result.to_dict()}))
-    else:
-        print(result.summary(errors_in(args)))
-        print(f"\nsaved {args.output}")
+    show(args, result, args.output, named="model")
     return 0
 
 
