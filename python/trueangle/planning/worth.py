@@ -73,7 +73,7 @@ def question_of(spot: Ambiguity, rich: Signals, around: JointPattern, rms: float
     spot : Blindness
     rich : Signals
         Of a run in which every cause shows that limits allow to show.
-    around : Surroundings
+    around : JointPattern
     rms : float
         Of the error of a cause that has no estimate, arcsec over ``rich``.
     """

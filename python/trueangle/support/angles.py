@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
 from .argumentkinds import told_kinds
-from .unit_periods import ARCSEC_PER_DEG, ARCSEC_PER_TURN, UNIT_PERIODS
+from .display_units import ARCSEC_PER_DEG, ARCSEC_PER_TURN, UNIT_PERIODS
 
 __all__ = [
     "ARCSEC_PER_DEG",

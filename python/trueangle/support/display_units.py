@@ -12,7 +12,6 @@ from typing import Final, NamedTuple, TypeAlias
 
 from ..errors import ArgumentError
 from .suggestions import check_choice
-from .unit_periods import ARCSEC_PER_TURN, UNIT_PERIODS
 
 #: What may be asked for by name; a number is the counts of a turn.
 ERROR_UNITS: Final = ("auto", "arcsec", "deg", "mrad", "count")
@@ -31,6 +30,12 @@ _SIZE: Final = r"(-?\d+(?:\.\d+)?(?:e[+-]?\d+)?) arcsec\b"
 
 #: Decimals are kept this far; beyond it a double has none.
 _MOST_DECIMALS: Final = 12
+
+ARCSEC_PER_DEG: Final = 3600.0
+ARCSEC_PER_TURN: Final = 360.0 * ARCSEC_PER_DEG
+
+#: Units by the suffix of a column name. Counts have no fixed period.
+UNIT_PERIODS: Final = {"deg": 360.0, "rad": 2.0 * math.pi, "turn": 1.0}
 
 
 class ErrorUnit(NamedTuple):
