@@ -22,7 +22,7 @@ from .history import Change, changes_of
 from .outliers import Deviates
 from .result import BetweenOrder, CommonOrder, Fleet
 from .sums import FleetSums
-from .tolerance import tolerance_of
+from .tolerance import check_shares, tolerance_of
 from .unit import VERDICTS, FleetUnit, UnitOrder, Verdict
 from .units import FEWEST, SharedPattern, Units, shared_pattern
 
@@ -104,9 +104,7 @@ def fleet(
     ('SN7', 'outlier')
     """
     check_choice("by", by, ("unit", "run"))
-    for name, value in (("share", share), ("confidence", confidence)):
-        if not 0.0 < value < 1.0:
-            raise ArgumentError(f"{name} must lie between 0 and 1, got {value!r}")
+    check_shares(share, confidence)
     if permitted_arcsec is not None and not 0.0 < permitted_arcsec < math.inf:
         raise ArgumentError(f"permitted_arcsec must be positive, got {permitted_arcsec!r}")
     wanted = None if orders is None else resolve_orders(orders, gear_ratio, fixed_member, shafts)

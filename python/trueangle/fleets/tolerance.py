@@ -88,11 +88,7 @@ def tolerance_factor(n: int, share: float, confidence: float, sides: int = 2) ->
     """
     if n < 2:
         raise ArgumentError(f"n must be 2 at least, got {n}")
-    if sides not in (1, 2):
-        raise ArgumentError(f"sides must be 1 or 2, got {sides!r}")
-    for name, value in (("share", share), ("confidence", confidence)):
-        if not 0.0 < value < 1.0:
-            raise ArgumentError(f"{name} must lie between 0 and 1, got {value!r}")
+    check_shares(share, confidence, sides)
     low, high = 1e-6, 1.0
     chance = _one_sided if sides == 1 else _two_sided
     where, weights = _normal_rule(n, share, sides)
@@ -164,16 +160,27 @@ def wilks_units(share: float, confidence: float, sides: int = 2) -> int:
     >>> wilks_units(0.95, 0.95, 1), wilks_units(0.95, 0.95, 2)
     (59, 93)
     """
-    if sides not in (1, 2):
-        raise ArgumentError(f"sides must be 1 or 2, got {sides!r}")
-    for name, value in (("share", share), ("confidence", confidence)):
-        if not 0.0 < value < 1.0:
-            raise ArgumentError(f"{name} must lie between 0 and 1, got {value!r}")
+    check_shares(share, confidence, sides)
     doubt = 1.0 - confidence
     n = max(sides, math.ceil(math.log(doubt) / math.log(share) - 1e-9))
     while sides == 2 and n * share ** (n - 1) - (n - 1) * share**n > doubt:
         n += 1
     return n
+
+
+def check_shares(share: float, confidence: float, sides: int = 1) -> None:
+    """Refuse what is no share of units, no confidence, or neither one side nor two.
+
+    Raises
+    ------
+    ArgumentError
+        Names the argument.
+    """
+    if sides not in (1, 2):
+        raise ArgumentError(f"sides must be 1 or 2, got {sides!r}")
+    for name, value in (("share", share), ("confidence", confidence)):
+        if not 0.0 < value < 1.0:
+            raise ArgumentError(f"{name} must lie between 0 and 1, got {value!r}")
 
 
 def tolerance_of(sizes: Array, left: Array, share: float, confidence: float) -> Tolerance:
