@@ -228,7 +228,10 @@ def _valued(fit: FitResult, angles: NDArray[np.float64], who: Identity) -> dict[
         {
             "angle_deg": float(angle),
             "error_arcsec": float(error),
-            **_uncertainty(budget),
+            "standard_arcsec": budget.standard,
+            "degrees_of_freedom": finite_or_none(budget.degrees_of_freedom),
+            "coverage_factor": budget.coverage_factor,
+            "expanded_arcsec": budget.expanded,
         }
         for angle, error, budget in zip(values.angle_deg, values.error_arcsec, budgets, strict=True)
     ]
@@ -274,13 +277,6 @@ def _budget(budget: Budget, angle_deg: float) -> dict[str, Any]:
             }
             for item, share in zip(budget.contributions, budget.shares(), strict=True)
         ],
-        **_uncertainty(budget),
-    }
-
-
-def _uncertainty(budget: Budget) -> dict[str, float | None]:
-    """Standard and expanded uncertainty of a budget, and what leads from one to the other."""
-    return {
         "standard_arcsec": budget.standard,
         "degrees_of_freedom": finite_or_none(budget.degrees_of_freedom),
         "coverage_factor": budget.coverage_factor,

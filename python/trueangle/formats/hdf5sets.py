@@ -150,6 +150,10 @@ def put(data: h5py.Dataset, start: int, stop: int, values: NDArray[Any]) -> None
 def _check_filters(path: Path, data: Any, name: str) -> None:
     """Refuse a data set whose filters do not fit it.
 
+    The n-bit and the scale-offset filter of libhdf5 read as many parameters, and unpack as many
+    values, as the file states; where that is wrong, the process ends. Layout of the parameters:
+    H5Znbit.c and H5Zscaleoffset.c of HDF5 1.14.
+
     Raises
     ------
     FileError
@@ -178,7 +182,10 @@ def _check_filters(path: Path, data: Any, name: str) -> None:
 
 
 class Hdf5Places(NamedTuple):
-    """Where the values of a data set lie in the file, which stores them as they are."""
+    """Where the values of a data set lie in the file, which stores them as they are.
+
+    HDF5 reads for one thread at a time, and its Python fills the memory before.
+    """
 
     dtype: np.dtype[Any]
     chunk: int

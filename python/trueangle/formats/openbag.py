@@ -1,4 +1,9 @@
-"""An open bag of ROS 1 or ROS 2: where its joint states are, what it says of its correction."""
+"""An open bag of ROS 1 or ROS 2: where its joint states are, what it says of its correction.
+
+Bags of ROS 2 hold the note of a correction among the custom data of their metadata, which stand in
+``metadata.yaml`` and once more inside every storage file; bags of ROS 1 in the headers of the
+corrected connections.
+"""
 
 from __future__ import annotations
 

@@ -284,7 +284,11 @@ def next_sizes(
 
 @dataclass
 class SizeSearch:
-    """The sizes of one cause, the trials made and those of the round at work."""
+    """The sizes of one cause, the trials made and those of the round at work.
+
+    Only what is known of the cause itself decides, in rounds, so that the sizes do not depend on
+    who else is at work.
+    """
 
     cause: str
     sizes: SizeRange | None
