@@ -17,8 +17,7 @@ from ..support.files import remove_leftovers
 from .correction import CorrectionTask, correct_log, is_disk_full, states_after
 from .joints import JointState, LogSettings, logged_joints
 from .manifest import Manifest, stamp
-from .progress import Progress
-from .report import BatchReport, LogReport, done_before
+from .report import BatchReport, LogReport, Progress, done_before
 from .sources import LogTarget, output_places
 
 __all__ = ["BatchReport", "LogReport", "correct_logs"]

@@ -15,8 +15,7 @@ from .accumulation import Accumulated, LogFitSettings, log_moments, merged_momen
 from .correction import CorrectionTask, correct_log, count_turns, is_disk_full, states_after
 from .joints import JointState, LogSettings
 from .manifest import Manifest
-from .progress import Progress
-from .report import LogReport, done_before
+from .report import LogReport, Progress, done_before
 from .sources import LogTarget
 from .turns import TurnSpan, TurnState
 

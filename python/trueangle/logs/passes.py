@@ -38,7 +38,7 @@ from .accumulation import (
     merged_moments,
 )
 from .keeping import SAMPLE
-from .progress import Progress
+from .report import Progress
 
 #: Orders per order of the table that sums of segments hold to a part in 1e10.
 _REACH = 2.89

@@ -436,7 +436,7 @@ def test_a_terminal_without_the_signs_gets_escapes(desk):
 
 
 def test_progress_may_rewrite_its_own_line():
-    from trueangle.logs.progress import Progress
+    from trueangle.logs.report import Progress
 
     stream = io.StringIO()
     times = iter(range(100))

@@ -3,7 +3,7 @@
 import io
 import json
 
-from trueangle.logs.progress import Progress
+from trueangle.logs.report import Progress
 
 
 class Terminal(io.StringIO):
