@@ -85,7 +85,7 @@ def _of_model(args: argparse.Namespace) -> Axes:
 
 def _of_runs(args: argparse.Namespace) -> Axes:
     from ..fitting.fit import fit
-    from ..plots.kinds import fit_plot
+    from ..plots import fit_plot
     from .run_lists import read_checked_runs
 
     refuse_given(args, ("joint",), "is of the model file of a robot, and these are runs")

@@ -10,8 +10,12 @@ matplotlib is imported at the first picture.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
+from ..errors import TrueAngleError
+from ..support.suggestions import check_choice
 from .amplitudespectrum import amplitude_spectrum
-from .canvas import text_alternative
+from .canvas import as_image, small_pictures, text_alternative
 from .controlcharts import fleet_history, watched_windows
 from .diagnosispictures import error_left, factors, gains
 from .drawnreadings import (
@@ -21,12 +25,14 @@ from .drawnreadings import (
     model_error,
     residuals,
 )
-from .fleetpictures import fleet_overview, fleet_patterns, fleet_phasors, fleet_sizes
-from .kinds import drawn as drawn
-from .kinds import fit_plot
-from .kinds import thumbnail as thumbnail
+from .fleetpictures import fleet_overview, fleet_patterns, fleet_phasors, fleet_plot, fleet_sizes
 from .phasesoverruns import phases_over_runs
 from .planpictures import detection, plan_factors, plan_positions
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..fitting.result import FitResult, Picture
 
 __all__ = [
     "amplitude_spectrum",
@@ -52,6 +58,48 @@ __all__ = [
     "watched_windows",
 ]
 
+_FIT = {
+    "errors": error_curves,
+    "spectrum": amplitude_spectrum,
+    "phases": phases_over_runs,
+    "residuals": residuals,
+}
+
 
 def __dir__() -> list[str]:
     return sorted(__all__)  # what completion shows: no module beside the function of its name
+
+
+def fit_plot(
+    fit: FitResult, kind: Picture = "errors", ax: Axes | None = None, **options: Any
+) -> Axes:
+    """See `trueangle.FitResult.plot`."""
+    draw: Any = _FIT[check_choice("kind", kind, _FIT)]
+    axes: Axes = draw(fit, ax=ax, **options)
+    return axes
+
+
+#: Results by the names of their classes, which need not be imported to be drawn.
+_RESULTS: dict[str, Any] = {
+    "FitResult": fit_plot,
+    "HarmonicModel": model_error,
+    "OrderSelection": amplitude_spectrum,
+    "Diagnosis": gains,
+    "Rehearsal": detection,
+    "Fleet": fleet_plot,
+}
+
+
+def thumbnail(result: object) -> str:
+    """A small picture of a result as an element of a page; empty where there is none to draw."""
+    draw = _RESULTS.get(type(result).__name__)
+    try:
+        with small_pictures():
+            return "" if draw is None else as_image(draw(result))
+    except TrueAngleError:  # of no matplotlib too
+        return ""
+
+
+def drawn(result: object, *args: Any, **options: Any) -> Any:
+    """The picture of a result (`trueangle.support.plainresult.result_picture`)."""
+    return _RESULTS[type(result).__name__](result, *args, **options)

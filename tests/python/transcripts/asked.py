@@ -32,7 +32,7 @@ DOORS = (
     "fleets.plan_unit", "rehearsal.after.plan_after", "simulation.simulate", "diagnosis.diagnose",
     "rehearsal.rehearse", "reports.report", "fleets.fleet.fleet", "export.export_model",
     "export.import_model", "selfcalibration.calibrate.selfcal", "model.monitor.Monitor",
-    "model.batches.read_batches", "plots.kinds.fit_plot",
+    "model.batches.read_batches", "plots.fit_plot",
     "plots.drawnreadings.model_error",
 )  # fmt: skip
 
