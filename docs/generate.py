@@ -139,17 +139,17 @@ def story(rows: int, columns: int) -> mpl.figure.Figure:
     )
     axes[0].plot(everywhere, truth, color="#B8C4CE", linewidth=0.4)
     axes[0].plot(positions, joint.pattern.value(np.radians(positions)), ".", color="#B06A00")
-    axes[0].set_title("1. the error,\nand 36 positions of it")
+    axes[0].set_title("1. Error of a joint,\nmeasured at 36 positions")
     rest = joint.pattern.value(np.radians(positions)) - left(once, positions)
     axes[1].plot(everywhere, truth - left(once, everywhere), color="#C04A00", linewidth=0.4)
     axes[1].plot(positions, rest, ".", color="#0072B2")
     between = (truth - left(once, everywhere)).std()
     axes[1].set_title(
-        f"2. corrected from these: {rest.std():.0f} arcsec\nthere, {between:.0f} between"
+        f"2. Corrected from these: {rest.std():.0f} arcsec\nat them, {between:.0f} between"
     )
     rest = truth - left(planned.model, everywhere)
     axes[2].plot(everywhere, rest, color="#0072B2", linewidth=1.2)
-    axes[2].set_title(f"3. from two mounts as planned:\n{rest.std():.1f} arcsec everywhere")
+    axes[2].set_title(f"3. Measured at two planned mounts:\n{rest.std():.1f} arcsec everywhere")
     for ax in axes:
         ax.set_xticks([0, 90, 180, 270, 360])
         ax.title.set_fontsize("medium")
