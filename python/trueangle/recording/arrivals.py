@@ -6,14 +6,14 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from ..errors import ArgumentError
 from ..support.arrays import Array
 from .lines import layout_of, layout_of_columns, layout_of_pattern
-from .sources import Source, SourceOptions
+from .sources import SourceOptions, open_source
 
 #: Seconds between two reads of a fast source, between two looks at what was read, and of silence
 #: after which a line is whole.
@@ -41,14 +41,20 @@ class Rows(NamedTuple):
         """Those at some places: numbers or truth values."""
         return Rows(self.values[places], self.time[places])
 
+    def followed_by(self, later: Rows) -> Rows:
+        """These and later ones."""
+        if not self.time.size:
+            return later
+        return Rows(*(np.concatenate(pair) for pair in zip(self, later, strict=True)))
+
 
 class Arrivals:
     """What arrives from a source, in rows; a thread reads so that a slow disk loses nothing.
 
     Parameters
     ----------
-    source : Source
-        Opened; closed by `close`.
+    address : str
+        See `trueangle.recording.sources.open_source`.
     options : SourceOptions
         With the pattern of its lines, and what is sent to it.
     start : float
@@ -62,21 +68,23 @@ class Arrivals:
         What ended the source, where it did not end by itself.
     """
 
-    def __init__(self, source: Source, options: SourceOptions, start: float) -> None:
-        self.source = source
+    def __init__(self, address: str, options: SourceOptions, start: float) -> None:
         self.layout = None if options.pattern is None else layout_of_pattern(options.pattern)
+        self._source = source = open_source(address, options)
         if source.names:
             self.layout = layout_of_columns("CSV", source.names)
         if options.send is not None:
+            if source.send is None:
+                raise ArgumentError("send: lines are only read here")
             source.send(f"{options.send}\n".encode())
         self.rejected: list[bytes] = []
         self.problem: OSError | None = None
-        self._start, self._opened = start, time.monotonic()
+        self._start = start
+        self._opened, self._before = time.monotonic() - start, math.nan
         self._read: deque[tuple[float, bytes]] = deque()
         self._lines: list[bytes] = []
         self._times: list[float] = []
-        self._tail, self._partial = b"", False
-        self._before, self._stamp = math.nan, -math.inf
+        self._tail, self._is_cut = b"", False
         self._intervals = np.zeros(3)  # lines, and sums of their intervals and squares
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._work, daemon=True)
@@ -104,29 +112,20 @@ class Arrivals:
         if not self._stopped.is_set():
             self._stopped.set()
             self._thread.join(2.0)
-            self.source.close()
+            self._source.close()
 
     def _work(self) -> None:
         before = 0.0
         try:
-            while not self._stopped.is_set() and (data := self.source.read()) is not None:
+            while not self._stopped.is_set() and (data := self._source.read()) is not None:
                 now = time.monotonic()
                 if data:
-                    self._read.append((now, data))
+                    self._read.append((now - self._start, data))
                     if now - before < 2.0 * _PAUSE:  # many lines in one read are cheaper
                         time.sleep(_PAUSE)
                     before = now
         except OSError as error:
             self.problem = error
-
-    def batches(self) -> Iterator[Rows]:
-        """Rows until the source ends, none where none are known by a look."""
-        over = False
-        while not over:
-            over = self.is_over and not self._read
-            yield self.take() if self.look() else Rows(np.empty((0, 0)), np.empty(0))
-            if not (over or self._read):
-                time.sleep(TICK)
 
     def look(self) -> bool:
         """Take lines apart that have arrived; whether their layout is known by now."""
@@ -151,30 +150,25 @@ class Arrivals:
         Of several in one read the last came now, the others evenly since the read before, at the
         mean interval at most.
         """
-        seconds = now - self._start
         if math.isnan(self._before):
-            self._partial = self.source.midway and now - self._opened < _SILENCE
-            self._before = seconds
+            self._is_cut = self._source.midway and now - self._opened < _SILENCE
+            self._before = now
         data = (self._tail + data).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         *lines, self._tail = data.split(b"\n")
         if len(self._tail) > _LONGEST:
-            lines.append(self._tail)
-            self._tail = b""
-        if lines and self._partial:
+            lines, self._tail = [*lines, self._tail], b""
+        if lines and self._is_cut:
             self.rejected.append(lines.pop(0))
-            self._partial = False
+            self._is_cut = False
         if not lines:
             return
-        gap, (count, total, _), within = seconds - self._before, self._intervals, len(lines) - 1
-        step = min(gap / len(lines), total / count if count else gap)
+        gap, n, (count, total, _) = now - self._before, len(lines), self._intervals
+        step = min(gap / n, total / count if count else gap)
         if gap > 0.0:
-            squares = within * step**2 + (gap - within * step) ** 2
-            self._intervals += len(lines), gap, squares
-        first = max(seconds - within * max(step, _STEP), self._stamp + _STEP)
-        step = max((seconds - first) / max(within, 1), _STEP)
+            self._intervals += n, gap, (n - 1) * step**2 + (gap - (n - 1) * step) ** 2
+        step, self._before = max(step, _STEP), max(now, self._before + n * _STEP)
         self._lines += lines
-        self._times += [first + i * step for i in range(len(lines))]
-        self._before, self._stamp = seconds, self._times[-1]
+        self._times += [self._before - i * step for i in reversed(range(n))]
 
     def take(self) -> Rows:
         """Rows that arrived until the last look, whose layout is known."""
@@ -182,7 +176,6 @@ class Arrivals:
         lines, rows = self._lines, Rows(self.layout.values(self._lines), np.array(self._times))
         self._lines, self._times = [], []
         good = np.isfinite(rows.values).all(axis=1)
-        passed = (b"", self.layout.header)
         wrong = [lines[i] for i in np.flatnonzero(~good)]
-        self.rejected += [line for line in wrong if line.strip() not in passed]
+        self.rejected += [x for x in wrong if x.strip() not in (b"", self.layout.header)]
         return rows.at(good)

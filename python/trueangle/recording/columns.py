@@ -11,9 +11,9 @@ from ..errors import ArgumentError, FileError
 from ..formats.columns import find_columns
 from ..support.angles import UNIT_PERIODS
 from ..support.arrays import Array
-from ..support.roles import ANGLE_UNITS, ANGLES, RoleColumn, role_code, role_kind, wanted_columns
+from ..support.roles import ANGLES, LABELS, RoleColumn, role_code, role_kind, wanted_columns
 from ..support.signals import find_signal
-from .arrivals import Rows
+from .arrivals import Arrivals, Rows
 
 #: Counts of a turn, of the indicated angle and of the reference.
 Counts: TypeAlias = tuple[float | None, float | None]
@@ -24,12 +24,16 @@ _KEPT, _PATIENCE = 4096, 2.0
 
 
 class Column(NamedTuple):
-    """A column that is written: its name, its place in the rows, and ``factor · x + offset``."""
+    """A column that is written: its name, its place in the rows, and ``factor · x + offset``.
+
+    ``turn`` is that of an angle of the shaft in its unit, else 0.
+    """
 
     name: str
     place: int
     factor: float = 1.0
     offset: float = 0.0
+    turn: float = 0.0
 
     def values(self, rows: Rows) -> Array:
         """As they are written."""
@@ -50,33 +54,32 @@ def written_columns(
     FileError
         A column that was asked for is missing, or its unit is.
     """
-    roles = find_columns(source, names, wanted_columns(signals))
-    by_name = {column.name: column for column in roles.values()}
+    found = find_columns(source, names, wanted_columns(signals)).values()
+    roles = {c.name: c for c in found if c.role not in LABELS and "offset" not in c.role}
     return [
-        _column(source, place, name, by_name.get(name), counts) for place, name in enumerate(names)
+        _column(source, place, roles[name], counts)
+        if name in roles
+        else Column(f"device_{name}" if name == "run" else name, place)
+        for place, name in enumerate(names)
     ]
 
 
-def _column(source: str, place: int, name: str, role: RoleColumn | None, counts: Counts) -> Column:
-    kind = "label" if role is None else role_kind(role.role)
-    if role is None or kind == "label" or role.role.startswith("reference_offset"):
-        return Column(f"device_{name}" if name == "run" else name, place)
-    pattern = f"{role.role}_{{}}" if role.role in ANGLES else find_signal(role.role).column
+def _column(source: str, place: int, column: RoleColumn, counts: Counts) -> Column:
+    role, kind = column.role, role_kind(column.role)
+    pattern = f"{role}_{{}}" if role in ANGLES else find_signal(role).column
     if kind in ("time", "plain"):
-        return Column(pattern, place, *role.scale(_PERIOD))
-    if role.unit is None:
-        problem = f"its unit is not known; give it: {role_code(role.role, name, 'count')}"
-        raise FileError(source, problem, column=name)
-    unit = role.unit.removesuffix("/s")
-    number = counts[role.role == "reference"]
-    known = unit in UNIT_PERIODS or (unit == "count" and number is None)
-    keeps = known or (role.role == "error" and unit != "count")
+        return Column(pattern, place, *column.scale(_PERIOD))
+    if column.unit is None:
+        problem = f"its unit is not known; give it: {role_code(role, column.name, 'count')}"
+        raise FileError(source, problem, column=column.name)
+    unit, number = column.unit.removesuffix("/s"), counts[role == "reference"]
+    if unit not in UNIT_PERIODS and not (unit == "count" and number is None):
+        unit = "deg"
     # As runs of a reversed sensor are written: minus what the sensor reads.
-    minus = "-" if role.sign < 0 and role.role == "indicated" else ""
-    factor = role.scale(_PERIOD, number)[0]
-    if keeps:
-        factor = -1.0 if role.is_reversed else 1.0
-    return Column(minus + pattern.format(unit if keeps else "deg"), place, factor)
+    minus = "-" if column.sign < 0 and role == "indicated" else ""
+    factor, offset = column.scale(UNIT_PERIODS.get(unit, _PERIOD), number)
+    turn = UNIT_PERIODS.get(unit, 0.0) if role in ANGLES[:2] else 0.0
+    return Column(minus + pattern.format(unit), place, factor, offset, turn)
 
 
 class PairedSources:
@@ -86,8 +89,10 @@ class PairedSources:
 
     Parameters
     ----------
+    arrivals : Arrivals
+        Of the reference.
     columns : list of Column
-        Those of the source of the reference.
+        Its columns.
 
     Attributes
     ----------
@@ -100,33 +105,29 @@ class PairedSources:
         It has no reference, or one in counts of unknown number.
     """
 
-    def __init__(self, columns: Sequence[Column]) -> None:
-        turns = {f"reference_{unit}": turn for unit, turn in ANGLE_UNITS.items()}
-        found = [column for column in columns if column.name in turns]
+    def __init__(self, arrivals: Arrivals, columns: Sequence[Column]) -> None:
+        found = [c for c in columns if c.turn and c.name.startswith("reference_")]
         if not found:
             raise ArgumentError(
                 "of two sources one needs an indicated angle, the other a reference; name others "
                 'with `signals={"a": {"indicated": ("NAME", "UNIT")}, "b": {"reference": '
                 '("NAME", "UNIT")}}`, and give `counts_per_turn_reference=` where it counts'
             )
-        self._column, self._degrees = found[0], 360.0 / turns[found[0].name]
-        self._time, self._angle = np.empty(0), np.empty(0)
-        self._waiting, self.lost = Rows(np.empty((0, 0)), np.empty(0)), 0
+        self._arrivals, self._column, self.lost = arrivals, found[0], 0
+        self._known = self._waiting = Rows(np.empty((0, 0)), np.empty(0))
 
-    def pair(self, rows: Rows, reference: Rows, now: float) -> tuple[Rows, Array]:
+    def pair(self, rows: Rows, now: float) -> tuple[Rows, Array]:
         """Rows whose reference is known by now, those that waited first, and it in degrees."""
         from ..runs.joining.stream import Stream
 
-        angle = self._column.values(reference) * self._degrees
-        self._time = np.append(self._time, reference.time)[-_KEPT:]
-        self._angle = np.append(self._angle, angle)[-_KEPT:]
-        if self._waiting.time.size:
-            rows = Rows(*(np.concatenate(pair) for pair in zip(self._waiting, rows, strict=True)))
-        ready = rows.time <= max([now - _PATIENCE, *self._time[-1:]])
+        self._known = self._known.followed_by(self._arrivals.take()).at(slice(-_KEPT, None))
+        rows, time = self._waiting.followed_by(rows), self._known.time
+        ready = rows.time <= max([now - _PATIENCE, *time[-1:]])
         rows, self._waiting = rows.at(ready), rows.at(~ready)
         known, angle = np.zeros(rows.time.size, dtype=bool), np.empty(0)
-        if self._time.size > 2 and known.size:
-            stream = Stream.of(self._time, self._angle)
+        if time.size > 2 and known.size:
+            degrees = self._column.values(self._known) * _PERIOD / self._column.turn
+            stream = Stream.of(time, degrees)
             known = stream.covers(rows.time)
             angle = stream.at(rows.time[known], cubic=False)[0]
         self.lost += int(np.count_nonzero(~known))

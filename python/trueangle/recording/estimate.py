@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..errors import RankError
-from ..support.angles import wrap
+from ..support.angles import arcsec, wrap
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_quantile
 
@@ -42,73 +41,8 @@ class LiveOrder(NamedTuple):
         return math.degrees(math.atan2(self.value.real, self.value.imag)) % 360.0
 
 
-class Travel:
-    """Which part of the turn was read in either direction, and how fast.
-
-    Attributes
-    ----------
-    cells : ndarray, shape (2, CELLS)
-        Readings by direction (forwards, backwards) and place in the turn.
-    turns : float
-        Turns travelled, both ways added up.
-    speeds : list of float
-        Least and greatest speed, turns per second; none before it has moved.
-    """
-
-    def __init__(self, period: float) -> None:
-        self.cells = np.zeros((2, CELLS), dtype=np.int64)
-        self.turns, self.speeds = 0.0, [math.inf, 0.0]
-        self._period, self._sign = period, 0
-        self._last = self._mark = math.nan
-        self._from = 0.0, 0.0
-
-    def add(self, angle: Array, time: Array) -> NDArray[np.intp]:
-        """Take in angles in the order they were read.
-
-        Returns
-        -------
-        ndarray of int, shape (3, n)
-            Cell of each, direction (0 at first), and whole turns travelled by it.
-        """
-        turn = angle / self._period
-        if math.isnan(self._last):
-            self._last = self._mark = float(turn[0])
-            self._from = self._last, float(time[0])
-        path = self._last + np.cumsum(wrap(np.diff(turn, prepend=self._last), 1.0))
-        steps, before = [], self._sign
-        for place in path.tolist():
-            if abs(place - self._mark) > _MOVED:
-                self._sign = 1 if place > self._mark else -1
-                self.turns += abs(place - self._mark)
-                self._mark = place
-            steps.append((self._sign, int(self.turns)))
-        directions, turns = np.transpose(steps)
-        directions[directions == 0] = self._sign  # it had moved that way already
-        cells = np.floor(path % 1.0 * CELLS).astype(np.intp) % CELLS
-        for row, sign in enumerate((1, -1)):
-            self.cells[row] += np.bincount(cells[directions == sign], minlength=CELLS)
-        self._last = float(path[-1])
-        seconds, far = float(time[-1]) - self._from[1], abs(self._last - self._from[0])
-        if seconds >= _SPEED or self._sign != before:
-            if far > _MOVED and self._sign == before:
-                slow, fast = self.speeds
-                self.speeds = [min(slow, far / seconds), max(fast, far / seconds)]
-            self._from = self._last, float(time[-1])
-        return np.array([cells, directions, turns])
-
-    @property
-    def covered(self) -> Array:
-        """Share of the turn that was read, forwards and backwards."""
-        return np.asarray((self.cells > 0).mean(axis=1))
-
-    @property
-    def is_covered(self) -> bool:
-        """Every part of the turn was read, in one direction or the other."""
-        return bool(self.cells.any(axis=0).all())
-
-
 class Estimate:
-    """The error by place, and its orders with their standard errors, in constant memory.
+    """Travel, and the error by place and its orders with standard errors, in constant memory.
 
     Orders are those of all readings by least squares, with one zero for each direction. Their
     variance is that of white noise or, where turns differ by more than it makes of them,
@@ -126,7 +60,12 @@ class Estimate:
 
     Attributes
     ----------
-    travel : Travel
+    cells : ndarray, shape (2, CELLS)
+        Readings by direction (forwards, backwards) and place in the turn.
+    travelled : float
+        Turns, both ways added up.
+    speeds : list of float
+        Least and greatest speed, turns per second; none before it has moved.
     orders : list of LiveOrder
         Those above what noise makes of the largest of all looked at, with 99 %; the strongest
         first.
@@ -136,70 +75,111 @@ class Estimate:
     """
 
     def __init__(self, period: float) -> None:
-        self.travel = Travel(period)
+        self.period = period
+        self.cells = np.zeros((2, CELLS), dtype=np.int64)
+        self.travelled, self.speeds = 0.0, [math.inf, 0.0]
         self.orders: list[LiveOrder] = []
         self.turns, self.is_settled = 0, False
-        self._all: dict[int, _core.Moments] = {}  # by direction
-        self._turn: dict[int, _core.Moments] = {}
+        self._zero = self._last = self._mark = math.nan
+        self._sign, self._from = 0, (0.0, 0.0, 0)  # seconds, travel and direction
+        self._all, self._turn = self._moments(), self._moments()
         self._seen = np.zeros(CELLS, dtype=bool)
-        self._period, self._zero = period, math.nan
         self._sums = np.zeros((2, CELLS))
-        self._values = self._last = np.zeros(_HIGHEST, dtype=complex)
+        self._values = self._before = np.zeros(_HIGHEST, dtype=complex)
         self._steps = np.zeros(_HIGHEST)
+
+    def _moments(self) -> dict[int, _core.Moments]:
+        """Sums of readings by direction."""
+        return {sign: _core.Moments(self.period, [1.0], _ORDERS) for sign in (1, -1)}
 
     def add(self, reference: Array, indicated: Array, time: Array) -> None:
         """Take in readings in the order they were taken."""
-        error = indicated - reference
+        error, place = indicated - reference, reference / self.period
         if math.isnan(self._zero):
-            self._zero = float(error[0])
-        error = self._zero + wrap(error - self._zero, self._period)
-        before = int(self.travel.turns)
-        cells, signs, turns = self.travel.add(reference, time)
-        self._sums[0] += np.bincount(cells, minlength=CELLS)
-        self._sums[1] += np.bincount(cells, error, CELLS)
-        ends = (np.flatnonzero(np.diff(turns, prepend=before)) + 1).tolist()
-        for start, stop in pairwise(sorted({0, *ends, error.size})):
-            for sign in {*signs[start:stop].tolist()} - {0}:
-                rows = start + np.flatnonzero(signs[start:stop] == sign)
-                for sums in (self._all, self._turn):
-                    if sign not in sums:
-                        sums[sign] = _core.Moments(self._period, [1.0], _ORDERS)
-                    sums[sign].update(reference[rows], error[rows])
-            self._seen[cells[start:stop]] = True
-            if stop in ends and self._seen.all():
+            self._zero, self._last = float(error[0]), float(place[0])
+            self._mark, self._from = self._last, (float(time[0]), 0.0, 0)
+        error = self._zero + wrap(error - self._zero, self.period)
+        path = self._last + np.cumsum(wrap(np.diff(place, prepend=self._last), 1.0))
+        self._last = float(path[-1])
+        before = int(self.travelled)
+        signs, turns = self._travel(path, time)
+        cells = np.floor(path % 1.0 * CELLS).astype(np.intp) % CELLS
+        for row, sign in enumerate(self._turn):
+            self.cells[row] += np.bincount(cells[signs == sign], minlength=CELLS)
+        self._sums += np.bincount(cells, minlength=CELLS), np.bincount(cells, error, CELLS)
+        ends = np.flatnonzero(np.diff(turns, prepend=before)) + 1
+        for i, rows in enumerate(np.split(np.arange(error.size), ends)):
+            for sign, sums in self._turn.items():
+                own = rows[signs[rows] == sign]
+                sums.update(reference[own], error[own])
+            self._seen[cells[rows]] = True
+            if i < ends.size and self._seen.all():
                 with suppress(RankError):  # it goes on until its places tell the orders apart
-                    self._end_turn(*map(self._solved, (self._turn, self._all)))
+                    self._end_turn(self._solved(self._turn)[0])
+
+    def _travel(self, path: Array, time: Array) -> NDArray[np.intp]:
+        """Direction at each place, 0 before it has moved, and whole turns travelled by it."""
+        steps = []
+        for place in path.tolist():
+            if abs(place - self._mark) > _MOVED:
+                self._sign = 1 if place > self._mark else -1
+                self.travelled += abs(place - self._mark)
+                self._mark = place
+            steps.append((self._sign, int(self.travelled)))
+        found = np.transpose(steps)
+        found[0, found[0] == 0] = self._sign  # it had moved that way already
+        start, before, sign = self._from
+        seconds, far = float(time[-1]) - start, self.travelled - before
+        if seconds >= _SPEED or sign != self._sign:
+            if far > _MOVED and sign == self._sign:
+                slow, fast = self.speeds
+                self.speeds = [min(slow, far / seconds), max(fast, far / seconds)]
+            self._from = float(time[-1]), self.travelled, self._sign
+        return found
 
     def _solved(self, sums: dict[int, _core.Moments]) -> tuple[Any, Array]:
         """Cosine and sine of all orders, and variance of either."""
-        found = _core.fit_moments([*sums.values()], self._period, [1.0], _ORDERS)
+        read = [each for each in sums.values() if each.count]
+        found = _core.fit_moments(read, self.period, [1.0], _ORDERS)
         variance = np.diag(found.covariance)[1:].reshape(-1, 2).mean(axis=1)
         return np.array(found.cosine[0]) + 1j * np.array(found.sine[0]), variance
 
-    def _end_turn(self, turn: tuple[Any, Array], found: tuple[Any, Array]) -> None:
+    def _end_turn(self, turn: Any) -> None:
         """Find the orders by all readings, and judge whether the last turn has changed them."""
-        self._turn, self._seen = {}, np.zeros(CELLS, dtype=bool)
+        for sign, sums in self._turn.items():
+            self._all[sign].merge(sums)
+        self._turn, self._seen = self._moments(), np.zeros(CELLS, dtype=bool)
+        before, (self._values, white) = self._values, self._solved(self._all)
         self.turns += 1
         more = max(self.turns - 1.0, 1.0)
-        last, (self._last, _) = self._last, turn
-        self._steps += np.abs(self._last - last) ** 2 * (self.turns > 1)
-        before, known = self._values, {order.order for order in self.orders}
-        self._values, white = found[0], np.maximum(found[1], 1e-300)
+        self._steps += np.abs(turn - self._before) ** 2 * (self.turns > 1)
+        self._before, white = turn, np.maximum(white, 1e-300)
         own = self._steps / (4.0 * self.turns * more)
         # All orders together first: noise of any colour is in each.
         common = float(np.median(own / white))
-        white = white * (common if common > _COLOURED else 1.0)
+        white *= common if common > _COLOURED else 1.0
         limit = chi_squared_quantile(1.0 - _CHANCE / _HIGHEST, 2.0 * more) / (2.0 * more)
         std = np.sqrt(np.where(own > limit * white, own, white))
         least = math.sqrt(-2.0 * math.log(_CHANCE / _HIGHEST)) * std
+        sizes, known = np.abs(self._values), {order.order for order in self.orders}
         self.orders = [
             LiveOrder(int(i) + 1, complex(self._values[i]), float(std[i]))
-            for i in np.argsort(-np.abs(self._values))
-            if abs(self._values[i]) > least[i]
+            for i in np.argsort(-sizes)
+            if sizes[i] > least[i]
         ]
-        known |= {order.order for order in self.orders}
-        changes = np.abs(self._values - before)
-        self.is_settled = self.turns > 1 and all(changes[k - 1] <= std[k - 1] for k in known)
+        watched = [k - 1 for k in known | {order.order for order in self.orders}]
+        is_steady = np.abs(self._values - before) <= std
+        self.is_settled = self.turns > 1 and bool(is_steady[watched].all())
+
+    @property
+    def covered(self) -> Array:
+        """Share of the turn that was read, forwards and backwards."""
+        return np.asarray((self.cells > 0).mean(axis=1))
+
+    @property
+    def is_covered(self) -> bool:
+        """Every part of the turn was read, in one direction or the other."""
+        return bool(self.cells.any(axis=0).all())
 
     @property
     def curve(self) -> tuple[Array, Array]:
@@ -209,12 +189,16 @@ class Estimate:
         error = self._sums[1][known] / self._sums[0][known]
         return places, error - (error.mean() if error.size else 0.0)
 
-    def to_dict(self, scale: float) -> dict[str, Any]:
-        """The orders as plain values; sizes times ``scale`` are arcsec."""
-        _, error = self.curve
+    def to_dict(self) -> dict[str, Any]:
+        """Travel, and the orders, as plain values."""
+        scale, (_, error) = arcsec(1.0, self.period), self.curve
+        forwards, backwards = (360.0 * self.covered).round(1).tolist()
         return {
+            "coverage_deg": {"forwards": forwards, "backwards": backwards},
+            "speeds_deg_s": [360.0 * s for s in self.speeds] if self.speeds[1] else [],
+            "turns_travelled": round(self.travelled, 3),
             "turns": self.turns,
-            "peak_to_peak_arcsec": scale * float(np.ptp(error)) if error.size else None,
+            "peak_to_peak_arcsec": scale * float(np.ptp(error)) if error.any() else None,
             "orders": [
                 {
                     "order": order.order,

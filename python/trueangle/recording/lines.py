@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from ..errors import ArgumentError
+from ..formats.seriallog import NUMBER
 from ..support.arrays import Array
 
 #: Lines that agree on their layout.
 _ENOUGH: Final = 3
-#: A number as firmware prints it.
-NUMBER: Final = rb"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER: Final = re.compile(rb"(?<![\w.])%s(?![\w.])" % NUMBER)
 #: What is between two numbers where several blanks are one: a mark, and the name of the second.
 _BLANKS: Final = re.compile(rb"([ \t])[ \t]+")
@@ -26,9 +26,6 @@ _GAP: Final = re.compile(
 )
 #: A name of a column, which no sentence is.
 _NAME: Final = re.compile("-?[A-Za-z_][^,;\t\ufffd]*(?<![.:!?])")
-
-#: Cells of a line, or None where it is no row.
-Cells = Callable[[bytes], Sequence[bytes | float] | None]
 
 
 class LineLayout(NamedTuple):
@@ -39,33 +36,29 @@ class LineLayout(NamedTuple):
     kind : str
         As it is shown: ``"CSV"``, ``"name:value pairs"``, ``"numbers"``, ``"JSON"``, ``"pattern"``.
     names : tuple of str
-    cells : callable
-        Cells of a line, one for each name; None of a line that is no row.
+    row : pattern or None
+        What a line that is a row holds, a named group for each name; None of JSON.
     header : bytes or None
         The line that named the columns: it is no row where it comes again.
-    every : pattern or None
-        What matches each line of many that are rows.
     """
 
     kind: str
     names: tuple[str, ...]
-    cells: Cells
+    row: re.Pattern[bytes] | None = None
     header: bytes | None = None
-    every: re.Pattern[bytes] | None = None
 
     def values(self, lines: Sequence[bytes]) -> Array:
-        """Numbers of each line, shape (n, columns); NaN of one that is no row.
+        """Numbers of each line, shape (n, columns); NaN of one that is no row."""
+        cells = chain.from_iterable(map(self._cells, lines))
+        return np.fromiter(map(float, cells), float).reshape(len(lines), len(self.names))
 
-        All at once where all are rows, which is five times as fast.
-        """
-        found: list[Any] = self.every.findall(b"\n".join(lines)) if self.every else []
-        if len(found) != len(lines):
-            none = (b"nan",) * len(self.names)
-            found = [self.cells(line) or none for line in lines]
-        elif len(self.names) == 1:
-            found = [(cell,) for cell in found]
-        numbers = np.fromiter(map(float, chain.from_iterable(found)), float)
-        return numbers.reshape(len(lines), len(self.names))
+    def _cells(self, line: bytes) -> Sequence[bytes | float]:
+        if self.row is None:
+            found = _numbers(line)
+            return [found.get(name, math.nan) for name in self.names]
+        match = self.row.search(line)
+        cells = [*match.groupdict(b"").values()] if match else [b""]
+        return cells if all(map(_NUMBER.fullmatch, cells)) else [math.nan] * len(self.names)
 
 
 def layout_of(lines: Sequence[bytes], hurry: bool = False) -> LineLayout | None:
@@ -85,7 +78,7 @@ def layout_of(lines: Sequence[bytes], hurry: bool = False) -> LineLayout | None:
         return None
     best = (enough or [counts.most_common(1)[0][0]])[0]
     if isinstance(best[0], str):
-        return LineLayout("JSON", best, lambda line: _members(line, best))
+        return LineLayout("JSON", best)
     marks, named = zip(*best, strict=True)
     mark = (*marks[1:], b"")[0]
     kind = "name:value pairs" if any(named) else "CSV" if mark else "numbers"
@@ -102,19 +95,13 @@ def layout_of_columns(
     header: bytes | None = None,
 ) -> LineLayout:
     """The layout of lines of numbers, with a mark and a name before each: of CSV without any."""
-    pattern = b""
-    for mark, name in gaps or [(b"", b""), *[(b",", b"")] * (len(names) - 1)]:
+    # Each has one way to match: a long line of rubbish costs its length.
+    row = rb"^\s*"
+    for i, (mark, name) in enumerate(gaps or [(b",", b"")] * len(names)):
         between = rb" *%s[ \t]*" % mark if mark else rb"[ \t]+"
         label = rb"%s[ \t]*[:=][ \t]*" % re.escape(name) if name else b""
-        pattern += (between if pattern else b"") + label + rb"(%s)" % NUMBER
-    # Each has one way to match: a long line of rubbish costs its length.
-    whole = re.compile(pattern + rb"[ \t]*[,;]?")
-
-    def cells(line: bytes) -> Sequence[bytes] | None:
-        match = whole.fullmatch(line.strip())
-        return match.groups() if match else None
-
-    return LineLayout(kind, names, cells, header, re.compile(rb"^%s$" % pattern, re.MULTILINE))
+        row += (between if i else b"") + label + rb"(?P<c%d>%s)" % (i, NUMBER)
+    return LineLayout(kind, names, re.compile(row + rb"(?:[ \t]*[,;])?\s*$"), header)
 
 
 def layout_of_pattern(pattern: str) -> LineLayout:
@@ -135,12 +122,7 @@ def layout_of_pattern(pattern: str) -> LineLayout:
             "R(?P<raw>\\d+)'"
         )
 
-    def cells(line: bytes) -> Sequence[bytes] | None:
-        match = found.search(line)
-        given = [*match.groupdict(b"").values()] if match else [b""]
-        return given if all(map(_NUMBER.fullmatch, given)) else None
-
-    return LineLayout("pattern", tuple(found.groupindex), cells)
+    return LineLayout("pattern", tuple(found.groupindex), found)
 
 
 def _seen(line: bytes) -> tuple[Any, ...] | None:
@@ -161,11 +143,6 @@ def _head(line: bytes, mark: bytes) -> tuple[str, ...]:
     names = tuple(part.decode("utf-8", "replace").strip().strip('"') for part in parts)
     words = all(name.isprintable() and _NAME.fullmatch(name) for name in names)
     return names if words and len(set(names)) == len(names) else ()
-
-
-def _members(text: bytes, names: Sequence[str]) -> list[float] | None:
-    found = _numbers(text)
-    return [found[name] for name in names] if found.keys() >= {*names} else None
 
 
 def _numbers(text: bytes) -> dict[str, float]:

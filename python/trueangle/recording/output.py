@@ -11,7 +11,7 @@ import os
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 from ..errors import ArgumentError, FileError
 from ..support.arrays import Array
@@ -44,10 +44,9 @@ class WholeFile:
 
     def __init__(self, path: Path, filled: bool = True) -> None:
         self.path, self.lines = path, 0
-        self._filled = filled
-        self._handle: int | None = None
-        self._size, self._longest, self._waiting = 0, 0, b""
-        self._synced = time.monotonic()
+        self._filled, self._longest = filled, 0
+        self._file: BinaryIO | None = None
+        self._waiting, self._synced = b"", time.monotonic()
 
     def add(self, lines: bytes, count: int) -> None:
         """Add whole lines; what has waited for a second is written."""
@@ -67,36 +66,34 @@ class WholeFile:
         self._synced = time.monotonic()
         if not self._waiting:
             return
-        if self._handle is None:
-            flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0)
-            self._handle = os.open(self.path, flags, 0o666)
-            self._size = os.fstat(self._handle).st_size
-        pieces, self._waiting = self._pieces(self._waiting), b""
+        if self._file is None:
+            self._file = open(self.path, "ab", buffering=0)  # noqa: SIM115
+        handle, (data, self._waiting) = self._file.fileno(), (self._waiting, b"")
+        size = os.fstat(handle).st_size
         try:
-            for piece in pieces:
-                if os.write(self._handle, piece) < len(piece):
+            for piece in self._pieces(data, size):
+                if os.write(handle, piece) < len(piece):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-                self._size += len(piece)
+                size += len(piece)
             with contextlib.suppress(OSError):  # the null device, some network file systems
-                os.fsync(self._handle)
+                os.fsync(handle)
         except OSError as error:
             with contextlib.suppress(OSError):
-                os.ftruncate(self._handle, self._size)
+                os.ftruncate(handle, size)
             raise OSError(error.errno, error.strerror, str(self.path)) from None
 
-    def _pieces(self, data: bytes) -> Iterator[bytes]:
-        """Whole lines, as many as the page of the file takes."""
+    def _pieces(self, data: bytes, size: int) -> Iterator[bytes]:
+        """Whole lines, as many as the page of a file of this size takes."""
         start = 0
         self._longest = max(self._longest, 1 + max(map(len, data.split(b"\n"))))
         while start < len(data):
-            room = _PAGE - self._size % _PAGE
-            end = data.rfind(b"\n", start, start + room) + 1
-            if not end:  # longer than what the page has left
-                end = data.index(b"\n", start) + 1
-            piece, left = data[start:end], room - (end - start)
-            start = end
+            room = _PAGE - size % _PAGE
+            # One that is longer than what the page has left goes alone.
+            end = data.rfind(b"\n", start, start + room) + 1 or data.index(b"\n", start) + 1
+            piece, left, start = data[start:end], room - (end - start), end
             if self._filled and left > 0 and (start < len(data) or left < self._longest):
                 piece = piece[:-1] + b" " * left + b"\n"
+            size += len(piece)
             yield piece
 
     def close(self) -> None:
@@ -104,9 +101,8 @@ class WholeFile:
         try:
             self.flush()
         finally:
-            if self._handle is not None:
-                os.close(self._handle)
-                self._handle = None
+            if self._file is not None:
+                self._file.close()
 
 
 class RunsFile:
@@ -129,33 +125,21 @@ class RunsFile:
     """
 
     def __init__(self, path: Path, label: str | None, append: bool) -> None:
-        is_device = path.exists() and not path.is_file()
-        rejected = path if is_device else path.with_name(path.name + ".rejected")
-        self.rows, self.rejected = WholeFile(path), WholeFile(rejected, filled=False)
-        self._header: list[str] = []
-        there = [p for p in (path, rejected) if p.is_file() and p.stat().st_size]
+        # Next to the null device no file can be.
+        beside = (
+            path.with_name(path.name + ".rejected") if path.is_file() or not path.exists() else path
+        )
+        self.rows, self.rejected = WholeFile(path), WholeFile(beside, filled=False)
+        there = [p for p in (path, beside) if p.is_file() and p.stat().st_size]
         if there and not append:
             raise FileError(
                 there[0], "is there already: name another file, or add a run to it (`append=True`)"
             )
-        labels = self._continued(path) if path in there else set()
+        self._header, labels = _continued(path) if path in there else ([], set[str]())
         if label in labels:
             raise ArgumentError(f"label: {path} has a run {label!r}; give another label")
         numbers = map(str, itertools.count(len(labels) + 1))
         self.label = label or next(number for number in numbers if number not in labels)
-
-    def _continued(self, path: Path) -> set[str]:
-        """The labels of a file that is there; it ends with a whole row then."""
-        with open(path, "r+b") as file:
-            size = sum(len(line) for line in file if line.endswith(b"\n"))
-            file.truncate(size)
-        with open(path, encoding="utf-8", newline="") as text:
-            rows = csv.reader(text)
-            self._header = next(rows, [])
-            if self._header and "run" not in self._header:
-                problem = "has no column run: only what was recorded is continued"
-                raise FileError(path, problem, line=1)
-            return {cell for row in rows for cell in row[self._header.index("run") :][:1]}
 
     def begin(self, names: Sequence[str]) -> None:
         """State the columns, those of the rows behind the label of the run.
@@ -167,14 +151,10 @@ class RunsFile:
         """
         header = ["run", *names]
         if self._header and self._header != header:
-            raise FileError(
-                self.rows.path,
-                f"has the columns {', '.join(self._header)}, and {', '.join(header)} come; name "
-                "another file",
-                line=1,
-            )
-        label = _line([self.label])[:-1].replace(b"%", b"%%")
-        self._row = label + b",%.15g" * len(names) + b"\n"
+            own, come = ", ".join(self._header), ", ".join(header)
+            problem = f"has the columns {own}, and {come} come; name another file"
+            raise FileError(self.rows.path, problem, line=1)
+        self._row = _line([self.label])[:-1].replace(b"%", b"%%") + b",%.15g" * len(names) + b"\n"
         if not self._header:
             self.rows.add(_line(header), 0)
 
@@ -198,6 +178,19 @@ class RunsFile:
             self.rows.close()
         finally:
             self.rejected.close()
+
+
+def _continued(path: Path) -> tuple[list[str], set[str]]:
+    """Columns and labels of a file that is there; it ends with a whole row then."""
+    with open(path, "r+b") as file:
+        file.truncate(sum(len(line) for line in file if line.endswith(b"\n")))
+    with open(path, encoding="utf-8", newline="") as text:
+        rows = csv.reader(text)
+        header = next(rows, [])
+        if header and "run" not in header:
+            raise FileError(path, "has no column run: only what was recorded is continued", line=1)
+        place = header.index("run") if header else 0
+        return header, {cell for row in rows for cell in row[place : place + 1]}
 
 
 def _line(cells: Sequence[str]) -> bytes:

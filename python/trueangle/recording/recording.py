@@ -7,22 +7,20 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import ArgumentError, FileError
 from ..formats.columns import find_columns
-from ..runs.angles import RunAngles, find_run_angles
-from ..support.angles import UNIT_PERIODS, arcsec, wrap
+from ..runs.angles import find_run_angles
+from ..support.angles import wrap
 from ..support.arrays import Array
 from .arrivals import TICK, Arrivals, Rows
 from .columns import Column, Counts, PairedSources, written_columns
-from .estimate import Estimate, Travel
+from .estimate import Estimate
 from .output import RunsFile
-from .sources import SourceOptions, open_source
+from .sources import SourceOptions
 
 #: Ratio of two speeds that tell a delay.
 _SPEEDS = 1.5
@@ -36,8 +34,7 @@ _LATEST, _LEAST = 4000, 50
 _MOVED = 1.0 / 36.0
 
 
-@dataclass(frozen=True)
-class Choices:
+class Choices(NamedTuple):
     """What is recorded, and until when.
 
     Attributes
@@ -76,35 +73,30 @@ class LiveRecording:
     ----------
     rows : int
         Readings written.
+    unpaired : int
+        Readings without a reference at their time.
     faults : dict of str to str
         Faults so far, by name.
-    estimate : Estimate or None
-        Where both angles are known.
-    travel : Travel or None
-        Where one angle is known.
+    estimate : Estimate
+        Without an error where one angle alone is known; empty where none is.
     note : str
-        Why there is no estimate.
-    jitter : float
-        Of the times, seconds, where they are those of arrival: the device gives none. Else NaN.
+        Why the error is not known; empty where it is.
     """
 
     def __init__(self, arrivals: Mapping[str, Arrivals], file: RunsFile, choices: Choices) -> None:
         self.arrivals, self.file, self._choices = arrivals, file, choices
-        self._main, *self._others = arrivals.values()
+        self._main = next(iter(arrivals.values()))
         self._columns: list[Column] = []
         self._pairs: PairedSources | None = None
-        self._angles: RunAngles | None = None
+        self._angles: Callable[[Callable[[str], Array]], tuple[Array, Array]] | None = None
         self._names: list[str] = []
-        self._single, self._is_stamped = 0, True
         self._slot, self._last, self._looked = -math.inf, 0.0, 0.0
         self._latest: Array = np.empty((3, 0))
-        self.rows, self.faults = 0, dict[str, str]()
-        self.estimate: Estimate | None = None
-        self.travel: Travel | None = None
-        self.period, self.note = 360.0, "no line that is a row has come"
+        self.rows, self.unpaired, self.faults = 0, 0, dict[str, str]()
+        self.estimate, self.note = Estimate(360.0), "no line that is a row has come"
 
     @property
-    def ended(self) -> bool:
+    def is_over(self) -> bool:
         """A source has ended, and what it gave was taken."""
         return any(each.is_over for each in self.arrivals.values()) and not self.is_behind
 
@@ -114,22 +106,17 @@ class LiveRecording:
         return bool(self._names) and any(each.is_behind for each in self.arrivals.values())
 
     @property
-    def unpaired(self) -> int:
-        """Readings without a reference at their time."""
-        return 0 if self._pairs is None else self._pairs.lost
-
-    @property
     def jitter(self) -> float:
-        """See the class."""
-        return self._main.jitter if self._is_stamped else math.nan
+        """Of times of arrival, seconds; NaN where the device gives the time."""
+        timed = any(column.name == "time_s" for column in self._columns)
+        return math.nan if timed else self._main.jitter
 
     @property
     def is_enough(self) -> bool:
         """What it was to go on until is there."""
         if self._choices.until == "orders":
-            return self.estimate is not None and self.estimate.is_settled
-        is_covered = self.travel is not None and self.travel.is_covered
-        return is_covered and self._choices.until == "coverage"
+            return self.estimate.is_settled
+        return self._choices.until == "coverage" and self.estimate.is_covered
 
     def take(self, now: float) -> None:
         """Take what has arrived by ``now``, seconds from the start of the recording."""
@@ -137,83 +124,59 @@ class LiveRecording:
         if all(known):
             if not self._names:
                 self._begin()
-            rows, reference = self._main.take(), None
+            rows, further = self._main.take(), list[Array]()
             if self._pairs is not None:
-                rows, reference = self._pairs.pair(rows, self._others[0].take(), now)
+                rows, *further = self._pairs.pair(rows, now)
+                self.unpaired = self._pairs.lost
             if rows.time.size:
-                self._write(rows, reference)
+                self._write(rows, further)
         for each in self.arrivals.values():
             self.file.reject(each.rejected)
             each.rejected = []
 
     def _begin(self) -> None:
         """Choose the columns, now that those of all sources are known."""
-        layouts = [each.layout for each in self.arrivals.values()]
-        names = [layout.names for layout in layouts if layout is not None]
-        found = [
-            written_columns(address, own, self._signals_of(i, names), self._choices.counts)
-            for i, (address, own) in enumerate(zip(self.arrivals, names, strict=True))
-        ]
-        if self._others:
-            if not any("indicated_" in column.name for column in found[0]):
-                found.reverse()
-                self._main, self._others = self._others[0], [self._main]
-            self._pairs = PairedSources(found[1])
-        self._columns = found[0]
+        names = [each.layout.names for each in self.arrivals.values() if each.layout is not None]
+        shared: dict[str, Any] = {**self._choices.signals}
+        own = [shared.pop(source, {}) for source, _ in zip("ab", names, strict=False)]
+        found = []
+        for i, (address, each) in enumerate(self.arrivals.items()):
+            theirs = names[1 - i] if len(names) > 1 else ()
+            # Of two sources each has the columns that only it has.
+            signals = {
+                role: wanted
+                for role, wanted in shared.items()
+                if (wanted if isinstance(wanted, str) else wanted[0]).lstrip("-") not in theirs
+            }
+            columns = written_columns(address, names[i], signals | own[i], self._choices.counts)
+            found.append((each, columns))
+        found.sort(key=lambda pair: not any("indicated_" in column.name for column in pair[1]))
+        (self._main, self._columns), *others = found
+        self._pairs = PairedSources(*others[0]) if others else None
         kept = [column.name for column in self._columns]
-        self._is_stamped = "time_s" not in kept
-        kept = ["time_s"] * self._is_stamped + kept + ["reference_deg"] * len(self._others)
+        kept = ["time_s"] * ("time_s" not in kept) + kept + ["reference_deg"] * len(others)
         twice = [name for name in kept if kept.count(name) > 1]
         if twice:
             raise ArgumentError(f"two columns would be called {twice[0]}: name one with `signals=`")
         self.file.begin(kept)
-        self._names = kept
-        self._find_angles(self.file.rows.path)
-
-    def _signals_of(self, place: int, names: Sequence[Sequence[str]]) -> dict[str, Any]:
-        """Columns by role of one source: of two, each has those that only it has."""
-        shared: dict[str, Any] = {**self._choices.signals}
-        if len(names) < 2:
-            return shared
-        own: list[dict[str, Any]] = [shared.pop(source, {}) for source in "ab"]
-        for role, wanted in [*shared.items()]:
-            name = wanted if isinstance(wanted, str) else str(wanted[0])
-            if name.removeprefix("-") in names[1 - place]:
-                del shared[role]
-        return shared | own[place]
-
-    def _find_angles(self, path: Path) -> None:
-        indicated, reference = self._choices.counts
+        self._names, path = kept, self.file.rows.path
         try:
-            self._angles = find_run_angles(
-                path,
-                self._names,
-                find_columns(path, self._names, {}),
-                counts_per_turn=indicated,
-                counts_per_turn_reference=reference,
-            )
-            self.period = self._angles.period
-            self.estimate = Estimate(self.period)
-            self.travel, self.note = self.estimate.travel, ""
+            angles = find_run_angles(path, kept, find_columns(path, kept, {}))
+            self._angles, period, self.note = angles.values, angles.period, ""
         except FileError as error:
             self.note = error.problem
-            known = {
-                f"{role}_{u}": p
-                for role in ("indicated", "reference")
-                for u, p in UNIT_PERIODS.items()
-            }
-            turns = [known.get(name.lstrip("-"), 0.0) for name in self._names]
-            if any(turns):  # one angle alone: a shaft that turns
-                self.period = next(filter(None, turns))
-                self.travel, self._single = Travel(self.period), turns.index(self.period)
-            if self._choices.until == "orders" or (self._choices.until and self.travel is None):
+            alone = [(column.name, column.turn) for column in self._columns if column.turn]
+            if self._choices.until == "orders" or (self._choices.until and not alone):
                 raise
+            if not alone:
+                return
+            name, period = alone[0]  # a shaft that turns
+            self._angles = lambda get: (get(name), get(name))
+        self.estimate = Estimate(period)
 
-    def _write(self, rows: Rows, reference: Array | None) -> None:
-        stamps = [rows.time.round(6)] if self._is_stamped else []
-        further = [] if reference is None else [reference]
-        values = [*stamps, *(column.values(rows) for column in self._columns), *further]
-        table = np.column_stack(values)
+    def _write(self, rows: Rows, further: list[Array]) -> None:
+        stamps = [rows.time.round(6)] * (self._names[0] != self._columns[0].name)
+        table = np.column_stack([*stamps, *(c.values(rows) for c in self._columns), *further])
         if self._choices.rate is not None:
             slots = np.floor(rows.time * self._choices.rate)
             table = table[np.diff(slots, prepend=self._slot) > 0.0]
@@ -221,14 +184,11 @@ class LiveRecording:
         self._last = float(rows.time[-1])
         self.file.add(table)
         self.rows += len(table)
-        by_name = dict(zip(self._names, table.T.copy(), strict=True))
-        seconds = by_name.get("time_s", np.empty(0))
-        if self._angles is not None and self.estimate is not None and len(table):
-            first, second = self._angles.values(by_name.__getitem__)
-            self.estimate.add(first, second, seconds)
-            self._latest = np.hstack([self._latest, [first, second, seconds]])[:, -_LATEST:]
-        elif self.travel is not None and len(table):
-            self.travel.add(table[:, self._single], seconds)
+        if self._angles is not None and len(table):
+            by_name = dict(zip(self._names, table.T.copy(), strict=True))
+            readings = np.array([*self._angles(by_name.__getitem__), by_name["time_s"]])
+            self.estimate.add(*readings)
+            self._latest = np.hstack([self._latest, readings])[:, -_LATEST:]
 
     def new_faults(self, now: float, at_once: bool = False) -> dict[str, str]:
         """Faults by name that were not there before; looked for every two seconds."""
@@ -253,13 +213,13 @@ class LiveRecording:
     def _faults_of_readings(self) -> dict[str, str]:
         """Those of `check`, in the latest readings, and an angle that stands still."""
         reference, indicated, seconds = self._latest
-        if reference.size < _LEAST:
+        if reference.size < _LEAST or self.note:
             return {}
         pairs = (("indicated", indicated, reference), ("reference", reference, indicated))
         for name, own, other in pairs:
-            still = reference.size - max([0, *(np.flatnonzero(own != own[-1]) + 1)[-1:].tolist()])
-            path = np.cumsum(wrap(np.diff(other[-still:]), self.period))
-            if np.ptp([0.0, *path]) > _MOVED * self.period:
+            still = int(np.argmax(np.append(own[::-1] != own[-1], True)))
+            path = np.cumsum(wrap(np.diff(other[-still:]), self.estimate.period))
+            if np.ptp([0.0, *path]) > _MOVED * self.estimate.period:
                 says = f"the {name} angle is the same in the last {still} readings"
                 return {"stuck": f"{says} while the other one moves; is the sensor connected?"}
         # These take longer to import than all that shows the first reading.
@@ -267,44 +227,38 @@ class LiveRecording:
         from ..runs.checks.record import records_of
         from ..runs.run import CalibrationRun
 
-        run = CalibrationRun(reference, indicated, period=self.period, time=seconds, label="now")
+        run = CalibrationRun(reference, indicated, period=self.estimate.period, time=seconds)
         return {f.fault: f"{f.says}; {f.mend}" for f in data_faults(records_of([run]))}
 
     @property
     def missing(self) -> str:
         """What the recording still lacks, in one line; empty where it lacks nothing."""
-        if self.travel is None or not self.rows:
+        forwards, backwards = self.estimate.covered.tolist()
+        share = float(self.estimate.cells.any(axis=0).mean())
+        if self._angles is None or not self.rows:
             return self.note
-        forwards, backwards = self.travel.covered.tolist()
-        share = float(self.travel.cells.any(axis=0).mean())
         if not share:
             return "motion: turn it slowly"
         if share < 1.0:
             return f"turn on: {360.0 * share:.0f} of 360 deg are read"
-        if self.estimate is None:
+        if self.note:
             return self.note
         if min(forwards, backwards) < 1.0:
             return f"turn it {'backwards' if forwards > backwards else 'forwards'} as well"
         if not self.estimate.is_settled:
             return "turn on: a further turn changes orders by more than their standard errors"
-        slow, fast = self.travel.speeds
+        slow, fast = self.estimate.speeds
         return "turn it at another speed as well" if fast < _SPEEDS * slow else ""
 
     def to_dict(self, now: float) -> dict[str, Any]:
         """What is known by ``now``, as plain values."""
-        travel = self.travel or Travel(self.period)
-        estimate = self.estimate or Estimate(self.period)
-        forwards, backwards = (360.0 * travel.covered).round(1).tolist()
         return {
             "seconds": round(now, 3),
             "readings": self.rows,
             "rejected": self.file.rejected.lines,
             "unpaired": self.unpaired,
             "run": self.file.label,
-            "coverage_deg": {"forwards": forwards, "backwards": backwards},
-            "speeds_deg_s": [360.0 * s for s in travel.speeds] if travel.speeds[1] else [],
-            "turns_travelled": round(travel.turns, 3),
-            **estimate.to_dict(arcsec(1.0, self.period)),
+            **self.estimate.to_dict(),
             "missing": self.missing,
             "faults": [{"fault": name, "says": says} for name, says in self.faults.items()],
         }
@@ -350,19 +304,18 @@ def record(
         stack.callback(file.close)
         arrivals, start = dict[str, Arrivals](), time.monotonic()
         for address in addresses:
-            source = open_source(address, choices.options)
-            arrivals[address] = Arrivals(source, choices.options, start)
+            arrivals[address] = Arrivals(address, choices.options, start)
             stack.callback(arrivals[address].close)
         recording, ended = LiveRecording(arrivals, file, choices), ""
-        limited = choices.until is not None or choices.seconds < math.inf
         while not ended:
             now = time.monotonic() - start
             recording.take(now)
             show(recording, now, "")
             if now >= choices.seconds or recording.is_enough:
                 ended = "asked"
-            elif recording.ended:
+            elif recording.is_over:
                 broken = any(each.problem is not None for each in arrivals.values())
+                limited = choices.until is not None or choices.seconds < math.inf
                 ended = "source" if broken or limited else "asked"
             elif stopped():
                 ended = "stopped"

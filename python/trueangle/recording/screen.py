@@ -7,17 +7,15 @@ import sys
 from collections import deque
 from typing import Final, TextIO
 
-import numpy as np
-
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
 from ..support.layout import counted
 from ..support.letterchart import letter_chart
 from .recording import LiveRecording
 
-#: Seconds between two drawings, and over which the rate is taken.
+#: Seconds between two drawings, and drawings over which the rate is taken.
 _DRAWN: Final = {"text": 0.25, "json": 0.5, "none": 0.5}
-_RATE: Final = 2.0
+_RATED: Final = 9
 #: Letters of the cells of a turn by direction, and orders that are shown.
 _MARKS: Final = ("forwards ", "backwards")
 _SHOWN: Final = 6
@@ -41,20 +39,16 @@ class Screen:
         self._redraws = self.style == "text" and is_terminal
         self._errors_in = errors_in
         self._drawn, self._lines = -1.0, 0
-        self._counts: deque[tuple[float, int]] = deque([(0.0, 0)])
-        self._began = False
+        self._counts: deque[tuple[float, int]] = deque([(0.0, 0)], _RATED)
 
     def show(self, recording: LiveRecording, now: float, ended: str = "") -> None:
         """Draw, where it is time to, at the first reading, or where the recording has ended."""
-        first = recording.rows > 0 and not self._began
-        if not (first or ended) and now - self._drawn < _DRAWN[self.style]:
+        is_first = recording.rows > 0 == self._counts[-1][1]
+        if not (is_first or ended) and now - self._drawn < _DRAWN[self.style]:
             return
-        self._began |= first
         self._drawn = now
         new = recording.new_faults(now, bool(ended))
         self._counts.append((now, recording.rows))
-        while len(self._counts) > 2 and now - self._counts[1][0] >= _RATE:
-            self._counts.popleft()
         then, rows = self._counts[0]
         rate = (recording.rows - rows) / max(now - then, 1e-9)
         lines = []
@@ -77,18 +71,18 @@ class Screen:
         """The screen."""
         head, *told = self.summary(recording)
         lines = [f"{now:.1f} s  {rate:.1f}/s  {head}"]
-        travel = recording.travel
-        if travel is not None and recording.rows:
-            for mark, read, share in zip(_MARKS, travel.cells, travel.covered, strict=True):
+        estimate = recording.estimate
+        if estimate.cells.any():
+            for mark, read, share in zip(_MARKS, estimate.cells, estimate.covered, strict=True):
                 cells = "".join("#" if count else "." for count in read)
                 lines.append(f"{mark} [{cells}] {360.0 * share:.0f} deg")
-            slow, fast = (360.0 * speed for speed in travel.speeds)
+            slow, fast = (360.0 * speed for speed in estimate.speeds)
             speeds = f"{slow:.3g} to {fast:.3g} deg/s" if fast else "none yet"
-            lines.append(f"travelled {travel.turns:.2f} turns  speed {speeds}")
-        places, error = recording.estimate.curve if recording.estimate else ((), ())
-        if len(error) > 1:
-            size = arcsec(1.0, recording.period) * np.asarray(error)
-            lines += letter_chart(360.0 * np.asarray(places), {"o": size}, "arcsec")
+            lines.append(f"travelled {estimate.travelled:.2f} turns  speed {speeds}")
+        places, error = estimate.curve
+        if error.any():
+            size = arcsec(1.0, estimate.period) * error
+            lines += letter_chart(360.0 * places, {"o": size}, "arcsec")
         return [line[:200] for line in (*lines, *told)]
 
     def summary(self, recording: LiveRecording) -> list[str]:
@@ -108,11 +102,11 @@ class Screen:
             lines.append(f"{counted(recording.unpaired, 'reading')} without a reference")
         if recording.jitter >= 0.0:
             lines.append(f"times are those of arrival, jitter {1e3 * recording.jitter:.2g} ms")
-        for order in estimate.orders[:_SHOWN] if estimate else ():
-            size, std = (arcsec(x, recording.period) for x in (abs(order.value), order.std))
+        for order in estimate.orders[:_SHOWN]:
+            size, std = (arcsec(x, estimate.period) for x in (abs(order.value), order.std))
             shown = error_unit(self._errors_in, size).text(size, std)
             lines.append(f"order {order.order:3d}  {shown} at {order.phase_deg:.0f} deg")
-        if estimate is not None and estimate.turns > 1 and not estimate.orders:
+        if estimate.turns > 1 and not (estimate.orders or recording.note):
             lines.append("no order above the noise")
         lines += [f"fault {name}: {says}" for name, says in recording.faults.items()]
         return [*lines, f"missing: {recording.missing or 'nothing'}"]

@@ -9,15 +9,16 @@ import os
 import re
 import select
 import socket
-import stat
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Final
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from ..errors import ArgumentError, FileError, MissingExtraError
+from ..formats.seriallog import NUMBER
 
 #: Bytes of one read, at most; seconds that one waits, and a server is waited for.
 MOST: Final = 1 << 16
@@ -27,14 +28,12 @@ _PATIENCE: Final = 5.0
 _LOOK: Final = 0.02
 
 #: ``ID:byte:length:scale``; behind the length ``s`` is signed, ``b`` is big-endian.
-_FIELD: Final = re.compile(r"(0x[0-9a-fA-F]+|\d+):(\d+):([1-8])([sb]{0,2}):([-+.\deE]+)")
+_FIELD: Final = re.compile(rb"(0x[\da-fA-F]+|\d+):(\d+):([1-8])([sb]{0,2}):(%s)" % NUMBER)
 #: ``ID#DATA`` as `cansend` takes it.
-_FRAME: Final = re.compile(rb"([0-9a-fA-F]{1,8})#((?:[0-9a-fA-F]{2}){0,8})\s*")
-_STANDARD: Final = 0x7FF
+_FRAME: Final = re.compile(rb"([\da-fA-F]{1,8})#((?:[\da-fA-F]{2}){0,8})\s*")
 
 
-@dataclass(frozen=True)
-class SourceOptions:
+class SourceOptions(NamedTuple):
     """What a source is opened with.
 
     Attributes
@@ -58,66 +57,28 @@ class SourceOptions:
     send: str | None = None
 
 
-class Source:
+class Source(NamedTuple):
     """Bytes that arrive.
-
-    Parameters
-    ----------
-    stream : object
-        It is closed with the source, and waited for where ``waits``.
-    take : callable
-        Bytes that are there; None where the source has ended.
-    put : callable, optional
-        Sends bytes.
 
     Attributes
     ----------
+    read : callable
+        What has arrived, after 0.1 s at most; None where the source has ended. An `OSError` where
+        the device is gone.
+    close : callable
+    send : callable, optional
+        Sends bytes to the device; None where lines are only read.
     midway : bool
         Whether the first line may have begun before the source was opened.
     names : tuple of str
         Of the columns, where the source knows them; its lines are CSV then.
     """
 
-    midway = False
+    read: Callable[[], bytes | None]
+    close: Callable[[], object]
+    send: Callable[[bytes], object] | None = None
+    midway: bool = False
     names: tuple[str, ...] = ()
-
-    def __init__(
-        self,
-        stream: Any,
-        take: Callable[[], bytes | None],
-        put: Callable[[bytes], object] | None = None,
-        waits: bool = True,
-    ) -> None:
-        self._stream, self._take, self._put, self._waits = stream, take, put, waits
-
-    def read(self) -> bytes | None:
-        """What has arrived, after 0.1 s at most; None where the source has ended.
-
-        Raises
-        ------
-        OSError
-            The device is gone.
-        """
-        if self._waits and not select.select([self._stream], [], [], WAIT)[0]:
-            return b""
-        return self._take()
-
-    def send(self, data: bytes) -> None:
-        """Send to the device.
-
-        Raises
-        ------
-        ArgumentError
-            Lines are only read here, or this is nothing that the device takes.
-        """
-        if self._put is None:
-            raise ArgumentError("send: lines are only read here")
-        self._put(data)
-
-    def close(self) -> None:
-        """Close the source."""
-        if self._stream is not sys.stdin:
-            self._stream.close()
 
 
 def kind_of(address: str) -> str:
@@ -128,16 +89,14 @@ def kind_of(address: str) -> str:
     >>> [kind_of(address) for address in ("udp://:5005", "-", "COM3", "nosuch.csv")]
     ['udp', 'pipe', 'port', '']
     """
-    scheme = re.match("(can|tcp|udp):", address)
-    mode = 0
-    with contextlib.suppress(OSError, ValueError):
-        mode = os.stat(address).st_mode
-    kinds = {
-        "pipe": address == "-" or stat.S_ISFIFO(mode),
-        "file": stat.S_ISREG(mode),
-        "port": "://" in address or stat.S_ISCHR(mode) or address.upper().startswith("COM"),
-    }
-    return scheme[1] if scheme else next((kind for kind, it_is in kinds.items() if it_is), "")
+    scheme, path = re.match("(can|tcp|udp):", address), Path(address)
+    if scheme:
+        return scheme[1]
+    if address == "-" or path.is_fifo():
+        return "pipe"
+    if "://" in address or path.is_char_device() or address.upper().startswith("COM"):
+        return "port"
+    return "file" if path.is_file() else ""
 
 
 def open_source(address: str, options: SourceOptions) -> Source:
@@ -161,61 +120,62 @@ def open_source(address: str, options: SourceOptions) -> Source:
     """
     kind = kind_of(address)
     if kind == "can":
-        return CanBus(address, options)
+        return _can_bus(address, options)
     if kind in ("tcp", "udp"):
-        try:
-            return _of_network(address)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror or str(error), address) from None
+        return _socket(address, kind)
     if kind == "port":
-        serial = library("serial", "serial ports need pyserial")
+        serial = _library("serial", "serial ports need pyserial")
         port = serial.serial_for_url(address, options.baud, timeout=WAIT, exclusive=True)
-        source = Source(
-            port, lambda: port.read(max(1, min(port.in_waiting, MOST))), port.write, waits=False
+        return Source(
+            lambda: port.read(max(1, min(port.in_waiting, MOST))), port.close, port.write, True
         )
-        source.midway = True
-        return source
     if not kind:
         raise FileError(
             address,
             "no such source; it is a serial port (/dev/ttyUSB0, COM3), - (standard input), "
             "tcp://HOST:PORT, udp://:PORT, can:vcan0 or a file",
         )
-    file: Any = sys.stdin if address == "-" else open(address, "rb", buffering=0)  # noqa: SIM115
-    handle = file.fileno()
-    if kind == "pipe":
-        return Source(file, lambda: os.read(handle, MOST) or None, waits=os.name != "nt")
+    handle = sys.stdin.fileno() if address == "-" else address
+    file: Any = open(handle, "rb", buffering=0, closefd=address != "-")  # noqa: SIM115
 
     def added() -> bytes | None:
         """What was added to the file; it ends where it gets shorter."""
-        data = os.read(handle, MOST)
+        data: bytes = file.read(MOST)
         if not data:
             time.sleep(_LOOK)
-        is_shorter = os.fstat(handle).st_size < os.lseek(handle, 0, os.SEEK_CUR)
-        return None if is_shorter and not data else data
+        return data if data or os.fstat(file.fileno()).st_size >= file.tell() else None
 
-    return Source(file, added, waits=False)
+    if kind == "file":
+        return Source(added, file.close)
+    piped = partial(_ready, file, lambda: file.read(MOST) or None)
+    return Source(piped if os.name != "nt" else lambda: file.read(MOST) or None, file.close)
 
 
-def _of_network(address: str) -> Source:
+def _ready(stream: Any, take: Callable[[], bytes | None]) -> bytes | None:
+    """What a stream has, after 0.1 s at most."""
+    return take() if select.select([stream], [], [], WAIT)[0] else b""
+
+
+def _socket(address: str, kind: str) -> Source:
     """A TCP server that is connected to, or UDP datagrams, each a line, at an own port."""
     try:
         parts = urlsplit(address)
-        scheme, host, port = parts.scheme, parts.hostname or "", parts.port
+        host, port = parts.hostname or "", parts.port
     except ValueError:
-        port = None
-    if port is None or (scheme == "tcp" and not host):
+        host, port = "", None
+    if port is None or (kind == "tcp" and not host):
         raise ArgumentError(f"{address}: tcp://HOST:PORT or udp://:PORT is needed")
-    if scheme == "tcp":
-        link = socket.create_connection((host, port), _PATIENCE)
-        return Source(link, lambda: link.recv(MOST) or None, link.sendall)
-    own = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
-    own.setblocking(False)
     try:
+        if kind == "tcp":
+            link = socket.create_connection((host, port), _PATIENCE)
+            received = partial(_ready, link, lambda: link.recv(MOST) or None)
+            return Source(received, link.close, link.sendall)
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        own = socket.socket(family, socket.SOCK_DGRAM)
+        own.setblocking(False)
         own.bind((host, port))
-    except OSError:
-        own.close()
-        raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), address) from None
 
     def datagrams() -> bytes:
         found = b""
@@ -224,10 +184,10 @@ def _of_network(address: str) -> Source:
                 found += own.recv(MOST).rstrip(b"\r\n") + b"\n"
         return found
 
-    return Source(own, datagrams)
+    return Source(partial(_ready, own, datagrams), own.close)
 
 
-def library(name: str, what: str) -> Any:
+def _library(name: str, what: str) -> Any:
     """A library of the extra for recordings.
 
     Raises
@@ -240,93 +200,93 @@ def library(name: str, what: str) -> Any:
         raise MissingExtraError(f"{what}: pip install 'trueangle[record]'") from None
 
 
-class CanBus(Source):
+def _can_bus(address: str, options: SourceOptions) -> Source:
     """``can:CHANNEL`` or ``can:INTERFACE:CHANNEL``; rows come as lines of CSV.
 
     A row is complete with one frame of each identifier that is asked for, whatever their order:
-    rows come as often as the rarest of them, with the newest of each. A frame that is too short
-    becomes a line that is no row: it is rejected and counted as any other.
+    rows come as often as the rarest of them, with the newest of each. Frames without a value of
+    each column become a line that is no row: it is rejected and counted as any other.
     """
-
-    def __init__(self, address: str, options: SourceOptions) -> None:
-        self._can = can = library("can", "a CAN bus needs python-can")
-        database = library("cantools", "a CAN bus needs cantools").database
-        self._signals, self._damage = _signals(options, database), database.Error
-        self.names = tuple(self._signals)
-        self._frames = {message.frame_id for message, _ in self._signals.values()}
-        self._values: dict[int, bytes] = {}
-        interface, _, channel = address.removeprefix("can:").partition(":")
-        if not channel or interface not in can.interfaces.VALID_INTERFACES:
-            interface, channel = "", address.removeprefix("can:")
+    can = _library("can", "a CAN bus needs python-can")
+    signals = _can_signals(options)
+    frames: dict[int, bytes] = dict.fromkeys((number for number, _ in signals.values()), b"")
+    waited = {*frames}
+    interface, _, channel = address.removeprefix("can:").partition(":")
+    if not channel or interface not in can.interfaces.VALID_INTERFACES:
+        interface, channel = "", address.removeprefix("can:")
+    try:
         try:
-            try:
-                self._bus = can.Bus(channel=channel, interface=interface or None)
-            except can.CanInterfaceNotImplementedError:  # none is configured: that of Linux
-                self._bus = can.Bus(channel=channel, interface="socketcan")
-        except (can.CanError, OSError, ValueError) as error:
-            raise FileError(
-                address, f"cannot be opened: {error}; name it as can:vcan0 or can:INTERFACE:CHANNEL"
-            ) from None
+            bus = can.Bus(channel=channel, interface=interface or None)
+        except can.CanInterfaceNotImplementedError:  # none is configured: that of Linux
+            bus = can.Bus(channel=channel, interface="socketcan")
+    except (can.CanError, OSError, ValueError) as error:
+        problem = f"cannot be opened: {error}; name it as can:vcan0 or can:INTERFACE:CHANNEL"
+        raise FileError(address, problem) from None
 
-    def read(self) -> bytes:
-        """See `Source.read`."""
-        lines: list[str] = []
-        wait = WAIT
+    def rows() -> bytes:
+        found, wait = b"", WAIT
         try:
-            while len(lines) < MOST and (message := self._bus.recv(wait)):
+            while len(found) < MOST and (message := bus.recv(wait)):
                 wait = 0.0
-                if message.arbitration_id in self._frames and not message.is_error_frame:
-                    self._values[message.arbitration_id] = bytes(message.data)
-                if self._frames <= self._values.keys():
-                    lines += self._row()
-        except self._can.CanError as error:
+                if message.arbitration_id in frames and not message.is_error_frame:
+                    frames[message.arbitration_id] = bytes(message.data)
+                    waited.discard(message.arbitration_id)
+                    if not waited:
+                        found += row()
+        except can.CanError as error:
             raise OSError(str(error)) from None
-        return "".join(f"{line}\n" for line in lines).encode()
+        return found
 
-    def _row(self) -> list[str]:
+    def row() -> bytes:
         """The row of the frames that have come."""
-        values, self._values = self._values, {}
-        try:
-            found = [
-                message.decode(values[message.frame_id], decode_choices=False).get(name, math.nan)
-                for message, name in self._signals.values()
-            ]
-        except self._damage:
-            return [f"too short: {frame:x}#{data.hex()}" for frame, data in values.items()]
-        return [",".join(repr(float(value)) for value in found)]
+        waited.update(frames)
+        values = [value(frames[number]) for number, value in signals.values()]
+        if any(map(math.isnan, values)):
+            came = (f" {number:x}#{data.hex()}" for number, data in frames.items())
+            return f"no value:{''.join(came)}\n".encode()
+        return f"{','.join(map(repr, values))}\n".encode()
 
-    def send(self, data: bytes) -> None:
-        """Send one frame, written as ``ID#DATA``; see `Source.send`."""
-        found = _FRAME.fullmatch(data)
-        if found is None:
+    def send(data: bytes) -> None:
+        """Send one frame, written as ``ID#DATA``."""
+        frame = _FRAME.fullmatch(data)
+        if frame is None:
             raise ArgumentError(f"send: a frame as 123#0102FF is needed, got {data.decode()!r}")
-        number, content = int(found[1], 16), bytes.fromhex(found[2].decode())
-        self._bus.send(
-            self._can.Message(arbitration_id=number, data=content, is_extended_id=len(found[1]) > 3)
-        )
+        number, content = int(frame[1], 16), bytes.fromhex(frame[2].decode())
+        extended = len(frame[1]) > 3
+        bus.send(can.Message(arbitration_id=number, data=content, is_extended_id=extended))
 
-    def close(self) -> None:
-        """See `Source.close`."""
-        self._bus.shutdown()
+    return Source(rows, bus.shutdown, send, names=tuple(signals))
 
 
-def _signals(options: SourceOptions, database: Any) -> dict[str, tuple[Any, str]]:
-    """Message and signal of each column: fields, and those of a DBC asked for or all of them."""
-    found = {n: (_message(database, n), n) for n in options.fields if _FIELD.fullmatch(n)}
+def _can_signals(options: SourceOptions) -> dict[str, tuple[int, Callable[[bytes], float]]]:
+    """Identifier and value of each column: of fields, and of a DBC those asked for or all.
+
+    A value is NaN in a frame that is too short for it.
+    """
+    fields = {name: _FIELD.fullmatch(name.encode()) for name in options.fields}
+    found = {name: _field(field) for name, field in fields.items() if field}
     if options.dbc is not None:
+        database = _library("cantools", "a DBC needs cantools").database
         try:
             described = database.load_file(options.dbc)
         except (database.Error, ValueError) as error:
             raise FileError(options.dbc, f"is no description of a CAN bus: {error}") from None
+
+        def decoded(message: Any, name: str, data: bytes) -> float:
+            try:
+                return float(message.decode(data, decode_choices=False).get(name, math.nan))
+            except database.Error:
+                return math.nan
+
         every = {
-            name: (message, signal.name)
+            name: (message.frame_id, partial(decoded, message, signal.name))
             for message in described.messages
             for signal in message.signals
             for name in (signal.name, f"{message.name}.{signal.name}")
         }
         # One that is in no message is missed when its role is looked for.
         asked = [name for name in options.fields if name in every]
-        found |= {n: every[n] for n in asked or [n for n in every if "." not in n]}
+        found |= {name: every[name] for name in asked or [n for n in every if "." not in n]}
     if not found:
         raise ArgumentError(
             "a CAN bus needs its signals: their description (`dbc=`), or ID:byte:length:scale "
@@ -335,19 +295,13 @@ def _signals(options: SourceOptions, database: Any) -> dict[str, tuple[Any, str]
     return found
 
 
-def _message(database: Any, field: str) -> Any:
-    """The message that ``ID:byte:length:scale`` describes, of one signal."""
-    frame, first, length, marks, scale = _FIELD.fullmatch(field).groups()  # type: ignore[union-attr]
-    is_big, number = "b" in marks, int(frame, 0)
-    signal = database.can.Signal(
-        field,
-        8 * int(first) + 7 * is_big,
-        8 * int(length),
-        "big_endian" if is_big else "little_endian",
-        is_signed="s" in marks,
-        conversion=database.conversion.BaseConversion.factory(float(scale), 0.0),
-    )
-    size, extended = int(first) + int(length), number > _STANDARD
-    return database.can.Message(
-        number, field, size, [signal], is_extended_frame=extended, strict=False
-    )
+def _field(field: re.Match[bytes]) -> tuple[int, Callable[[bytes], float]]:
+    """Identifier and value of ``ID:byte:length:scale``."""
+    start, stop = int(field[2]), int(field[2]) + int(field[3])
+    order: Any = "big" if b"b" in field[4] else "little"
+
+    def value(data: bytes) -> float:
+        whole = int.from_bytes(data[start:stop], order, signed=b"s" in field[4])
+        return float(field[5]) * whole if len(data) >= stop else math.nan
+
+    return int(field[1], 0), value

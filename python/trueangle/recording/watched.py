@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Iterator
+from contextlib import closing
 
 import numpy as np
 
@@ -14,8 +15,8 @@ from ..model.model import HarmonicModel
 from ..runs.files import Conversion
 from ..runs.source import ReadingOptions, checked_reading_options
 from ..support.layout import counted
-from .arrivals import Arrivals
-from .sources import SourceOptions, open_source
+from .arrivals import TICK, Arrivals
+from .sources import SourceOptions
 
 
 def watched_batches(
@@ -41,26 +42,25 @@ def watched_batches(
     FileError
         No line is a row, or a column is missing; the source ends by a fault.
     """
-    arrivals = Arrivals(open_source(address, options), options, time.monotonic())
-    columns, rejected = None, 0
-    try:
-        for rows in arrivals.batches():
+    given = Conversion.of(checked_reading_options(reading))
+    columns, rejected, over = None, 0, False
+    with closing(Arrivals(address, options, time.monotonic())) as arrivals:
+        while not over:
+            over = arrivals.is_over and not arrivals.is_behind
+            if arrivals.look() and arrivals.layout is not None:
+                names, rows = arrivals.layout.names, arrivals.take()
+                columns = columns or WatchedColumns.of(address, names, reading, given, None)
+                if rows.time.size:
+                    found = dict(zip(names, np.ascontiguousarray(rows.values.T), strict=True))
+                    batch = columns.batch(found.__getitem__, model)
+                    yield batch if batch.time is not None else batch._replace(time=rows.time)
             rejected += len(arrivals.rejected)
             arrivals.rejected = []
-            names = arrivals.layout.names if arrivals.layout is not None else ()
-            if columns is None and names:
-                given = Conversion.of(checked_reading_options(reading))
-                columns = WatchedColumns.of(address, names, reading, given, None)
-            if columns is not None and rows.time.size:
-                found = dict(zip(names, np.ascontiguousarray(rows.values.T), strict=True))
-                batch = columns.batch(found.__getitem__, model)
-                yield batch if batch.time is not None else batch._replace(time=rows.time)
-    finally:
-        arrivals.close()
+            if not (over or arrivals.is_behind):
+                time.sleep(TICK)
     lines = counted(rejected, "line")
     if rejected and columns is not None:
-        be = "is" if rejected == 1 else "are"
-        text = f"{address}: {lines} that {be} no row of numbers rejected"
+        text = f"{address}: {lines} rejected: no row of numbers"
         warnings.warn(text, MessageLinesWarning, stacklevel=level_of_caller())
     if arrivals.problem is not None:
         raise FileError(address, f"ended by a fault: {arrivals.problem}")

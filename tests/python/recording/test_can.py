@@ -79,7 +79,7 @@ def test_frames_that_are_too_short_are_rejected():
         assert source.names == ("1:0:2:0.5", "1:2:1s:1")
         for data in (b"\x04\x00\xff", b"\x04\x00", b"\x06\x01\x02"):
             bus.send(can.Message(arbitration_id=1, data=data, is_extended_id=False))
-        assert source.read() == b"2.0,-1.0\ntoo short: 1#0400\n131.0,2.0\n"
+        assert source.read() == b"2.0,-1.0\nno value: 1#0400\n131.0,2.0\n"
         source.send(b"1A3#01ff\n")
         sent = bus.recv(1.0)
         assert (sent.arbitration_id, sent.data) == (0x1A3, b"\x01\xff")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trueangle.recording.estimate import CELLS, Estimate, Travel
+from trueangle.recording.estimate import CELLS, Estimate
 
 SEED = 52_003
 JOINTS, WITHIN, HELD = 20, 1.5, 19
@@ -91,17 +91,17 @@ def test_a_drift_is_not_enough():
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_travel_knows_where_it_was_and_which_way(sign):
-    travel = Travel(1.0)
+    travel = Estimate(1.0)
     rng = np.random.default_rng(SEED)
     there = np.concatenate([np.arange(0.0, 1.5, 0.002), np.arange(1.5, 1.25, -0.002)])
     path = sign * there + rng.normal(0.0, 2e-4, there.size)
     for rows in np.array_split(np.arange(path.size), 40):
-        travel.add(path[rows] % 1.0, rows * 0.01)
+        travel.add(path[rows] % 1.0, path[rows] % 1.0, rows * 0.01)
     one_way, other = travel.covered[:: int(sign)]
     assert one_way == 1.0
     assert other == pytest.approx(0.25, abs=2.0 / CELLS)
     assert travel.is_covered
-    assert travel.turns == pytest.approx(1.75, abs=0.02)
+    assert travel.travelled == pytest.approx(1.75, abs=0.02)
     assert travel.speeds == pytest.approx([0.2, 0.2], rel=0.2)
 
 

@@ -101,6 +101,7 @@ def test_a_full_disk_leaves_whole_rows_and_is_named(tmp_path, monkeypatch):
     file.add(b"0123456789\n" * 2000, 2000)
     with pytest.raises(OSError, match=re.escape("a.csv")):
         file.flush()
+    file.close()
     rows = {row.rstrip(b" ") for row in file.path.read_bytes().split(b"\n")}
     assert rows == {b"0123456789", b""}
     assert 4000 < file.path.stat().st_size <= 10_000

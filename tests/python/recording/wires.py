@@ -1,56 +1,45 @@
 """Sources for the tests of recordings: bytes given by hand, and joints that send lines."""
 
+import itertools
 import time
 
 import numpy as np
+import pytest
 
 from trueangle.recording.arrivals import Arrivals
 from trueangle.recording.output import RunsFile
 from trueangle.recording.recording import Choices, LiveRecording
-from trueangle.recording.sources import SourceOptions
+from trueangle.recording.sources import Source, SourceOptions
 
 
-class Given:
-    """A source that gives pieces of bytes, one a read, and ends."""
-
-    midway, names = False, ()
-
-    def __init__(self, pieces):
-        self.pieces, self.sent = list(pieces), b""
-
-    def read(self):
-        return self.pieces.pop(0) if self.pieces else None
-
-    def send(self, data):
-        self.sent += data
-
-    def close(self):
-        pass
+def given(data, sizes=(1 << 16,), pattern=None):
+    """Arrivals of bytes that come in pieces of these sizes, one a read, all of them read."""
+    cuts = np.cumsum([0, *itertools.islice(itertools.cycle(sizes), len(data) // min(sizes) + 1)])
+    pieces = iter([data[a:b] for a, b in itertools.pairwise(cuts) if a < len(data)])
+    source = Source(lambda: next(pieces, None), lambda: None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("trueangle.recording.arrivals.open_source", lambda *_: source)
+        arrivals = Arrivals("given", SourceOptions(pattern=pattern), time.monotonic())
+    while not arrivals.is_over:
+        time.sleep(0.001)
+    return arrivals
 
 
 def arrived(data, pattern=None, sizes=(1 << 16,)):
     """Rows and rejected lines of bytes that arrive in pieces of these sizes."""
-    pieces, at, i = [], 0, 0
-    while at < len(data):
-        pieces.append(data[at : at + sizes[i % len(sizes)]])
-        at += sizes[i % len(sizes)]
-        i += 1
-    arrivals = Arrivals(Given(pieces), SourceOptions(pattern=pattern), time.monotonic())
-    while not arrivals.is_over:
-        time.sleep(0.001)
-    values, times = [], []
-    for rows in arrivals.batches():
-        values += rows.values.tolist()
-        times += rows.time.tolist()
+    arrivals, values, times, behind = given(data, sizes, pattern), [], [], True
+    while behind:
+        behind = arrivals.is_behind
+        if arrivals.look():
+            rows = arrivals.take()
+            values += rows.values.tolist()
+            times += rows.time.tolist()
     return arrivals, np.array(values), np.array(times)
 
 
 def recorded(path, lines, signals=None, counts=(None, None), **options):
     """A recording of lines that are there at once."""
-    data = "".join(f"{line}\n" for line in lines).encode()
-    arrivals = Arrivals(Given([data]), SourceOptions(), time.monotonic())
-    while not arrivals.is_over:
-        time.sleep(0.001)
+    arrivals = given("".join(f"{line}\n" for line in lines).encode())
     file = RunsFile(path, options.pop("label", None), options.pop("append", False))
     choices = Choices(signals or {}, SourceOptions(), counts, **options)
     recording = LiveRecording({"given": arrivals}, file, choices)
