@@ -188,7 +188,8 @@ def _opened(path: Path, output: _WrittenFile | None = None) -> Iterator[h5py.Fil
 class _WrittenFile(io.FileIO):
     """A file that HDF5 can always close: over one that it cannot it ends the process.
 
-    The first failure to write is kept, and what comes after it goes nowhere.
+    The first failure to write is kept, and what comes after it goes nowhere; so does what comes
+    after an interrupt has closed the file, as h5py keeps HDF5's own open until its last reference.
     """
 
     failure: OSError | None = None
@@ -196,14 +197,23 @@ class _WrittenFile(io.FileIO):
     def __repr__(self) -> str:
         return str(self.name)
 
+    def seek(self, *place: int) -> int:
+        return 0 if self.closed else super().seek(*place)
+
     def write(self, data: Any) -> int:
         rest = memoryview(data)
         try:
-            while rest and self.failure is None:
+            while rest and self.failure is None and not self.closed:
                 rest = rest[super().write(rest) :]
         except OSError as error:
             self.failure = error
         return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        return 0 if self.closed else super().truncate(size)
+
+    def flush(self) -> None:
+        """Nothing waits to be written."""
 
     def check(self) -> None:
         """Raise the failure, if there was one."""

@@ -206,3 +206,15 @@ def test_parts_hold_every_row_once_and_whole_chunks(tmp_path, monkeypatch, chunk
     np.testing.assert_array_equal(np.concatenate(read), angles)
     edges = np.cumsum([values.size for values in read])
     assert not (edges[edges < ROWS] % (chunk or 1)).any()
+
+
+def test_hdf5_closes_after_its_file_was_closed(tmp_path, recwarn):
+    """As an interrupt while h5py opens it leaves them: no error, and nothing told at the end."""
+    path = made_file(tmp_path / "a.h5", made_angles(ROWS), chunks=(500,), compression="gzip")
+    with hdf5._WrittenFile(path, "r+b") as output:
+        file = h5py.File(output, "r+")
+        file["joint3/indicated_deg"][::2] = 1.0
+        file["more"] = np.arange(ROWS)
+    file.close()
+    output.check()
+    assert not recwarn

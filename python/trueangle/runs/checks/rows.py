@@ -32,9 +32,6 @@ _ROUNDING: Final = 1e-9
 #: Of more readings every second, third ... is looked at.
 _LOOKED_AT: Final = 8192
 
-#: Readings that are looked for before all are: where one is alone, not all are copied.
-_TRIED: Final = 8
-
 
 def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
     """Jumps of the error that stay, and are of no place of the joint.
@@ -203,19 +200,21 @@ def duplicate_runs(records: list[Record]) -> Iterator[DataFault]:
 
 
 def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
-    """Rows with one time stamp and the same readings; without times, all rows several times.
+    """Rows with one time stamp and the same readings; without times, readings that repeat others.
 
-    Some equal readings without times are those of a coarse scale.
+    A reference that repeats with another indicated angle is measured anew, and readings that
+    agree there may be those of a coarse scale.
     """
     for record in records:
         timed = record.time is not None
-        columns = [record.reference, record.indicated, *([record.time] if timed else [])]
+        columns = [record.indicated, record.reference, *([record.time] if timed else [])]
         table = np.stack([column for column in columns if column is not None])
-        if np.all(np.diff(table[-1]) > 0.0) if timed else _is_alone(table):
+        if np.unique(table[-1]).size == len(record):
             continue
         order = np.lexsort(table)
-        again = np.append(False, (np.diff(table[:, order]) == 0.0).all(axis=0))
-        rows = np.sort(record.rows[order[again]])
+        same = np.diff(table[:, order]) == 0.0
+        again = same.all(axis=0)
+        rows = np.sort(record.rows[order[1:][again]])
         if timed and rows.size:
             yield DataFault.of(
                 "duplicate_rows",
@@ -225,23 +224,15 @@ def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
                 f"{rows[0]}) are there twice, time stamp and readings",
                 "drop the second of each",
             )
-        counts = np.diff(np.append(np.flatnonzero(~again), again.size))
-        times = int(np.gcd.reduce(counts))
-        if not timed and times > 1 and counts.size >= LEAST_READINGS:
+        elif rows.size >= LEAST_READINGS and np.array_equal(again, same[-1]):
             yield DataFault.of(
                 "duplicate_rows",
                 [record.label],
                 rows.tolist(),
-                f"every reading of run {record.label} is there {times} times, to the last digit "
-                f"(first again: row {rows[0]}): uncertainties would come out too small",
+                f"{rows.size} of {len(record)} readings of run {record.label} repeat others to "
+                f"the last digit (first: row {rows[0]}): uncertainties would come out too small",
                 "drop the copies",
             )
-
-
-def _is_alone(table: Array) -> bool:
-    """Whether one of the first readings is there once."""
-    first = table[:, :_TRIED].T
-    return any(np.count_nonzero((one == table.T).all(axis=1)) < 2 for one in first)
 
 
 def _listed(labels: list[str]) -> str:

@@ -213,24 +213,26 @@ def test_one_column_is_label_and_mount(tmp_path: Path) -> None:
         ta.read_runs(path, signals={"run": "turned", "mount": ("turned", "deg")})
 
 
-@pytest.mark.parametrize("times", [2, 5])
-def test_copies_of_all_rows_are_told_by_check_and_fit(times: int, tmp_path: Path, capsys) -> None:
-    rng = np.random.default_rng(times)
+@pytest.mark.parametrize("copies", [30, 90, 360])
+def test_copies_of_rows_are_told_by_check_and_fit(copies: int, tmp_path: Path, capsys) -> None:
+    """Of a third of them, too: the last rows again, of all, or of all four times more."""
+    rng = np.random.default_rng(copies)
     theta = rng.uniform(0.0, 360.0, 90)
     error = 0.1 * np.sin(np.radians(theta)) + rng.normal(0.0, 3e-3, 90)
     rows = [f"{t:.4f},{t + e:.4f}" for t, e in zip(theta, error, strict=True)]
     path = tmp_path / "r.csv"
-    for count in (1, times):
-        path.write_text("\n".join(["reference_deg,indicated_deg", *count * rows]) + "\n")
-        words = f"very reading of run 1 is there {count} times, to the last digit"
+    twice = [*rows, *(4 * rows)[-copies:]]
+    words = f"{copies} of {len(twice)} readings of run 1 repeat others to the last digit"
+    for written in (rows, twice):
+        path.write_text("\n".join(["reference_deg,indicated_deg", *written]) + "\n")
         told = [str(fault) for fault in ta.check(path).data_faults if words in fault.says]
         notes = [note for note in ta.fit(path, orders=[1]).notes if words in note]
         assert main(["fit", str(path), "--orders", "1", "-o", str(tmp_path / "m.json")]) == 0
-        assert (words in capsys.readouterr().err) == (count > 1)
-        assert len(told) == len(notes) == (count > 1)
-    assert f"(first again: row {90 + 1})" in notes[0]
+        assert (words in capsys.readouterr().err) == (written is twice)
+        assert len(told) == len(notes) == (written is twice)
+    assert "(first: row 91)" in notes[0]
     assert notes[0].endswith("drop the copies.")
     # It is done as it says.
     (fault,) = ta.check(path).data_faults
-    kept = [row for k, row in enumerate(times * rows, 1) if k not in fault.rows]
+    kept = [row for k, row in enumerate(twice, 1) if k not in fault.rows]
     assert kept == rows
