@@ -208,5 +208,8 @@ def source_options(args: argparse.Namespace) -> SourceOptions:
     """What sources are opened with."""
     from ..recording.sources import SourceOptions
 
+    baud = 115200 if args.baud is None else args.baud
+    if baud < 1:
+        raise ArgumentError(f"--baud must be positive, got {baud}")
     fields = tuple(name.lstrip("-") for _joint, _role, name, _unit in args.signal or ())
-    return SourceOptions(args.baud or 115200, args.dbc, fields, args.pattern, args.send)
+    return SourceOptions(baud, args.dbc, fields, args.pattern, args.send)

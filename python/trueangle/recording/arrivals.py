@@ -10,7 +10,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ..errors import ArgumentError
 from ..support.arrays import Array
 from .lines import layout_of, layout_of_columns, layout_of_pattern
 from .sources import SourceOptions, open_source
@@ -56,7 +55,7 @@ class Arrivals:
     address : str
         See `trueangle.recording.sources.open_source`.
     options : SourceOptions
-        With the pattern of its lines, and what is sent to it.
+        With the pattern of its lines.
     start : float
         Of the clock (`time.monotonic`) from which seconds count.
 
@@ -73,10 +72,6 @@ class Arrivals:
         self._source = source = open_source(address, options)
         if source.names:
             self.layout = layout_of_columns("CSV", source.names)
-        if options.send is not None:
-            if source.send is None:
-                raise ArgumentError("send: lines are only read here")
-            source.send(f"{options.send}\n".encode())
         self.rejected: list[bytes] = []
         self.problem: OSError | None = None
         self._start = start

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
@@ -26,7 +27,7 @@ _KEPT, _PATIENCE = 4096, 2.0
 class Column(NamedTuple):
     """A column that is written: its name, its place in the rows, and ``factor · x + offset``.
 
-    ``turn`` is that of an angle of the shaft in its unit, else 0.
+    ``turn`` is that of an angle of the shaft in its unit, NaN in counts of unknown number, else 0.
     """
 
     name: str
@@ -78,7 +79,7 @@ def _column(source: str, place: int, column: RoleColumn, counts: Counts) -> Colu
     # As runs of a reversed sensor are written: minus what the sensor reads.
     minus = "-" if column.sign < 0 and role == "indicated" else ""
     factor, offset = column.scale(UNIT_PERIODS.get(unit, _PERIOD), number)
-    turn = UNIT_PERIODS.get(unit, 0.0) if role in ANGLES[:2] else 0.0
+    turn = UNIT_PERIODS.get(unit, math.nan) if role in ANGLES[:2] else 0.0
     return Column(minus + pattern.format(unit), place, factor, offset, turn)
 
 
@@ -106,7 +107,7 @@ class PairedSources:
     """
 
     def __init__(self, arrivals: Arrivals, columns: Sequence[Column]) -> None:
-        found = [c for c in columns if c.turn and c.name.startswith("reference_")]
+        found = [c for c in columns if c.turn > 0.0 and c.name.startswith("reference_")]
         if not found:
             raise ArgumentError(
                 "of two sources one needs an indicated angle, the other a reference; name others "

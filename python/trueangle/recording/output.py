@@ -125,17 +125,17 @@ class RunsFile:
     """
 
     def __init__(self, path: Path, label: str | None, append: bool) -> None:
-        # Next to the null device no file can be.
-        beside = (
-            path.with_name(path.name + ".rejected") if path.is_file() or not path.exists() else path
-        )
+        is_device = path.exists() and not path.is_file()
+        beside = path if is_device else path.with_name(path.name + ".rejected")
         self.rows, self.rejected = WholeFile(path), WholeFile(beside, filled=False)
-        there = [p for p in (path, beside) if p.is_file() and p.stat().st_size]
-        if there and not append:
+        is_there = path.is_file() and path.stat().st_size > 0
+        if is_there and not append:
             raise FileError(
-                there[0], "is there already: name another file, or add a run to it (`append=True`)"
+                path, "is there already: name another file, or add a run to it (`append=True`)"
             )
-        self._header, labels = _continued(path) if path in there else ([], set[str]())
+        if beside.is_file() and not is_there:  # of an attempt without a row
+            beside.unlink()
+        self._header, labels = _continued(path) if is_there else ([], set[str]())
         if label in labels:
             raise ArgumentError(f"label: {path} has a run {label!r}; give another label")
         numbers = map(str, itertools.count(len(labels) + 1))
@@ -155,12 +155,13 @@ class RunsFile:
             problem = f"has the columns {own}, and {come} come; name another file"
             raise FileError(self.rows.path, problem, line=1)
         self._row = _line([self.label])[:-1].replace(b"%", b"%%") + b",%.15g" * len(names) + b"\n"
-        if not self._header:
-            self.rows.add(_line(header), 0)
+        self._head = b"" if self._header else _line(header)
 
     def add(self, values: Array) -> None:
         """Add rows, shape (n, columns)."""
-        self.rows.add(self._row * len(values) % tuple(values.ravel().tolist()), len(values))
+        rows = self._row * len(values) % tuple(values.ravel().tolist())
+        self.rows.add(self._head + rows, len(values))
+        self._head = b""
 
     def reject(self, lines: Sequence[bytes]) -> None:
         """Keep lines that are no rows, as they came."""

@@ -16,6 +16,7 @@ from ..formats.columns import find_columns
 from ..runs.angles import find_run_angles
 from ..support.angles import wrap
 from ..support.arrays import Array
+from ..support.layout import counted
 from .arrivals import TICK, Arrivals, Rows
 from .columns import Column, Counts, PairedSources, written_columns
 from .estimate import Estimate
@@ -166,8 +167,10 @@ class LiveRecording:
         except FileError as error:
             self.note = error.problem
             alone = [(column.name, column.turn) for column in self._columns if column.turn]
+            if len(alone) == 1 and math.isnan(alone[0][1]):
+                alone, self.note = [], "counts need their number per turn: give `counts_per_turn=`"
             if self._choices.until == "orders" or (self._choices.until and not alone):
-                raise
+                raise FileError(path, self.note) from None
             if not alone:
                 return
             name, period = alone[0]  # a shaft that turns
@@ -328,9 +331,13 @@ def record(
         recording.take(math.inf)  # what still waits for a reference has none
         show(recording, time.monotonic() - start, ended)
     if not recording.rows and ended != "stopped":
-        raise FileError(
-            addresses[0],
-            f"no line that is a row has come, {file.rejections}; is it the right baud rate? Give "
-            "`pattern=` where lines have another layout",
-        )
+        address = next((a for a, each in arrivals.items() if each.layout is None), addresses[0])
+        problem = f"no line that is a row has come, {file.rejections}; is it the right baud rate? "
+        problem += "Give `pattern=` where lines have another layout"
+        if recording.unpaired:
+            lost = counted(recording.unpaired, "reading")
+            problem = f"{lost} without a reference at their time; do both send at the same time?"
+        elif not file.rejected.lines:
+            problem = "nothing has come; does it send? `send=` sends a line that it waits for"
+        raise FileError(address, problem)
     return recording, ended

@@ -30,7 +30,7 @@ _LOOK: Final = 0.02
 #: ``ID:byte:length:scale``; behind the length ``s`` is signed, ``b`` is big-endian.
 _FIELD: Final = re.compile(rb"(0x[\da-fA-F]+|\d+):(\d+):([1-8])([sb]{0,2}):(%s)" % NUMBER)
 #: ``ID#DATA`` as `cansend` takes it.
-_FRAME: Final = re.compile(rb"([\da-fA-F]{1,8})#((?:[\da-fA-F]{2}){0,8})\s*")
+_FRAME: Final = re.compile(r"([\da-fA-F]{1,8})#((?:[\da-fA-F]{2}){0,8})")
 
 
 class SourceOptions(NamedTuple):
@@ -66,8 +66,6 @@ class Source(NamedTuple):
         What has arrived, after 0.1 s at most; None where the source has ended. An `OSError` where
         the device is gone.
     close : callable
-    send : callable, optional
-        Sends bytes to the device; None where lines are only read.
     midway : bool
         Whether the first line may have begun before the source was opened.
     names : tuple of str
@@ -76,7 +74,6 @@ class Source(NamedTuple):
 
     read: Callable[[], bytes | None]
     close: Callable[[], object]
-    send: Callable[[bytes], object] | None = None
     midway: bool = False
     names: tuple[str, ...] = ()
 
@@ -100,16 +97,16 @@ def kind_of(address: str) -> str:
 
 
 def open_source(address: str, options: SourceOptions) -> Source:
-    """Open a source by its address; a port exclusively, and nothing is sent.
+    """Open a source by its address, a port exclusively, and send what is asked for.
 
     Raises
     ------
     FileError, ArgumentError
-        No source has this address.
+        No source has this address, it cannot be opened, or lines are only read from it.
     MissingExtraError
         The library that reads it is not installed.
     OSError
-        It cannot be opened.
+        A server or file that cannot be opened.
 
     Examples
     --------
@@ -118,22 +115,31 @@ def open_source(address: str, options: SourceOptions) -> Source:
     b''
     >>> source.close()
     """
-    kind = kind_of(address)
+    kind, text = kind_of(address), options.send
+    if text is not None and kind in ("udp", "pipe", "file"):
+        raise ArgumentError(f"send: nothing can be sent to {address}")
+    sent = b"" if text is None else f"{text}\n".encode()
     if kind == "can":
         return _can_bus(address, options)
     if kind in ("tcp", "udp"):
-        return _socket(address, kind)
+        return _socket(address, kind, sent)
     if kind == "port":
         serial = _library("serial", "serial ports need pyserial")
-        port = serial.serial_for_url(address, options.baud, timeout=WAIT, exclusive=True)
+        try:
+            port = serial.serial_for_url(address, options.baud, timeout=WAIT, exclusive=True)
+        except (OSError, ValueError) as error:
+            problem = f"cannot be opened: {error}; is it plugged in and free of other programs?"
+            raise FileError(address, f"{problem}{_ports()}") from None
+        if sent:
+            port.write(sent)
         return Source(
-            lambda: port.read(max(1, min(port.in_waiting, MOST))), port.close, port.write, True
+            lambda: port.read(max(1, min(port.in_waiting, MOST))), port.close, midway=True
         )
     if not kind:
         raise FileError(
             address,
             "no such source; it is a serial port (/dev/ttyUSB0, COM3), - (standard input), "
-            "tcp://HOST:PORT, udp://:PORT, can:vcan0 or a file",
+            f"tcp://HOST:PORT, udp://:PORT, can:vcan0 or a file{_ports()}",
         )
     handle = sys.stdin.fileno() if address == "-" else address
     file: Any = open(handle, "rb", buffering=0, closefd=address != "-")  # noqa: SIM115
@@ -151,12 +157,20 @@ def open_source(address: str, options: SourceOptions) -> Source:
     return Source(piped if os.name != "nt" else lambda: file.read(MOST) or None, file.close)
 
 
+def _ports() -> str:
+    """Serial ports that are there, for a message."""
+    with contextlib.suppress(MissingExtraError):
+        found = _library("serial.tools.list_ports", "").comports()
+        return f"; serial ports here: {', '.join(port.device for port in found) or 'none'}"
+    return ""
+
+
 def _ready(stream: Any, take: Callable[[], bytes | None]) -> bytes | None:
     """What a stream has, after 0.1 s at most."""
     return take() if select.select([stream], [], [], WAIT)[0] else b""
 
 
-def _socket(address: str, kind: str) -> Source:
+def _socket(address: str, kind: str, sent: bytes) -> Source:
     """A TCP server that is connected to, or UDP datagrams, each a line, at an own port."""
     try:
         parts = urlsplit(address)
@@ -168,8 +182,8 @@ def _socket(address: str, kind: str) -> Source:
     try:
         if kind == "tcp":
             link = socket.create_connection((host, port), _PATIENCE)
-            received = partial(_ready, link, lambda: link.recv(MOST) or None)
-            return Source(received, link.close, link.sendall)
+            link.sendall(sent)
+            return Source(partial(_ready, link, lambda: link.recv(MOST) or None), link.close)
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         own = socket.socket(family, socket.SOCK_DGRAM)
         own.setblocking(False)
@@ -211,6 +225,9 @@ def _can_bus(address: str, options: SourceOptions) -> Source:
     signals = _can_signals(options)
     frames: dict[int, bytes] = dict.fromkeys((number for number, _ in signals.values()), b"")
     waited = {*frames}
+    sent = None if options.send is None else _FRAME.fullmatch(options.send.strip())
+    if options.send is not None and sent is None:
+        raise ArgumentError(f"send: a frame as 123#0102FF is needed, got {options.send!r}")
     interface, _, channel = address.removeprefix("can:").partition(":")
     if not channel or interface not in can.interfaces.VALID_INTERFACES:
         interface, channel = "", address.removeprefix("can:")
@@ -222,6 +239,11 @@ def _can_bus(address: str, options: SourceOptions) -> Source:
     except (can.CanError, OSError, ValueError) as error:
         problem = f"cannot be opened: {error}; name it as can:vcan0 or can:INTERFACE:CHANNEL"
         raise FileError(address, problem) from None
+
+    if sent is not None:
+        number, extended = int(sent[1], 16), len(sent[1]) > 3
+        data = bytes.fromhex(sent[2])
+        bus.send(can.Message(arbitration_id=number, data=data, is_extended_id=extended))
 
     def rows() -> bytes:
         found, wait = b"", WAIT
@@ -246,16 +268,7 @@ def _can_bus(address: str, options: SourceOptions) -> Source:
             return f"no value:{''.join(came)}\n".encode()
         return f"{','.join(map(repr, values))}\n".encode()
 
-    def send(data: bytes) -> None:
-        """Send one frame, written as ``ID#DATA``."""
-        frame = _FRAME.fullmatch(data)
-        if frame is None:
-            raise ArgumentError(f"send: a frame as 123#0102FF is needed, got {data.decode()!r}")
-        number, content = int(frame[1], 16), bytes.fromhex(frame[2].decode())
-        extended = len(frame[1]) > 3
-        bus.send(can.Message(arbitration_id=number, data=content, is_extended_id=extended))
-
-    return Source(rows, bus.shutdown, send, names=tuple(signals))
+    return Source(rows, bus.shutdown, names=tuple(signals))
 
 
 def _can_signals(options: SourceOptions) -> dict[str, tuple[int, Callable[[bytes], float]]]:

@@ -75,17 +75,17 @@ def test_rows_have_one_frame_of_each(servo, described, tmp_path, monkeypatch):
 
 def test_frames_that_are_too_short_are_rejected():
     with can.Bus(interface="virtual", channel="short") as bus:
-        source = open_source("can:virtual:short", SourceOptions(fields=("1:0:2:0.5", "1:2:1s:1")))
+        options = SourceOptions(fields=("1:0:2:0.5", "1:2:1s:1"), send="1A3#01ff")
+        source = open_source("can:virtual:short", options)
         assert source.names == ("1:0:2:0.5", "1:2:1s:1")
+        sent = bus.recv(1.0)
+        assert (sent.arbitration_id, sent.data) == (0x1A3, b"\x01\xff")
         for data in (b"\x04\x00\xff", b"\x04\x00", b"\x06\x01\x02"):
             bus.send(can.Message(arbitration_id=1, data=data, is_extended_id=False))
         assert source.read() == b"2.0,-1.0\nno value: 1#0400\n131.0,2.0\n"
-        source.send(b"1A3#01ff\n")
-        sent = bus.recv(1.0)
-        assert (sent.arbitration_id, sent.data) == (0x1A3, b"\x01\xff")
-        with pytest.raises(ArgumentError, match="a frame as 123#0102FF"):
-            source.send(b"start\n")
         source.close()
+        with pytest.raises(ArgumentError, match="a frame as 123#0102FF is needed, got 'start'"):
+            open_source("can:virtual:short", options._replace(send="start"))
 
 
 def test_what_is_no_bus_and_no_signal_is_named(capsys, tmp_path):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -60,6 +61,7 @@ def port():
 
     device, slave = pty.openpty()
     tty.setraw(slave)
+    os.set_blocking(device, False)  # it does not care whether anyone reads
     yield os.ttyname(slave), device
     os.close(slave)
     with contextlib.suppress(OSError):
@@ -94,7 +96,6 @@ def test_a_serial_port_until_the_orders_are_known(port, capsys):
 
 def test_nothing_is_sent_but_what_is_asked(port, capsys):
     name, device = port
-    os.set_blocking(device, False)
     for sent in ([], ["--send", "start 10"]):
         with sending(lambda line: os.write(device, line)):
             assert main(["record", name, "-o", f"{len(sent)}.csv", "--for", "0.4", *sent]) == 0
@@ -230,6 +231,7 @@ def test_rates_labels_and_what_stands_in_the_way(tmp_path, capsys):
     plain = ["--pattern", r"(?P<a>\d+)\.\d*,(?P<b>\d+)"]
     assert main(["record", "log.txt", "-o", "d.csv", *plain, "--until", "orders"]) == 1
     told = capsys.readouterr().err
+    assert not (tmp_path / "b.csv").exists()
     for part in (
         "--append",
         "is also read",
@@ -288,3 +290,73 @@ def test_two_sources_are_joined(port, capsys):
     assert fit.model.amplitudes[0] == pytest.approx(0.5, abs=0.05)
     assert main(["record", *sources, sources[0], "-o", "x.csv"]) == 1
     assert "one source is recorded, or two are joined" in capsys.readouterr().err
+
+
+ALONE = ["--signal", "indicated=enc:count"]
+DBC = 'VERSION ""\nBU_: a\nBO_ 257 Output: 2 a\n SG_ angle : 0|16@1+ (0.005,0) [0|0] "" a\n'
+#: What a new user types, and the one line that names what helps.
+WRONG = {
+    "/dev/ttyNONE": "no such source; it is a serial port (/dev/ttyUSB0, COM3), ",
+    "COM99": "cannot be opened: ",
+    "nosuch://port": "protocol 'nosuch' not known; is it plugged in and free of other programs?",
+    "PORT --baud fast": "--baud: invalid int value: 'fast'",
+    "PORT --baud 0": "--baud must be positive, got 0",
+    "PORT --pattern (\\d+)": "names no group; name columns as in ",
+    "PORT --signal indicated=roh:count": "column 'roh': no such column; its columns are ref, enc",
+    "PORT --signal indicated=enc": "its unit is not known; give it: --signal indicated=enc:count",
+    "PORT --signal indicated=enc:count --until coverage": "give --counts-per-turn",
+    "PORT --until order": "did you mean orders?",
+    "PORT -o there.csv": "there.csv: is there already: name another file, or add a run to it (--",
+    "PORT -o there.csv --append": "there.csv, line 1: has the columns run, time_s, a, and run, ",
+    "PORT PORT": "one source is recorded, or two are joined; got 2",
+    "can:virtual:w --dbc a.dbc --signal indicated=angel:deg": "did you mean 'angle'?",
+    "can:virtual:w --dbc a.dbc --signal indicated=angle:deg": "nothing has come; does it send? ",
+    "can:virtual:w": "a CAN bus needs its signals: their description (--dbc), or ID:byte:length:",
+    "can:virtual:w --signal indicated=1:0:2:1:deg --send go": "a frame as 123#0102FF is needed, ",
+    "silent.fifo": "silent.fifo: nothing has come; does it send? --send",
+    "tcp://127.0.0.1": "tcp://HOST:PORT or udp://:PORT is needed",
+    "words.txt": "words.txt: no line that is a row has come, 5 lines rejected (o.csv.rejected); is",
+    "words.txt --send go": "send: nothing can be sent to words.txt",
+    "PORT words.txt --signal a.indicated=enc:deg": "words.txt: no line that is a row has come",
+}
+
+
+@pytest.mark.parametrize("typed", WRONG)
+def test_what_is_wrong_is_named_in_one_line_with_what_helps(typed, port, capsys):
+    if typed.startswith("can:"):
+        pytest.importorskip("cantools")
+    name, device = port
+    Path("there.csv").write_text("run,time_s,a\n1,0,1\n")
+    Path("words.txt").write_text("Ready.\n" * 5)
+    Path("a.dbc").write_text(DBC)
+    os.mkfifo("silent.fifo")
+    words = typed.replace("PORT", name).split()
+    command = ["record", *words, *(() if "-o" in words else ("-o", "o.csv")), "--for", "0.4s"]
+    handle = os.open("silent.fifo", os.O_RDWR)  # who may write, and does not
+
+    def send(line):
+        os.write(device, line.replace(b"reference_deg", b"ref").replace(b"indicated_deg", b"enc"))
+
+    with sending(send), contextlib.suppress(SystemExit):
+        assert main(command) == 1
+    os.close(handle)
+    *before, last = capsys.readouterr().err.splitlines()
+    assert WRONG[typed] in last, last
+    assert all(line.startswith(("usage: ", "trueangle: warning: ")) for line in before)
+    assert not Path("o.csv").exists()
+
+
+def test_sources_without_a_common_time_are_named(port, capsys):
+    name, device = port
+    Path("ref.txt").write_text("".join(f"{x / 100:.2f}\n" for x in range(500)))
+    options = ["--signal", "a.indicated=indicated_deg:deg", "--signal", "b.reference=column1:deg"]
+    pairs = (line.partition(b" ")[2] for line in PAIRS)
+
+    def late(line):
+        time.sleep(0.2)
+        os.write(device, line)
+
+    with sending(late, pairs):
+        assert main(["record", name, "ref.txt", "-o", "o.csv", *options, "--for", "1s"]) == 1
+    told = capsys.readouterr().err
+    assert "readings without a reference at their time; do both send at the same time?" in told
