@@ -27,7 +27,7 @@ def _status(pid: int) -> tuple[float, int]:
 def _lines(first: int, count: int, rate: float) -> bytes:
     found = []
     for i in range(first, first + count):
-        angle = 30.0 * i / rate
+        angle = 90.0 * i / rate
         error = 0.5 * math.sin(math.radians(angle)) + 0.02 * math.sin(12345.6789 * i)
         found.append(f"{angle % 360.0:.4f},{(angle + error) % 360.0:.4f}\n")
     return "".join(found).encode()

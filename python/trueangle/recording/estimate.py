@@ -21,8 +21,12 @@ CELLS: Final = 72
 _HIGHEST: Final = 32
 _ORDERS: Final = [list(range(1, _HIGHEST + 1))]
 _CHANCE: Final = 0.01
-#: Variance of all orders by turns, in that of white noise, from which on noise is not white.
+#: Variance of all orders by turns, in that of white noise, from which on noise is not white, and
+#: orders on either side that have as much of it.
 _COLOURED: Final = 1.5
+_NEAR: Final = 4
+#: Of the period, below which a standard error is that of rounding.
+_ROUNDING: Final = 1e-12
 #: Turns by which an angle moves before it has another direction, and seconds that make a speed.
 _MOVED: Final = 1.0 / 288.0
 _SPEED: Final = 0.5
@@ -52,6 +56,7 @@ class Estimate:
         s_k² = Σ_w |c_kw - c_k,w-1|² / (4 n (n - 1))
 
     with the coefficients c of each of n turns: by their steps, in which a drift does not hide.
+    Noise that is not white is the median of neighbouring orders: of these, and of their sizes.
     The orders are settled when the last turn has changed none by more than its standard error.
 
     Parameters
@@ -81,7 +86,7 @@ class Estimate:
         self.orders: list[LiveOrder] = []
         self.turns, self.is_settled = 0, False
         self._zero = self._last = self._mark = math.nan
-        self._sign, self._from = 0, (0.0, 0.0, 0)  # seconds, travel and direction
+        self._sign, self._ended, self._from = 0, 0, (0.0, 0.0, 0)  # seconds, travel, direction
         self._all, self._turn = self._moments(), self._moments()
         self._seen = np.zeros(CELLS, dtype=bool)
         self._sums = np.zeros((2, CELLS))
@@ -108,17 +113,17 @@ class Estimate:
             self.cells[row] += np.bincount(cells[signs == sign], minlength=CELLS)
         self._sums += np.bincount(cells, minlength=CELLS), np.bincount(cells, error, CELLS)
         ends = np.flatnonzero(np.diff(turns, prepend=before)) + 1
-        for i, rows in enumerate(np.split(np.arange(error.size), ends)):
+        for rows in filter(len, np.split(np.arange(error.size), ends)):
             for sign, sums in self._turn.items():
                 own = rows[signs[rows] == sign]
                 sums.update(reference[own], error[own])
             self._seen[cells[rows]] = True
-            if i < ends.size and self._seen.all():
+            if turns[rows[-1]] > self._ended and self._seen.all():
                 with suppress(RankError):  # it goes on until its places tell the orders apart
-                    self._end_turn(self._solved(self._turn)[0])
+                    self._end_turn(self._solved(self._turn)[0], int(turns[rows[-1]]))
 
     def _travel(self, path: Array, time: Array) -> NDArray[np.intp]:
-        """Direction at each place, 0 before it has moved, and whole turns travelled by it."""
+        """Direction at each place, 0 before it has moved, and whole turns travelled."""
         steps = []
         for place in path.tolist():
             if abs(place - self._mark) > _MOVED:
@@ -126,8 +131,6 @@ class Estimate:
                 self.travelled += abs(place - self._mark)
                 self._mark = place
             steps.append((self._sign, int(self.travelled)))
-        found = np.transpose(steps)
-        found[0, found[0] == 0] = self._sign  # it had moved that way already
         start, before, sign = self._from
         seconds, far = float(time[-1]) - start, self.travelled - before
         if seconds >= _SPEED or sign != self._sign:
@@ -135,6 +138,8 @@ class Estimate:
                 slow, fast = self.speeds
                 self.speeds = [min(slow, far / seconds), max(fast, far / seconds)]
             self._from = float(time[-1]), self.travelled, self._sign
+        found = np.transpose(steps)
+        found[0, found[0] == 0] = self._sign  # it had moved that way already
         return found
 
     def _solved(self, sums: dict[int, _core.Moments]) -> tuple[Any, Array]:
@@ -144,22 +149,26 @@ class Estimate:
         variance = np.diag(found.covariance)[1:].reshape(-1, 2).mean(axis=1)
         return np.array(found.cosine[0]) + 1j * np.array(found.sine[0]), variance
 
-    def _end_turn(self, turn: Any) -> None:
+    def _end_turn(self, turn: Any, ended: int) -> None:
         """Find the orders by all readings, and judge whether the last turn has changed them."""
         for sign, sums in self._turn.items():
             self._all[sign].merge(sums)
         self._turn, self._seen = self._moments(), np.zeros(CELLS, dtype=bool)
         before, (self._values, white) = self._values, self._solved(self._all)
-        self.turns += 1
-        more = max(self.turns - 1.0, 1.0)
+        self.turns, self._ended = self.turns + 1, ended
         self._steps += np.abs(turn - self._before) ** 2 * (self.turns > 1)
-        self._before, white = turn, np.maximum(white, 1e-300)
+        self._before, white = turn, np.maximum(white, (_ROUNDING * self.period) ** 2)
+        more = max(self.turns - 1.0, 1.0)
         own = self._steps / (4.0 * self.turns * more)
-        # All orders together first: noise of any colour is in each.
-        common = float(np.median(own / white))
-        white *= common if common > _COLOURED else 1.0
+        # Of n turns noise has one mean, in which true orders are few, and n - 1 steps.
+        middle = chi_squared_quantile(0.5, 2.0 * more) / (2.0 * more)
+        mean = np.abs(self._values) ** 2 / (2.0 * math.log(2.0))
+        noise = np.array([mean, *[own / middle] * min(self.turns - 1, _NEAR)])
+        if np.median(noise / white) > _COLOURED:
+            near = (noise[:, max(i - _NEAR, 0) : i + _NEAR + 1] for i in range(_HIGHEST))
+            white = np.maximum(white, [np.median(part) for part in near])
         limit = chi_squared_quantile(1.0 - _CHANCE / _HIGHEST, 2.0 * more) / (2.0 * more)
-        std = np.sqrt(np.where(own > limit * white, own, white))
+        std = np.sqrt(np.where((own > limit * white) & (self.turns > 1), own, white))
         least = math.sqrt(-2.0 * math.log(_CHANCE / _HIGHEST)) * std
         sizes, known = np.abs(self._values), {order.order for order in self.orders}
         self.orders = [

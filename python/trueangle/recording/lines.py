@@ -57,8 +57,10 @@ class LineLayout(NamedTuple):
             found = _numbers(line)
             return [found.get(name, math.nan) for name in self.names]
         match = self.row.search(line)
-        cells = [*match.groupdict(b"").values()] if match else [b""]
-        return cells if all(map(_NUMBER.fullmatch, cells)) else [math.nan] * len(self.names)
+        cells = [*match.groupdict(b"").values()] if match else []
+        if self.kind == "pattern" and not all(map(_NUMBER.fullmatch, cells)):
+            cells = []
+        return cells or [math.nan] * len(self.names)
 
 
 def layout_of(lines: Sequence[bytes], hurry: bool = False) -> LineLayout | None:

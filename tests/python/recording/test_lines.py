@@ -1,6 +1,8 @@
 """Lines: their layout is found, and whatever befalls them only whole rows pass."""
 
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,10 +10,11 @@ import pytest
 from trueangle.errors import ArgumentError
 from trueangle.recording.lines import layout_of, layout_of_pattern
 
-from .wires import arrived
+from .wires import arrived, recorded
 
 SEED = 52_001
-DAMAGED = 100_000
+#: Damaged lines: a hundred thousand by night.
+DAMAGED = 100_000 if os.environ.get("TRUEANGLE_NIGHTLY") == "1" else 3_500
 
 
 def printed(kind, step, raw):
@@ -91,20 +94,27 @@ def damaged(line, rng):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_whatever_befalls_lines_only_whole_rows_pass_and_the_others_are_counted(kind):
+def test_whatever_befalls_lines_only_whole_rows_pass_and_the_others_are_kept(kind, tmp_path):
     rng = np.random.default_rng([SEED, *kind.encode()])
     print("seed", SEED)
     good = [printed(kind, i, 0.25 * i + 7.0).encode() + b"\n" for i in range(10)]
-    for _ in range(DAMAGED // len(KINDS) // 500):
+    for part in range(DAMAGED // len(KINDS) // 500):
         sent = [printed(kind, i, 0.25 * i).encode() + b"\n" for i in rng.integers(0, 9999, 500)]
         data = b"".join([*good, *(damaged(line, rng) for line in sent), b"\n", *good])
-        arrivals, values, _ = arrived(data, sizes=[*rng.integers(1, 900, 97).tolist(), 65536])
-        assert arrivals.layout.names == KINDS[kind][1]
-        assert values.shape[1] == 2
+        path = tmp_path / f"{part}.csv"
+        recording = recorded(path, data, sizes=[*rng.integers(1, 900, 97).tolist(), 65536])
+        header, *rows = path.read_text().splitlines()
+        assert header == ",".join(["run", "time_s", *KINDS[kind][1]])
+        values = np.array([row.split(",") for row in rows], dtype=float)
+        assert values.shape == (recording.rows, 4)
         assert np.isfinite(values).all()
-        np.testing.assert_array_equal(values[:10], values[-10:])
+        assert (np.diff(values[:, 1]) > 0.0).all()
+        np.testing.assert_array_equal(values[:10, 2:], values[-10:, 2:])
         lines = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
-        assert len(values) + len(arrivals.rejected) == sum(bool(line.strip()) for line in lines)
+        kept = Path(f"{path}.rejected").read_bytes().split(b"\n")[:-1]
+        assert len(kept) == recording.file.rejected.lines
+        assert len(rows) + len(kept) == sum(bool(line.strip()) for line in lines)
+        assert {*kept} <= {*lines}
 
 
 def test_a_line_without_end_costs_its_length_and_no_more():

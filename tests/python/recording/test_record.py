@@ -188,6 +188,74 @@ def test_a_signal_ends_it_with_a_whole_file(number):
     assert b"interrupted" in err
 
 
+#: Kills at random moments.
+KILLS = int(os.environ.get("TRUEANGLE_KILLS", "6"))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_whenever_it_is_ended_the_file_holds_whole_rows_from_the_first_on(number):
+    rng = np.random.default_rng([52_005, number])
+    program = [sys.executable, "-m", "trueangle", "record", "-", "-o"]
+    sizes = []
+    for i in range(-(-KILLS // 3)):
+        with subprocess.Popen(
+            [*program, f"{i}.csv"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        ) as process:  # fmt: skip
+            out = told(process, number, time.monotonic() + rng.uniform(0.2, 3.0))
+        assert abs(process.returncode) in (number, 128 + number)
+        path = Path(f"{i}.csv")
+        header, *rows, last = path.read_bytes().split(b"\n") if path.exists() else (b"", b"")
+        assert last == b""
+        values = [[float(cell) for cell in row.split(b",")] for row in rows]
+        assert [row[2:] for row in values] == [[k, 2 * k] for k in range(len(rows))]
+        assert header in (b"run,time_s,n,m", b"")
+        if number != signal.SIGKILL and out:
+            assert f"{i}.csv: {len(rows)} reading" in out
+        sizes.append(len(rows))
+    print(sizes)
+
+
+def told(process, number, end):
+    """What it printed, fed with lines until a time or until its pipe is full, and ended then."""
+    feed, sent = process.stdin.fileno(), 0
+    os.set_blocking(feed, False)
+    while time.monotonic() < end:
+        lines = b"".join(b"n:%d m:%d\n" % (k, 2 * k) for k in range(sent, sent + 100))
+        with contextlib.suppress(BlockingIOError):
+            if os.write(feed, lines) < len(lines):
+                break  # within a line
+            sent += 100
+        time.sleep(0.005)
+    process.send_signal(number)
+    return process.communicate()[0].decode()
+
+
+def test_ten_thousand_lines_a_second_are_all_there(port):
+    name, device = port
+    program = [sys.executable, "-m", "trueangle", "record", name, "-o", "runs.csv"]
+    os.set_blocking(device, True)
+    with subprocess.Popen([*program, "--progress", "json"], stderr=subprocess.PIPE) as process:
+        process.stderr.readline()  # the port is open
+        start, sent = time.monotonic(), 0
+        while sent < 30_000:
+            due = min(int(1e4 * (time.monotonic() - start)), 30_000)
+            os.write(device, b"".join(b"%d %d\n" % (i, 7 * i) for i in range(sent, due)))
+            sent = due
+            time.sleep(0.002)
+        time.sleep(0.5)
+        process.terminate()
+        process.communicate()
+    assert process.returncode == 128 + signal.SIGTERM
+    rejected = Path("runs.csv.rejected")
+    cut = rejected.read_bytes().count(b"\n") if rejected.exists() else 0
+    assert cut <= 1  # the first may have begun before
+    values = np.loadtxt("runs.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(values[:, 2], np.arange(cut, 30_000))
+    np.testing.assert_array_equal(values[:, 3], 7 * np.arange(cut, 30_000))
+    assert (np.diff(values[:, 1]) > 0.0).all()
+
+
 COUNTS = ["--signal", "reference=step:count", "--counts-per-turn-reference", "3200"]
 COUNTS += ["--signal", "indicated=-raw:count", "--counts-per-turn", "4096"]
 

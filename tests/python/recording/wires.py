@@ -37,9 +37,10 @@ def arrived(data, pattern=None, sizes=(1 << 16,)):
     return arrivals, np.array(values), np.array(times)
 
 
-def recorded(path, lines, signals=None, counts=(None, None), **options):
-    """A recording of lines that are there at once."""
-    arrivals = given("".join(f"{line}\n" for line in lines).encode())
+def recorded(path, lines, signals=None, counts=(None, None), sizes=(1 << 16,), **options):
+    """A recording of lines, or bytes in pieces of these sizes, that are there at once."""
+    text = lines if isinstance(lines, bytes) else "".join(f"{line}\n" for line in lines).encode()
+    arrivals = given(text, sizes)
     file = RunsFile(path, options.pop("label", None), options.pop("append", False))
     choices = Choices(signals or {}, SourceOptions(), counts, **options)
     recording = LiveRecording({"given": arrivals}, file, choices)
