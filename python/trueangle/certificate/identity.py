@@ -137,7 +137,7 @@ def load_identity(path: str | PathLike[str]) -> Identity:
         logo = Path(path).parent / found.logo
         if logo.suffix.lower() not in _LOGOS or not logo.is_file():
             raise ArgumentError(
-                f"[certificate] logo must name a picture beside this file "
+                f"[certificate] logo must name a picture in this file's folder "
                 f"({', '.join(_LOGOS)}), got {found.logo!r}"
             )
         return replace(found, logo=str(logo))

@@ -51,7 +51,7 @@ def note_in(language: str, note: str) -> str:
 
     Examples
     --------
-    >>> note_in("de", "3 outliers set aside.")
+    >>> note_in("de", "3 outliers rejected.")
     '3 Ausreißer ausgeschlossen.'
     """
     found = translated(note.removesuffix("."), language)

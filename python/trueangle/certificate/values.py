@@ -92,7 +92,7 @@ def nominal_positions(fit: FitResult, count: int | None = None) -> Array:
     if angles.size < 2:
         raise ArgumentError(
             f"the travel from {low:.6g} to {high:.6g} deg holds fewer than two of "
-            f"{count or POSITIONS} positions to a turn: ask for more"
+            f"{count or POSITIONS} positions a turn: use more positions"
         )
     return np.asarray(angles, dtype=np.float64)
 
@@ -197,7 +197,7 @@ def reversal_halfwidth(fit: FitResult) -> Contribution | None:
     half = float(np.mean(halves))
     count = len(halves)
     error = float(np.std(halves, ddof=1) / np.sqrt(count)) if count > 2 else float(np.max(errors))
-    name = "reversal error, half of it"
+    name = "half the reversal error"
     if abs(half) <= _SEEN * error:
         return Contribution(name, 0.0, "A", "two-point")
     freedom = 0.5 * (half / error) ** 2 if error > 0.0 else np.inf

@@ -176,7 +176,7 @@ def _failed(
         _say(f"error: {_system(error)}")
     elif isinstance(error, MemoryError):
         _say(
-            f"error: out of memory ({str(error) or 'no more is given'}); take fewer "
+            f"error: out of memory ({str(error) or 'no more is available'}); take fewer "
             "readings at a time, or --one-pass where the command has it"
         )
     elif isinstance(error, ImportError):  # one that is there: missing ones are told of above

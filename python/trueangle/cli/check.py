@@ -16,7 +16,7 @@ from .signal_options import add_signals, of_joint, reading_options
 if TYPE_CHECKING:
     from .robots import JointAsked
 
-HELP = "say whether data are fit to be used, and what they can tell, before anything is fitted"
+HELP = "check data for faults before a fit, and report what they can determine"
 EXAMPLE = "trueangle check runs.csv"
 
 

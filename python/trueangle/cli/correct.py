@@ -95,7 +95,8 @@ def run(args: argparse.Namespace) -> int:
     if named and (args.column or args.unit):
         option = "--column" if args.column else "--unit"
         print(
-            f"trueangle: error: {option} and --signal indicated=NAME:UNIT say the same; give one",
+            f"trueangle: error: {option} and --signal indicated=NAME:UNIT name the same column; "
+            "give one",
             file=sys.stderr,
         )
         return 2

@@ -63,8 +63,8 @@ def _corrected(seed: int) -> str:
     published = PUBLISHED[JOINT_A.name]
     return "\n".join(
         [
-            "A joint's encoder is wrong by the same pattern in every turn. Measured once",
-            "   against a reference, the pattern can be taken off from then on:",
+            "The error of a joint's encoder repeats in every turn. Measured once",
+            "   against a reference, the pattern is subtracted from then on:",
             "",
             *letter_chart(place, {"o": read, "*": corrected}, "arcsec"),
             "   o error as read, * error corrected, over one turn of the output in degrees",
@@ -81,7 +81,7 @@ def _corrected(seed: int) -> str:
 def _between(seed: int) -> str:
     """What the 36 positions cannot tell."""
     return (
-        "What 36 positions cannot tell: orders 36 apart look the same there. A\n"
+        "What 36 positions cannot show: orders 36 apart give the same readings. A\n"
         "   correction may then be right at the positions and wrong between them.\n\n"
         f"{short_report(paper_study(seed))}"
     )
@@ -105,7 +105,7 @@ def short_report(study: Study) -> str:
 
     add(study.published, "as published")
     add(study.gear, "gear orders instead")
-    lines.append("  The 36 readings of both are the same: only others can tell.")
+    lines.append("  The 36 readings of both are the same: only other positions separate them.")
     add(study.planned, f"read {offset} deg apart too")
     lines.append(
         f"  `ta.plan_mounts(gear_ratio=100)`: mounts at 0 and {offset} deg, "
@@ -126,8 +126,8 @@ def _diagnosed(seed: int) -> str:
     true = replace(believed, effects=(Backlash(half_width_arcsec=8.0),))
     result = diagnose(simulate(true, seed=seed), believed)
     return (
-        "Why is a joint wrong? This one has a backlash of +-8 arcsec that its\n"
-        f"   simulation does not know. What the diagnosis says of its runs:\n\n{result.summary()}"
+        "Where does the error come from? This joint has a backlash of +-8 arcsec that its\n"
+        f"   simulation does not have. The diagnosis of its runs:\n\n{result.summary()}"
     )
 
 

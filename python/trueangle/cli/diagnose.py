@@ -42,9 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--simulated LOG",
         Input,
-        "what another simulator (MuJoCo, Isaac, Gazebo, Simulink ...) says of the same "
-        "motion: its true angle as reference, its encoder as indicated; the simulation and its "
-        "extension stand on top of it. --signal simulated.ROLE=NAME[:UNIT] names its columns",
+        "log of another simulator (MuJoCo, Isaac, Gazebo, Simulink ...) under the same "
+        "motion: its true angle as reference, its encoder as indicated. The simulation and "
+        "its extension are added to it. --signal simulated.ROLE=NAME[:UNIT] names its columns",
     )
     add(
         "--simulated-by",
@@ -86,15 +86,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--within TIME",
         seconds,
-        "the best account in that time, as 10s, 2min or seconds; it says what is missing "
-        "(default: as much work as ordinary readings take three times over, on any machine)",
+        "time limit, as 10s, 2min or seconds; the result lists what was not "
+        "done (default: three times the work of usual readings, on any machine)",
     )
     add_shared(parser, "progress", "errors-in")
     add("--json", bool, "print the diagnosis as JSON")
     add(
         "--verbose",
         bool,
-        "say why each cause that is not seen could not be in such runs, and what to measure",
+        "list why these runs cannot show each further cause, and what to measure",
     )
 
 
@@ -273,7 +273,7 @@ def _believed(args: argparse.Namespace, empty: bool = False) -> Simulation | Non
         if args.simulated is not None:
             return None
         raise ArgumentError(
-            "give --simulation FILE, or --simulated LOG, or both; where nothing is believed, "
+            "give --simulation FILE, or --simulated LOG, or both; without a simulation, "
             "--gear-ratio R of the joint (--gear-ratio 1 --fixed-member none without a gear)"
         )
     shafts = declared_shafts(args.shaft).items()
@@ -329,7 +329,7 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
     def plan() -> str:
         if result.next_runs is None or not result.next_runs.runs:
             raise ArgumentError(
-                f"nothing is seen that a further run tells: {args.plan} not written"
+                f"no further run would distinguish anything: {args.plan} not written"
             )
         result.next_runs.save(args.plan)
         return f"\nRuns to measure next: {args.plan}"

@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--loss",
         ("auto", "linear", "huber", "tukey"),
-        "auto (default): least squares with outliers set aside and reported",
+        "auto (default): least squares; outliers are rejected and reported",
         default="auto",
     )
     add_shared(parser, "run")

@@ -16,7 +16,7 @@ from .values import declared_shafts, orders_by_shaft
 if TYPE_CHECKING:
     from ..fleets.result import Fleet
 
-HELP = "say which units of a fleet stand out, what they share, and which moved since last time"
+HELP = "find outliers of a fleet, the pattern that its units share, and units that changed"
 EXAMPLE = "trueangle fleet spring/ autumn/ -o fleet.json"
 
 
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--by",
         ("unit", "run"),
-        "what tells the units apart (default: the column unit; without one, the runs)",
+        "what identifies a unit (default: the column unit; without one, the runs)",
         default="unit",
     )
     add("--orders 1-4", str, "orders looked at (default: those above the noise)")

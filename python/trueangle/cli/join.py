@@ -10,7 +10,7 @@ from .parser import declare
 from .paths import Input
 from .signal_options import add_signals, signals_of_both
 
-HELP = "join an indicated and a reference log that have clocks of their own"
+HELP = "join an indicated and a reference log with separate clocks"
 EXAMPLE = "trueangle join joint.csv laser.csv -o runs.csv --signal b.reference='angle (rad)'"
 
 

@@ -55,8 +55,8 @@ _SHARED: Final[dict[str, tuple[str, Kind, str, dict[str, Any]]]] = {
     "reference-orders": (
         "--reference-orders 50,100",
         str,
-        "orders that the reference itself makes: fitted jointly with the pattern, not "
-        "retained; with a phase of their own in every run where it was mounted anew",
+        "orders of the reference's own error: fitted jointly with the pattern and "
+        "not retained; with a new phase in every run where the reference was mounted again",
         {},
     ),
     "covariance": (

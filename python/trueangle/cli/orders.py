@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..fitting.orders.result import OrderSelection
     from .robots import JointAsked
 
-HELP = "say which orders of the angle error are real, and what they may be"
+HELP = "list which orders of the angle error are real, and their possible sources"
 EXAMPLE = "trueangle orders joint_a.csv --gear-ratio 100"
 
 

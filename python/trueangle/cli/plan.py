@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--fixed-member",
         ("circular_spline", "flexspline", "none"),
-        "the member of the gear that stands still (default: %(default)s)",
+        "the fixed member of the gear (default: %(default)s)",
         default="circular_spline",
     )
     add("--positions N", int, "positions per mount (default: 36)")
@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "degrees; where to read on this arc (--arc=-135:135 where it starts below zero)",
     )
     of_arc("--readings N", int, "readings to spend (default: 60)")
-    of_arc("--runs R", int, "runs, each with a zero of its own (default: 1)")
+    of_arc("--runs R", int, "runs, each with a separate zero (default: 1)")
     of_arc("--both-directions", bool, "read every place from either side")
     of_arc("--apart DEG", float, "least distance of two places (default: none)")
     of_arc(
@@ -246,19 +246,19 @@ def _angles(text: str) -> list[float]:
 
 def add_after_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of ``--after``."""
-    add = partial(declare, parser.add_argument_group("after a diagnosis that could not tell"))
+    add = partial(declare, parser.add_argument_group("after a diagnosis with open questions"))
     add(
         "--after RUNS...",
         Input,
-        "the runs measured so far: which to measure next, with --simulation what is believed",
+        "runs measured so far, to plan the next ones; --simulation gives the assumed joint",
     )
-    add("--between A,B", names, "causes to tell apart (default: all that the diagnosis could not)")
+    add("--between A,B", names, "causes to distinguish (default: all that the diagnosis could not)")
     add(
         "--limits FILE",
         Input,
-        "what a run may be: TOML, table [limits] with arc_deg, speed_deg_s, temperature_C, "
-        "torque_Nm, gravity_Nm, mount_deg, current_A, samples, runs, reversals (default: one turn "
-        "or the arc measured so far, 1 to 60 deg/s, loads and temperatures as seen)",
+        "limits of a run: TOML, table [limits] with arc_deg, speed_deg_s, temperature_C, "
+        "torque_Nm, gravity_Nm, mount_deg, current_A, samples, runs, reversals. Default: one turn "
+        "or the arc measured so far, 1 to 60 deg/s, measured loads and temperatures",
     )
     add("--seeds N", int, "simulated diagnoses of each cause in question (default: 10)")
     add("--within TIME", seconds, "time that it may take (default: 10s)")
@@ -279,7 +279,7 @@ def _run_after(args: argparse.Namespace) -> int:
     from .run_lists import read_checked_runs
 
     if args.simulation is None:
-        raise ArgumentError("--after needs what is believed: add --simulation FILE")
+        raise ArgumentError("--after needs the assumed joint: add --simulation FILE")
     refuse_given(args, _OTHERS, "does not go with --after; leave one of them out")
     args.runs = args.after
     plan = plan_after(
@@ -295,7 +295,7 @@ def _run_after(args: argparse.Namespace) -> int:
     if args.output is not None:
         if not plan.runs:
             raise ArgumentError(
-                f"no run within the limits tells more: {args.output} is not written"
+                f"no run within the limits adds information: {args.output} is not written"
             )
         plan.save(args.output)
     return 0

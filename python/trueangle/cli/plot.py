@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_joint(parser)
     add("--joint NAME", str, "of the model file of a robot, this joint")
     add_shared(parser, "errors-in")
-    add("--json", bool, "print what was drawn as JSON")
+    add("--json", bool, "print the plotted data as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

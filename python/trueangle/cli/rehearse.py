@@ -13,7 +13,7 @@ from .paths import Input, Output
 from .plot import save_picture
 from .values import names, seconds
 
-HELP = "tell from which size on a diagnosis of planned runs would name each cause"
+HELP = "find the least size of each cause that a diagnosis of planned runs would name"
 EXAMPLE = "trueangle rehearse joint.toml --within 5min --plot detection.png"
 
 

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the report to write: HTML, or PDF where the name ends so",
         required=True,
     )
-    add("--simulation FILE", Input, "say what this simulation gets wrong, and why")
+    add("--simulation FILE", Input, "diagnose the runs with this simulation")
     add_shared(parser, "orders")
     add_joint(parser)
     add_robot(parser)
@@ -41,14 +41,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--model MODEL",
         Input,
-        "say of this model how it was made, what it cannot see and what it leaves of the "
-        "runs; in a certificate the values as left, after those as found",
+        "describe this model: its data, its limits and the residual of the runs; a "
+        "certificate adds the values as left to those as found",
     )
     add(
         "--certificate IDENTITY",
         Input,
-        "write a calibration certificate (PDF) with what this TOML file says of the item, "
-        "the laboratory and the type B uncertainties",
+        "write a calibration certificate (PDF); this TOML file gives the item, the "
+        "laboratory and the type B uncertainties",
     )
     add("--positions N", int, "nominal positions of a certificate (36)")
     add(
@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--by",
         ("unit", "run"),
-        "what tells the units of --fleet apart (default: the column unit; without one, the runs)",
+        "what identifies a unit of --fleet (default: the column unit; without one, the runs)",
     )
     add("--permitted-arcsec E", float, "with --fleet: error from which a calibration is due")
     add_shared(parser, "errors-in")

@@ -231,7 +231,7 @@ def joint_asked(path: str, joint: str | None) -> tuple[HarmonicModel, dict[str, 
         (joint,) = robot
     known = ", ".join(robot)
     if joint is None:
-        raise ArgumentError(f"{path} holds the models of {known}: say which with --joint NAME")
+        raise ArgumentError(f"{path} holds the models of {known}: name one with --joint NAME")
     if joint not in robot:
         raise ArgumentError(
             f"--joint {joint}: {path} holds the models of {known}{did_you_mean(joint, list(robot))}"

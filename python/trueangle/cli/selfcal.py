@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "and cosine",
         default="auto",
     )
-    add("--orders", str, "auto (default: those that stand out), 1-24 or 1,4,8", default="auto")
+    add("--orders", str, "auto (default: the significant ones), 1-24 or 1,4,8", default="auto")
     add(
         "--loop",
         LOOPS,
@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--head-angles 0,119.2,203.7",
         str,
-        "where the heads stand, degrees, if their readings share one zero",
+        "angles of the heads, degrees, if their readings share one zero",
     )
     add_signals(parser, runs=False)
     add_shared(parser, "errors-in")

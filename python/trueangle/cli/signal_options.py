@@ -43,8 +43,8 @@ def add_signals(
     signal = add(
         "--signal [JOINT.]ROLE=NAME[:UNIT]",
         signal_option,
-        f"column that holds a role, and its unit (deg, rad, turn, count, arcsec, arcmin; "
-        f"s, ms, us, ns; deg/s, rad/s, turn/s); may be repeated; -NAME is a reversed sensor. "
+        f"column that holds a role, and its unit (deg, rad, turn, count, arcsec, "
+        f"arcmin; s, ms, us, ns; deg/s, rad/s, turn/s). Repeatable. -NAME is a reversed sensor. "
         f"Roles: {ROLES}. Without it "
         "columns are found by their names: reference_deg, time_s, 'pos act [rad]'",
         many=True,
@@ -60,7 +60,7 @@ def add_signals(
         add(
             "--periods-per-turn P",
             int,
-            "periods in a turn of the channels sine and cosine, of which the angle is made",
+            "periods per turn of the channels sine and cosine",
         )
     if topic:
         add(

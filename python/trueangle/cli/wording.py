@@ -72,9 +72,7 @@ _OWN = frozenset(
 )
 
 #: What a diagnosis may do where no order is supported: there may be no model at all.
-_PERHAPS = (
-    "; a diagnosis names what else there is, and with --corrected-model FILE writes the model of it"
-)
+_PERHAPS = "; a diagnosis names other causes, and --corrected-model FILE writes the corrected model"
 
 #: Fewest readings of a diagnosis (`diagnosis.diagnose.LEAST_READINGS`, which takes numpy).
 _LEAST_READINGS = 20

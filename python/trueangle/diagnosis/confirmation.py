@@ -63,27 +63,28 @@ def confirmation_status(
     effect = EFFECTS[cause]
     takes_up = is_flexible(effect) or _of_scatter(cause)
     if regression is not None and group and set(group) <= {*free_paths(regression)}:
-        return NOT_CONFIRMED, (
-            f"it is {FREE_PATH}, which follows anything: it says how the noise goes"
-        )
+        return NOT_CONFIRMED, (f"it is {FREE_PATH}, which fits anything: it describes the noise")
     if unexplained.found and takes_up and not _is_seen_without_a_name(regression, group):
-        return NOT_CONFIRMED, ("something is unexplained, and this cause takes up whatever is left")
+        return NOT_CONFIRMED, (
+            "part of the error is unexplained, and this flexible cause would fit it"
+        )
     if regression is not None and group and takes_up and cause != DriftWithinRun.kind:
         drift = _drift(regression)
         is_seen = drift > 0.0 and _is_seen_without_a_name(regression, group)
         if not is_seen and drift > _size(regression, group):
             return NOT_CONFIRMED, (
-                f"the drift of {brief_number(drift)} arcsec rms, which is larger, may leave it"
+                f"the drift of {brief_number(drift)} arcsec rms, which is larger, may cause it"
             )
     beside = unexplained.beside_path
     if beside and regression is not None and group:
         if not takes_up and _size(regression, group) < beside:
             return NOT_CONFIRMED, (
-                f"{brief_number(beside)} arcsec rms are unexplained, of which this may be a part"
+                f"{brief_number(beside)} arcsec rms are unexplained, and this may be a part of them"
             )
         follows = _follows(regression, group)
         if follows:
-            return NOT_CONFIRMED, f"something is unexplained, and this follows the {follows}"
+            why = f"part of the error is unexplained, and this follows the {follows}"
+            return NOT_CONFIRMED, why
     if regression is not None and group and cause == NonIntegerOrder.kind:
         order = float(regression.terms[group[0]].shape["order"])
         if _is_whole(regression, group, order):
@@ -111,10 +112,10 @@ def _of_scattered_zeros(
         return ""
     if not zeros_scatter(unexplained):
         runs = regression.signals.runs
-        return f"it shows in the zeros of {runs} runs alone, and each may have one of its own"
+        return f"it shows only in the zeros of {runs} runs, and every run may have a new zero"
     return (
-        "the zeros of the runs scatter beyond the noise, which makes as much of it in "
-        f"{regression.signals.runs} runs by chance (p {chance:.2g})"
+        "the zeros of the runs scatter more than the noise and may cause an effect of this size in "
+        f"{regression.signals.runs} runs at random (p {chance:.2g})"
     )
 
 

@@ -83,7 +83,7 @@ class Correctable(PlainResult):
         if model is None:
             self._check_correctable()
         else:
-            of_type("model", model, HarmonicModel, "a trueangle.HarmonicModel, or left out")
+            of_type("model", model, HarmonicModel, "a trueangle.HarmonicModel, or omitted")
         given = self.runs if runs is None else runs
         return extend_model(model, given, self.extended, argument)
 
@@ -143,7 +143,7 @@ class Correctable(PlainResult):
         if self._is_correctable:
             return
         raise NoModelError(
-            "no correction can be given: nothing was confirmed that a corrector can take off"
+            "no correction can be given: no confirmed cause can be corrected"
             + "".join(f"; {reason}" for reason in self._uncorrected())
         )
 
@@ -159,9 +159,6 @@ class Correctable(PlainResult):
         seen = [spot for spot in self.not_identifiable if spot.supported]
         told = {spot.measure: ", ".join(spot.causes) for spot in reversed(seen)}
         if told:
-            yield from (f"to tell {causes} apart: {measure}" for measure, causes in told.items())
+            yield from (f"to distinguish {causes}: {measure}" for measure, causes in told.items())
         else:
-            yield (
-                "measure more runs, in both directions and at two speeds, before it is diagnosed "
-                "again"
-            )
+            yield ("measure more runs, in both directions and at two speeds, then diagnose again")

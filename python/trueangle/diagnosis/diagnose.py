@@ -149,7 +149,7 @@ def diagnose(
         is_joined = isinstance(simulated, MeasuredMinusSimulated)
         log = simulated if is_joined else minus_simulated(measured, simulated)
     elif sim is None:
-        raise ArgumentError("nothing is believed: give a simulation, or a log as `simulated=`")
+        raise ArgumentError("no simulation: give one, or a log as `simulated=`")
     with with_deadline(within, progress) as at, at.bounded(_used(measured)), one_blas_thread():
         stated = Simulation() if sim is None else sim
         found = _diagnosis(measured, log, stated, gain)
@@ -280,7 +280,7 @@ def _used(runs: list[CalibrationRun]) -> int:
 
 def _incomplete(at: Deadline, gain: bool) -> str:
     """That the account was ended, while what, and what that means."""
-    means = "causes may be missing or stand for others"
+    means = "causes may be missing or wrong"
     if gain:
         means += ", and what was not held out is not confirmed"
     return f"INCOMPLETE: {at.why} while {at.cut}; {means}"

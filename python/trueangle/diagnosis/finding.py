@@ -184,7 +184,7 @@ def _by_level(gain: LevelGain, unit: ErrorUnit) -> str:
     if gain.reducible_share is None or gain.interval is None:
         return f"Gain by {gain.factor} ({levels} {gain.unit}): {gain.note}."
     return (
-        f"Gain with each {gain.factor} left out in turn ({levels} {gain.unit}): rms "
+        f"Gain with each {gain.factor} held out in turn ({levels} {gain.unit}): rms "
         f"{unit.number(gain.rms_before or 0.0)} -> {unit.text(gain.rms_after or 0.0)}; "
         "reducible share "
         f"{gain.reducible_share:.2f} ({gain.interval[0]:.2f} to {gain.interval[1]:.2f}); "

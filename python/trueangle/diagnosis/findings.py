@@ -194,7 +194,8 @@ def equal_scatter(item: ScatterFinding) -> Ambiguity | None:
     less = ", ".join(f"{other} {gap:.1f} less" for other, gap in equal)
     return replace(
         alike_causes(EFFECTS[item.cause], [other for other, _ in equal]),
-        because=f"they explain the scatter of these readings alike (BIC: {less} than {item.cause})",
+        because=f"they explain the scatter of these readings equally well (BIC: {less} than "
+        f"{item.cause})",
         evidence=item.bic_gain,
         estimates={item.cause: item.parameters, **item.alternatives},
     )

@@ -147,8 +147,8 @@ def not_the_only_ratio(finding: Finding) -> str:
     values = np.atleast_1d(np.asarray(aliases.value, dtype=np.float64))
     told = ", ".join(f"{value:.6g}" for value in values)
     return (
-        f"at these positions {told} would show the same numbers, and of all it is only the nearest "
-        "to the believed one"
+        f"at these positions {told} would give the same readings; this one is only the nearest "
+        "to the assumed value"
     )
 
 
@@ -211,8 +211,8 @@ def many_causes(findings: Sequence[Finding]) -> str:
     common = max(FOLLOWED, key=factors.count)
     shared = [c for c, factor in zip(causes, factors, strict=True) if factor == common]
     text = (
-        f"{len(causes)} causes confirmed in one joint are implausible together: one that has no "
-        "name may be behind several"
+        f"{len(causes)} causes at once are unlikely in one joint; one unknown "
+        "cause may explain several"
     )
     if len(shared) > 1:
         text += f"; {', '.join(shared)} all follow {FOLLOWED[common]}"

@@ -42,5 +42,5 @@ def hold_out_extended(fit: FitResult, sim: Simulation) -> HeldOut:
             before = correct_held_out(None, runs[i], label).before
             found.append(HeldOutRun(label, runs[i], model, before, after))
     if not found:
-        raise ArgumentError(f"no run can be left out: {left_in[0][1]}")
+        raise ArgumentError(f"no run can be held out: {left_in[0][1]}")
     return HeldOut(in_order(found, runs), tuple(left_in))

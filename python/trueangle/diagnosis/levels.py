@@ -36,7 +36,7 @@ ONE_SIGN = 0.9
 #: Levels at most; of more, neighbours are put together.
 MOST_LEVELS = 5
 
-NONE_TO_SPARE = "no level can be left out: the others alone do not tell this cause from all else"
+NONE_TO_SPARE = "no level can be held out: the others alone do not separate this cause"
 
 #: Share of its regressors' power by which a cause must differ from all else at the levels
 #: that are left, to be fitted there at all.
@@ -223,7 +223,7 @@ def _reach(levels: list[float], held_out: list[float]) -> str:
     else:
         reach = "the form was carried to levels between those it was fitted at"
     if len(held_out) < len(levels):
-        reach += "; without the levels not left out it cannot be fitted"
+        reach += "; it cannot be fitted without the levels that were kept"
     return reach
 
 

@@ -82,7 +82,7 @@ def path_evidence(regression: Regression) -> Evidence | None:
         "free path in time",
         deviance,
         0.5 * chi_squared_tail(deviance, 1.0),
-        f"what is left follows {FREE_PATH}, {brief_number(rms)} arcsec rms and new in every run: "
+        f"the residual follows {FREE_PATH}, {brief_number(rms)} arcsec rms and new in every run: "
         "noise that drifts, or something bound to time that has no name",
         rms=rms,
         looks_like=FREE_PATH,
@@ -111,7 +111,7 @@ def aside_evidence(regression: Regression) -> Evidence | None:
         "put aside in a row",
         float(count),
         float(min(expected, 1.0) ** count / np.prod(np.arange(1.0, count + 1.0))),
-        f"{int(rows.sum())} readings far off stand in {count} rows of {least} and more: something "
+        f"{int(rows.sum())} outliers lie in {count} rows of {least} and more: something "
         "that lasts, and no glitches",
         rms=rms,
     )

@@ -186,7 +186,7 @@ def alike_causes(effect: type[Effect], equal: Sequence[str]) -> Ambiguity:
     """That these explain as much as this."""
     return Ambiguity(
         (effect.kind, *equal),
-        "they explain what these readings show alike",
+        "they explain these readings equally well",
         telling_apart(effect, EFFECTS[equal[0]]) or effect.measure,
         supported=True,
         factor=effect.factor,

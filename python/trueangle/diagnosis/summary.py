@@ -46,7 +46,9 @@ def diagnosis_summary(
     ]
     if diagnosis.structure:
         shares = [f"{cause} {100.0 * s:.0f} %" for cause, s in diagnosis.structure.items()]
-        lines += _wrapped(f"Of the variance each alone accounts for: {', '.join(shares[:6])}.", 2)
+        lines += _wrapped(
+            f"Share of the variance that each would explain alone: {', '.join(shares[:6])}.", 2
+        )
     if diagnosis.readings_used < diagnosis.readings:
         used = f"{diagnosis.readings_used} of the readings were used: spread evenly, and none"
         lines += _wrapped(f"{used} at a turning point, where the direction is not known.", 0)
@@ -54,7 +56,7 @@ def diagnosis_summary(
         lines += ["", *finding_lines(f"{k}. ", finding, unit)]
     wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
     if wrong:
-        lines += ["", "What the simulation claims and the readings do not show:"]
+        lines += ["", "Wrong in the simulation:"]
         for belief in wrong:
             lines += _wrapped(f"- {_belief(belief, unit)}", 2)
     g = diagnosis.gain
@@ -97,7 +99,7 @@ def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
     if rest is not None and rest.found:
         lines += _wrapped(
             f"NOT UNDERSTOOD: at least {unit.text(rest.rms)} rms ({100.0 * rest.share:.0f} % of "
-            "the variance that is left) is not noise and has no name.",
+            "the residual variance) is not noise and has no known cause.",
             2,
         )
         for item in rest.firing[:3]:
@@ -121,18 +123,18 @@ def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
         lines += _wrapped(f"Wrong in the simulation: {told}.", 2)
     for spot in diagnosis.not_identifiable:
         if spot.supported and not spot.common:
-            lines += _wrapped(f"Seen, and not distinguished: {_seen(spot, unit)}.", 2)
+            lines += _wrapped(f"Detected, not distinguished: {_seen(spot, unit)}.", 2)
     noise = [] if rest is None else [item for item in rest.noise_firing if _is_material(item)]
     if lines:
         for item in noise:
             if item.test == AGAINST_STATED:
                 lines += _wrapped(f"{item.says[0].upper()}{item.says[1:]}.", 2)
     elif noise:
-        lines = ["No pattern beyond the simulation, but its noise is another:"]
+        lines = ["No pattern beyond the simulation, but the noise differs:"]
         for item in noise:
             lines += _wrapped(f"- {unit.spoken(item.says)} (p {_chance(item.p)})", 4, 2)
     else:
-        lines = ["Nothing beyond the simulation: no test of the readings fires."]
+        lines = ["Nothing beyond the simulation: no test is significant."]
     return [*lines, ""]
 
 
@@ -162,7 +164,7 @@ def _belief(belief: Belief, unit: ErrorUnit) -> str:
     text = f"{belief.what}: {belief.verdict.replace('_', ' ')}; "
     parts = [
         f"{shown.replace('_', ' ')} {' +- '.join(of.pair(measured[name], std[name]))}, "
-        f"believed {of.number(value)}"
+        f"assumed {of.number(value)}"
         for name, value in believed.items()
         for shown, of in [parameter_unit(name, unit)]
     ]
@@ -199,7 +201,7 @@ def _ambiguity_entries(
     spots = sorted(diagnosis.not_identifiable, key=lambda spot: not spot.supported)
     shown = [spot for spot in spots if verbose or _ambiguity_matters(spot, diagnosis)]
     if shown:
-        yield "What these readings cannot tell:", 0, 0
+        yield "What these readings cannot distinguish:", 0, 0
     for spot in shown:
         how = "" if spot.causes in planned and not verbose else f" To find out: {spot.measure}."
         yield f"- {_head(spot)}: {spot.because}.{how}", 2, 0
@@ -212,7 +214,7 @@ def _ambiguity_entries(
         names = ", ".join(dict.fromkeys(rest))
         again = " either" if shown else ""
         yield (
-            f"Not seen, and could not be in such runs{again}: {names} (why: `verbose=True`).",
+            f"Not detectable in these runs{again}: {names} (why: `verbose=True`).",
             2,
             0,
         )
@@ -225,4 +227,4 @@ def _head(spot: Ambiguity) -> str:
     if spot.common:
         others = ", ".join(cause for cause in spot.causes if cause != spot.common)
         return f"whether {spot.common} is due to {others}"
-    return f"{names} ({'one of them' if len(spot.causes) > 1 else 'something'} is seen)"
+    return f"{names} ({'one of them' if len(spot.causes) > 1 else 'something'} is detected)"

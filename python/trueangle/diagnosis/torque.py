@@ -115,8 +115,8 @@ class TorqueAccount(ShownResult):
     def lines(self) -> Iterator[str]:
         """The account, a sentence or a finding each."""
         yield (
-            f"Torque of the drive, measured minus simulated: rms {self.rms:.3g} Nm, of which "
-            f"{self.noise:.3g} Nm are noise of one reading."
+            f"Torque of the drive, measured minus simulated: rms {self.rms:.3g} Nm, including "
+            f"{self.noise:.3g} Nm noise of one reading."
         )
         for finding in self.findings:
             yield f"- {finding.summary()}"

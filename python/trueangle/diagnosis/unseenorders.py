@@ -41,8 +41,8 @@ def arc_note(regression: Regression) -> str:
         return ""
     turns = _turns(regression)
     return (
-        f"over {turns:.2g} turns low orders and a ramp are nearly one another: the fewest that "
-        "explain the readings are named, and their errors hold what the others may do to them"
+        f"{turns:.2g} turns are too few to separate a ramp from low orders: the "
+        "fewest that explain the readings are named, and their errors allow for the others"
     )
 
 

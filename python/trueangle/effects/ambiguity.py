@@ -63,7 +63,7 @@ class Ambiguity(ShownResult):
     hypotheses: dict[str, tuple[Any, ...]] = field(default_factory=dict, repr=False, compare=False)
 
     def _brief(self) -> str:
-        seen = "one of them is seen" if self.supported else "not seen"
+        seen = "one of them is detected" if self.supported else "not detected"
         return f"{', '.join(self.causes)}: {seen}"
 
     def hides(self, cause: str) -> bool:

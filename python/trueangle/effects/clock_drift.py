@@ -42,8 +42,8 @@ class ClockDrift(Effect):
 
     kind: ClassVar[str] = "clock_drift"
     sentence: ClassVar[str] = (
-        "The reference and the joint are stamped by clocks that run apart: a delay that grows "
-        "while a run lasts, and so an error in proportion to time and speed, none at rest."
+        "The clocks of reference and joint drift apart: the delay grows during a "
+        "run. The error is proportional to time and speed, and zero at rest."
     )
     needs: ClassVar[tuple[str, ...]] = ("time",)
     factor: ClassVar[str] = "velocity"
@@ -51,7 +51,7 @@ class ClockDrift(Effect):
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         Latency: "longer runs: a delay is the same at their end",
         ScaleError: "out and back in one run, with a stop in between",
-        DriftWithinRun: "two speeds, and a stop: at rest it stands still",
+        DriftWithinRun: "two speeds, and a stop: the error is constant at rest",
     }
     measure: ClassVar[str] = "out and back in one run at two speeds, with a stop in between"
     acts_on_runs: ClassVar[bool] = True

@@ -76,7 +76,7 @@ class Curve(Effect):
     kind: ClassVar[str] = CurveTerm.kind
     is_cause: ClassVar[bool] = False
     sentence: ClassVar[str] = (
-        "The error follows a factor in a form that has no name: the measured function stands for it"
+        "The error follows a factor in a form without a name: the measured curve describes it"
     )
 
     def __post_init__(self) -> None:

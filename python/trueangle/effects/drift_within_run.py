@@ -61,7 +61,7 @@ FORMS = (
     "walk",
     "flicker",
     "centred ramp",
-    "centred bend",
+    "centred curvature",
     "centred walk",
     "centred flicker",
 )
@@ -91,9 +91,9 @@ class DriftWithinRun(Effect):
     kind: ClassVar[str] = "drift_within_run"
     size_name: ClassVar[str] = "arcsec_per_s"
     sentence: ClassVar[str] = (
-        "The set-up settles, warms up or creeps while a run lasts: the error follows the clock "
-        "and not the angle, differently in every run. A ramp, one relaxation or a slow bend is "
-        "such a drift; a free path in time describes the noise."
+        "The set-up settles, warms up or creeps during a run: the error follows time "
+        "and not angle, differently in every run. It is a ramp, one relaxation or a "
+        "slow curve; a free path in time describes the noise."
     )
     factor: ClassVar[str] = "time"
     form_of: ClassVar[tuple[str, ...]] = ("run_time",)
@@ -306,8 +306,8 @@ class DriftWithinRun(Effect):
             *([] if signals.velocity is not None else [Latency]),
         ]
         spot = cls.blind(
-            f"{counted(signals.runs, 'run')} that reverse about once: an error that changes with "
-            "the direction of travel and one that changes with time look alike",
+            f"{counted(signals.runs, 'run')} that reverse about once: an error that depends on "
+            "direction and one that depends on time give the same readings",
             *others,
         )
         return replace(

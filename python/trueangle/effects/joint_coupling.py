@@ -52,7 +52,7 @@ class JointCoupling(_OfOthers):
     )
     needs: ClassVar[tuple[str, ...]] = ("coupled",)
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
-        ScaleError: "turn one joint while the other stands still",
+        ScaleError: "turn one joint while the other is at rest",
     }
     measure: ClassVar[str] = (
         "log the angle of the other joint, and turn it apart from this one, or alone"
@@ -140,7 +140,7 @@ def _hidden_by(regression: Regression, joint: str) -> _Hidden | None:
     signals = regression.signals
     own = _about_means(signals, signals.coupled[joint])
     if not own.any():
-        return (f"joint {joint} stands still in every run: its share is in the zeros of the runs",)
+        return (f"joint {joint} is at rest in every run: its share is in the zeros of the runs",)
     angle = np.degrees(signals.theta)
     motion = np.column_stack([angle, _about_means(signals, angle)])
     if share_left(regression, own[:, None], motion) < OWN_POWER:

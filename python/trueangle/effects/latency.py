@@ -46,9 +46,9 @@ class Latency(Effect):
 
     kind: ClassVar[str] = LatencyTerm.kind
     sentence: ClassVar[str] = (
-        "One of the two readings is older than the other, the joint's (a positive delay) or the "
-        "reference's (a negative one): the error is proportional to velocity and the pattern "
-        "is shifted along with it."
+        "One of the two readings is older: the joint's (positive delay) or the "
+        "reference's (negative). The error is proportional to velocity, and "
+        "the pattern is shifted."
     )
     needs: ClassVar[tuple[str, ...]] = ("time",)
     factor: ClassVar[str] = "velocity"

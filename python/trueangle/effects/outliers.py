@@ -100,7 +100,7 @@ class Outliers(Effect):
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         LocalDefect: "a second pass over the same place",
     }
-    not_at_run_time: ClassVar[str] = "a single reading does not tell a fault from a motion"
+    not_at_run_time: ClassVar[str] = "a single reading cannot distinguish a fault from a motion"
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         far_off = rng.random(len(signals)) < self.fraction

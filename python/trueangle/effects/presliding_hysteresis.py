@@ -83,7 +83,7 @@ class PreslidingHysteresis(Effect):
     size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
         "Friction winds up the elastic parts after each reversal: the error moves from one "
-        "branch to the other over a transition length and remembers where it turned."
+        "branch to the other over a transition length, and depends on where it reversed."
     )
     factor: ClassVar[str] = "direction"
     form_of: ClassVar[tuple[str, ...]] = ("direction", "reversal_time")

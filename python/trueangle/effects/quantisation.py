@@ -33,8 +33,7 @@ class Quantisation(Effect):
 
     kind: ClassVar[str] = "quantisation"
     sentence: ClassVar[str] = (
-        "The reading comes in steps: what is left is the rounding to them, flat and without "
-        "spread at rest."
+        "The reading is quantised: the residual is uniform rounding error, constant at rest."
     )
     factor: ClassVar[str] = "none"
     confused_with: ClassVar[Mapping[type[Effect], str]] = {

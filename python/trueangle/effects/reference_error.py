@@ -47,7 +47,7 @@ class ReferenceLines(Effect):
     kind: ClassVar[str] = "reference_error"
     size_name: ClassVar[str] = "amplitudes_arcsec"
     sentence: ClassVar[str] = (
-        "The reference (polygon, table, encoder) has an error of its own or sits off centre: it "
+        "The reference (polygon, table, encoder) has its own error or is off centre: the error "
         "turns with the reference's mount and is not the joint's."
     )
     needs: ClassVar[tuple[str, ...]] = ("mount",)

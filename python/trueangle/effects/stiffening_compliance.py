@@ -60,8 +60,8 @@ class StiffeningCompliance(Effect):
     kind: ClassVar[str] = StiffeningComplianceTerm.kind
     size_name: ClassVar[str] = "arcsec_per_Nm3"
     sentence: ClassVar[str] = (
-        "The gear stiffens under torque, as K1 and K2 of its catalogue say: the wind-up grows "
-        "less than in proportion, which under gravity leaves orders 1 and 3."
+        "The gear stiffens under torque, as K1 and K2 of its catalogue state. The wind-up grows "
+        "less than proportionally; under gravity this gives orders 1 and 3."
     )
     needs: ClassVar[tuple[str, ...]] = ("torque",)
     factor: ClassVar[str] = "torque"

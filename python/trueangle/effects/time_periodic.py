@@ -75,8 +75,8 @@ class TimePeriodic(Effect):
     kind: ClassVar[str] = "time_periodic"
     size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
-        "Mains, a converter's clock, vibration or the alias of one of them: a line of fixed "
-        "frequency in time, at every speed and at rest, with another phase in every run."
+        "Mains, a converter's clock, vibration, or an alias of one of them: a "
+        "line of fixed frequency in time, with a new phase in every run."
     )
     needs: ClassVar[tuple[str, ...]] = ("time",)
     factor: ClassVar[str] = "run"
@@ -209,7 +209,7 @@ class TimePeriodic(Effect):
             return None
         return cls.blind(
             f"one speed: a line of {order * level:.4g} Hz and one of order {order:.4g} with a "
-            "phase of its own in every run are the same",
+            "new phase in every run are the same",
             NonIntegerOrder,
         )
 

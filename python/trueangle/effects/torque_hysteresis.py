@@ -62,8 +62,8 @@ class TorqueHysteresis(Effect):
     kind: ClassVar[str] = "torque_hysteresis"
     size_name: ClassVar[str] = "half_width_arcsec"
     sentence: ClassVar[str] = (
-        "Friction between teeth holds back the wind-up: at one torque the gear stands at two "
-        "angles, one while the load grows and one while it falls."
+        "Friction between teeth delays the wind-up: at one torque the gear has two "
+        "angles, one for rising and one for falling load."
     )
     needs: ClassVar[tuple[str, ...]] = ("torque",)
     factor: ClassVar[str] = "torque"

@@ -55,8 +55,8 @@ class WrongGearRatio(Effect):
     size_name: ClassVar[str] = "gear_ratio_departure"
     size_most: ClassVar[float] = 1.0
     sentence: ClassVar[str] = (
-        "The simulation counts with another gear ratio than the joint has: all lines of the "
-        "motor and the wave generator stand at other orders, together."
+        "The simulation uses another gear ratio than the joint has: all lines of the "
+        "motor and the wave generator are at other orders."
     )
     form_of: ClassVar[tuple[str, ...]] = ("place",)
     confused_with: ClassVar[Mapping[type[Effect], str]] = {

@@ -181,7 +181,7 @@ class Moments(ShownResult):
     @told_kinds
     def merge(self, other: Moments) -> Moments:
         """Add the readings of another accumulator over the same orders; runs go by label."""
-        self._of_a_kind(other, "merge", "other: moments that forget do not merge: order counts")
+        self._of_a_kind(other, "merge", "other: moments with forgetting cannot be merged")
         self._sums.merge(other._sums)
         return self
 
@@ -216,7 +216,7 @@ class Moments(ShownResult):
         >>> both.subtract(first).solve().cosine.round(9)
         array([0.3])
         """
-        forgets = "other: sums that forget their readings cannot be taken apart"
+        forgets = "other: sums with forgetting cannot be subtracted"
         self._of_a_kind(other, "subtract", forgets)
         self._sums.subtract(other._sums)
         return self

@@ -44,7 +44,9 @@ class Admt4000(Target):
         "model of the device's arithmetic exists; measure after writing"
     )
     arithmetic_known = False
-    options = {"bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24")}
+    options = {
+        "bits": Option(int, 24, "bits of a reading: all values are evaluated, up to 24 bits")
+    }
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         pattern.check_one_turn(self.name)
@@ -66,7 +68,7 @@ class Admt4000(Target):
             codes[order] = magnitude, phase if magnitude else 0
         if not any(magnitude for magnitude, _ in codes.values()):
             raise ArgumentError(
-                "admt4000 holds orders 1, 2, 3 and 8, of which the model has none that reaches "
+                "admt4000 holds orders 1, 2, 3 and 8, and the model has none of them above "
                 f'its step of {_MAGNITUDE / _CORDIC:.3g} deg; use `target="c"`'
             )
         mean = float(np.mean(values))

@@ -33,10 +33,10 @@ class Ax5000(ChannelTarget):
     kind: ClassVar[FileKind] = FileKind("parameters of AX5000", (".txt",))
     arithmetic_known = False
     unknown = (
-        "the number that stands for a gain of 1 is not documented, nor is the arithmetic: give "
-        "`gain_one=` as the drive shows it at first; check one reading after writing"
+        "neither the number for a gain of 1 nor the arithmetic is documented: give `gain_one=` "
+        "as the drive shows it at first; check one reading after writing"
     )
-    options = {"gain_one": Option(int, 65536, "value of a gain that stands for 1")}
+    options = {"gain_one": Option(int, 65536, "value that means a gain of 1")}
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         channels, one = self.channels(pattern), options["gain_one"]

@@ -78,8 +78,8 @@ def _comment(name: str, chain: Chain, terms: RunTimeTerms | None, header: Commen
         own.append(f"Channels: uint32_t indicated = {name}_decode(sine, cosine);")
     own += [
         f"{'Or' if chain.whole else 'Use'}: int64_t corrected = {name}_correct_unwrapped(turns, "
-        "indicated), in 2^-32 turns: the whole turns that the output has made since the model's "
-        "zero, negative backwards, and the reading within the turn; (uint32_t) of it is the angle.",
+        "indicated), in 2^-32 turns: whole turns of the output since the model's zero "
+        "(negative backwards) and the reading within the turn. (uint32_t)corrected is the angle.",
         *([] if terms is None else [terms.use(f"{name}_step", "&state", "{0}")]),
         f"The bound holds for every input of up to {bits} bits.",
         *table_lines(chain),

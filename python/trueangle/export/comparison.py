@@ -125,8 +125,8 @@ class Comparison(PlainResult):
             return []
         told = "changed" if self.verdict == "changed" else "not distinguishable in their noise"
         return [
-            f"{told}: p = {self.p:.2g}, and below {self.false_alarms:g} it is called changed "
-            "(the zero left out)"
+            f"{told}: p = {self.p:.2g}, and below {self.false_alarms:g} it counts as changed "
+            "(without the zero)"
         ]
 
     def _arithmetic(self, unit: ErrorUnit) -> list[str]:

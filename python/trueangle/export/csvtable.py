@@ -92,7 +92,7 @@ class CsvTable(Target):
         if len(table) < 5 or not np.allclose(
             table[:, 0], np.arange(len(table)) * 360.0 / (len(table) - 1), atol=1e-6
         ):
-            raise table_error(path, "lines must stand at equal distances from 0 to 360 degrees")
+            raise table_error(path, "lines must be equally spaced from 0 to 360 degrees")
         values = table[:-1, 1]
         return sampled_model(
             values / 360.0, path, self, _interpolated(values), step=_LAST_DIGIT / 360.0

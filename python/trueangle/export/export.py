@@ -130,7 +130,7 @@ def export_model(
     if max_arcsec is not None and total > max_arcsec:
         raise ArgumentError(
             f"{target} differs by up to {total:.4g} arcsec with these options, and at "
-            f"most {max_arcsec:g} is asked for"
+            f"most {max_arcsec:g} is allowed"
         )
     notes = [*made.notes, *_notes(found, pattern, made)]
     if found.at_sensor and loaded.indicated_sign < 0:
@@ -268,13 +268,13 @@ def _share(
     if beside >= max_arcsec:
         names = ", ".join(f"{row['term']} {row['size_arcsec']:.4g} arcsec" for row in rows)
         raise ArgumentError(
-            f"a table of the angle leaves out {names}, and at most {max_arcsec:g} is asked for"
+            f"a table of the angle leaves out {names}, and at most {max_arcsec:g} is allowed"
         )
     left = (max_arcsec - beside - rounding) / steep
     if left <= 0.0:
         raise ArgumentError(
             f"float arithmetic of the terms leaves {rounding:.4g} arcsec, and at most "
-            f"{max_arcsec:g} is asked for"
+            f"{max_arcsec:g} is allowed"
         )
     return left
 
@@ -339,7 +339,7 @@ def _first(
         raise refused
     raise ArgumentError(
         f"{target.name} does not keep {max_arcsec:g} arcsec: the best of its sizes with these "
-        f"options differs by {best:.4g}; ask for more, or for another number format or method"
+        f"options differs by {best:.4g}; allow more, or use another number format or method"
     )
 
 
@@ -369,17 +369,17 @@ def _notes(target: Target, pattern: TurnPattern, made: Made) -> list[str]:
     uncertainty = pattern.uncertainty_arcsec
     if uncertainty is not None and made.floor_arcsec > uncertainty:
         notes.append(
-            f"the number format leaves {made.floor_arcsec:.3g} arcsec rms, more than the model's "
-            f"own uncertainty of {uncertainty:.3g}"
+            f"the number format adds {made.floor_arcsec:.3g} arcsec rms, more than the "
+            f"model's uncertainty of {uncertainty:.3g}"
         )
     if round(made.zero_deg, 9):
         notes.append(
-            f"a constant of {made.zero_deg:.9f} deg is not in the table: the corrected angle is "
-            "larger by it, so take it off where the target sets its zero"
+            f"subtract {made.zero_deg:.9f} deg where the target sets "
+            "its zero: the table omits this constant"
             + (
                 ""
                 if target.argument == "indicated"
-                else "; do so before the table is used, whose positions are true angles"
+                else "; do so before the table, whose positions are true angles"
             )
         )
     channels = pattern.source.channels

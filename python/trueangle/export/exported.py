@@ -170,9 +170,9 @@ class Exported(PlainResult):
         parts = [
             f"differs from the model by at most {shown(self.max_difference_total_arcsec)} "
             f"{unit.name}",
-            *([f"left out: {terms(self.left_out)}"] if self.left_out else []),
+            *([f"omitted: {terms(self.left_out)}"] if self.left_out else []),
             *([f"at run time: {terms(self.at_run_time)}"] if self.at_run_time else []),
-            f"the rest by at most {table}",
+            f"the table itself by at most {table}",
         ]
         return "; ".join(parts)
 
@@ -223,8 +223,8 @@ def run_time_bound(
     if slope + own >= 1.0:
         raise ArgumentError(
             f"the terms {', '.join(terms.kinds)} are as steep as {own:.3g} over the signals that "
-            f"the model records, beside {slope:.3g} of the pattern: below 1 in all, an angle is "
-            "found at every reading"
+            f"the model records, and the pattern adds {slope:.3g}; the sum must "
+            "be below 1"
         )
     largest = sum(row["size_arcsec"] for row in rows) / ARCSEC_PER_TURN
     steep = (1.0 - slope) / (1.0 - slope - own)

@@ -40,8 +40,8 @@ class MiniCheetah(Tinymovr):
 
     def write(self, table: Whole, bits: int, header: CommentBlock) -> str:
         own = (
-            "offset_lut of the position sensor: ticks of 2^16 a turn that are added at the raw "
-            "reading; entry k stands at the reading 512 k."
+            "offset_lut of the position sensor: ticks of 2^16 a turn that are added to the raw "
+            "reading; entry k belongs to the reading 512 k."
         )
         lines = header.comment("// ", own)
         values = number_rows([str(int(value)) for value in table])

@@ -56,7 +56,7 @@ class Moteus(Target):
     )
     options = {
         "source": Option(int, 0, "position source 0, 1 or 2 that reads this encoder"),
-        "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
+        "bits": Option(int, 24, "bits of a reading: all values are evaluated, up to 24 bits"),
         "variant": Option(
             ("table", _COMMON), "table", "compensation table, or the offset of sine and cosine"
         ),
@@ -227,7 +227,7 @@ def _common_mode(pattern: TurnPattern, aux: int) -> Made:
         notes=(
             f"one offset for both channels, whose own differ by "
             f"{abs(channels.offset_sine - channels.offset_cosine):.3g} counts; gain and phase "
-            "stay. What is left can go into the source's compensation table: fit its position",
+            "stay. The residual can go into the source's compensation table: fit its position",
         ),
     )
 

@@ -169,8 +169,8 @@ class TurnPattern:
         if not self.is_periodic:
             strangers = [s.name for s in self.model.shafts if s.cycles_per_turn % 1.0]
             raise ArgumentError(
-                f"{target} holds one turn of the output, and shaft {', '.join(strangers)} does "
-                "not come back to its start in one: export its model from the shaft's own "
+                f"{target} holds one turn of the output, and shaft {', '.join(strangers)} is "
+                "not back at its start after it: export its model from the shaft's own "
                 'encoder, or use `target="c"`, which writes one function per shaft'
             )
 
@@ -260,8 +260,8 @@ def inverse_rising(rising: Callable[[Array], Array], wanted: Array, points: int)
     if np.min(rise) <= 0.0:
         k = int(np.argmin(rise))
         raise NotInvertibleError(
-            f"it is not monotone between {at[k] * 360.0:.4g} and {at[k + 1] * 360.0:.4g} deg: one "
-            "corrected angle would stand for several readings",
+            f"it is not monotone between {at[k] * 360.0:.4g} and {at[k + 1] * 360.0:.4g} deg: "
+            "several readings would give one corrected angle",
             float(1.0 - rise[k] * points),
         )
     turn = np.floor(wanted - values[0])

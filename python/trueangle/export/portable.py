@@ -56,13 +56,13 @@ class PortableTarget(Target):
 
     sign = "subtract"
     options = {
-        "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
+        "bits": Option(int, 24, "bits of a reading: all values are evaluated, up to 24 bits"),
         "entries": Option(int, None, "of each table, a power of two (default: by the model)"),
         "method": Option(METHODS, None, "of interpolation"),
         "number": Option(NUMBERS, None, "int16, int32 or float (default: the first that holds it)"),
         "name": Option(str, None, "of the functions (default: the file's)"),
         "direction": Option(
-            DIRECTIONS, "auto", "what tells the direction of travel, where a term follows it"
+            DIRECTIONS, "auto", "source of the direction of travel, if a term needs it"
         ),
     }
 
@@ -87,9 +87,9 @@ class PortableTarget(Target):
         notes = []
         if not chain.whole:
             notes.append(
-                "a shaft does not turn a whole number of times per output turn: correct_unwrapped "
-                "finds the unwrapped angle of its own shaft from the turns of the output, counted "
-                "as in the readings that the model was fitted to, and its angle"
+                "a shaft does not turn a whole number of times "
+                "per output turn. correct_unwrapped takes the turns of the output, "
+                "counted as in the fitted readings, and the angle"
             )
         if floating:
             notes.append(
@@ -329,7 +329,7 @@ def _stated(match: re.Match[str], path: str) -> tuple[int, int, float]:
     if not 0.0 < cycles < 1 << 31 or shift > _LARGEST_SHIFT:
         raise table_error(
             path,
-            f"the table of shaft {match['shaft']} is said to have a shift of "
+            f"the table of shaft {match['shaft']} has a stated shift of "
             f"{match['shift'][:20]} (0 to {_LARGEST_SHIFT}) and {match['cycles'][:30]} cycles",
         )
     return entries, shift, cycles

@@ -191,7 +191,7 @@ class RunTimeTerms:
     def use(self, function: str, state: str, fresh: str) -> str:
         """A line on how it is called."""
         told = {
-            "angle": "The direction of travel is seen in the angle itself.",
+            "angle": "The direction of travel is taken from the angle itself.",
             "velocity": "The direction of travel is the sign of the velocity.",
             "direction": "The direction of travel is a signal: 1, -1, or 0 as before.",
         }

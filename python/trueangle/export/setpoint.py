@@ -301,7 +301,7 @@ def travel_model(
     if varies > last_digit:
         note += (
             f"; forward and reverse differ by a pattern of {varies * 3600.0:.4g} arcsec rms "
-            "beside their mean, which is not in the model"
+            "about their mean, which is not in the model"
         )
     return function_model(
         [ReadTable("output", 1.0, function, entries, last_digit / 360.0, forward=forward)],

@@ -63,7 +63,7 @@ class Siemens840d(Target):
                 f"Encoder compensation of axis {options['axis']}, degrees. The value at a position "
                 "is added to the actual position of the axis (a positive value moves the axis in "
                 "the negative direction); lines between points.",
-                f"Check 1: stand at {travel.nominal[k]:.6g} deg and switch the compensation on "
+                f"Check 1: move to {travel.nominal[k]:.6g} deg and switch the compensation on "
                 "(MD32700 ENC_COMP_ENABLE = 1, axis referenced).",
                 f"Check 2: the axis must move by {-values[k]:.6g} deg; where it moves the other "
                 "way, turn the sign of every value.",

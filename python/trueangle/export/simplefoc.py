@@ -69,7 +69,7 @@ class SimpleFoc(Target):
             "minus-u16",
             "version of the library, or the LinearHall sensor",
         ),
-        "bits": Option(int, 24, "bits of a reading: so many are all evaluated, up to 24"),
+        "bits": Option(int, 24, "bits of a reading: all values are evaluated, up to 24 bits"),
         "entries": Option(int, 200, "of the table"),
     }
 
@@ -123,8 +123,8 @@ class SimpleFoc(Target):
             notes=(
                 f"variant {variant}: {VARIANTS[variant]}"
                 + (
-                    "; its arithmetic is restated from what is known of that change, while that of "
-                    "the float tables was run"
+                    "; its arithmetic follows the published change; that of the float "
+                    "tables was run"
                     if variant == "minus-u16"
                     else ""
                 ),
@@ -189,7 +189,7 @@ class SimpleFoc(Target):
             raise table_error(
                 path,
                 f"these are {'whole numbers' if whole else 'radians'}, and variant {variant} is "
-                f"asked for; give `variant={'minus-u16' if whole else 'minus-float'!r}`"
+                f"required; give `variant={'minus-u16' if whole else 'minus-float'!r}`"
                 f"{'' if whole else ' or plus-float'}",
                 line,
             )

@@ -29,8 +29,8 @@ class Tinymovr(Target):
     kind: ClassVar[FileKind] = FileKind("a C source for Tinymovr", (".h", ".c", ".txt"))
     sign = "add"
     unknown = (
-        "no command that writes rec_table from outside is known: the firmware fills it by its own "
-        "calibration; paste the lines where the sensor's configuration is made and set "
+        "no command is known that writes rec_table: the firmware fills it by its own "
+        "calibration. Paste the lines where the sensor is configured and set "
         "rec_calibrated"
     )
     options = {

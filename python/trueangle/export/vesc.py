@@ -44,8 +44,8 @@ class Vesc(ChannelTarget):
     what = "the sine/cosine encoder of VESC's motor configuration (XML)"
     kind: ClassVar[FileKind] = FileKind("a motor configuration of VESC", (".xml", ".txt"))
     unknown = (
-        "firmware 6 or later is wanted, which keeps amplitudes and a phase; the error of its fast "
-        "arc tangent is not counted, and readings are rejected whose radius is not from 0.7 to 1.3 "
+        "needs firmware 6 or later, which keeps amplitudes and a phase; the error of its fast "
+        "arc tangent is not included. It rejects readings with a radius outside 0.7 to 1.3 "
         "amplitudes"
     )
     options = {

@@ -88,9 +88,9 @@ def choose_argument(
         return ArgumentChoice("reference")
     return ArgumentChoice(
         "indicated",
-        "the reference has a zero of its own in every run (they differ by up to "
-        f"{moved * 360.0 / period:.3g} deg) and the pattern stays with the joint's own reading: "
-        "the error is taken at the indicated angle",
+        "the zero of the reference changes from run to run (by up to "
+        f"{moved * 360.0 / period:.3g} deg) and the pattern follows the joint's own reading; "
+        "the error is fitted over the indicated angle",
     )
 
 

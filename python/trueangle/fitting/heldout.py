@@ -149,7 +149,7 @@ def hold_out(fit: FitResult) -> HeldOut:
             correct_held_out(model, runs[i], label) for i, label in zip(fold, labels, strict=True)
         ]
     if not found:
-        raise ArgumentError(f"no run can be left out: {left_in[0][1]}")
+        raise ArgumentError(f"no run can be held out: {left_in[0][1]}")
     return HeldOut(in_order(found, runs), tuple(left_in))
 
 

@@ -98,9 +98,9 @@ def check_new_run(estimate: EvidenceEstimate, travel: Array, orders: Sequence[fl
     if gain <= _SURE * spread:
         listed = ", ".join(f"{order:g}" for order in orders[:6])
         raise NoModelError(
-            f"no correction can be given: of order {listed} the runs differ by so much that a "
-            "further run may be made worse; they seem to be of different joints: fit each by "
-            "itself, or declare the `orders=`"
+            f"no correction can be given: order {listed} differs so much between the runs that a "
+            "correction may make a new run worse. The runs may be of different joints: fit each "
+            "separately, or declare the `orders=`"
         )
 
 

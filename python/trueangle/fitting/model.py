@@ -53,7 +53,7 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         yield f"Fitted on {travel.describe(360.0)} only: outside it is extrapolated."
     if fit.missing:
         rows = "row" if fit.missing == 1 else "rows"
-        yield f"{fit.missing} {rows} with an empty cell left out."
+        yield f"{fit.missing} {rows} with an empty cell omitted."
     yield from channel_notes(fit.problem.runs)
     yield from (_sentence(remark) for remark in fit.remarks)
     records = records_of(fit.runs) if fit.moments is None else []
@@ -63,12 +63,12 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         where = "arc" if fit.problem.is_periodic else "travel"
         yield (
             f"On this {where} the orders nearly cancel: a ridge of {fit.ridge:.1e} keeps the "
-            "amplitudes small; single coefficients have no meaning of their own. Standard errors "
-            "and intervals hold what the ridge may have taken from the pattern, for patterns "
-            "of the sizes that the readings show, on average over the travel."
+            "amplitudes small; single coefficients have no meaning. Standard "
+            "errors and intervals include the bias of the ridge, for "
+            "patterns of this size, on average over the travel."
         )
     if weighted.wild:
-        yield f"{weighted.wild} outlier{'s' if weighted.wild > 1 else ''} set aside."
+        yield f"{weighted.wild} outlier{'s' if weighted.wild > 1 else ''} rejected."
     if fit.uncertainty.note:
         yield _sentence(fit.uncertainty.note)
     fractional = [s.name for s in fit.problem.shafts if s.cycles_per_turn % 1.0]

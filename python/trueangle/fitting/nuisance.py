@@ -88,8 +88,8 @@ class Nuisance:
             "drift": f"a drift in time (cubic spline of {self.intervals} "
             f"interval{'s' if self.intervals > 1 else ''} in every run)",
             "reference": f"{len(self.reference)} lines of the reference",
-            "turned": "lines of the reference with a phase of their own in every run, because its "
-            f"zero is new in each ({', '.join(self._told(period))})",
+            "turned": "lines of the reference with a new phase in every run, "
+            f"because its zero changes ({', '.join(self._told(period))})",
         }
         shares = dict(self.shares)
         for kind in self.kinds:
@@ -97,9 +97,9 @@ class Nuisance:
             yield f"fitted jointly with the pattern, and not in the model: {words[kind]}{gain}"
         for kind in self.unseparated:
             yield (
-                f"{words[kind].split(' of ')[0]} would lower the error too, but this design cannot "
-                "tell it from the pattern: run `ta.diagnose(...)`, or measure in both directions, "
-                "at several speeds and over more turns"
+                f"{words[kind].split(' of ')[0]} would also lower the error, but these runs cannot "
+                "separate it from the pattern: run `ta.diagnose(...)`, or measure in both "
+                "directions, at several speeds and over more turns"
             )
 
     def _told(self, period: float) -> Iterable[str]:

@@ -134,7 +134,7 @@ class Posterior(NamedTuple):
         return (
             f"fitted with a prior from {self.units} units of its design: {100.0 * self.share:.0f} "
             "% of the coefficients is the unit's own readings, on average over the orders; "
-            "standard errors and intervals hold what the prior may take, for units like those"
+            "standard errors and intervals include the bias of the prior, for units of this design"
         )
 
 

@@ -108,9 +108,9 @@ def covariance_with_repeats(
     if left <= rounded or all_of_it <= (1.0 + _TOLD) * noise:
         return wider
     said = (
-        "orders left out repeat at every position, and the positions do not keep them apart from "
-        f"those fitted: standard errors are {math.sqrt(all_of_it / noise):.2g} times those of the "
-        "noise, for what orders left out, all equally strong, leak into those fitted"
+        "omitted orders repeat at every position and leak into the fitted "
+        f"ones: standard errors are {math.sqrt(all_of_it / noise):.2g} times larger, "
+        "which allows for omitted orders of equal size"
     )
     return wider._replace(note="; ".join(filter(None, (found.note, said))))
 

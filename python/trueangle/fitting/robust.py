@@ -119,8 +119,8 @@ def fit_without_outliers(problem: Problem, outliers: int) -> RobustFit:
 def unsettled_weights_sentence(weighted: RobustFit) -> str:
     """That re-weighting was broken off."""
     return (
-        f"outliers still changed after {weighted.unsettled} rounds of setting them aside and "
-        "solving anew, the most for so many orders: fit fewer, or take loss='linear'"
+        f"outliers still changed after {weighted.unsettled} rounds of rejecting them, the "
+        "limit for this number of orders: fit fewer, or use loss='linear'"
     )
 
 
@@ -260,19 +260,20 @@ def robust_breakdown_sentence(problem: Problem, weighted: RobustFit) -> str:
     bent = scale > _BENT * near
     if robust and share > (MANY if bent else _MOST):
         return (
-            f"{100.0 * share:.0f} % of the readings lie beyond {FAR:g} robust standard deviations "
-            "(0.7 % of normal ones do): more than a robust fit holds out against, where they stand "
-            "together; the coefficients may be off by far more than their errors. Look at the "
-            "residuals, and give the readings that are wrong weight 0"
+            f"{100.0 * share:.0f} % of the readings are beyond {FAR:g} robust standard "
+            "deviations (normal noise: 0.7 %): a robust fit fails if they are adjacent. The "
+            "coefficients may be wrong by far more than their standard errors. Look at "
+            "the residuals, and give wrong readings weight 0"
         )
     # Most neighbours are equal where a joint rests or a grid is coarse: they tell nothing.
     if not bent or near == 0.0:
         return ""
     # A block of readings that the few orders cannot follow widens the scale it is judged by.
-    many = ", more than a robust fit holds out against" if robust else ""
+    many = ", which a robust fit does not withstand" if robust else ""
     return (
-        f"the residuals are {brief_number(scale / near)} times what neighbours in angle differ by: "
-        f"the model lacks an effect, or wrong readings stand together{many}; look at the residuals"
+        f"the residuals are {brief_number(scale / near)} times the difference of neighbours in "
+        f"angle: the model lacks an effect, or wrong readings are adjacent{many}; look at the "
+        "residuals"
     )
 
 

@@ -60,6 +60,6 @@ def zeros_follow_speed_sentence(delay: float, chance: float) -> str:
     """What to tell of zeros that follow the speed."""
     return (
         f"the zeros of the runs follow their speed, as with a delay of {brief_number(1e3 * delay)} "
-        f"ms (p = {chance:.1g}): the model holds their mean only. Run diagnose, which separates a "
-        "delay from a reversal error, and compare by rms, which holds the zero"
+        f"ms (p = {chance:.1g}): the model has only their mean. Run diagnose, which separates a "
+        "delay from a reversal error, and compare by rms, which includes the zero"
     )

@@ -57,9 +57,9 @@ class SummedReadings:
         """What one pass cannot know, in one sentence."""
         kept = sum(map(len, self.runs))
         return (
-            f"the coefficients, their evidence and the span are of all {self.readings} readings, "
-            "in one pass; what needs readings in their order (positions, repeats, correlation, "
-            f"the ridge) is estimated from {kept} of them, taken in blocks at random"
+            f"the coefficients, their evidence and the span are of all "
+            "{self.readings} readings, in one pass. Positions, repeats, correlation and "
+            f"the ridge are estimated from {kept} of them, in random blocks"
         )
 
 
@@ -79,8 +79,8 @@ def _sums_of_moments(moments: Moments, orders: Sequence[float]) -> HarmonicSums:
     index = np.rint(steps).astype(np.int64)
     if index.size and np.abs(steps - index).max() > _WHOLE * np.abs(steps).max():
         raise ArgumentError(
-            "orders are judged in one pass where all shafts turn a whole number of times in the "
-            "turns after which they are back together: fit in memory, or give orders of the others"
+            "one pass can only judge orders that are multiples of a common "
+            "base order: fit in memory, or give orders of the other shafts"
         )
     highest = int(index.max(initial=1))
     spectra = [moments.spectrum(run, highest) for run in moments.runs]

@@ -31,9 +31,9 @@ class SummedProblem(Problem):
         super().__init__(summed.runs, shafts, summed.argument, None, threads)
         if any(mine is not given for mine, given in zip(self.runs, summed.runs, strict=True)):
             raise ArgumentError(
-                "the angles lie within one turn, and a shaft does not turn a whole number of times "
-                "in it: turns would have to be counted, which one pass does not; give the angles "
-                "over all turns, or fewer readings"
+                "the angles are within one turn, and a shaft is not "
+                "periodic in it: one pass does not count turns. Give unwrapped "
+                "angles, or fewer readings"
             )
         self.summed = summed
         self.readings = summed.readings

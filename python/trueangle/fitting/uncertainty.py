@@ -182,7 +182,7 @@ def _noise(
         ]
         note = (
             f"{said}standard errors by the scatter of {len(clusters)} segments of the readings, "
-            f"which remember about {memory:.0f} readings. A slower drift cannot be known from "
+            f"correlated over about {memory:.0f} readings. A slower drift cannot be estimated from "
             f"{'one run' if len(used) == 1 else f'{len(used)} runs'}: measure "
             f"{ENOUGH_RUNS} runs and more"
         )
@@ -196,8 +196,8 @@ def _noise(
     return Uncertainty(kind, *_with_constant(white, bent.bread * covariance, freedom), note)
 
 
-_SHORT: Final = "The runs are too short for their memory"
-_SUMMED: Final = "One pass keeps no segments of them"
+_SHORT: Final = "The runs are too short for their correlation time"
+_SUMMED: Final = "One pass keeps no segments"
 
 
 def _thinned(
@@ -208,12 +208,11 @@ def _thinned(
     The scatter of a few stretches has fewer directions than there are coefficients: its
     standard errors may come out as small as they like.
     """
-    told = "standard errors as if the readings were independent"
+    told = "standard errors as for independent readings"
     if round(memory) > 1:
-        told = f"standard errors as if one in {memory:.0f} readings were independent"
+        told = f"{memory:.0f} readings carry the information of one"
     note = (
-        f"{said}{told} (the memory of the residuals). {why}, and the covariance is not known: "
-        f"measure {ENOUGH_RUNS} runs and more"
+        f"{said}{told}. {why}, and the covariance is not known: measure {ENOUGH_RUNS} runs and more"
     )
     # Of so many independent readings the fit takes its unknowns, and the residuals are smaller.
     left = max(independent - unknowns, 1.0)
@@ -255,9 +254,9 @@ def _untold(problem: Problem, used: Sequence[int]) -> str:
     if len(used) >= FEWEST_RUNS or count >= _TELLING:
         return ""
     return (
-        f"{count} readings in {len(used)} run{'s' if len(used) > 1 else ''} do not tell whether "
-        "neighbours correlate: the standard errors hold if they do not, else the covariance is not "
-        f"known; measure {ENOUGH_RUNS} runs and more"
+        f"{count} readings in {len(used)} run{'s' if len(used) > 1 else ''} cannot show whether "
+        "neighbours correlate: the standard errors hold only if they do not; "
+        f"measure {ENOUGH_RUNS} runs and more"
     )
 
 
@@ -270,16 +269,16 @@ def _between(clusters: int, runs: int) -> str:
     note = f"standard errors by the scatter between {clusters} "
     note += "runs" if clusters == runs else f"groups of the {runs} runs"
     if clusters < ENOUGH_RUNS:
-        note += f"; so few tell them roughly: {ENOUGH_RUNS} runs and more tell them well"
+        note += f"; this few give only rough ones: {ENOUGH_RUNS} runs and more give good ones"
     return note
 
 
 def _repeated(share: float, runs: int) -> str:
     """Standard errors by runs that repeat better than their residual lets expect, in words."""
     return (
-        f"coefficients scatter {math.sqrt(share):.2g} times as much between the {runs} runs as "
-        "white noise of this residual would make them: standard errors by that scatter, pooled "
-        "over the coefficients"
+        f"the {runs} runs repeat better than the residual suggests (scatter "
+        "{math.sqrt(share):.2g} times that of white noise): standard errors by that scatter, "
+        "pooled over the coefficients"
     )
 
 

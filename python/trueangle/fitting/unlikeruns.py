@@ -112,9 +112,9 @@ def unlike_runs_sentence(labels: Sequence[str], count: int) -> str:
     more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
     which = f"run{'s' if len(labels) > 1 else ''} {', '.join(labels[:_NAMED])}{more}"
     return (
-        f"the runs do not show one pattern: the coefficients of {which} (of {count}) "
-        "differ from the common ones far beyond their errors; fit apart what is not one joint, "
-        "or look for what changed between the runs"
+        f"the runs have different patterns: the coefficients of {which} (of {count}) "
+        "differ from the common ones far beyond their errors. Fit different joints separately, "
+        "or find what changed between the runs"
     )
 
 

@@ -115,18 +115,18 @@ def fleet(
     dated, untold = sums.calibrations()
     if not dated:
         raise ArgumentError(
-            f"orders: the readings of no unit tell all {sums.orders.size} of them apart; "
+            f"orders: no unit has readings that separate all {sums.orders.size} of them; "
             "name fewer, or read more places"
         )
     notes = []
     if by == "unit" and not sums.named:
         kind = "file (its name without folders)" if sums.by_file else "run"
         notes.append(
-            f"No column names the units: every {kind} is taken for a unit. A role 'unit', or a "
-            "pattern of the names (`unit_from=`), says which are one."
+            f"No column names the units: every {kind} is treated as a unit. Name units by the role "
+            "'unit' or by a pattern of the names (`unit_from=`)."
         )
     if untold:
-        notes.append(f"The readings of {_listed(untold)} do not tell the orders apart; left out.")
+        notes.append(f"The readings of {_listed(untold)} do not separate the orders; omitted.")
     found = Units(dated, sums.shafts or [], sums.period or 1.0)
     joint = Joint(gear_ratio or 1.0, fixed_member if gear_ratio else "none")
     turn = found.period / ARCSEC_PER_TURN
@@ -151,8 +151,8 @@ def _judged_fleet(
     n = len(units.last)
     chosen = shared_pattern(units)
     if n < FEWEST:
-        those = "One unit does" if n == 1 else f"{n} units do"
-        notes.append(f"{those} not tell which of them is an outlier: {FEWEST} are needed.")
+        those = "One unit is" if n == 1 else f"{n} units are"
+        notes.append(f"{those} too few to find outliers: {FEWEST} are needed.")
     again = [dates for dates in units.dated if len(dates) > 1]
     spread = np.array([one.variance for one in chosen.between])
     changes = {
@@ -161,7 +161,7 @@ def _judged_fleet(
     }
     if again and not changes:
         notes.append(
-            f"{len(again)} units calibrated again do not tell what an ordinary change is: "
+            f"{len(again)} units calibrated again are too few to estimate an ordinary change: "
             "4 are needed."
         )
     belong = chosen.belong
@@ -290,10 +290,10 @@ def _unit_row(
 def _among_tails(count: int) -> str:
     """Why a unit that is far from the others is no outlier."""
     if count < FEWEST:
-        return f"far from the others, which are too few to tell damage by: {FEWEST} are needed"
+        return f"far from the others, but {FEWEST} units are needed to find an outlier"
     return (
-        "far from the others, as a quarter of the units are before it: a wide design, or several "
-        "designs, and not damage of one"
+        "far from the others, but a quarter of the units deviate as much: probably "
+        "several designs, not damage"
     )
 
 
@@ -330,7 +330,7 @@ def _moved(units: Units, u: int, change: Change, joint: Joint) -> tuple[Verdict,
         return "changed", f"{told}, more than units differ by: {cause}"
     if change.grows is None and 2 * len(change.orders) > max(units.orders.size, 2):
         return "changed", f"{told}, all together: was a part replaced or turned?"
-    slow = "it grows slowly" if change.grows else "two dates do not tell a drift from a step"
+    slow = "it grows slowly" if change.grows else "two dates cannot separate a drift from a step"
     return "recalibrate", f"{told}; {slow}"
 
 

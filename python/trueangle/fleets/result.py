@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _TESTED = (
-    "  p: chance that a sound unit is as far from the other units or, where it moved, has changed "
-    "as much; reported below the limit, which one fleet of sound units in a hundred passes"
+    "  p: probability that a sound unit deviates, or changes, this much. Below the limit "
+    "it is reported; 1 % of sound fleets have such a unit"
 )
 
 #: Units that are fine of which the sizes are listed.
@@ -285,7 +285,7 @@ def _calendar(fleet: Fleet, shown: ErrorUnit, scale: float, width: int) -> list[
     if far:
         lines.append(
             f"  {counted(far, 'unit')} from {far[0].next_calibration} ({far[0].unit}) on: "
-            "extrapolated beyond twice the time seen"
+            "extrapolated beyond twice the measured time"
         )
     return lines
 

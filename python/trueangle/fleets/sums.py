@@ -214,7 +214,7 @@ def worth_keeping(
     shafts = _told_apart(units, shafts)
     orders = output_orders(shafts)
     if all(sum(map(len, runs)) <= len(runs) + 2 * orders.size for runs in units):
-        raise NoOrderError("the readings of no unit tell orders 1 and 2 apart: read more places")
+        raise NoOrderError("no unit has readings that separate orders 1 and 2: read more places")
     runs = [run for own in units for run in own]
     groups, _ = zero_groups(runs, whole=bool((orders == np.round(orders)).all()))
     looked = sorted(set(orders.tolist()))

@@ -203,7 +203,7 @@ def plan_unit(
     if known.between > 0.0:
         notes.append(
             f"runs of one unit of this fleet differ by {known.between:.3g} arcsec in a coefficient "
-            "beyond their noise, and no readings of one run tell the unit better"
+            "beyond their noise; more readings of one run do not improve on this"
         )
     turns, counts = np.unique(np.round(known.grid[places] * 360.0, 6), return_counts=True)
     left = np.diag(known.covariance(places))[1:].reshape(-1, 2)
@@ -294,7 +294,7 @@ class Spread:
             if len(places) >= _MOST:
                 raise ArgumentError(
                     f"`uncertainty={uncertainty:g}` takes more than {_MOST} readings of "
-                    f"{self.noise:g} arcsec noise: ask for more"
+                    f"{self.noise:g} arcsec noise: allow a larger one"
                 )
             # Not beyond a per cent at a time: each but shifts where the next belongs.
             for _ in range(max(int(_GROWS * len(places)), 1)):

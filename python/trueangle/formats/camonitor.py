@@ -59,8 +59,8 @@ def copy(task: CopyTask) -> Contents:
     """Refused: a line has no room for another column."""
     raise FileError(
         task.source,
-        "a log of camonitor has no room for corrected angles; make a table of it first "
-        "(`ta.join(...)`), or correct the runs that it was joined to",
+        "a log of camonitor cannot hold corrected angles; join it to a "
+        "table first (`ta.join(...)`), or correct the joined runs",
     )
 
 

@@ -77,7 +77,7 @@ class QuotedBlock:
             value = cell_number(cell, self.header.decimal)
             if value is None:
                 again = cell == name.partition(" [")[0]
-                hint = "; the names stand there again: give the files one by one" if again else ""
+                hint = "; the names are repeated there: give the files one by one" if again else ""
                 raise self._refused(i, name, f"a number is needed, got {_shown(cell)}{hint}")
             if strict and not np.isfinite(value):
                 problem = f"readings must be finite, got {_shown(cell)}; drop the row"

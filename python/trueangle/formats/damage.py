@@ -24,7 +24,7 @@ def damage_told(path: object, name: str, hint: str = "") -> Iterator[None]:
         raise
     except MemoryError:
         raise FileError(
-            path, "asks for more memory than there is: it is damaged, or its parts are too large"
+            path, "needs more memory than available: it is damaged, or its parts are too large"
         ) from None
     except OSError as cause:
         _raise_if_of_machine(cause)

@@ -94,8 +94,8 @@ def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     }
     if lost or settling:
         warnings.warn(
-            f"{path}: {lost} frames without a star and {settling} while the guiding settled are "
-            "left out",
+            f"{path}: {lost} frames without a star and {settling} while the guiding settled "
+            "are omitted",
             MessageLinesWarning,
             stacklevel=9,
         )
@@ -226,8 +226,8 @@ def _frame(
     if given.get("mount", "").strip('"') != "Mount":
         raise FileError(
             path,
-            f"frames of {given.get('mount', '')[:20]} are not read: an adaptive optics unit moves "
-            "the star too, and says not how far",
+            f"frames of {given.get('mount', '')[:20]} are not read: an adaptive optics unit also "
+            "moves the star, by an unknown angle",
             line=line,
             column="mount",
         )

@@ -66,8 +66,8 @@ def is_elsewhere(data: h5py.Dataset) -> bool:
 def _elsewhere(path: Path, name: str) -> FileError:
     return FileError(
         path,
-        "its values are in other data sets or files (a virtual or external data set), which are "
-        "not followed; write them into this file (h5repack, or h5py with its values)",
+        "its values are in other data sets or files (a virtual or external data set), "
+        "which are not read. Write them into this file (h5repack or h5py)",
         column=name,
     )
 
@@ -88,7 +88,7 @@ def _check_stored(path: Path, data: h5py.Dataset, name: str) -> None:
     if size > budget.DECODED_BYTES and share < _LEAST_STORED:
         raise FileError(
             path,
-            f"says to hold {data.size} values, but {100.0 * share:.2g} % of them are stored, the "
+            f"declares {data.size} values, but {100.0 * share:.2g} % of them are stored, the "
             "others are filled in; write it with all of its values",
             column=name,
         )

@@ -160,7 +160,7 @@ def _matrices(path: Path) -> Iterator[_Matrix]:
             count, place = rows * width, file.tell()
             end = place + count * dtype.itemsize * (1 + imaginary)
             if end > size or length > size:
-                raise FileError(path, "is shorter than its header says", column=name)
+                raise FileError(path, "is shorter than its header states", column=name)
             is_vector = sort == 0 and not imaginary and min(rows, width) == 1 < count
             yield _Matrix(name, dtype, count, place, is_vector, start)
             file.seek(end)

@@ -101,12 +101,14 @@ def _check_sizes(path: Path, mdf: MDF) -> None:
         if group.channel_group.flags & OF_TEXTS and group.channels:
             raise FileError(
                 path,
-                f"is damaged: a group of texts says to hold {counted(group.channels, 'channel')}",
+                f"is damaged: a group of texts declares {counted(group.channels, 'channel')}",
             )
         if said > _MOST_COMPRESSED * size:
-            raise FileError(path, f"is damaged: of {size} bytes it says to hold {said}")
+            raise FileError(path, f"is damaged: it has {size} bytes and declares {said}")
         if record > _MOST_COMPRESSED * size:
-            raise FileError(path, f"is damaged: of {size} bytes it says that records have {record}")
+            raise FileError(
+                path, f"is damaged: it has {size} bytes and declares records of {record}"
+            )
         marks = 8 * int(group.channel_group.invalidation_bytes_nr)
         for channel in group.channels:
             if channel.channel_type not in _VIRTUAL:
@@ -212,7 +214,7 @@ def _leads(path: Path, file: BinaryIO, block: int, size: int) -> list[int]:
                 raise FileError(
                     path,
                     f"is damaged: the {kind[2:].decode()} block at byte {block} leads to byte "
-                    f"{link}, where no {wanted[2:].decode()} block stands",
+                    f"{link}, where there is no {wanted[2:].decode()} block",
                 )
         found.append(link)
     return found

@@ -128,7 +128,7 @@ def copy(task: CopyTask) -> Contents:
                 task.watch(table.num_rows, digest.rows / total)
         if digest.rows != file.metadata.num_rows:
             raise FileError(
-                task.source, f"{digest.rows} rows read, its footer says {file.metadata.num_rows}"
+                task.source, f"{digest.rows} rows read, its footer states {file.metadata.num_rows}"
             )
     return digest.contents()
 

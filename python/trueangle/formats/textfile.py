@@ -206,7 +206,7 @@ def warn_of_messages(path: Path, messages: Sequence[tuple[int, str]]) -> None:
         one = len(messages) == 1
         warnings.warn(
             f"{path}: {len(messages)} line{'' if one else 's'} of words "
-            f"{'is' if one else 'are'} no reading{'' if one else 's'} and left out, the first at "
+            f"{'is' if one else 'are'} no reading{'' if one else 's'} and omitted, the first at "
             f"line {line}: {text[:_SHOWN]!r}",
             MessageLinesWarning,
             stacklevel=9,

@@ -109,10 +109,10 @@ def _unpack(path: Path, target: Path, room: int) -> int:
             if size > room:
                 raise FileError(
                     path,
-                    f"unpacks to {shown_bytes(size)} or more ({stored_size(path)} on the disk), "
-                    f"but the files of a bag may take {shown_bytes(_limit())} together while they "
-                    f"are read; where it is as large as that, set the variable {LIMIT} to the "
-                    "bytes it may take, or unpack the bag by `ros2 bag convert`",
+                    f"unpacks to {shown_bytes(size)} or more ({stored_size(path)} on the "
+                    f"disk), above the limit of {shown_bytes(_limit())} for the files of "
+                    f"a bag. If it is that large, set the variable {LIMIT} to "
+                    "more bytes, or unpack the bag by `ros2 bag convert`",
                 )
             file.write(part)
     shutil.copystat(path, target)

@@ -79,8 +79,7 @@ def correct_log(task: CorrectionTask, watch: Watch = lambda rows, part: None) ->
             if moved:  # parts of a damaged file lie over each other
                 raise FileError(
                     source,
-                    "is damaged: its readings are others once corrected ones are written beside "
-                    "them, which are not kept",
+                    "is damaged: writing corrected readings changes the others; nothing is kept",
                     column=moved[0],
                 )
             raise FileError(

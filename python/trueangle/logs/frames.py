@@ -323,8 +323,8 @@ def _array_channel(settings: LogSettings, state: Any = None) -> JointChannel:
 
 
 _OUT_OF_ORDER = (
-    "the model needs the rows in their order (to count turns, since its error does not repeat "
-    "after one turn, or to follow the direction of travel), which {} does not keep: {}"
+    "the model needs the rows in order, to count turns or to "
+    "follow the direction of travel. {} does not keep the order: {}"
 )
 
 #: Library -> what corrects its data, or says NotImplemented to that of others.

@@ -362,7 +362,7 @@ class JointChannel:
             goes_round = high - low > _ROUND * max(abs(low), abs(high))
             if goes_round and np.ptp(self._ranges[name]) < _STILL * (high - low):
                 return (
-                    f"channel {name} stands still while {other} goes from {low:g} to {high:g}: it "
+                    f"channel {name} is constant while {other} goes from {low:g} to {high:g}: it "
                     "is dead, and the angles are wrong; is it connected?"
                 )
         return ""

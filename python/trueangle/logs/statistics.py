@@ -181,6 +181,6 @@ class UnitEvidence:
         more = " and `counts_per_turn=N`" if unit == "count" else ""
         return (
             f"the readings of column '{column}' go from {self.low:.6g} to {self.high:.6g} and are "
-            f"taken for {unit_name(self.period)}, the model's unit: they look like {unit}; if so, "
+            f"read as {unit_name(self.period)}, the model's unit, but look like {unit}; if so, "
             f"give `unit={unit!r}`{more} (else `unit={unit_name(self.period)!r}`)"
         )

@@ -233,7 +233,8 @@ class Robot(ShownResult, Mapping[str, HarmonicModel]):
             terms = "".join(f", {term.kind}" for term in model.terms)
             lines.append(
                 f"  {joint}: {orders}{terms}, at most {most:.4g} arcsec"
-                f"{' beside its terms' if model.terms else ''}, angles in {unit_name(model.period)}"
+                f"{' without its terms' if model.terms else ''}, angles in "
+                f"{unit_name(model.period)}"
             )
         return laid_out(lines)
 

@@ -36,8 +36,8 @@ def check_invertible(slope: float) -> None:
     """Raise `NotInvertibleError` when ``|d error / d angle|`` may reach 1."""
     if slope >= 1.0:
         raise NotInvertibleError(
-            f"|error'| may reach {slope:.3g}: from 1 on an indicated angle stands for several "
-            "true angles and cannot be corrected; use fewer or lower orders, or "
+            f"|error'| may reach {slope:.3g}: from 1 on several true angles give one reading, "
+            "which cannot be corrected. Check the gear ratio, use fewer or lower orders, or "
             "`argument='indicated'`",
             slope,
         )

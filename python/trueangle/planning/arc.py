@@ -142,8 +142,8 @@ def plan_arc(
     beyond = [k for k, f in zip(wanted, factors, strict=True) if f > HOPELESS]
     if beyond:
         notes.append(
-            f"order{'s'[: len(beyond) != 1]} {', '.join(f'{k:g}' for k in beyond)}: this arc tells "
-            "them no better than a thousandth of the readings over a whole turn would"
+            f"order{'s'[: len(beyond) != 1]} {', '.join(f'{k:g}' for k in beyond)}: on this arc "
+            "they need more than 1000 times the readings of a whole turn"
         )
     places, counts = np.unique(np.round(turns * 360.0, 6), return_counts=True)
     return ArcPlan(

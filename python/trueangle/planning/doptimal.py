@@ -78,8 +78,8 @@ class OrthonormalColumns:
         _, values, turned = np.linalg.svd(raw, full_matrices=False)
         if values[-1] < _SINGULAR * values[0]:
             raise ArgumentError(
-                f"orders {', '.join(f'{k:g}' for k in orders)} look alike over "
-                f"{(stop - start) * 360.0:g} deg: ask for fewer `orders`, or a longer arc"
+                f"orders {', '.join(f'{k:g}' for k in orders)} are collinear over "
+                f"{(stop - start) * 360.0:g} deg: use fewer `orders`, or a longer arc"
             )
         self._turned = turned.T * (math.sqrt(self.grid.size) / values)
         self.log_scale = 2.0 * float(np.sum(np.log(values / math.sqrt(self.grid.size))))

@@ -142,7 +142,7 @@ class NextRuns(PlainResult):
         if shown:
             lines.append(f"  shows {', '.join(dict.fromkeys(shown))}")
         if self.beyond:
-            lines.append(f"  beyond what was seen so far: {', '.join(self.beyond)}")
+            lines.append(f"  beyond what was measured so far: {', '.join(self.beyond)}")
         lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)
 

@@ -146,7 +146,7 @@ def plan_mounts(
         crowded = _crowded_class(positions, seen)
         raise NoModelError(
             f"{mounts} mount{'s' if mounts > 1 else ''} of {positions} positions cannot separate "
-            f"orders {', '.join(f'{m:g}' for m in crowded)}, which look alike there: "
+            f"orders {', '.join(f'{m:g}' for m in crowded)}, which are collinear there: "
             f"use at least {need} mounts, or a free reference encoder"
         )
     offsets = search_offsets(positions, mounts, seen)

@@ -163,7 +163,7 @@ def _entries(
 
 def _notes(designs: Sequence[RunDesign], over: bool) -> Iterator[str]:
     if not designs:
-        yield f"no run {'found so far' if over else 'within the limits'} tells any of these causes"
+        yield f"no run {'found so far' if over else 'within the limits'} distinguishes these causes"
     if over:
         yield "the search was ended early"
 

@@ -187,7 +187,7 @@ def plan_self(
     what = "heads" if method == "heads" else "shifts"
     notes = [
         f"{count} equispaced {what} do not show multiples of {count}",
-        "the zero is never seen",
+        "the zero is not identifiable",
     ]
     if method == "shifts":
         notes.append(
@@ -219,8 +219,9 @@ def _spin_down(
     readings = _readings(noise, error, factor)
     notes = [
         "coast with the drive off: a loop closed on the encoder hides the orders it follows",
-        "without a change of speed each order is encoder or ripple: ask for a ratio of 3 or more",
-        "the zero is never seen",
+        "without a change of speed, encoder error and speed ripple are confounded: plan a ratio of "
+        "3 or more",
+        "the zero is not identifiable",
     ]
     turns, seconds = _TURNS, None
     if start is not None and rate is not None:
@@ -250,15 +251,15 @@ def _spin_down(
 def _dual(
     orders: tuple[float, ...], ratio: float | None, noise: float | None, error: float | None
 ) -> SelfPlan:
-    notes = ["only sums are seen: output encoder with gear, motor encoder with gear"]
+    notes = ["only sums are identifiable: output encoder with gear, motor encoder with gear"]
     turns = 3.0
     if ratio is not None:
         ratio = shaft_cycles(ratio, "none")["motor"]
         gap = min(abs(j * ratio - k) for j in range(1, 9) for k in orders)
         if abs(ratio - round(ratio)) < 1e-9:
             notes.append(
-                f"the ratio of {ratio:g} is whole: output order {ratio:g} and motor order 1 are "
-                "one number; a spin-down of the motor alone tells them apart"
+                f"the ratio of {ratio:g} is whole: output order {ratio:g} and motor order 1 "
+                "are confounded; a spin-down of the motor alone separates them"
             )
         elif gap > 0.0:
             # Two lines part when they differ by a whole wave over the travel.

@@ -335,7 +335,7 @@ def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsI
         ax,
         f"Error of the model over the angle: {significant_digits(float(np.ptp(curve.error)), 3)} "
         f"{unit.name} peak-to-peak in {counted(len(model.orders), 'order')}"
-        + (f"; not drawn: {terms}" if terms else "")
+        + (f"; not shown: {terms}" if terms else "")
         + ".",
         "Error of the model",
     )

@@ -107,7 +107,7 @@ def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     grid(ax, "y")
     blind = [f"{orders[i]:g}" for i in place[~seen]]
     told = f"worst {float(factors[seen].max(initial=0.0)):.3g}" + (
-        f"; not seen: {', '.join(blind)}" if blind else ""
+        f"; not detected: {', '.join(blind)}" if blind else ""
     )
     text = f"Noise factor of {len(orders)} wanted orders: {told}."
     return described(ax, text, "Noise factor of every wanted order")

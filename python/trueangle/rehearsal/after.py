@@ -31,7 +31,7 @@ SEEDS = 10
 WITHIN = 10.0
 
 #: What is said where there was no time for them.
-UNTRIED = "not rehearsed: the time given was up; with more of it (as within) it is counted how "
+UNTRIED = "not rehearsed: the time limit was reached; give a longer one (`within`) to count how "
 UNTRIED += "often the true cause is named"
 
 #: Factor of the readings where simulated diagnoses do not name the cause often enough.
@@ -115,7 +115,7 @@ def plan_after(
     of_type("sim", sim, Simulation, "a trueangle.Simulation (trueangle.load_simulation reads one)")
     names = None if between is None else list(dict.fromkeys(between))
     if names is not None and not names:
-        raise ArgumentError("no cause to tell apart: name two, or leave between out for all")
+        raise ArgumentError("no causes to distinguish: name two, or omit between for all")
     for name in names or ():
         check_choice("between", name, EFFECTS)
     for name, value, least in (("seeds", seeds, 0), ("seed", seed, 0)):

@@ -239,7 +239,7 @@ class Rehearsal(PlainResult):
             return [*self.next_runs.summary().splitlines(), ""]
         if all(cause.ever_named for cause in self.causes):
             return []
-        return ["No further run was found that tells another cause."]
+        return ["No further run was found that identifies another cause."]
 
     def plot(self) -> Figure:
         """Detection against size, a small picture for every cause (needs ``trueangle[plot]``)."""
@@ -306,7 +306,7 @@ def _never(cause: RehearsedCause) -> str:
         times = counted(cause.trials, "time")
         text += f" (hidden {times}, up to {cause.size_name} {largest:.3g}"
         instead = ", ".join([*cause.confused_with][:MOST])
-        text += f"; taken for {instead})" if instead else f"; reported: {_else(cause)})"
+        text += f"; confused with {instead})" if instead else f"; reported: {_else(cause)})"
     if cause.measure:
         text += f". To find out: {cause.measure}"
     return text + "."

@@ -223,7 +223,7 @@ def report(
     joint = known_joint(simulation, gear_ratio, fixed_member, shafts)
     if certificate is not None:
         if title is not None:
-            raise ArgumentError("a certificate has no title of its own: its identity names it")
+            raise ArgumentError("a certificate takes its title from the identity file")
         from ..certificate import certify
 
         certified = certify(

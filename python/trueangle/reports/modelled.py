@@ -220,7 +220,7 @@ def fit_or_reason(
 def gain_or_reason(fit: FitResult | None) -> tuple[HeldOut | None, str]:
     """What the fit gains on runs left out of it; or the reason why that is not known."""
     if fit is None:
-        return None, "There is no model to hold against other runs."
+        return None, "There is no model to compare with other runs."
     try:
         return hold_out(fit), ""
     except TrueAngleError as reason:

@@ -11,7 +11,7 @@ from ..support.display_units import ErrorUnit
 FIGURE_TITLES: Final = {
     "errors": "Measured error of every run, and the model",
     "measured-simulated": "Measured error and what the simulation expects",
-    "error-left": "What is left of held-out runs without each cause (log scale)",
+    "error-left": "Residual of held-out runs without each cause (log scale)",
     "spectrum": "Size of every order",
     "phases": "Phase and size of every order, run by run",
     "before-after": "Held-out runs before and after correction",

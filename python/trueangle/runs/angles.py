@@ -144,9 +144,7 @@ def find_run_angles(
     _check_alike(error, found)
     if first.role != "reference" and (facets is not None or offsets_of(roles)):
         name = facets.file if facets is not None else offsets_of(roles)[0].name
-        raise error(
-            f"{name} is added to a reference, and there is none beside the error", first.name
-        )
+        raise error(f"{name} is added to a reference, and the file has only the error", first.name)
     period = UNIT_PERIODS.get(first.unit or "", PERIOD)
 
     def part(column: RoleColumn | None) -> _Part | None:
@@ -226,7 +224,7 @@ def two_channels(
     for option, count in counts.items():
         if count is not None:
             words += [option, f"{count:.17g}"]
-    return f": the two angles have rows of their own; run: {shlex.join(words)}"
+    return f": the two angles are in separate rows; run: {shlex.join(words)}"
 
 
 def _typed(column: RoleColumn) -> str:

@@ -279,8 +279,8 @@ def _entries(table: FileReadings, counts: float | None) -> _RunColumns:
     unit = column.unit or unit_in_name(name, "indicated") or (None if counts is None else "count")
     if unit is None or (unit == "count" and counts is None):
         raise table.error(
-            "one column is taken for a table whose entry i of n is the reading at i/n of a turn, "
-            f"and its unit is not known: give {role_code('indicated', name, 'deg')} (or another "
+            "one column is read as a table with entry i of n at i/n of a turn, "
+            f"and its unit is unknown: give {role_code('indicated', name, 'deg')} (or another "
             "unit), or `counts_per_turn=`; or name the file's reference column",
             name,
         )
@@ -342,8 +342,8 @@ def _warn_of_empty(
         line = table.format.line_of(table.path, row)
         warnings.warn(
             f"{table.path}: {count} of {counted(missing.size, 'row')} "
-            f"{'has an empty cell and is' if count == 1 else 'have an empty cell and are'} left "
-            f"out, the first at line {line}, column '{_column_of(table, role)}'",
+            f"{'has an empty cell and is' if count == 1 else 'have an empty cell and are'} "
+            f"omitted, the first at line {line}, column '{_column_of(table, role)}'",
             EmptyCellsWarning,
             stacklevel=level_of_caller(),
         )

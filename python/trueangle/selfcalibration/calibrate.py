@@ -151,9 +151,9 @@ def _method(recordings: Sequence[Recording]) -> str:
     if first.sine is not None and first.cosine is not None:
         return "channels"
     raise NoModelError(
-        f"{first.named}: nothing here calibrates without a reference; record time_s with every "
-        "reading of a turning shaft, or several heads (head1_deg, head2_deg), or the motor's "
-        "angle (motor_deg), or two encoders at several shifts (shift_deg)"
+        f"{first.named}: these columns do not allow a calibration without a reference. "
+        "Record one of: time_s of a turning shaft; several heads (head1_deg, head2_deg); the "
+        "motor's angle (motor_deg); two encoders at several shifts (shift_deg)"
     )
 
 

@@ -111,8 +111,8 @@ def dual(
         kept, lost = lines, []
     if not kept:
         raise NoModelError(
-            f"{recordings[0].named}: no order of either shaft stands out of what is left; record "
-            "more travel (whole output turns)"
+            f"{recordings[0].named}: no order of either shaft is significant; record more "
+            "travel (whole output turns)"
         )
     fit = fit_dual_lines(channels, ratio, kept)
     dense = fit.dense
@@ -162,7 +162,7 @@ def _check_travel(named: str, channels: GearedChannels, gear_ratio: float | None
     if turns < 1.0 - SLIP:  # positions evenly over a turn do not repeat the first
         ratio = "" if gear_ratio is None else f", gear_ratio={gear_ratio:g}"
         raise NoModelError(
-            f"{named}: the motor turned only {turns:.2g} turns in the longest run; 1 turn in one "
+            f"{named}: the motor made only {turns:.2g} turns in the longest run; 1 turn in one "
             "run is needed for orders of the motor, 1 turn of the output for those of the output; "
             f'record more: `ta.planning.plan_self("dual"{ratio})` plans the travel'
         )
@@ -182,7 +182,7 @@ def _ratio(
     far = _FAR * measured.std
     told = f"{measured.value:.7g} (std {measured.std:.2g})"
     if not math.isfinite(measured.std):
-        note = "the readings do not tell the gear ratio from orders of the output"
+        note = "the readings do not separate the gear ratio from orders of the output"
         note += f": {start:g} is kept" if given else "; give it as `gear_ratio=`"
         return _UsedRatio(start if given else whole, measured, note if asked or not given else "")
     if given and not asked:
@@ -227,11 +227,11 @@ def _blind(
     kept: Sequence[SharedLine], lost: Sequence[SharedLine], ratio: float, turns: float
 ) -> list[Blind]:
     blind = [
-        Blind.zero("the zero: only the difference of two readings is seen"),
+        Blind.zero("the zero: only the difference of two readings is measured"),
         Blind(
             tuple(line.order for line in kept),
-            "only sums are seen: output encoder together with gear (orders of the output), motor "
-            "encoder together with gear (orders of the motor)",
+            "only sums are identifiable: output encoder with gear (orders of the output), motor "
+            "encoder with gear (orders of the motor)",
             "calibrate the motor's encoder alone by a spin-down, change the load (the gear "
             "follows, encoders do not), or turn a magnet against its shaft",
         ),
@@ -287,17 +287,17 @@ def _arc_note(span: Span, kept: Sequence[SharedLine], period: float) -> str:
     if not low or span.stop - span.start >= period:
         return ""
     return (
-        f"over {span.describe(period)} {blind_words(low)} of the output tell the error within this "
-        "travel: beyond it they are extrapolated, and others would fit as well"
+        f"over {span.describe(period)} {blind_words(low)} of the output describe the error "
+        "within this travel; beyond it they are extrapolated"
     )
 
 
 def _notes(fit: DualFit, ratio: float, channels: GearedChannels) -> list[str]:
     notes = fit.dense.notes
     if not motion_varies(channels, ratio)[0]:
-        notes.append("one direction of travel only: reversal error is not seen")
+        notes.append("one direction of travel only: reversal error is not identifiable")
     notes.append(
-        "the model takes what is seen for the output's: it makes the output agree with the motor"
+        "the model assigns the error to the output: it makes the output agree with the motor"
     )
     return notes
 

@@ -70,7 +70,7 @@ def head_patterns(
         kept = significant_orders(fit.projected, fit.patterns, fit.covariance, kept)
     if not kept:
         raise NoModelError(
-            f"{recordings[0].named}: no order stands out of the noise between the heads"
+            f"{recordings[0].named}: no order of the difference between the heads is significant"
         )
     fit = _fit(readings, kept)
     count = sum(h.size for h in readings)
@@ -121,8 +121,8 @@ def _places(
         shared = bool(np.abs(wrap(gaps)).max() < _SAME)
         if shared and angles is None:
             raise NoModelError(
-                f"{r.named}: the heads read the same angle, so their zeros were set alike and "
-                "where they stand is not known: give it (`head_angles=[0, 119.2, 203.7]`)"
+                f"{r.named}: the heads read the same angle, so their zeros were set equal "
+                "and their places are unknown: give them (`head_angles=[0, 119.2, 203.7]`)"
             )
         found.append(
             (r, given - given[0] if shared and angles is not None else np.zeros(len(numbers)))
@@ -204,7 +204,7 @@ def _blind(
     return [
         Blind(
             lost,
-            f"with heads at {where} deg all heads see these orders alike (order {lost[0]:g} at "
+            f"with heads at {where} deg all heads read these orders equally (order {lost[0]:g} at "
             f"head {numbers[0]} is the same at every head): differences hold nothing of them",
             "move one head, or add one, off the equal spacing "
             '(`trueangle.planning.plan_self("heads")`)',

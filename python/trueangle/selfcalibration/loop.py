@@ -48,7 +48,7 @@ def followed_orders(
         return tuple(orders), Blind(
             tuple(orders),
             f"encoder or loop: {how}; a loop closed on this encoder moves the shaft by its error, "
-            "and the log shows what is left",
+            "and the log shows only the residual",
             'coast down with the drive off or turn by an open-loop field (`loop="open"`), or '
             'state the loop\'s bandwidth (`loop="closed", loop_bandwidth=HZ`)',
         )

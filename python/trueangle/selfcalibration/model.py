@@ -95,9 +95,9 @@ def reference_free_model(
         )
     except NotInvertibleError as error:
         raise NotInvertibleError(
-            f"the pattern found is no encoder's: its slope reaches {error.slope:.3g}, and from 1 "
-            "on a reading stands for several angles; does the shaft turn through these readings, "
-            "and are their unit and period right? `check` shows both",
+            f"the pattern is not that of an encoder: its slope reaches {error.slope:.3g}, and from "
+            "1 on several angles give one reading. Does the shaft turn through these readings, "
+            "and are unit and period right? `check` shows both",
             error.slope,
         ) from None
 

@@ -240,8 +240,8 @@ def clampings_of(recordings: Sequence[Recording]) -> Clampings:
             )
     if len(recordings) < 2:
         raise NoModelError(
-            f"{first.named}: one clamping shows the sum of both patterns only; record at least two "
-            "(three are better), each as a run of its own with its shift_deg"
+            f"{first.named}: one clamping shows only the sum of both patterns; record at least "
+            "two (three are better), each as a separate run with its shift_deg"
         )
     joint = [np.asarray(r.indicated) for r in recordings]
     other = [np.asarray(r.reference) for r in recordings]

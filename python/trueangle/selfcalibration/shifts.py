@@ -81,15 +81,15 @@ def shift_patterns(
         raise NoModelError(
             f"{recordings[0].named}: no order can be determined: "
             + (
-                f"all shifts are alike at orders {order_ranges(lost)}"
+                f"all shifts are equivalent at orders {order_ranges(lost)}"
                 if lost
-                else "none stands out"
+                else "none is significant"
             )
         )
     count = sum(a.size for a in design.joint)
     if count <= len(design.joint) + fit.projected.rank:
         raise NoModelError(
-            f"{recordings[0].named}: {count} readings are no more than there are unknowns (zeros, "
+            f"{recordings[0].named}: {count} readings are not more than the unknowns (zeros, "
             "orders, facets), so no error can be stated: clamp at one more angle, or give fewer "
             "orders"
         )
@@ -103,15 +103,15 @@ def shift_patterns(
             retained[first + 1] = retained[first]
     covariance = fit.covariance[np.ix_(at, at)]
     table = order_estimates(kept, fit.patterns[at], covariance, retained[at], limit)
-    blind = [Blind.zero("the zero: only differences of two readings are seen")]
+    blind = [Blind.zero("the zero: only differences of two readings are measured")]
     if lost:
         where = ", ".join(f"{math.degrees(s) % 360.0:.4g}" for s in design.shift)
         what = FACETS if design.facets else OTHER
         blind.append(
             Blind(
                 lost,
-                f"at shifts of {where} deg order k of {ENCODER} together with order k of {what} is "
-                "all that is seen: k times every shift is the same part of a turn",
+                f"at shifts of {where} deg order k of {ENCODER} and order k of {what} are "
+                "confounded: k times every shift is the same part of a turn",
                 "clamp at one more angle, off the equal spacing "
                 '(`trueangle.planning.plan_self("shifts")`)',
             )

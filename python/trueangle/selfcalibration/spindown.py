@@ -58,13 +58,11 @@ def spin_down(
     )
     if any(k > 2.0 * most for k in chosen):
         raise NoModelError(
-            f"order {max(chosen):g} passes faster than half the rate of readings: read more often, "
-            f"turn slower, or ask for orders up to {most}"
+            f"order {max(chosen):g} is above half the sampling rate: sample faster, "
+            f"turn slower, or limit orders to {most}"
         )
     if not chosen:
-        raise NoModelError(
-            "no order stands out of the noise: record more turns, or name the `orders=`"
-        )
+        raise NoModelError("no order is significant: record more turns, or name the `orders=`")
     with_current = _add_current(readings, loop)
     rippling, separable = _ripple_orders(readings, chosen, ripple)
     fit = fit_steady(readings, chosen, rippling)
@@ -236,7 +234,7 @@ def _sorted_out(
             Blind(
                 tuple(o.order for o in may_ripple),
                 f"encoder or ripple: at one speed (ratio {high / low:.2f}) order k of {ENCODER} "
-                "together with order k of the speed ripple is all that is seen",
+                "and order k of the speed ripple are confounded",
                 "let it coast from this speed to a third of it or below, or add a segment at "
                 "another speed (ratio 3 or more)",
             )
@@ -274,12 +272,12 @@ def _notes(
     if loud:
         k, c = max(loud, key=lambda pair: pair[1])
         notes.append(
-            f"what is left is not white: {c:.1f} times the white noise near order {k:g}; the "
+            f"the residual is not white: {c:.1f} times the white noise near order {k:g}; the "
             "standard errors allow for it"
         )
     wild = int((~fit.valid).sum())
     if wild:
-        notes.append(f"{counted(wild, 'outlier')} set aside")
+        notes.append(f"{counted(wild, 'outlier')} rejected")
     per_turn = sum(fit.motion.knots.intervals) / sum(s.turns for s in readings.stretches)
     notes.append(
         f"motion: {counted(readings.stretches, 'segment')}, "
@@ -289,8 +287,8 @@ def _notes(
         first = max((o.amplitude for o in (*given, *sums) if o.order == 1.0), default=math.nan)
         bound = "" if math.isnan(first) else f" ({first:.3g}/k^2 arcsec)"
         notes.append(
-            f"one speed: orders {order_ranges([o.order for o in given])} are the encoder's as far "
-            f"as torque at them ripples no more than at order 1{bound}"
+            f"one speed: orders {order_ranges([o.order for o in given])} are the encoder's if the "
+            f"torque ripple at them is at most that at order 1{bound}"
         )
     if not given and sums:
         notes.append("no order can be given as the encoder's")

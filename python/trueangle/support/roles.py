@@ -209,7 +209,7 @@ def wanted_columns(signals: Mapping[str, Any] | None) -> dict[str, tuple[str, st
         name, unit = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
         if not isinstance(name, str) or not (unit is None or isinstance(unit, str)):
             raise ArgumentError(
-                f"signals[{role!r}] must be the name of a column, or a pair of it and its unit, "
+                f"signals[{role!r}] must be the name of a column, or a pair (name, unit), "
                 f"got {given!r}"
             )
         known = None if unit is None else wanted_unit(unit, role)

@@ -180,7 +180,7 @@ def signal_columns(
         signal = find_signal(name)
         if signal.name in reserved:
             raise ArgumentError(
-                f"{name} is an argument of its own: give `{name}=` as well as `signals=`"
+                f"{name} is a separate argument: give `{name}=` as well as `signals=`"
             )
         found[name] = signal_column(f"signals[{name!r}]", values, size)
     return found

@@ -101,7 +101,7 @@ def test_what_the_series_does_not_hold_enters_the_budget() -> None:
 
 
 def test_a_reversal_error_enters_the_budget() -> None:
-    name = "reversal error, half of it"
+    name = "half the reversal error"
     lines = _lines(certify(_runs(play=3.0), Identity("1", "joint"), orders=[1]))
     assert lines[name]["standard_arcsec"] == pytest.approx(3.0, abs=0.3)
     lines = _lines(certify(_runs(), Identity("1", "joint"), orders=[1]))

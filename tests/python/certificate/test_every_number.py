@@ -97,7 +97,7 @@ def test_lines_of_the_budget(made):
     content = made.content
     lines, rows = content["budget"]["lines"], content["positions"]
     names = ["fit of the readings", "error that the series does not hold"]
-    names += ["reversal error, half of it"] * bool(made.play)
+    names += ["half the reversal error"] * bool(made.play)
     assert [line["name"] for line in lines] == [*names, *(item.name for item in made.more)]
     assert [line["type"] for line in lines] == ["A"] * len(names) + ["B"] * len(made.more)
     kinds = ["t", "t", "two-point"][: len(names)] + [item.distribution for item in made.more]

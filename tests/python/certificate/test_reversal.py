@@ -31,7 +31,7 @@ def test_play_counts_once_however_few_the_runs(count):
     """With one run and with two U had been 263 arcsec, by play taken for noise that remembers."""
     made = certify(runs_of(count), Identity("1", "joint"), orders=[1]).content
     lines = {line["name"]: line for line in made["budget"]["lines"]}
-    play = lines["reversal error, half of it"]
+    play = lines["half the reversal error"]
     error = NOISE / np.sqrt(74.0 * count)
     assert play["standard_arcsec"] == pytest.approx(HALF, abs=5.0 * error)
     # What is known to a hundredth has as many degrees of freedom as a Gaussian.
@@ -49,13 +49,13 @@ def test_the_play_of_a_few_runs_has_the_freedom_of_how_well_it_is_known():
     halves = [-9.0, -10.0, -11.0]
     runs = [runs_of(1, half, 5)[0] for half in halves]
     made = certify(runs, Identity("1", "joint"), orders=[1]).content
-    play = next(x for x in made["budget"]["lines"] if x["name"].startswith("reversal"))
+    play = next(x for x in made["budget"]["lines"] if x["name"].endswith("reversal error"))
     assert play["standard_arcsec"] == pytest.approx(10.0, abs=0.3)
     assert play["degrees_of_freedom"] == pytest.approx(0.5 * (10.0 * np.sqrt(3.0)) ** 2, rel=0.3)
 
 
 def test_no_play_is_no_line_of_it():
     made = certify(runs_of(3, 0.0), Identity("1", "joint"), orders=[1]).content
-    play = next(x for x in made["budget"]["lines"] if x["name"].startswith("reversal"))
+    play = next(x for x in made["budget"]["lines"] if x["name"].endswith("reversal error"))
     assert play["standard_arcsec"] == 0.0
     assert not any("reversal error" in note for note in made["notes"])

@@ -71,7 +71,7 @@ class Panic(BaseException):
         (RecursionError("too\ndeep"), "unexpected RecursionError: too deep; this is a defect"),
         (Panic("index out of bounds"), "unexpected Panic: index out of bounds; this is a defect"),
         (MemoryError("Unable to allocate 37 GiB"), "out of memory (Unable to allocate 37 GiB)"),
-        (MemoryError(), "out of memory (no more is given)"),
+        (MemoryError(), "out of memory (no more is available)"),
         (OSError(5, "Input/output error", "a.csv"), "a.csv: Input/output error"),
     ],
 )

@@ -123,7 +123,7 @@ def test_where_nothing_can_be_taken_off_the_diagnosis_is_all(
     assert names == [effect.kind for effect in effects]  # type: ignore[attr-defined]
     assert not Path("m.json").exists()
     assert shown.err.count("\n") == 1
-    assert "nothing was confirmed that a corrector can take off" in shown.err
+    assert "no confirmed cause can be corrected" in shown.err
     assert all(name in shown.err for name in names)
     assert "measure" in shown.err
     with pytest.raises(NoModelError, match="nothing was confirmed"):
@@ -481,7 +481,7 @@ def test_two_channels_in_one_file_are_joined_as_it_says(
     for command in (["check"], ["fit", "-o", "m.json"]):
         assert main([command[0], "two logs.csv", *command[1:], *words]) == 1
         said = capsys.readouterr().err
-        assert "the two angles have rows of their own" in said
+        assert "the two angles are in separate rows" in said
     program, *again = shlex.split(said.split("; run: ")[1])
     assert (program, again[0]) == ("trueangle", "join")
     assert main(again) == 0

@@ -340,7 +340,7 @@ def test_the_file_of_a_robot_is_a_model_of_each_joint(arm, tmp_path, capsys, mon
                     ["compare", "robot.json", "elbow.json"]):  # fmt: skip
         status, told = said(*command)
         assert status == 1
-        assert "shoulder, elbow, wrist: say which with --joint NAME" in told.err
+        assert "shoulder, elbow, wrist: name one with --joint NAME" in told.err
         status, told = said(*command, "--joint", "elbo")
         assert status == 1
         assert "did you mean elbow?" in told.err

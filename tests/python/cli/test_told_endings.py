@@ -31,8 +31,8 @@ TOLD = {
     "error: --errors-in must be one": ArgumentError("errors_in must be one"),
     "error: give --joint arm": ArgumentError("give `joint=arm`"),
     "error: first is none": TrueAngleError("first is none"),
-    "error: out of memory (no more is given); take fewer readings at a time, or --one-pass where "
-    "the command has it": MemoryError(),
+    "error: out of memory (no more is available); take fewer readings at a time, or "
+    "--one-pass where the command has it": MemoryError(),
     "error: out of memory (1 GiB); take fewer readings at a time, or --one-pass where the command "
     "has it": MemoryError("1 GiB"),
     "error: a library cannot be loaded: libx; is there memory enough for it?": ImportError("libx"),
@@ -246,7 +246,7 @@ def test_a_plan_without_runs_is_told_and_not_written(runs, tmp_path, monkeypatch
     monkeypatch.setattr("trueangle.rehearsal.after.plan_after", lambda *_, **__: plan)
     line = ["plan", "--after", "a.csv", "--simulation", "s.toml", "-o", "n.toml"]
     assert main(line) == (0 if runs else 1)
-    no = "trueangle: error: no run within the limits tells more: n.toml is not written\n"
+    no = "trueangle: error: no run within the limits adds information: n.toml is not written\n"
     wanted = ("What next.\nsaved n.toml\n", "") if runs else ("What next.\n", no)
     assert capsys.readouterr() == wanted
 

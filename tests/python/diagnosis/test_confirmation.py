@@ -52,7 +52,7 @@ def test_a_line_in_time_is_confirmed_at_the_frequency_that_is_seen_without_it(
         assert (status, reason) == ("confirmed", "")
     else:
         assert status == "not_confirmed"
-        assert "this cause takes up whatever is left" in reason
+        assert "this flexible cause would fit it" in reason
 
 
 def drawn_in(share: int, runs: int, seed: int) -> Regression:
@@ -144,7 +144,7 @@ def test_a_fixed_line_does_not_follow_what_else_is_recorded(
     status, reason = confirmation_status("missing_order", None, start.with_terms([term]), [0], rest)
     assert (status == "confirmed") != follows
     assert reason == (
-        f"something is unexplained, and this follows the {channel}" if follows else ""
+        f"part of the error is unexplained, and this follows the {channel}" if follows else ""
     )
 
 

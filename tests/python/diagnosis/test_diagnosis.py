@@ -226,7 +226,7 @@ def test_a_line_of_the_reference_or_of_the_joint_is_a_line():
     assert spot.supported
     assert "turn the reference" in spot.measure
     # Without readings no further runs are planned, which takes ten times as long as the rest.
-    assert "Seen, and not distinguished" not in replace(result, runs=[]).summary()
+    assert "Detected, not distinguished" not in replace(result, runs=[]).summary()
 
 
 def test_units_order_of_runs_and_zero_do_not_matter():

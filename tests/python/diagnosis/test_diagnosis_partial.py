@@ -169,7 +169,7 @@ def test_gain_is_measured_on_levels_that_were_left_out():
     assert (heat.held_out, heat.reducible_share) == ([], None)
     assert heat.levels == pytest.approx([20.0, 30.0])
     text = result.summary()
-    assert "Gain with each velocity left out in turn (5, 15, 30 deg/s)" in " ".join(text.split())
+    assert "Gain with each velocity held out in turn (5, 15, 30 deg/s)" in " ".join(text.split())
     shown = result.to_dict()["findings"][0]["gain"]["by_level"]
     assert {"factor", "levels", "held_out", "reducible_share", "note"} <= set(shown)
 

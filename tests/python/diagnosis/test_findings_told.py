@@ -256,7 +256,7 @@ def test_noise_beyond_the_stated_is_never_nothing():
     truth = replace(SIM, sigma_arcsec=1.5, runs=tuple(runs))
     said = ta.diagnose(ta.simulate(truth, 21), replace(truth, sigma_arcsec=1.0)).summary()
     assert "Nothing beyond" not in said
-    assert said.startswith("No pattern beyond the simulation, but its noise is another:")
+    assert said.startswith("No pattern beyond the simulation, but the noise differs:")
     assert "where the simulation states 1" in said
     same = ta.diagnose(ta.simulate(truth, 22), truth).summary()
     assert same.startswith("Nothing beyond the simulation")

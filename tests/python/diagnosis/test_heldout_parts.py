@@ -68,7 +68,7 @@ def test_where_no_run_can_be_held_out_it_is_said(monkeypatch: pytest.MonkeyPatch
         raise TrueAngleError("nothing to be seen")
 
     monkeypatch.setattr(heldout, "diagnose", diagnose)
-    with pytest.raises(ArgumentError, match="no run can be left out: nothing to be seen"):
+    with pytest.raises(ArgumentError, match="no run can be held out: nothing to be seen"):
         heldout.hold_out_extended(ta.fit(runs_of(3), orders=[1]), Simulation())
     with pytest.raises(ArgumentError, match="one run only"):
         heldout.hold_out_extended(ta.fit(runs_of(1), orders=[1]), Simulation())

@@ -49,8 +49,8 @@ def test_scatter_that_others_explain_as_well_is_none_of_them() -> None:
     assert spot is not None
     assert spot.causes == ("heteroscedastic_noise", "timestamp_jitter")
     assert spot.because == (
-        "they explain the scatter of these readings alike (BIC: timestamp_jitter 6.0 less than "
-        "heteroscedastic_noise)"
+        "they explain the scatter of these readings equally well (BIC: timestamp_jitter 6.0 less "
+        "than heteroscedastic_noise)"
     )
     assert (spot.evidence, spot.supported) == (33.0, True)
     assert spot.estimates == {

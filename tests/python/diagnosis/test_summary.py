@@ -51,7 +51,7 @@ def test_a_finding_says_its_numbers_in_their_order() -> None:
         "random); a note."
     ) in text
     assert (
-        "Gain with each velocity left out in turn (30 deg/s): rms 61.00 -> 62.00 arcsec; "
+        "Gain with each velocity held out in turn (30 deg/s): rms 61.00 -> 62.00 arcsec; "
         "reducible share 0.63 (0.64 to 0.65); far enough."
     ) in text
     doubt = replace(FOUND, status="not_confirmed", reason="it is 4.5 arcsec small")
@@ -112,12 +112,10 @@ def test_the_account_says_each_of_its_numbers_in_one_unit(result, unit, per_arcs
     assert told(rf"runs: rms # -> # {unit}, peak-to-peak # -> #, max abs # -> #") == pytest.approx(
         [11.0, 21.0, 12.0, 22.0, 13.0, 23.0], **close
     )
-    assert told(rf"amplitude {unit} # \+- #, believed #") == pytest.approx(
-        [9.0, 0.5, 8.0], rel=0.02
-    )
+    assert told(rf"amplitude {unit} # \+- #, assumed #") == pytest.approx([9.0, 0.5, 8.0], rel=0.02)
     assert told(rf"held out, rms # -> # {unit}") == pytest.approx([11.0, 21.0], **close)
     # An angle of phase is in degrees whatever the errors are in.
-    assert "phase deg 90.0 +- 1.5, believed 60.00" in text
+    assert "phase deg 90.0 +- 1.5, assumed 60.00" in text
     assert "motor order 2: wrong phase" in text
     assert "alone accounts for: backlash 78 %, latency 8 %" in text
 
@@ -128,7 +126,7 @@ def test_what_is_not_understood_is_told_by_size_share_and_chance(result) -> None
                   for p, says in ((1e-20, "first of 12 arcsec"), (0.0023, "second")))  # fmt: skip
     made = replace(rest, found=True, rms=5.5, share=0.375, evidence=[sure, rare])
     text = flat(diagnosis_summary(replace(result, unexplained=made)))
-    assert "NOT UNDERSTOOD: at least 5.500 arcsec rms (38 % of the variance that is left)" in text
+    assert "NOT UNDERSTOOD: at least 5.500 arcsec rms (38 % of the residual variance)" in text
     assert "- first of 12 arcsec (p below 1e-12)" in text
     assert "- second (p 0.002)" in text
 

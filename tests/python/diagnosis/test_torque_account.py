@@ -104,7 +104,7 @@ def test_an_account_says_how_much_is_noise_and_whether_it_is_whole(
     account = TorqueAccount(0.5125, 0.125, unexplained, found, complete)
     told = account.summary()
     assert told.startswith(
-        "Torque of the drive, measured minus simulated: rms 0.512 Nm, of which 0.125 Nm are noise"
+        "Torque of the drive, measured minus simulated: rms 0.512 Nm, including 0.125 Nm noise"
     )
     assert ("nothing is in it beyond the simulator's" in told) == (not found)
     assert ("beyond the simulator's that has a name" in told) == (not found and unexplained)

@@ -43,7 +43,7 @@ def test_a_joint_at_rest_stands_still_wherever_it_stands(place: float) -> None:
     signals = signals_of(a=at_rest)
     assert not _about_means(signals, signals.coupled["a"]).any()
     (told,) = spots_of(signals)
-    assert told == "joint a stands still in every run: its share is in the zeros of the runs"
+    assert told == "joint a is at rest in every run: its share is in the zeros of the runs"
     assert JointCoupling.propose(regression_of(signals)) is None
     # The least that is no rounding is a motion; less than that is none.
     for size, seen in ((1e-9, True), (1e-14, False)):

@@ -134,7 +134,7 @@ def test_a_share_of_a_motion_in_proportion_and_a_ramp_are_both_named_and_neither
     (spot,) = [s for s in found.not_identifiable if "joint_coupling" in s.causes]
     assert spot.causes == ("joint_coupling", "scale_error")
     assert spot.supported
-    assert spot.measure == "turn one joint while the other stands still"
+    assert spot.measure == "turn one joint while the other is at rest"
     ramp = scale - factor * 17.0 / 41.0
     share = spot.estimates["joint_coupling"]["factor"]
     slope = spot.estimates["scale_error"]["relative_error"]

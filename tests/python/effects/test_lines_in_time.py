@@ -87,7 +87,7 @@ def test_at_one_speed_a_line_in_time_may_be_one_of_an_order(
     if spot is not None:
         assert spot.because == (
             f"one speed: a line of {order * level:.4g} Hz and one of order {order:.4g} with a "
-            "phase of its own in every run are the same"
+            "new phase in every run are the same"
         )
         assert spot.causes == ("time_periodic", "non_integer_order")
     other = regression.propose("backlash", {}, regression.signals.direction[:, None])

@@ -100,7 +100,7 @@ def test_few_readings_say_that_they_cannot_tell():
         ta.CalibrationRun(x, x + 0.1 * np.sin(np.radians(x)) + 0.01 * rng.normal(size=72), 360.0),
         [1],
     )
-    assert any("do not tell whether neighbours correlate" in note for note in found.notes)
+    assert any("cannot show whether neighbours correlate" in note for note in found.notes)
 
 
 def test_the_sandwich_is_that_of_the_readings_one_by_one():
@@ -237,7 +237,7 @@ def test_a_run_too_short_for_its_memory_gets_no_small_errors_by_chance(memory):
         error = sum(c * np.sin(np.radians(k * x + p)) for k, c, p in LINES)
         run = ta.CalibrationRun(x, x + error + SIGMA * correlated(rng, memory, x.size), 360.0)
         found = ta.fit(run, orders=[1, 2, 5])
-        assert any("too short for their memory" in note for note in found.notes)
+        assert any("too short for their correlation time" in note for note in found.notes)
         low, high = found.interval()[1:].T
         hit.append((low < TRUE) & (high > TRUE))
         band = found.model.band(np.linspace(0.0, 360.0, 181))

@@ -60,13 +60,13 @@ def test_lines_stand_at_equal_distances_but_for_their_rounding(moved, tmp_path):
     if abs(moved) < 1e-6:
         read(tmp_path, table(36, moved))
     else:
-        with pytest.raises(FileError, match="equal distances from 0 to 360"):
+        with pytest.raises(FileError, match="equally spaced from 0 to 360"):
             read(tmp_path, table(36, moved))
 
 
 def test_a_table_has_four_lines_and_the_first_again_at_least(tmp_path):
     read(tmp_path, table(4))
-    with pytest.raises(FileError, match="equal distances"):
+    with pytest.raises(FileError, match="equally spaced"):
         read(tmp_path, table(3))
 
 

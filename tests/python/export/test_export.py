@@ -62,7 +62,7 @@ def test_a_format_coarser_than_what_is_known_is_told(std: float, said: bool) -> 
     """Of a 16-bit table: what its numbers leave against the model's own uncertainty."""
     model = described(std=std, terms=(), fit=None)
     made = ta.export_model(model, "c", entries=64, number="q15", bits=12)
-    notes = [n for n in made.notes if n.startswith("the number format leaves")]
+    notes = [n for n in made.notes if n.startswith("the number format adds")]
     assert len(notes) == said
     # Six coefficients of one variance: half of each is what a turn has on the mean.
     known = math.sqrt(3.0) * std * 3600.0

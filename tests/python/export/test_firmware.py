@@ -88,7 +88,7 @@ def test_a_list_that_is_there_is_told_by_its_distance(tmp_path) -> None:
 
 
 def test_a_list_that_ends_in_two_equal_readings_counts_as_rising(tmp_path) -> None:
-    """As Klipper has it; taken for a falling one it is of no motor with this model."""
+    """As Klipper has it; confused with a falling one it is of no motor with this model."""
     path = Path(existing(tmp_path, model(o2=500.0)))
     *rows, before, _ = path.read_text().split(", ")
     path.write_text(", ".join([*rows, before, before]) + "\n")

@@ -80,4 +80,4 @@ def test_zeros_that_moved_by_less_than_a_fifth_of_a_degree_are_none(sign, unit):
         found = choose_argument(runs, "auto", shafts)
         assert found.argument == ("indicated" if moved else "reference")
         if moved:
-            assert f"differ by up to {degrees:.3g} deg" in found.note
+            assert f"by up to {degrees:.3g} deg" in found.note

@@ -222,8 +222,9 @@ def test_thinned_readings_lose_their_unknowns() -> None:
     found = _thinned(2.0 * np.eye(3), 100.0, 10.0, 5.0, "", "Why")
     np.testing.assert_allclose(found.covariance, 2.0 * np.eye(3) * 5.0 * 100.0 / 90.0)
     assert found.freedom.tolist() == [90.0] * 3
-    assert "one in 5 readings" in found.note
-    assert "scatter 0.5 times as much between the 8 runs" in _repeated(0.25, 8)
+    assert "5 readings carry the information of one" in found.note
+    assert "the 8 runs repeat better" in _repeated(0.25, 8)
+    assert "(scatter 0.5 times that" in _repeated(0.25, 8)
 
 
 @pytest.mark.parametrize("covariance", ["white", "cluster"])

@@ -147,12 +147,12 @@ def test_a_reference_that_is_mounted_anew_has_its_phase_in_every_run(mounted):
         assert (order, amplitude) == (50.0, pytest.approx(0.03, rel=0.02))
         off = np.degrees(phases) - turned
         assert np.abs(ta.wrap(off, 360.0)).max() < 6.0 * np.degrees(SIGMA / 0.03 / np.sqrt(1000))
-        (told,) = (note for note in found.notes if "zero is new in each" in note)
+        (told,) = (note for note in found.notes if "its zero changes" in note)
         assert "not in the model" in told
         assert "order 50: 108 arcsec" in told
     chosen = ta.select_orders(runs, argument="reference", reference_orders=[50, 100])
     assert chosen.orders == (1, 3)
-    assert any("zero is new in each" in n for n in chosen.notes) == (mounted == "anew")
+    assert any("its zero changes" in n for n in chosen.notes) == (mounted == "anew")
 
 
 def test_standard_errors_grow_beside_a_nuisance():
@@ -269,8 +269,8 @@ def test_what_was_taken_out_is_said_with_its_size_and_unit():
         "an error of -0.5 ms times the velocity (a delay)",
         "a drift in time (cubic spline of 1 interval in every run), 25 % of the held-out error",
         "2 lines of the reference",
-        "lines of the reference with a phase of their own in every run, because its zero is new "
-        "in each (order 3: 3.6 arcsec)",
+        "lines of the reference with a new phase in every run, because its zero "
+        "changes (order 3: 3.6 arcsec)",
     ]
     assert "of 2 intervals in" in next(iter(Nuisance(("drift",), intervals=2).sentences(360.0)))
     turn = Nuisance(("direction",), half_width=0.002 / 360.0)

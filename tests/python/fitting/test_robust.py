@@ -39,7 +39,7 @@ def test_auto_names_the_rows_it_sets_aside():
     result = ta.fit(run, orders=range(1, 6))
     assert [row for _, row in result.wild] == hit.tolist()
     assert {label for label, _ in result.wild} == {"r"}
-    assert "8 outliers set aside" in result.summary()
+    assert "8 outliers rejected" in result.summary()
     assert result.model.fit.wild == 8
 
 
@@ -48,7 +48,7 @@ def test_one_outlier_is_one():
     error = 0.01 * np.random.default_rng(3).normal(size=400)
     error[100] += 5.0
     told = ta.fit(ta.CalibrationRun(theta, theta + error, 360.0), orders=[1]).summary()
-    assert "1 outlier set aside" in told
+    assert "1 outlier rejected" in told
 
 
 #: Degrees by which one reading is wrong, or what stands in its place.

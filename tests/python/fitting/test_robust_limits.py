@@ -151,8 +151,8 @@ def test_a_fit_says_where_readings_stand_together(ratio, share, robust_one, told
     assert told in found
     assert bool(found) == bool(told)
     if told == "model lacks":
-        assert found.startswith(f"the residuals are {ratio:g} times what neighbours")
-        assert ("more than a robust fit holds out against" in found) == robust_one
+        assert found.startswith(f"the residuals are {ratio:g} times the difference of neighbours")
+        assert ("which a robust fit does not withstand" in found) == robust_one
 
 
 @pytest.mark.parametrize(

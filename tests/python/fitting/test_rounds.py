@@ -41,10 +41,10 @@ def test_many_orders_are_solved_a_few_times_only(solved):
 def test_rounds_that_do_not_suffice_are_told(monkeypatch):
     monkeypatch.setattr(robust, "_rounds", lambda problem: 1)
     found = ta.fit(heavy(3, 1500), orders=range(1, 8))
-    assert any("after 1 rounds of setting them aside" in note for note in found.notes)
+    assert any("after 1 rounds of rejecting them" in note for note in found.notes)
 
 
 def test_few_orders_settle_as_ever(solved):
     found = ta.fit(heavy(2, 1200), orders=range(1, 8))
     assert robust._rounds(found.problem) == robust.STEPS
-    assert not any("rounds of setting them aside" in note for note in found.notes)
+    assert not any("rounds of rejecting them" in note for note in found.notes)

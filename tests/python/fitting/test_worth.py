@@ -49,7 +49,7 @@ def levels(seed: int, scale: float) -> ta.CalibrationRun:
 
 def test_three_levels_of_a_servo_make_no_model_but_of_declared_orders():
     run = levels(1, 1.0)
-    with pytest.raises(NoModelError, match=r"own standard error of|several true ones"):
+    with pytest.raises(NoModelError, match=r"own standard error of|several true angles"):
         ta.fit(run)
     assert ta.fit(run, orders=[1]).model.orders == (1.0,)
 

@@ -188,7 +188,7 @@ def test_what_is_no_fleet_is_refused(runs):
     with pytest.raises(ArgumentError, match="orders is empty"):
         ta.fleet(runs, orders=[])
     short = [ta.CalibrationRun([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], 360.0, unit="a")]
-    with pytest.raises(ArgumentError, match="the readings of no unit"):
+    with pytest.raises(ArgumentError, match="no unit has readings"):
         ta.fleet(short, orders=[1, 2])
     turns = ta.CalibrationRun(runs[0].reference / 360.0, runs[0].indicated / 360.0, 1.0, unit="b")
     with pytest.raises(ArgumentError, match="different units"):

@@ -115,7 +115,7 @@ def test_units_that_tell_nothing_are_named_up_to_five_and_counted(count):
     found = ta.fleet([*units(rng, 6, runs=1), *few], orders=[1, 2])
     more = f" and {count - 5} more" if count > 5 else ""
     listed = ", ".join(f"s{i}" for i in range(min(count, 5))) + more
-    assert f"The readings of {listed} do not tell the orders apart; left out." in found.notes
+    assert f"The readings of {listed} do not separate the orders; omitted." in found.notes
 
 
 def test_units_that_need_attention_stand_first_and_are_counted(fleet):

@@ -154,9 +154,7 @@ def test_a_large_data_set_is_read_where_half_of_it_is_stored(
     if told is None:
         assert sum(part["x"].size for part in hdf5.read(tmp_path / "a.h5", selection)) == 10_000
         return
-    with pytest.raises(
-        FileError, match=f"says to hold 10000 values, but {told} of them are stored"
-    ):
+    with pytest.raises(FileError, match=f"declares 10000 values, but {told} of them are stored"):
         list(hdf5.read(tmp_path / "a.h5", selection))
 
 

@@ -131,12 +131,12 @@ def test_records_that_a_group_of_mdf_has_not(tmp_path):
 
 @pytest.mark.parametrize(
     ("place", "value", "told"),
-    [(24, 1 << 30, "it says that records have"), (28, 0, "its mark is bit .* of 0")],
+    [(24, 1 << 30, "declares records of"), (28, 0, "its mark is bit .* of 0")],
 )
 def test_records_and_marks_wider_than_the_file(place, value, told, tmp_path):
     error = corrected(mdf_with(tmp_path, place, "<I", value))
     assert isinstance(error, FileError)
-    assert re.search(told, str(error)) or "says to hold" in str(error)
+    assert re.search(told, str(error)) or "declares" in str(error)
 
 
 def test_a_topic_that_is_no_text(tmp_path):

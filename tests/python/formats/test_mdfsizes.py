@@ -46,10 +46,10 @@ TAKEN = [
     group(pos_invalidation_bit=99),  # without marks the bit means nothing
 ]
 REFUSED = [
-    (group(MOST // 8 + 1), "100 bytes it says to hold 200008"),
-    (group(MOST // 10 + 1, marks=2), "100 bytes it says to hold 200010"),
-    (group(MOST + 1, 0), "says to hold 200001"),
-    (group(0, MOST + 1), "says that records have 200001"),
+    (group(MOST // 8 + 1), "100 bytes and declares 200008"),
+    (group(MOST // 10 + 1, marks=2), "100 bytes and declares 200010"),
+    (group(MOST + 1, 0), "declares 200001"),
+    (group(0, MOST + 1), "declares records of 200001"),
     (group(byte_offset=4, bit_offset=7, bit_count=26), "behind its record of 8 bytes"),
     (group(byte_offset=8, bit_count=1), "behind its record of 8 bytes"),
     (group(marks=1, flags=2, pos_invalidation_bit=8), "its mark is bit 8 of 8"),

@@ -67,8 +67,8 @@ def test_several_joints_have_columns_of_their_own(table, model, tmp_path):
 @pytest.mark.parametrize(
     ("options", "status", "message"),
     [
-        (["--signal", "indicated=motor pos:rad", "--column", "x"], 2, "say the same"),
-        (["--signal", "indicated=motor pos", "--unit", "rad"], 2, "say the same"),
+        (["--signal", "indicated=motor pos:rad", "--column", "x"], 2, "name the same"),
+        (["--signal", "indicated=motor pos", "--unit", "rad"], 2, "name the same"),
         (["--signal", "indicated"], 2, r"[JOINT.]ROLE=NAME[:UNIT] is needed"),
         (["--signal", "angel=x"], 2, "no column has the role 'angel'"),
         (["--signal", "indicated=motor"], 1, "no such column"),

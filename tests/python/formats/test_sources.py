@@ -154,7 +154,7 @@ def test_epics_that_is_damaged_or_to_be_corrected(tmp_path, capsys):
     command = ["correct", str(path), "-m", str(tmp_path / "model.json"), "--column", "PV"]
     assert main([*command, "--unit", "deg", "-o", str(tmp_path / "out.camonitor")]) == 1
     printed = capsys.readouterr()
-    assert "no room for corrected angles" in printed.out + printed.err
+    assert "cannot hold corrected angles" in printed.out + printed.err
     assert not (tmp_path / "out.txt").exists()
 
 

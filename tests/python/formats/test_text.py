@@ -338,10 +338,10 @@ def test_files_that_were_put_together_are_not_read_in_part(rows, tmp_path):
     )
     path = tmp_path / "both.csv"
     path.write_text(2 * one)
-    again = f"both.csv, line {rows + 2}, column 'reference_deg': .* names stand there again"
+    again = f"both.csv, line {rows + 2}, column 'reference_deg': .* names are repeated there"
     with pytest.raises(FileError, match=again):
         ta.read_runs(path)
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.25])], 0.5, 360.0)
     report = ta.correct_logs(path, model, tmp_path / "out.csv")
-    assert "names stand there again" in str(report.logs[0].error)
+    assert "names are repeated there" in str(report.logs[0].error)
     assert not (tmp_path / "out.csv").exists()

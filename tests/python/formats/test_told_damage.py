@@ -80,7 +80,7 @@ TOLD = {
              "a matrix at byte 0 is not a full one of numbers or text of MATLAB 4 (its type is 2); "
              "save the file with -v7"),
     "short": ("a.mat", lambda p: matlab4(p, rows=4),
-              "column 'a': is shorter than its header says"),
+              "column 'a': is shorter than its header states"),
     "version": ("a.wpilog", of_bytes(EXAMPLE[:6] + b"\2\0" + EXAMPLE[8:]),
                 "is a data log of version 0.2; version 1 is read"),
     "elements": ("a.mat", of_bytes(saved({"x": X}) + b"\0\0\0"),
@@ -102,9 +102,9 @@ TOLD = {
                       "stands"),
     "no mdf": ("a.mf4", of_bytes(b"x" * 100), "is not MDF4"),
     "virtual": ("a.h5", virtual,
-                "column 'reference_deg': its values are in other data sets or files (a virtual or "
-                "external data set), which are not followed; write them into this file (h5repack, "
-                "or h5py with its values)"),
+                "column 'reference_deg': its values are in other data sets or files (a virtual "
+                "or external data set), which are not read. Write them into "
+                "this file (h5repack or h5py)"),
     "lengths": ("a.h5", lengths, "data sets that belong together differ in length: reference_deg "
                 "5, indicated_deg 4"),
     "square": ("a.h5", square, "column 'reference_deg': one angle after the other is needed, its "

@@ -138,7 +138,7 @@ def test_dask_frames_stay_lazy_and_give_the_same_numbers(model):
     assert len(lazy._meta) == 0
     found = lazy.compute(scheduler="threads")["corrected_deg"]
     np.testing.assert_array_equal(found, model.correct(ANGLES))
-    with pytest.raises(ArgumentError, match="rows in their order"):
+    with pytest.raises(ArgumentError, match="rows in order"):
         ta.correct(frame, made_model(ratio=50.5))
 
 

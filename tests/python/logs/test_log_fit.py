@@ -197,7 +197,7 @@ def test_orders_are_selected_by_evidence(folder):
     assert {shaft.name: shaft.orders for shaft in found.model.shafts} == {"output": (1, 3, 50)}
     assert found.selection.row(1).holdout_gain > 0.5
     assert found.selection.row(2).verdict == "noise"
-    assert found.notes[0] == "2 rows with an empty cell left out."
+    assert found.notes[0] == "2 rows with an empty cell omitted."
     assert "in one pass" in found.notes[1]
 
 
@@ -214,8 +214,8 @@ def test_the_note_of_one_pass_tells_how_many_readings_were_kept(folder, monkeypa
     monkeypatch.setattr(fitting, "fitted_to", fitted)
     notes = ta.fit_logs(folder, gear_ratio=50.0).notes
     assert any(
-        f"are of all 59998 readings, in one pass; what needs readings in their order "
-        f"(positions, repeats, correlation, the ridge) is estimated from {kept[-1]} of them" in note
+        f"are of all 59998 readings, in one pass. Positions, repeats, correlation "
+        f"and the ridge are estimated from {kept[-1]} of them" in note
         for note in notes
     )
     # Four runs of a block each at least; halves go where they are more than 2000.
@@ -405,7 +405,7 @@ def test_a_gear_of_a_fraction_is_fitted_over_its_turns(tmp_path):
             {name: np.mod(table[name].to_numpy(), 360.0) for name in table.column_names}
         )
         pq.write_table(within, tmp_path / f"{i}.parquet")
-    with pytest.raises(ta.errors.ArgumentError, match="turns would have to be counted"):
+    with pytest.raises(ta.errors.ArgumentError, match="one pass does not count turns"):
         ta.fit_logs(tmp_path, ORDERS, gear_ratio=ratio)
 
 

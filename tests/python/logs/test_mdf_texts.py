@@ -91,7 +91,7 @@ def test_readings_in_a_group_of_texts_are_damage(tmp_path: Path) -> None:
     (log,) = ta.correct_logs(source, MODEL, tmp_path / "b.mf4").logs
     assert isinstance(log.error, FileError)
     assert "a.mf4" in str(log.error)
-    assert "a group of texts says to hold 3 channels" in str(log.error)
+    assert "a group of texts declares 3 channels" in str(log.error)
     assert not (tmp_path / "b.mf4").exists()
 
 

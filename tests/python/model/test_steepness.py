@@ -90,4 +90,4 @@ def test_a_refusal_gives_its_own_reason():
     chosen = ta.select_orders(ta.CalibrationRun(x, x + error, 360.0), range(1, 41))
     assert chosen.orders == ()
     assert "noise" not in chosen.reason
-    assert "several true ones" in chosen.reason
+    assert "several true angles" in chosen.reason

@@ -315,14 +315,14 @@ def test_a_diagnosis_with_nothing_open_writes_no_plan(desk, capsys):
     ta.write_runs(simulate(SIM, 3), "fine.csv")
     asked = ["diagnose", "fine.csv", "--simulation", "joint.toml", "--plan", "next.toml"]
     assert main(asked) == 1
-    assert "nothing is seen that a further run" in capsys.readouterr().err
+    assert "no further run would distinguish" in capsys.readouterr().err
     assert not (desk / "next.toml").exists()
 
 
 def test_what_cannot_be_planned_is_refused():
     with pytest.raises(ArgumentError, match="did you mean backlash"):
         ta.plan_after(RUNS, SIM, between=["backlas"])
-    with pytest.raises(ArgumentError, match="no cause to tell apart"):
+    with pytest.raises(ArgumentError, match="no causes to distinguish"):
         ta.plan_after(RUNS, SIM, between=[])
     with pytest.raises(ArgumentError, match="seeds must be a whole number from 0"):
         ta.plan_after(RUNS, SIM, seeds=-1)

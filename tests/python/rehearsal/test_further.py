@@ -111,7 +111,7 @@ def test_a_plan_is_rehearsed_where_something_is_seen(
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"between": []}, "^no cause to tell apart"),
+        ({"between": []}, "^no causes to distinguish"),
         ({"between": ["latency", "backlsh"]}, "^between must be one of .*did you mean backlash"),
         ({"seeds": -1}, "^seeds must be a whole number from 0, got -1$"),
         ({"seed": -1, "seeds": 3}, "^seed must be a whole number from 0, got -1$"),

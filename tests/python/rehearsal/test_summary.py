@@ -79,9 +79,9 @@ def test_the_summary_has_what_ended_it_first_and_every_cause_where_it_belongs() 
     assert [line for line in lines[:at] if line.startswith(second[:40])]
     told = " ".join(" ".join(lines[at:]).split())
     assert told == (
-        "Not named in these runs: - outliers (hidden 5 times, up to share 3; taken for zero_slip, "
-        "latency, clock_drift). - clock_drift: not tried. No further run was found that tells "
-        "another cause. Note: a note. Note: another."
+        "Not named in these runs: - outliers (hidden 5 times, up to share 3; confused with "
+        "zero_slip, latency, clock_drift). - clock_drift: not tried. No further run was found that "
+        "identifies another cause. Note: a note. Note: another."
     )
 
 

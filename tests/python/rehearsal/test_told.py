@@ -55,7 +55,7 @@ def test_what_is_never_named_is_told_with_its_trials_and_largest_size() -> None:
     never = {"tried": {1.0: (0, 4), 8.0: (0, 3)}, "told": {"not_confirmed": 5, "nothing": 2}}
     said = _never(cause(**never, blind_because="one way", measure="turn back"))
     assert said == (
-        "backlash: one way (hidden 7 times, up to half_width_arcsec 8; taken for latency). "
+        "backlash: one way (hidden 7 times, up to half_width_arcsec 8; confused with latency). "
         "To find out: turn back."
     )
     said = _never(cause(**never, confused_with={}))

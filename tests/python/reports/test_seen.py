@@ -49,7 +49,7 @@ def test_it_stands_in_the_first_lines_of_the_summary(at_one_speed):
     found = ta.diagnose(*at_one_speed, gain=False)
     assert not any(finding.confirmed for finding in found.findings)
     first = " ".join(line.strip() for line in found.summary().split("\n\n")[0].splitlines())
-    assert "Seen, and not distinguished: " in first
+    assert "Detected, not distinguished: " in first
     assert "backlash" in first
     assert any(abs(value - HALF) < 5.0 * std < 1.0 for value, std in sizes(first))
 
@@ -62,5 +62,5 @@ def test_it_stands_in_the_first_lines_of_the_report(at_one_speed):
     body = page[page.index("<body") :]
     first = body[: body.index('aria-labelledby="measured"')]
     text = " ".join(html.unescape(re.sub(r"<[^>]*>", "", first)).split())
-    assert "Seen, and not distinguished:" in text
+    assert "Detected, not distinguished:" in text
     assert any(abs(value - HALF) < 5.0 * std < 1.0 for value, std in sizes(text))

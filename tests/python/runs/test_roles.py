@@ -161,7 +161,7 @@ def test_what_is_added_to_the_reference(tmp_path):
     with pytest.raises(FileError, match=r"'ac': its unit is not known"):
         ta.read_runs(path, signals={"reference_offset": "ac"})
     path = saved(tmp_path / "b.csv", indicated_deg=READ, error_arcsec=ERROR, ac=first)
-    with pytest.raises(FileError, match="is added to a reference, and there is none"):
+    with pytest.raises(FileError, match="is added to a reference, and the file has only"):
         ta.read_runs(path, signals={"reference_offset": ("ac", "arcsec")})
 
 

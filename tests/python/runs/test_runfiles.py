@@ -139,7 +139,7 @@ def test_rows_with_an_empty_cell_are_counted_left_out_and_said(tmp_path):
     assert first.columns["note"].tolist() == ["x"]
     # Of several the first.
     path = written(tmp_path, f"{GOOD}b,,0.5,1,z\nb,20,20.5,,z\n")
-    told = r"2 of 5 rows have an empty cell and are left out, the first at line 5, .*reference_deg"
+    told = r"2 of 5 rows have an empty cell and are omitted, the first at line 5, .*reference_deg"
     with pytest.warns(EmptyCellsWarning, match=told):
         assert [run.left_out for run in ta.read_runs(path)] == [0, 2]
 
@@ -147,7 +147,7 @@ def test_rows_with_an_empty_cell_are_counted_left_out_and_said(tmp_path):
 def test_entries_of_a_turn_stand_at_even_places():
     """Entry i of n at i/n of a turn, whether those before it hold a number or not."""
     table = {"entry_deg": [0.5, 90.5, None, 270.5]}
-    with pytest.warns(EmptyCellsWarning, match="1 of 4 rows has an empty cell and is left out"):
+    with pytest.warns(EmptyCellsWarning, match="1 of 4 rows has an empty cell and is omitted"):
         (run,) = ta.read_runs(table)
     np.testing.assert_array_equal(run.reference, [0.0, 90.0, 270.0])
     np.testing.assert_array_equal(run.indicated, [0.5, 90.5, 270.5])

@@ -143,7 +143,7 @@ def test_further_signals_are_of_one_container():
     ("signals", "message"),
     [
         ({"curent": 1.0}, "did you mean current"),
-        ({"torque": 1.0}, "argument of its own"),
+        ({"torque": 1.0}, "separate argument"),
         ({"head0": 1.0}, "no signal"),
         ({"current": [1.0, 2.0]}, r"signals\['current'\] has 2"),
         ({"current": np.nan}, "must be finite"),

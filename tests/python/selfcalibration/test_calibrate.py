@@ -33,7 +33,7 @@ X = np.zeros(4)
 def test_the_method_is_that_of_the_columns(channels: dict, method: str | None) -> None:
     recording = Recording("7", **channels)
     if method is None:
-        with pytest.raises(NoModelError, match="run 7: nothing here calibrates"):
+        with pytest.raises(NoModelError, match="run 7: these columns do not allow"):
             _method([recording])
     else:
         assert _method([recording]) == method

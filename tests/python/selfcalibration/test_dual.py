@@ -88,7 +88,7 @@ def test_random_sweeps_claim_no_other_ratio():
             assert any("give the count of teeth" in note for note in alone.notes), seed
         std = asked.beside["gear_ratio_std"]
         if std is None:  # a third of a turn may not tell it from orders of the output
-            assert any("do not tell the gear ratio" in note for note in asked.notes), seed
+            assert any("do not separate the gear ratio" in note for note in asked.notes), seed
         else:
             pulls.append((asked.beside["gear_ratio_measured"] - teeth) / std)
     assert len(pulls) >= 0.95 * SWEEPS
@@ -162,7 +162,7 @@ def test_less_than_a_turn_of_the_motor_is_refused_with_what_to_record(turns, tmp
     for extra in ([], ["--gear-ratio", "-63"], ["--orders", "1"]):
         assert main(["selfcal", str(log), "-o", str(out), "--method", "dual", *extra]) != 0
         told = " ".join(capsys.readouterr().err.split())
-        assert re.search(rf"short.csv: the motor turned only {turns:.2g} turns", told)
+        assert re.search(rf"short.csv: the motor made only {turns:.2g} turns", told)
         assert not out.exists()
         advice = re.search(r"record more: trueangle (.+) plans the travel$", told)
         assert main(advice[1].split()) == 0

@@ -86,8 +86,8 @@ def test_a_range_of_ratios_is_told_where_teeth_are_not(
     ("how", "ratio", "told"),
     [
         (GIVEN, 50.2, ""),
-        (ASKED, 50.2, "do not tell the gear ratio from orders of the output: {} is kept"),
-        (FREE, 50.0, "tell the gear ratio from orders of the output; give it as `gear_ratio=`"),
+        (ASKED, 50.2, "do not separate the gear ratio from orders of the output: {} is kept"),
+        (FREE, 50.0, "separate the gear ratio from orders of the output; give it as `gear_ratio=`"),
     ],
 )  # fmt: skip
 def test_readings_that_do_not_tell_the_ratio_leave_the_one_that_is_known(

@@ -56,7 +56,7 @@ def test_what_only_sums_show_is_named_with_its_reason(sign: float) -> None:
 def test_orders_of_the_output_are_those_of_a_travel_below_a_turn() -> None:
     part, whole = Span(10.0, 250.0, False), Span(0.0, 360.0, True)
     note = dual._arc_note(part, [SharedLine(1.0, 1, 0), BOTH, MOTOR, OUTPUT], 360.0)
-    assert "orders 1, 2 of the output tell the error within this travel" in note
+    assert "orders 1, 2 of the output describe the error within this travel" in note
     assert dual._arc_note(whole, [OUTPUT], 360.0) == ""
     assert dual._arc_note(part, [MOTOR, BOTH], 360.0) == ""
 
@@ -85,7 +85,7 @@ def test_two_hundred_readings_predict_each_other(size: int, told: bool) -> None:
 @pytest.mark.parametrize("back", [False, True])
 def test_one_direction_shows_no_reversal(back: bool) -> None:
     one = selfcal(swept(300, back)[0])
-    told = "one direction of travel only: reversal error is not seen" in one.notes
+    told = "one direction of travel only: reversal error is not identifiable" in one.notes
     assert told != back
     assert ("reversal_error_arcsec" in one.beside) == back
     # The speed changes either way, and shows a delay.

@@ -146,7 +146,7 @@ def test_clampings_that_show_the_sum_only_are_refused() -> None:
         ([0.0, 0.49], None, "all clampings have one shift"),
         ([0.0, 0.51], [None, None], ""),
         ([0.0, 0.49], [None, None], "all clampings are at one angle"),
-        ([0.0], None, "one clamping shows the sum"),
+        ([0.0], None, "one clamping shows only"),
     ):
         recordings = clamped(shifts, told)
         if fails:

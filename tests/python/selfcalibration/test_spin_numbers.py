@@ -112,7 +112,7 @@ def test_outliers_are_counted_and_a_changed_pattern_is_told(log) -> None:
     wild = {**log, "indicated_rad": log["indicated_rad"].copy()}
     wild["indicated_rad"][[50, 400, 411]] += np.array([0.02, -0.02, 0.05])
     notes = ta.selfcal(wild, **OPTIONS).notes
-    assert any("3 outliers set aside" in note for note in notes)
+    assert any("3 outliers rejected" in note for note in notes)
     theta = np.unwrap(log["indicated_rad"])
     turn = np.floor((theta - theta[0]) / (2.0 * np.pi)).astype(int) & 1
     odd = {**log, "indicated_rad": np.mod(theta + 100.0 * ARCSEC * turn * np.sin(4.0 * theta),

@@ -28,7 +28,7 @@ SLOW = re.compile(
 IDLE = {
     "--checksums": "a fit in memory keeps them by itself",
     "--counts-per-turn": "of a picture of a model it is the unit of --errors-in count",
-    "--fixed-member": "says what a --gear-ratio means, and there is none",
+    "--fixed-member": "says what a --gear-ratio means, and the file has only",
     "--progress": "nothing is told of work that is done at once",
     "--robot": "the file of the models names the same columns",
 }

@@ -256,7 +256,7 @@ def _one_function(findings: Sequence[Finding], regression: Regression) -> dict[i
     """Bumps that are one function of the place."""
     bumps = [k for k, f in enumerate(findings) if f.confirmed and f.cause == LocalDefect.kind]
     at = {k: _bump(findings[k]) for k in bumps}
-    because = "several bumps beside each other are one function of the place"
+    because = "several adjacent bumps are one function of the place"
     if len(bumps) > MOST_BUMPS:
         return dict.fromkeys(bumps, because)
     near = {

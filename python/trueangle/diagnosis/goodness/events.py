@@ -85,7 +85,7 @@ def _relaxing(
         f"time since {looks_like.rsplit(' ', 1)[-1]}",
         abs(size),
         p,
-        f"what is left relaxes in time {when}, within about {constant:.2g} {unit}",
+        f"the residual relaxes in time {when}, within about {constant:.2g} {unit}",
         rms=abs(size) * rms,
         looks_like=looks_like,
     )

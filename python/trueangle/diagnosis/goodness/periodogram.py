@@ -259,7 +259,7 @@ def time_test(left: Leftover, correlation: float = 0.0) -> Evidence | None:
     if found is None:
         return None
     unit = "Hz" if left.timed else "cycles per reading"
-    detail = " (or an alias of it)" if found.even else ""
+    detail = " (or an alias)" if found.even else ""
     return Evidence(
         "time periodogram",
         found.statistic,

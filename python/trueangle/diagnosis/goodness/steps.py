@@ -67,7 +67,7 @@ def steps_test(left: Leftover) -> Evidence | None:
         "steps in time",
         kurtosis,
         normal_tail(normal_kurtosis(kurtosis - ALLOWED, d.size / SHARED)),
-        f"what is left changes in steps between levels: {steps.size} of about "
+        f"the residual changes in steps between levels: {steps.size} of about "
         f"{brief_number(size)} arcsec",
         rms=0.5 * size,
         looks_like=STEPS,

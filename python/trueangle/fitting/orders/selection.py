@@ -228,18 +228,17 @@ class EvidenceSelection:
         """Why nothing was retained."""
         if not rows:
             return (
-                f"{len(self.positions)} distinct positions can tell no order from the zero: "
+                f"{len(self.positions)} distinct positions cannot separate an order from the zero: "
                 "read at three positions or more"
             )
         best = max(rows, key=lambda row: row.probability)
         beside = f"the strongest of {len(self.orders)} orders searched, {best.order:g},"
         if best.verdict == "reference":
-            return "the only orders that stand out are the reference's own"
+            return "the only significant orders are the reference's own"
         if best.verdict not in ("noise", "alias"):
             return f"{beside} {verdict_reason(best.verdict)}"
         return (
-            f"{beside} does not stand out of the noise "
-            f"(it is there with a probability of {brief_number(100.0 * best.probability)} %)"
+            f"{beside} is not significant (probability {brief_number(100.0 * best.probability)} %)"
         )
 
     def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> tuple[Array, float]:

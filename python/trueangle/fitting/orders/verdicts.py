@@ -38,14 +38,14 @@ _UNDER_SAMPLED: Final = 0.25
 _TELLING_FACTOR: Final = 5.0
 
 _VERDICTS: Final = {
-    "noise": "does not stand out of the noise",
+    "noise": "is not significant",
     "negligible": "significant, but too small to change any reading",
-    "too steep": "with it an indicated angle would stand for several true ones: "
-    "it can be corrected with argument='indicated' only",
+    "too steep": "with it several true angles give one reading: it "
+    "can be corrected with argument='indicated' only",
     "rounding": "may be made by the sensor's rounding to whole steps, which at evenly spaced "
     "positions is the same each time: read at other positions, too",
-    "shared": "over this travel orders stand for each other: with the others it holds the "
-    "curve, and may not be there itself",
+    "shared": "orders are collinear over this travel: it is needed for the "
+    "curve, but may not be real",
     "small": "has no prominent amplitude",
     "phase varies": "its phase varies from run to run",
     "too long": "over so short a travel, passed once, it cannot be distinguished from drift in "
@@ -90,7 +90,7 @@ def row_with_verdict(
     rivals += [f"{m:g}" for m in row.aliases if m in candidates.main and m not in named]
     if rivals:
         reason = (
-            f"{row.order:g} may be {' or '.join(rivals)}; these positions cannot tell. "
+            f"{row.order:g} may be {' or '.join(rivals)}; these positions cannot distinguish them. "
             f"Measure {_measure(positions, ratio, member)}"
         )
     return replace(row, explanations=explanations, reason=reason, doubtful=bool(rivals))
@@ -171,9 +171,9 @@ def selection_notes(
     independent = round(positions.span * max((row.order for row in selection.table), default=0)) + 1
     if retained and independent < orders:
         notes.append(
-            f"over {360.0 * positions.span:.0f} deg orders stand for each other: of {orders} about "
-            f"{independent} are independent, so those retained tell the error within this travel, "
-            "and not for certain which orders it has; a full turn does"
+            f"over {360.0 * positions.span:.0f} deg orders are collinear: of {orders} about "
+            f"{independent} are independent. The curve is valid within this travel; "
+            "a full turn would show which orders are real"
         )
     if candidates.local:
         notes.append(
@@ -185,8 +185,8 @@ def selection_notes(
         pairs = [f"{m:g} from {k:g}" for m, k in candidates.unresolved.items()]
         needed = 0.5 / min(abs(m - k) for m, k in candidates.unresolved.items())
         notes.append(
-            f"over this travel the gear's orders {', '.join(pairs)} cannot be distinguished: the "
-            f"low order stands for both, within this travel only; {needed:.3g} turns tell them"
+            f"over this travel the gear's orders {', '.join(pairs)} cannot be separated: the "
+            f"low order represents both, within this travel only; {needed:.3g} turns separate them"
         )
     if candidates.gear_ratio is not None and not candidates.whole:
         notes.append(
@@ -264,5 +264,5 @@ def _between(positions: Positions, candidates: Candidates) -> bool:
 def _sentence(positions: Positions, candidates: Candidates) -> str:
     where = f"verified at {positions.describe()}"
     if _between(positions, candidates):
-        return f"{where}, and in between for the orders these tell apart"
+        return f"{where}, and in between for the orders that these distinguish"
     return f"{where}; in between it is not: higher orders look like those retained"

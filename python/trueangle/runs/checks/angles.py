@@ -89,16 +89,16 @@ def ratio_suggestion(ratio: float | None, agrees: float = AGREES) -> str:
     Examples
     --------
     >>> ratio_suggestion(1.0002)
-    'the indicated angle is reduced to the output'
+    'no gear between the two columns'
     >>> ratio_suggestion(7.3)
     'a gear of ratio 73/10 between the two that is not reduced'
     """
     if ratio is None:
         return "the joint hardly moved"
     if abs(ratio - 1.0) < agrees:
-        return "the indicated angle is reduced to the output"
+        return "no gear between the two columns"
     if abs(ratio + 1.0) < AGREES:
-        return "the indicated angle counts the other way"
+        return "the indicated angle has the opposite sign"
     from fractions import Fraction  # loads decimal: for joints that are wrong only
 
     size = abs(ratio)
@@ -239,8 +239,8 @@ def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:
             "wrapped_reference",
             [record.label],
             record.rows[jumps + 1].tolist(),
-            f"the reference of run {record.label} wraps after {period:.4g} deg, which is no "
-            "turn: the same number stands for several places",
+            f"the reference of run {record.label} wraps after {period:.4g} deg, which is not "
+            "a turn: one number means several places",
             "log the reference over a whole turn, or unwrap it before",
         )
 

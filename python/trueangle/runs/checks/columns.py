@@ -123,7 +123,7 @@ class LogColumns(PlainResult):
         shared = [f"{c.role} '{c.name}'" for c in self.columns if not c.joint]
         if shared:
             lines.append(f"  all joints: {', '.join(shared)}")
-        lines += ["", "If that is so, say it, as here or in a robot file (--robot):"]
+        lines += ["", "If that is so, state it, as here or in a robot file (--robot):"]
         lines += [f"  --signal {shlex.quote(text)}" for text in self.signals]
         if any(text.endswith(":UNIT") for text in self.signals):
             lines.append("with deg, rad, turn or count in place of UNIT")

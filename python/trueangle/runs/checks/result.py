@@ -271,8 +271,8 @@ class Check(PlainResult):
         ratio = "unknown" if self.ratio is None else f"{self.ratio:.6g}"
         lines += [
             "",
-            f"{e.readings} readings in {e.runs} run{'s' * (e.runs != 1)}, {e.span_deg:.4g} deg of "
-            f"places, {e.turns:.4g} turns at most.",
+            f"{e.readings} readings in {e.runs} run{'s' * (e.runs != 1)}, {e.span_deg:.4g} deg "
+            f"covered, longest run {e.turns:.4g} turns.",
             f"Indicated per reference: {ratio} ({self.suggests}).",
             f"Directions: {_levels(e.directions)}; speeds: {_levels(e.speeds, 'deg/s')}; "
             f"loads: {_levels(e.loads, 'Nm')}; "

@@ -123,7 +123,7 @@ def _stuck(record: Record, name: str, own: Array, other: Array) -> Iterator[Data
             "saturated_travel",
             [record.label],
             rows.tolist(),
-            f"the {name} angle of run {record.label} stands at {value:g} deg, the end of its "
+            f"the {name} angle of run {record.label} stays at {value:g} deg, the end of its "
             f"range, in {rows.size} rows (first: row {rows[0]}) while the joint moves on",
             "leave these rows out, or measure inside the range",
         )

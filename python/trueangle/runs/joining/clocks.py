@@ -96,8 +96,8 @@ def estimated_clocks(
         notes.append("the rate of the clocks cannot be determined from this motion; taken as equal")
     if offset is None:
         notes.append(
-            "the offset holds any constant delay between the two channels: no log can tell them "
-            "apart; what varies with speed is left to diagnose"
+            "the offset includes any constant delay between the two channels: no log can separate "
+            "them. `diagnose` finds delays that vary with speed"
         )
     return replace(clocks, notes=tuple(notes))
 
@@ -122,8 +122,8 @@ def _coarse(indicated: Stream, reference: Stream) -> tuple[float, list[float] | 
     if float(np.std(b)) < _ONE_SPEED * size or float(np.std(a)) < _ONE_SPEED * size:
         if shared <= 0.0:
             raise ArgumentError(
-                "the two logs share no time, and with one speed only the motion does not tell "
-                "the offset of their clocks; declare it (`offset_s=`)"
+                "the two logs share no time, and motion at one speed does not determine the "
+                "offset of their clocks; declare it (`offset_s=`)"
             )
         return 0.0, None
     # Part of the motion in what overlaps that differs, at every lag: rests agree at any.

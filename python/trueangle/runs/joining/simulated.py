@@ -250,7 +250,7 @@ def _expected(run: CalibrationRun, log: CalibrationRun, by: str | None, source: 
         note = f"The motion of {source} is another than that of the readings"
     if not travelled.has_both and np.unique(run.direction).size > 1:
         note += (". " if note else "") + f"{source} moves in one direction only: its error is "
-        note += "taken for both"
+        note += "used for both"
     return _Expected("angle", error, known, travelled.std, note=note)
 
 

@@ -47,7 +47,8 @@ def test_gear_orders_behind_36_positions_are_named(seed):
     assert {22, 50, 58, 202} <= set(chosen.row(14).aliases)
     reason = chosen.row(14).reason
     assert reason.startswith("14 may be 202 (tooth mesh with the circular spline)")
-    assert "these positions cannot tell. Measure again with the reference turned by 2.14" in reason
+    assert "these positions cannot distinguish them. Measure again with" in reason
+    assert "the reference turned by 2.14" in reason
     assert "in between it is not" in chosen.summary()
 
 

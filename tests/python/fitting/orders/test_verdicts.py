@@ -81,9 +81,9 @@ def test_turns_that_tell_a_gears_orders_are_half_a_cycle_of_their_difference() -
     theta = np.linspace(0.0, 400.0, 500)
     errors = [line(2, 0.1, 0.0, theta) + extra for extra in noise(SEED + 2, 3, 500)]
     found = ta.select_orders(runs_of(errors, theta), gear_ratio=7.3)
-    (note,) = [n for n in found.notes if "cannot be distinguished" in n and "turns tell" in n]
+    (note,) = [n for n in found.notes if "cannot be separated" in n and "turns separate" in n]
     apart = [abs(float(a) - float(b)) for a, b in re.findall(r"([\d.]+) from ([\d.]+)", note)]
-    told = float(re.findall(r"([\d.]+) turns tell", note)[0])
+    told = float(re.findall(r"([\d.]+) turns separate", note)[0])
     assert told == pytest.approx(0.5 / min(apart), rel=0.01)
     assert min(apart) == pytest.approx(0.3, abs=1e-9)
 

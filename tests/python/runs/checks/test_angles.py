@@ -300,7 +300,7 @@ def test_wheels_that_differ_by_a_tooth_are_told_from_an_error_by_the_travel(rati
         assert not list(wrong_ratio([over(turns, 1.0, 25.0)])), turns
     lost = over(6.0, 1.0, 0.1, 36.0)  # counts lost halfway are no ratio
     assert not list(wrong_ratio([lost]))
-    assert told_ratio([lost])[1] == "the indicated angle is reduced to the output"
+    assert told_ratio([lost])[1] == "no gear between the two columns"
 
 
 def test_a_fit_of_a_steep_ratio_names_it_and_no_number_of_orders() -> None:
