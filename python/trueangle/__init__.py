@@ -1,4 +1,4 @@
-"""trueangle: make cheap rotary encoders and robot joints tell the true angle."""
+"""trueangle: measure, explain and correct the angle error of rotary encoders and robot joints."""
 
 from __future__ import annotations
 

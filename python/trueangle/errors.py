@@ -1,4 +1,4 @@
-"""What can go wrong: every error is a `ValueError` that says where and what to do."""
+"""What can go wrong: every error is a `ValueError` that states where and what to do."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _LONGEST = 2000
 
 
 def shortened(text: str) -> str:
-    """A message of bounded length: its beginning and its end, where the remedy stands.
+    """A message of bounded length: its beginning and its end, where the remedy is.
 
     Examples
     --------
@@ -77,7 +77,7 @@ class KindError(ArgumentError, TypeError):
 
 
 class RankError(TrueAngleError):
-    """The readings cannot tell the requested unknowns apart.
+    """The readings cannot separate the requested unknowns.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class RankError(TrueAngleError):
 
 
 class NotInvertibleError(TrueAngleError):
-    """The error's slope reaches 1: an indicated angle stands for several true angles.
+    """The error's slope reaches 1: an indicated angle represents several true angles.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class NotInvertibleError(TrueAngleError):
 
 
 class NoModelError(TrueAngleError):
-    """No model is supported by the data; the message says why."""
+    """No model is supported by the data; the message states why."""
 
 
 class NoOrderError(NoModelError):
@@ -175,19 +175,19 @@ class ModelFileError(FileError):
 
 
 class MissingExtraError(TrueAngleError, ImportError):
-    """An optional dependency is not installed; the message says how to install it."""
+    """An optional dependency is not installed; the message states how to install it."""
 
 
 class EmptyCellsWarning(UserWarning):
-    """Rows of a file were left out since a cell of theirs is empty."""
+    """Rows of a file were omitted since a cell of theirs is empty."""
 
 
 class MessageLinesWarning(UserWarning):
-    """Lines of a text file that hold no readings were left out."""
+    """Lines of a text file that hold no readings were omitted."""
 
 
 class OtherSheetsWarning(UserWarning):
-    """Sheets of an Excel file were left out: the first that holds cells is read."""
+    """Sheets of an Excel file were omitted: the first that holds cells is read."""
 
 
 class OutsideSpanWarning(UserWarning):
@@ -195,7 +195,7 @@ class OutsideSpanWarning(UserWarning):
 
 
 class UnitWarning(UserWarning):
-    """Angles look like another unit than the one they are taken for, or a channel is dead."""
+    """Angles look like another unit than the one they are confused with, or a channel is dead."""
 
 
 class NotCorrectedWarning(UserWarning):

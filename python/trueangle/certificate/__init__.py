@@ -1,7 +1,7 @@
 """Calibration certificates: value and expanded uncertainty at every nominal position.
 
 The budget (`budget`) and the propagation of uncertainty (`propagation`) follow JCGM 100
-(GUM); what a fit says of each position is in `values`; `identity` reads what only the
+(GUM); what a fit states about each position is in `values`; `identity` reads what only the
 laboratory knows, `conformity` states conformity after ILAC-G8 and JCGM 106; `language` holds the
 texts, `typesetting` makes the PDF.
 """

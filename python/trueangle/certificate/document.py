@@ -50,7 +50,7 @@ class Certificate:
     ----------
     content : dict
         Every number and word of it, plain values: `save` adds nothing but the layout.
-        Errors are in arcsec; ``errors_in`` says which unit the pages show.
+        Errors are in arcsec; ``errors_in`` states which unit the pages show.
         ``positions`` holds ``angle_deg, error_arcsec, standard_arcsec,
         degrees_of_freedom, coverage_factor, expanded_arcsec`` of every position;
         ``as_left`` the same as a model leaves it, ``conformity`` what `conformity` states;
@@ -116,8 +116,8 @@ def certify(
     fit : FitResult, optional
         A fit of ``runs`` that is there already.
     model : HarmonicModel or path, optional
-        What the joint is corrected by: beside the values as found stand those as left, of the
-        corrected readings, with a budget and a statement of their own.
+        What the joint is corrected by: next to the values as found are those as left, of the
+        corrected readings, with a budget and a separate statement.
     errors_in : str or float
         Unit of every value and uncertainty of the pages: ``"arcsec"``, ``"deg"``,
         ``"mrad"``, ``"count"``, or the counts of a turn; ``"auto"`` is arcsec, or degrees
@@ -195,9 +195,9 @@ def certify(
 
 
 def _fitted(runs: list[CalibrationRun], orders: Any, gear: dict[str, Any]) -> FitResult:
-    """The fit; beside a reversal error where one is seen, which has a line of its own.
+    """The fit; next to a reversal error where one is found, which has a separate line.
 
-    In the residuals it would be noise that remembers, and count twice.
+    In the residuals it would be autocorrelated noise, and count twice.
     """
     from ..fitting.fit import fit
 
@@ -322,7 +322,7 @@ def _readings(fit: FitResult) -> dict[str, Any]:
 
 
 def _aliases(fit: FitResult) -> list[dict[str, Any]]:
-    """Orders kept that these positions cannot tell from others."""
+    """Orders kept that these positions cannot distinguish from others."""
     if fit.selection is None:
         return []
     return [

@@ -1,4 +1,4 @@
-"""identity.toml: what only the laboratory knows of a calibration."""
+"""identity.toml: what only the laboratory knows about a calibration."""
 
 from __future__ import annotations
 

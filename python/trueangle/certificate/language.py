@@ -1,4 +1,4 @@
-"""Texts of certificates: one file a language in the folder beside this module."""
+"""Texts of certificates: one file a language in the folder next to this module."""
 
 from __future__ import annotations
 

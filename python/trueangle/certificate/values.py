@@ -1,4 +1,4 @@
-"""Errors at nominal positions: what a fit says and leaves, reversal; runs that were corrected."""
+"""Errors at nominal positions: what a fit states and leaves, reversal; runs that were corrected."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .budget import LEVEL, Contribution, propagated
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
 
-#: Nominal positions of a whole turn where none are asked for.
+#: Nominal positions of a whole turn where none are requested.
 POSITIONS: Final = 36
 
 #: Nominal positions at most: a certificate is read by people.
@@ -35,7 +35,7 @@ _MOST_POSITIONS: Final = 720
 #: Places of a turn among which errors that the series lacks are looked for.
 _PLACES: Final = 360
 
-#: Standard errors beyond which a reversal counts as seen. Below it is noise, and adding
+#: Standard errors beyond which a reversal counts as observed. Below it is noise, and adding
 #: noise to the budget would make every U too wide.
 _SEEN: Final = 3.0
 
@@ -66,8 +66,8 @@ class Values:
 def nominal_positions(fit: FitResult, count: int | None = None) -> Array:
     """Nominal positions in degrees.
 
-    Those that were read, where they are a grid of at most 36 and no other count is asked
-    for; else ``count`` (36) to a turn, and on partial travel those that it covers.
+    Those that were read, where they are a grid of at most 36 and no other count is
+    requested; else ``count`` (36) to a turn, and on partial travel those that it covers.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def left_at_places(fit: FitResult) -> Contribution:
 
 
 def reversal_halfwidth(fit: FitResult) -> Contribution | None:
-    """Half of the reversal error, where both directions were read and it is seen.
+    """Half of the reversal error, where both directions were read and it is found.
 
     ::
 

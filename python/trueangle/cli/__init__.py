@@ -71,7 +71,7 @@ class Command(Protocol):
 def build_parser(words: Container[str] = COMMANDS, commands: Iterable[str] = COMMANDS) -> Parser:
     """Parser of ``commands``, with the arguments of those among ``words``.
 
-    What a command can be asked is known to modules that take long to import (its targets,
+    The options of a command are known to modules that take long to import (its targets,
     its methods): of a command that is not called only the name and the line of help are.
     """
     parser = Parser(
@@ -109,7 +109,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     -------
     int
         0 done; 1 bad input or no result (one line on stderr); 2 usage (by argparse); as a
-        shell says it, 130, 143, 129 interrupted (Ctrl-C, SIGTERM, SIGHUP) and 141: who read
+        shell reports it, 130, 143, 129 interrupted (Ctrl-C, SIGTERM, SIGHUP) and 141: who read
         standard output has gone.
     """
     wording, ending = Wording(), Ending()
@@ -119,7 +119,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             with ending:
                 words = list(sys.argv[1:] if argv is None else argv)
-                # The others are looked at only where their names are to be told.
+                # The others are looked at only where their names are to be reported.
                 called = words[:1] if words and words[0] in COMMANDS else COMMANDS
                 parser = build_parser(words, called)
                 wording.parser = parser.commands.get(words[0] if words else "")
@@ -140,10 +140,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def process() -> NoReturn:
-    """Run one command as a process of its own, which ends with it."""
+    """Run one command as a separate process, which ends with it."""
     gc.set_threshold(_KEPT, *gc.get_threshold()[1:])
     if sys.argv[1:2] != ["bench"]:
-        # Beside the core's own threads (`trueangle.support.blas`); a bench lets numpy have its own.
+        # Next to the core's own threads (`trueangle.support.blas`); a bench lets numpy have its
+        # own.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         sys.exit(main())
@@ -154,7 +155,7 @@ def process() -> NoReturn:
 def _failed(
     error: BaseException, ending: Ending, wording: Wording, args: argparse.Namespace
 ) -> int:
-    """Tell an error in one line; the result is the exit status."""
+    """Show an error in one line; the result is the exit status."""
     if args.debug:
         import traceback  # brings the tokenizer with it
 
@@ -179,7 +180,7 @@ def _failed(
             f"error: out of memory ({str(error) or 'no more is available'}); take fewer "
             "readings at a time, or --one-pass where the command has it"
         )
-    elif isinstance(error, ImportError):  # one that is there: missing ones are told of above
+    elif isinstance(error, ImportError):  # one that is there: missing ones are reported above
         _say(f"error: a library cannot be loaded: {error}; is there memory enough for it?")
     else:
         _say(
@@ -200,7 +201,7 @@ def _system(error: OSError) -> str:
 
 
 def _say(text: str) -> None:
-    """Tell it in one line, whatever lines it came in."""
+    """Show it in one line, whatever lines it came in."""
     if sys.stderr is not None:
         with contextlib.suppress(OSError):  # a closed terminal
             # Blanks stay as they are: a name of a file may have two.

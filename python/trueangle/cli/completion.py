@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Argument(NamedTuple):
-    """What a shell has to know of one argument."""
+    """What a shell has to know about one argument."""
 
     flags: tuple[str, ...]
     takes_value: bool

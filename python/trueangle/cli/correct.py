@@ -21,7 +21,7 @@ from .signal_options import add_signals, signals_by_joint
 if TYPE_CHECKING:
     from ..logs.batch import BatchReport, LogReport
 
-#: Logs that failed, or wait, that are told by name.
+#: Logs that failed, or wait, that are reported by name.
 _TOLD = 5
 
 HELP = "correct the indicated angles of logs with a saved model"
@@ -127,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
 def _columns_of_joints(
     models: dict[Any, Any], args: argparse.Namespace
 ) -> tuple[dict[str, Any] | None, bool]:
-    """Columns of the log's joints, and whether it has one; joints left out go from ``models``."""
+    """Columns of the log's joints, and whether it has one; joints omitted go from ``models``."""
     from ..model.robotfile import is_robot_file, load_robot
 
     single = None in models
@@ -190,7 +190,7 @@ def _columns(entries: Sequence[str] | None, single: bool) -> Any:
 
 def _print(log: LogReport, asked: ErrorsIn) -> None:
     if not log.is_done:
-        return  # told at the end, on stderr
+        return  # reported at the end, on stderr
     result = log.result
     if log.status == "done before":
         print(f"{log.log}: done before -> {log.output}")

@@ -136,7 +136,7 @@ def run(args: argparse.Namespace) -> int:
             runs, simulation, simulated=simulated, within=args.within, progress=args.progress
         )
     extend = None if interruption.happened else args.extend
-    # Whatever fails from here on, the diagnosis is told.
+    # Whatever fails from here on, the diagnosis is reported.
     told = "" if args.json else result.summary(errors_in(args), verbose=args.verbose)
     print(result.to_json(extend) if args.json else told, flush=True)
     if interruption.happened:
@@ -146,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _of_channels(args: argparse.Namespace) -> bool:
-    """Print what is wrong with channels, where nothing is believed of the joint."""
+    """Print what is wrong with channels, where nothing is assumed of the joint."""
     stated = (args.simulation, args.simulated, args.gear_ratio, args.shaft or None)
     if any(given is not None for given in stated):
         return False
@@ -172,7 +172,7 @@ def _minus_simulated(
     Raises
     ------
     FileError
-        The log lacks a column; says how those that were named of the runs are named of it.
+        The log lacks a column; states their names in the log.
     """
     from ..runs.joining import minus_simulated
 
@@ -190,7 +190,7 @@ def _minus_simulated(
 
 
 def _refuse_idle(args: argparse.Namespace) -> None:
-    """Refuse options that need another one beside them."""
+    """Refuse options that need another one with them."""
     if args.simulated is None:
         refuse_given(args, ("simulated_by",), "joins the log of a simulator: add --simulated LOG")
     if args.extend_into is None or _is_fmu(args.extend_into):
@@ -248,7 +248,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
 
 
 def _believed(args: argparse.Namespace, empty: bool = False) -> Simulation | None:
-    """The simulation: that of the file, or of a joint of which nothing else is believed.
+    """The simulation: that of the file, or of a joint of which nothing else is assumed.
 
     ``empty`` where nothing need be stated of the joint.
 
@@ -288,7 +288,7 @@ def _believed(args: argparse.Namespace, empty: bool = False) -> Simulation | Non
 
 
 def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel | None) -> None:
-    """Write the files that were asked for, each whether or not another can be."""
+    """Write the files that were requested, each whether or not another can be."""
 
     def extend() -> str:
         result.simulation().save(args.extend)
@@ -364,7 +364,7 @@ def _unwritten(args: argparse.Namespace, complete: bool) -> str:
 
 
 def _corrected(result: Diagnosis, path: str, extended: bool) -> Iterator[str]:
-    """What the correction model takes off, and what it cannot."""
+    """What the correction model subtracts, and what it cannot."""
     from ..diagnosis.correction import NOT_AT_RUN_TIME
 
     yield f"\n{'Extended correction' if extended else 'Correction'} model: {path}"

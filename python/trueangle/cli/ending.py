@@ -95,12 +95,12 @@ class Ending:
 
     @property
     def status(self) -> int:
-        """The exit status, as a shell tells it."""
+        """The exit status, as a shell shows it."""
         return 128 + self.number
 
     @property
     def text(self) -> str:
-        """What is told of it."""
+        """What is reported about it."""
         named = "" if self.number == signal.SIGINT else f" by {signal.Signals(self.number).name}"
         return f"interrupted{named}"
 

@@ -43,7 +43,7 @@ def add_target_options(
 ) -> None:
     """Options of the targets, each once; a target refuses those it does not have.
 
-    ``more`` is what some of them mean beside.
+    ``more`` is what some of them mean in addition.
     """
     from ..export.targets import TARGETS
 

@@ -199,7 +199,7 @@ def refuse_robot(args: argparse.Namespace) -> None:
     Raises
     ------
     ArgumentError
-        It was asked for.
+        It was requested.
     """
     if args.one_pass or args.scheduler:
         raise ArgumentError("--one-pass and --scheduler go with one joint: leave --robot out")

@@ -59,7 +59,7 @@ def _orders(text: str, shafts: dict[str, float]) -> Any:
 
 
 def requested_fleet(args: argparse.Namespace, **limits: Any) -> Fleet:
-    """The fleet of the runs that are asked for."""
+    """The fleet of the runs that are requested."""
     from ..fleets.fleet import fleet
 
     shafts = declared_shafts(args.shaft)

@@ -128,7 +128,7 @@ def run(args: argparse.Namespace) -> int:
 def _planned(
     args: argparse.Namespace, orders: tuple[float, ...] | None
 ) -> CalibrationPlan | ArcPlan | UnitPlan | SelfPlan:
-    """The plan that is asked for: without a reference, of a unit, an arc or whole turns."""
+    """The plan that is requested: without a reference, of a unit, an arc or whole turns."""
     from ..planning import plan as planning
 
     if args.self_method is not None:
@@ -272,7 +272,7 @@ def add_after_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run_after(args: argparse.Namespace) -> int:
-    """Print the runs that tell what those there are could not, and write them."""
+    """Print the runs that show what those there are could not, and write them."""
     from ..planning.limits import load_limits
     from ..rehearsal.after import SEEDS, WITHIN, plan_after
     from ..simulation import load_simulation

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw, write, say what is seen."""
+    """Draw, write, state what is found."""
     import matplotlib as mpl
 
     from ..plots.canvas import text_alternative
@@ -101,7 +101,7 @@ def _of_runs(args: argparse.Namespace) -> Axes:
 
 
 def save_picture(drawn: Axes | Figure, path: str) -> None:
-    """Write a picture whole or not at all, as its ending says (PNG where it says none)."""
+    """Write a picture whole or not at all, as its ending states (PNG where it states none)."""
     ending = Path(path).suffix.lower()
     kind = ending[1:] if ending in PICTURE.endings else "png"
     figure = drawn if hasattr(drawn, "savefig") else drawn.get_figure(root=True)

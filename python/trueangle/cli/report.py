@@ -129,7 +129,7 @@ def _fleet(args: argparse.Namespace) -> int:
 
 
 def _made(args: argparse.Namespace, path: str | None, title: str | None = None) -> Any:
-    """The report or certificate that is asked for, written to ``path``."""
+    """The report or certificate that is requested, written to ``path``."""
     from ..reports import report
     from .run_lists import read_checked_runs
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: The name before a role that stands for the log of a simulator, not for a joint.
+#: The name before a role that represents the log of a simulator, not for a joint.
 _SIMULATED = "simulated"
 
 
@@ -60,12 +60,12 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
 
 
 def joints_asked(args: argparse.Namespace) -> tuple[str, list[JointAsked]] | None:
-    """The robot's name and the joints that were asked for; None where the log is of one joint.
+    """The robot's name and the joints that were requested; None where the log is of one joint.
 
     Raises
     ------
     ArgumentError
-        A joint that there is not; an option beside the robot file that this states itself.
+        A joint that there is not; an option next to the robot file that this states itself.
     """
     entries = list(args.signal or ())
     named = list(dict.fromkeys(e[0] for e in entries if e[0] not in (None, _SIMULATED)))
@@ -106,9 +106,9 @@ def _indicated(robot: Any, entries: list[Any]) -> dict[str, Any]:
 def _asked(
     joint: Any, args: argparse.Namespace, entries: list[Any], angles: dict[str, Any]
 ) -> JointAsked:
-    """The arguments as for this joint alone: what was typed stands before what the file says.
+    """The arguments as for this joint alone: what was typed overrides what the file states.
 
-    What was typed of this joint stands before what was typed of all. The angles of the others
+    What is typed for this joint overrides what is typed for all. The angles of the others
     are signals that it may be coupled to.
     """
     from ..support.signals import COUPLED
@@ -186,7 +186,7 @@ def save_models(
 def robot_messages(
     title: str, ranking: list[Any], texts: dict[str, str], errors_in: ErrorsIn = "auto"
 ) -> str:
-    """The ranking in front, and what is said of every joint after it."""
+    """The ranking in front, and what is reported about every joint after it."""
     from ..reports.robot import ranking_text
 
     parts = [ranking_text(title, ranking, errors_in)]

@@ -50,7 +50,7 @@ def _is_meant(name: str, label: str) -> bool:
 
 
 def read_checked_runs(args: argparse.Namespace) -> list[CalibrationRun]:
-    """Runs of the files; faults of the data are told on stderr, in the words of ``check``."""
+    """Runs of the files; faults of the data are reported on stderr, in the words of ``check``."""
     from ..runs.checks.check import data_faults
     from ..runs.checks.record import records_of
 

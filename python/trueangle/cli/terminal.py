@@ -12,7 +12,7 @@ from typing import Any, Final, TextIO
 STANDARD_OUTPUT: Final = "standard output"
 
 #: Control characters but tab and line end, what turns the direction of text, and halves of
-#: surrogates, which stand for bytes of file names that are no UTF-8.
+#: surrogates, which represent bytes of file names that are no UTF-8.
 _UNPRINTABLE: Final = (
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2028\u2029"
     "\u2066-\u2069\ufeff\ud800-\udfff]"
@@ -129,7 +129,8 @@ def silence_output() -> None:
         pass
 
 
-#: What stands out in a text, and how: bold, red, yellow, green. Words say all that colours do.
+#: What is significant in a text, and how: bold, red, yellow, green. Words state all that colours
+#: do.
 _RULES: Final = tuple(
     (re.compile(pattern, re.MULTILINE), code)
     for pattern, code in (
@@ -142,7 +143,7 @@ _RULES: Final = tuple(
 
 
 def has_colours(stream: Any) -> bool:
-    """Whether a stream is a terminal that takes colours, and nobody said that it should not."""
+    """Whether a stream is a terminal that takes colours, and nobody stated that it should not."""
     if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
         return False
     try:
@@ -152,7 +153,7 @@ def has_colours(stream: Any) -> bool:
 
 
 def coloured_text(text: str) -> str:
-    r"""``text`` with what stands out in colour; JSON stays as it is.
+    r"""``text`` with what is significant in colour; JSON stays as it is.
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """Messages in the words of a command, with the command that helps: Python becomes options.
 
-A message is written once, in Python: what a caller would type stands in backquotes, as
+A message is written once, in Python: what a caller would type is in backquotes, as
 ```bits=16```, ```signals={"torque": "tau"}``` or ```ta.diagnose(...)```. A command prints
 ``--bits 16``, ``--signal torque=tau`` and ``trueangle diagnose``.
 """
@@ -169,7 +169,7 @@ def _is_text(node: ast.expr) -> bool:
 
 
 def _values(node: ast.expr) -> list[str]:
-    """What stands after an option, once for each time it is given; nothing after a switch."""
+    """What is after an option, once for each time it is given; nothing after a switch."""
     import ast
     from shlex import quote
 
@@ -243,7 +243,7 @@ def _words(error: TrueAngleError, args: argparse.Namespace, build: _Build) -> li
     if isinstance(error, NoOrderError) and 0 < error.readings < _LEAST_READINGS:
         return ["plan", "--arc", "0:360", "--readings", str(_LEAST_READINGS)]
     if isinstance(error, NoModelError):
-        # Without a gear nothing but the output turns, and that is said.
+        # Without a gear nothing but the output turns, and that is reported.
         known = args.gear_ratio is not None
         bare = () if known else ("--gear-ratio", "1", "--fixed-member", "none")
         output = getattr(args, "output", None)

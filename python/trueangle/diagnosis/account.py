@@ -29,7 +29,7 @@ from .selection import select_causes
 from .unevennoise import uneven_noise
 from .unnamed import is_named
 
-#: Readings used at most: beyond, one of every so many in a row is drawn at random.
+#: Readings used at most: beyond, one of every this many in a row is sampled at random.
 MOST_READINGS = 40_000
 
 
@@ -56,7 +56,7 @@ class CauseSelection:
 
 @dataclass(frozen=True)
 class PreparedData:
-    """Readings as they are held against a simulation.
+    """Readings as they are compared with a simulation.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ def _better(account: Account, other: Account, price: float) -> Account:
 
 
 def _helps(seen: PreparedData, chosen: Regression) -> bool:
-    """Whether another ratio helps, alone or beside what was chosen; a whole account is slower."""
+    """Whether another ratio helps, alone or with what was chosen; a whole account is slower."""
     start = _start(seen, seen.sim)
     hopes = (start, start.with_terms(chosen.terms))
     return min(map(total_penalty, hopes)) < total_penalty(chosen)
@@ -175,7 +175,7 @@ def _helps(seen: PreparedData, chosen: Regression) -> bool:
 def _believed(seen: PreparedData) -> Account:
     """The account, and the simulation with the effects it claims as the readings show them."""
     choice, believed = _chosen(seen, seen.sim), seen.sim
-    # Twice each: what one was taken for is only known once the others are right.
+    # Twice each: what one was confused with is only known once the others are right.
     for _ in range(2 * len(seen.sim.effects)):
         others = [] if current_deadline().over else _corrections(choice, believed, seen.sim)
         tried = [(_chosen(seen, other), other) for other in others]
@@ -189,9 +189,9 @@ def _believed(seen: PreparedData) -> Account:
 def _corrections(
     choice: CauseSelection, believed: Simulation, stated: Simulation
 ) -> list[Simulation]:
-    """With one refuted effect as the readings show it, beside the causes chosen or for them.
+    """With one refuted effect as the readings show it, together with the causes chosen or for them.
 
-    Another size of what is believed comes before further causes that make up for it.
+    Another size of the assumed model comes before further causes that make up for it.
     """
     settled = [choice.chosen, choice.start] if choice.chosen.terms else [choice.start]
     found = (effects_as_measured(each, believed, stated, choice.spots) for each in settled)
@@ -201,7 +201,8 @@ def _corrections(
 def _start(seen: PreparedData, sim: Simulation) -> Regression:
     """The readings against a simulation, without any cause.
 
-    A delay stays free beside all else: what follows the direction, say, is judged jointly with it.
+    A delay stays free together with all else: what follows the direction, state, is judged jointly
+    with it.
     """
     beside = None if seen.delay is None else seen.delay.columns(seen.signals)
     error = seen.error - sim.predict(seen.signals)
@@ -218,7 +219,7 @@ def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:
     )
     scatter: list[ScatterFinding] = []
     if current_deadline().over:
-        return CauseSelection(start, chosen, scatter, spots)  # what is left is no scatter yet
+        return CauseSelection(start, chosen, scatter, spots)  # the residual is no scatter yet
     least = NEW_SCATTER + misfit_of_scatter(start, chosen)
     uneven = [item for item in _uneven(start, chosen) if item.bic_gain > least]
     if uneven:
@@ -268,7 +269,7 @@ def _directed(signals: Signals) -> NDArray[np.int64]:
 
 
 def _subsample(n: int) -> NDArray[np.int64]:
-    """One reading of every so many in a row, at random within each; all where they fit."""
+    """One reading of every this many in a row, at random within each; all where they fit."""
     if n <= MOST_READINGS:
         return np.arange(n)
     edges = np.linspace(0, n, MOST_READINGS + 1).astype(np.int64)

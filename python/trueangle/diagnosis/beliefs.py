@@ -1,7 +1,7 @@
 """Verdicts on what a simulation already claims: its lines and its effects.
 
-Every believed line stands in the regression with two free coefficients, every believed effect
-that can be predicted with a factor; what the readings say of them is
+Every assumed line is in the regression with two free coefficients, every assumed effect
+that can be predicted with a factor; what the readings state about them is
 
 ::
 
@@ -20,15 +20,15 @@ from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, normal_tail
 from ..support.plainresult import ShownResult
 
-#: Chance with which a right belief of many is refuted.
+#: Probability with which a right assumed model of many is refuted.
 LEVEL = 1e-4
 
-#: Share of the believed amplitude below which a line is absent, where it is no larger than
+#: Share of the assumed amplitude below which a line is absent, where it is no larger than
 #: three standard errors.
 ABSENT = 0.15
 
-#: Share of the amplitude by which a belief may be off and is still confirmed: nothing that a
-#: simulation states is exact, and good data see a thousandth.
+#: Share of the amplitude by which an assumed value may be off and is still confirmed: nothing that
+#: a simulation states is exact, and good data see a thousandth.
 CLOSE = 0.03
 
 #: Degrees of phase within which only the amplitude is wrong.
@@ -50,7 +50,7 @@ class Belief(ShownResult):
     std : dict of str to float
         Standard deviations of what is measured.
     gain : Gain or None
-        What the correction is worth on held-out runs; None where it is confirmed.
+        Gain of the correction on held-out runs; None where it is confirmed.
     """
 
     what: str
@@ -73,7 +73,7 @@ class Belief(ShownResult):
 
 
 def judge_line(what: str, believed: Sequence[float], change: Array, covariance: Array) -> Belief:
-    """Verdict on a line ``A cos + B sin`` that is believed, from the change that was fitted.
+    """Verdict on a line ``A cos + B sin`` that is assumed, from the change that was fitted.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def judge_line(what: str, believed: Sequence[float], change: Array, covariance: 
 
 
 def verdict_of_factor(factor: float, std: float) -> str:
-    """Verdict on an effect that shows ``factor`` times as strong as it is believed.
+    """Verdict on an effect that shows ``factor`` times as strong as it is assumed.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What causes propose beside those found, and which of it is the best."""
+"""What causes propose together with those found, and which of it is the best."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from .unnamed import effect_or_unnamed
 #: An extension, what it extends, and its net BIC gain.
 Candidate: TypeAlias = tuple[Extension, Regression, float]
 
-#: Time that what is said of chosen causes takes (gain, rivals), in shares of that of the choice.
+#: Time that what is reported about chosen causes takes (gain, rivals), in shares of that of the
+#: choice.
 AFTER_CHOICE = 0.7
 
 
@@ -43,8 +44,8 @@ def candidate_extensions(
 
     A cause that contains chosen ones as special cases takes their place. Those left when the
     time is up are not tried (`trueangle.support.deadline`). Of candidates that stay below
-    ``least``, the gain that matters beside those found so far, only as much is searched as tells
-    that; the strongest ones ``before`` are therefore tried first.
+    ``least``, the gain that matters together with those found so far, only as much is searched as
+    shows that; the strongest ones ``before`` are therefore tried first.
     """
     found: list[Candidate] = []
     places: list[int] = []
@@ -66,7 +67,7 @@ def candidate_extensions(
         wanted = max(least(found) + penalty, 0.0) if start.terms and least is not None else 0.0
         extension = candidates_above(start, cause, wanted)
         if at.over:
-            break  # a search that was cut short says nothing of its cause
+            break  # a search that was cut short contains nothing of its cause
         if extension is not None:
             found.append((extension, start, extension.bic_gain - penalty))
             places.append(causes.index(cause))
@@ -75,7 +76,7 @@ def candidate_extensions(
 
 
 def candidates_above(regression: Regression, cause: str, least: float = 0.0) -> Extension | None:
-    """What a cause proposes, searched only as far as candidates above ``least`` ask for.
+    """What a cause proposes, searched only as far as candidates above ``least`` need.
 
     None where the time is up and it has not been searched yet.
     """
@@ -116,7 +117,7 @@ class CandidateScores:
         return gain - (after - paid)
 
     def told_score(self, candidate: Candidate) -> float:
-        """Score once what bends of the causes found explain as well is taken off."""
+        """Score once what curves of the causes found explain as well is subtracted."""
         extension, start, _ = candidate
         if id(extension) not in self.told:
             less = extension.deviance - told_from_form_errors(start, extension).deviance
@@ -126,7 +127,7 @@ class CandidateScores:
     def best(self, candidates: Sequence[Candidate]) -> tuple[float, Candidate] | None:
         """The best candidate with its score, where one is above zero.
 
-        What is taken off only lowers a score: those behind the best one need not be asked.
+        What is subtracted only lowers a score: those behind the best one need not be tested.
         """
         best: tuple[float, Candidate] | None = None
         scored = [(self.score(candidate), candidate) for candidate in candidates]
@@ -139,7 +140,7 @@ class CandidateScores:
         return best
 
     def least(self, candidates: Sequence[Candidate]) -> float:
-        """Net gain that a further candidate needs to be the best; asked after each new one."""
+        """Net gain that a further candidate needs to be the best; tested after each new one."""
         for candidate in candidates[self.seen :]:
             if self.score(candidate) > self.leading:
                 self.leading = max(self.leading, self.told_score(candidate))

@@ -30,13 +30,13 @@ CONFIRMED, NOT_CONFIRMED = "confirmed", "not_confirmed"
 #: Distance from a whole order within which a line may be that one, changing over runs.
 NEAR = 0.4
 
-#: Deviance from which on a line follows a channel: a chance of 1e-6 for two coefficients.
+#: Deviance from which on a line follows a channel: a probability of 1e-6 for two coefficients.
 FOLLOWS = 28.0
 
-#: Chance from which on a line in time is there, whatever else is.
+#: Probability from which on a line in time is there, whatever else is.
 SEEN = 1e-6
 
-#: Runs from which on the evidence of each can be asked for.
+#: Runs from which on the evidence of each can be requested.
 ENOUGH_RUNS = 4
 
 #: Resamples of runs, and the lower quantile that must lie above zero.
@@ -54,11 +54,11 @@ def confirmation_status(
 
     A cause that transfers is confirmed by a gain on held-out data whose interval excludes
     zero. One that every run draws anew has none: it must explain the noise of the runs one
-    by one. Whatever takes up what is left (`is_flexible`, causes of the scatter) is not
+    by one. Whatever explains the residual (`is_flexible`, causes of the scatter) is not
     confirmed while something is ``unexplained``, but for a line in time that a test which needs
     no name sees at the same frequency. Nor is a cause that is smaller than what is unexplained: it
     may be a part of that. A free path in time follows anything: it is noise to other causes, and
-    none itself; nor is what takes up anything confirmed beside a drift that is larger.
+    none itself; nor is what explains anything confirmed together with a drift that is larger.
     """
     effect = EFFECTS[cause]
     takes_up = is_flexible(effect) or _of_scatter(cause)
@@ -136,7 +136,7 @@ def _drift(regression: Regression) -> float:
 
 
 def _is_seen_without_a_name(regression: Regression | None, group: Sequence[int]) -> bool:
-    """Without it the surest of what is left is a line in time at its frequency."""
+    """Without it the surest of the residual is a line in time at its frequency."""
     if regression is None or not group or regression.signals.runs < 2:
         return False
     if not is_line_in_time(regression.terms[group[0]]):

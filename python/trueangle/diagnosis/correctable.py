@@ -47,7 +47,7 @@ class Correctable(PlainResult):
         Parameters
         ----------
         model : HarmonicModel, optional
-            One to extend. Without it the lines that the simulation believes, as measured, and
+            One to extend. Without it the lines that the simulation assumes, as measured, and
             those of the findings are its orders, and other findings its terms.
         runs : CalibrationRun or iterable of them, optional
             In place of those that were diagnosed.
@@ -62,13 +62,13 @@ class Correctable(PlainResult):
         Raises
         ------
         NoModelError
-            Nothing was confirmed that a corrector can take off; says why and what to measure.
+            Nothing was confirmed that a corrector can subtract; states why and what to measure.
         NotInvertibleError
             The error is too steep for a model of the true angle.
         KindError
             What is given as model is none.
         ArgumentError
-            Nothing to extend, and the diagnosis stands on the log of another simulator.
+            Nothing to extend, and the diagnosis is on the log of another simulator.
 
         Examples
         --------
@@ -98,7 +98,7 @@ class Correctable(PlainResult):
         Returns
         -------
         HarmonicModel
-            Its error stands on top of the log, where the diagnosis had one; else it is all of
+            Its error is on top of the log, where the diagnosis had one; else it is all of
             the joint's.
 
         Raises
@@ -148,7 +148,7 @@ class Correctable(PlainResult):
         )
 
     def _uncorrected(self) -> Iterator[str]:
-        """Why nothing can be taken off, and what to measure."""
+        """Why nothing can be subtracted, and what to measure."""
         sure = [f for f in self.findings if f.confirmed]
         if sure:
             why = (f"{f.cause} ({EFFECTS[f.cause].not_at_run_time or 'no term'})" for f in sure)

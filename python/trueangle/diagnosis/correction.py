@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..fitting.argument import AnyArgument
     from ..simulation.simulation import Simulation
 
-#: Causes that no corrector can take off while the joint runs, and why.
+#: Causes that no corrector can subtract while the joint runs, and why.
 NOT_AT_RUN_TIME: dict[str, str] = {
     kind: effect.not_at_run_time for kind, effect in EFFECTS.items() if effect.not_at_run_time
 }
@@ -74,7 +74,7 @@ def without_terms(
     """The runs as a joint without the model's terms would have given them.
 
     With ``φ = θ - vτ`` the reference becomes ``φ`` and the
-    indicated angle loses the terms' error there: what is left is for the harmonics.
+    indicated angle loses the terms' error there: the residual is for the harmonics.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def extend_model(
 
     Effects become terms with the simulation's parameters; lines that the model lacks
     become orders; the harmonics are fitted anew to what the terms leave, so that nothing
-    is taken off twice.
+    is subtracted twice.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def extend_model(
     NotInvertibleError
         The error is too steep for a model of the true angle.
     """
-    from ..fitting.fit import fit  # a model is asked for after most of a diagnosis, if at all
+    from ..fitting.fit import fit  # a model is requested after most of a diagnosis, if at all
 
     found = as_runs(runs)
     if argument == "auto":
@@ -194,7 +194,7 @@ def _ranges(runs: Sequence[CalibrationRun]) -> tuple[tuple[str, float, float], .
 
 
 def _argument(model: HarmonicModel | None, simulation: Simulation) -> AnyArgument:
-    """The pattern's argument: an effect may say that it is the indicated angle."""
+    """The pattern's argument: an effect may state that it is the indicated angle."""
     if any(effect.changes_argument for effect in simulation.effects):
         return "indicated"
     return "auto" if model is None else model.argument
@@ -205,7 +205,7 @@ def _shafts(
 ) -> tuple[dict[str, float], dict[str, set[int]]]:
     """Cycles and orders of the model's shafts, of ``lines`` and of those found.
 
-    A line that is no whole order of its shaft gets a shaft of its own.
+    A line that is no whole order of its shaft gets a separate shaft.
     """
     cycles = {shaft.name: shaft.cycles_per_turn for shaft in model.shafts}
     orders = {shaft.name: set(shaft.orders) for shaft in model.shafts}

@@ -83,8 +83,8 @@ def diagnose(
     or runs that inform on a parameter, and 6 for a new cause, forward and then backward;
     a further cause must also bring 0.1 % of what the others explain, as no form is exact;
     correlated noise is whitened, outliers are clipped at four standard deviations,
-    and errors drawn anew in every run enter as random effects. What the design of the
-    runs cannot tell apart is worked out first and not named.
+    and errors sampled anew in every run enter as random effects. What the design of the
+    runs cannot separate is worked out first and not named.
 
     Parameters
     ----------
@@ -92,17 +92,18 @@ def diagnose(
         Time, velocity, torque, temperature and mount where known; files, folders, patterns and
         tables in memory as `trueangle.read_runs` takes them.
     sim : Simulation, optional
-        What is believed; may be left out where there is a log.
+        The assumed model; may be held out where there is a log.
     simulated : path, table, iterable of CalibrationRun or MeasuredMinusSimulated, optional
-        What any other simulator says of the same motion (`trueangle.runs.joining.minus_simulated`):
-        it is taken off the readings, and ``sim`` and its extension stand on top of it. Where
-        both have the torque of the drive, that is accounted for as well (`Diagnosis.torque`).
+        What any other simulator states about the same motion
+        (`trueangle.runs.joining.minus_simulated`): it is subtracted from the readings, and ``sim``
+        and its extension are on top of it. Where both have the torque of the drive, that is
+        accounted for as well (`Diagnosis.torque`).
     gain : bool
         Measure the gain on held-out runs (about half of the time).
     within : float, optional
         Seconds that it may take. By itself work is counted and no clock looked at, so that the
         same readings give the same account on any machine, however busy; ordinary ones need a
-        third of what may be done. When either is up, the account so far is given and says that
+        third of what may be done. When either is up, the account so far is given and states that
         it is incomplete (`Diagnosis.complete`, ``notes``): causes may be missing, and what was
         not held out is not confirmed. Seven tenths of the time are for the choice of causes.
     progress : {"none", "auto", "text", "json"}
@@ -124,8 +125,8 @@ def diagnose(
     Notes
     -----
     Readings at a turning point, where the joint turned and has not moved, take no part: which way
-    they were reached is not known. Up to 40 000 readings are used; of more, one of every so many
-    in a row is drawn at random (seed 0), which keeps the angles free of a grid. About 0.4 to
+    they were reached is not known. Up to 40 000 readings are used; of more, one of every this many
+    in a row is sampled at random (seed 0), which keeps the angles free of a grid. About 0.4 to
     1.5 s for 10 000 readings, on one processor: numpy's own threads are stopped meanwhile.
     Source: Frisch-Waugh projection; Schwarz (1978) and Kass and Wasserman (1995) for the
     penalty; Koenker (1981) for the variance.
@@ -303,7 +304,7 @@ def _ratio_finding(ratio: GearedLinesRatio) -> Finding:
 
 
 def _structure(start: Regression) -> dict[str, float]:
-    """Share of the readings' variance that each cause takes up alone, largest first."""
+    """Share of the readings' variance that each cause explains alone, largest first."""
     before = start.left_within_runs
     alone = {}
     for cause in EFFECTS:
@@ -316,14 +317,14 @@ def _structure(start: Regression) -> dict[str, float]:
 
 
 def _noise(chosen: Regression, rest: Unexplained) -> float:
-    """Standard deviation of one reading: what is left, where all that is left is noise."""
+    """Standard deviation of one reading: the residual, where all that is left is noise."""
     if rest.found or int(np.count_nonzero(~chosen.outlying)) <= chosen.rank:
         return float(np.hypot(rest.noise.sigma, rounding_of(chosen)))
     return float(np.sqrt(chosen.variance_within_runs))
 
 
 def _overall(before: Regression, after: Regression) -> dict[str, float]:
-    """rms, peak-to-peak and max abs without and with all findings, fitted alike."""
+    """rms, peak-to-peak and max abs without and with all findings, fitted in the same way."""
     numbers = {}
     for name, regression in (("before", before), ("after", after)):
         left = regression.left_within_runs

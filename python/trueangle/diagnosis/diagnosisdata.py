@@ -1,4 +1,4 @@
-"""What a diagnosis holds, what follows from it, and the runs that would tell what is open."""
+"""What a diagnosis holds, what follows from it, and the runs that would show what is open."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ class DiagnosisData(Correctable):
 
     @property
     def is_enough(self) -> bool:
-        """The simulation is enough: no finding, nothing unexplained, every belief confirmed.
+        """The simulation is enough: no finding, nothing unexplained, every assumed model confirmed.
 
-        An account that was ended early does not tell.
+        An account that was ended early does not show.
         """
         return (
             self.complete
@@ -71,7 +71,7 @@ class DiagnosisData(Correctable):
     def simulation(self) -> Simulation:
         """`extended`, with the noise of the readings and designs of their runs.
 
-        Both stand where the simulation states none: `trueangle.simulate` repeats the
+        Both are where the simulation states none: `trueangle.simulate` repeats the
         measurement then. What an extended simulation is written as.
 
         Examples
@@ -93,14 +93,14 @@ class DiagnosisData(Correctable):
     def plan(
         self, limits: Limits | None = None, *, between: Sequence[str] | None = None
     ) -> NextRuns:
-        """The runs that would tell what is open (`trueangle.planning.planner.next_runs`).
+        """The runs that would show what is open (`trueangle.planning.planner.next_runs`).
 
         Parameters
         ----------
         limits : Limits, optional
             What a run may be; by default much as those there are.
         between : sequence of str, optional
-            Causes to be told apart in place of what is open.
+            Causes to be separated in place of what is open.
 
         Returns
         -------
@@ -129,7 +129,7 @@ class DiagnosisData(Correctable):
 
     @cached_property
     def next_runs(self) -> NextRuns | None:
-        """The runs that would tell what is seen and not told, as `plan` has them by default.
+        """The runs that would separate what is detected, as `plan` has them by default.
 
         None where nothing is, or the account was ended early.
         """
@@ -152,7 +152,7 @@ class DiagnosisData(Correctable):
         return replace(self.extended, effects=tuple(kept))
 
     def _between(self, causes: tuple[str, ...]) -> tuple[Simulation, list[Ambiguity]]:
-        """What is believed without these causes, and the question which of them it is."""
+        """The assumed model without these causes, and the question which of them it is."""
         for spot in self.not_identifiable:
             if spot.supported and set(causes) <= set(spot.causes):
                 return self._without_open(), [replace(spot, causes=causes)]

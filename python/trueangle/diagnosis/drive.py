@@ -5,7 +5,7 @@
     τ_measured - τ_simulated = F sgn θ̇ + d θ̇ - Σ_m T_m sin(mθ + φ_m) + n
 
 It is diagnosed like an error of the angle: a line is a ripple, what follows the direction dry
-friction, what follows the velocity damping. A simulator has elements of its own for them.
+friction, what follows the velocity damping. A simulator has separate elements for them.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def diagnose_drive(
     Parameters
     ----------
     joined : MeasuredMinusSimulated
-        Says how the log was joined to the readings.
+        States how the log was joined to the readings.
     measured : sequence of CalibrationRun
     diagnosed : callable
         Diagnoses runs whose error is the torque.

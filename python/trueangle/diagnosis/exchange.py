@@ -1,8 +1,8 @@
 """Exchange causes of an account, one for another or for none, while that explains more.
 
-Forward and backward steps see one change at a time; what a cause is worth beside others, and which
-readings are outliers, may look otherwise once it is replaced. Of two that overlap, the first was
-chosen while it stood for both: over a part of a turn orders 6 and 7 for 5.
+Forward and backward steps see one change at a time; the gain of a cause together with others, and
+which readings are outliers, may look otherwise once it is replaced. Of two that overlap, the first
+was chosen while it represented both: over a part of a turn orders 6 and 7 for 5.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from .unnamed import is_named
 #: are implausible together, that would take as long as the whole choice.
 MOST_EXCHANGES, LOOKED_AT = 3, 2
 
-#: Pairs that are exchanged at most, and the correlation beside all else from which on a pair is
-#: tried: half of what one explains the other could.
+#: Pairs that are exchanged at most, and the correlation together with all else from which on a pair
+#: is tried: half of what one explains the other could.
 MOST_PAIRS, OVERLAP = 6, 0.5
 
 #: Criterion by which another account must be better: nothing worth more than a bare mention.
@@ -29,7 +29,7 @@ BETTER = 2.0
 
 
 def exchanged_causes(regression: Regression) -> Regression:
-    """The account of which no cause is better left out, or replaced by another one.
+    """The account of which no cause is better held out, or replaced by another one.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _better(regression: Regression) -> Regression | None:
         if len(groups) > LOOKED_AT:
             continue
         own = regression.terms[group[0]].cause
-        # What takes up anything explains more than any law, and is none.
+        # What explains anything explains more than any law, and is none.
         others = [
             name for name, effect in EFFECTS.items() if not (name == own or is_flexible(effect))
         ]
@@ -102,9 +102,9 @@ def _better(regression: Regression) -> Regression | None:
 
 
 def _reshaped(regression: Regression) -> Regression:
-    """With causes whose form follows what is beside them in the form that they have now.
+    """With causes whose form follows what is with them in the form that they have now.
 
-    What was chosen, or dropped, since may have stood for a part of one: a delay for the constant
+    What was chosen, or dropped, since may have represented a part of one: a delay for the constant
     part of channels that are read one after the other, which leaves their line with another sign.
     """
     for term in regression.terms:

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..effects import EFFECTS, Effect
 from ..estimation.quantity import Parameters, Quantity
-from ..support.display_units import ErrorUnit, error_unit, significant_digits, sine_of_rms
+from ..support.display_units import ErrorUnit, error_unit, sine_of_rms
 from ..support.layout import wrapped_lines
 from ..support.plainresult import ShownResult
 from .confirmation import CONFIRMED
@@ -30,8 +30,8 @@ _SHUFFLED = {
 #: Numbers that are no errors, which `ErrorUnit.pair` rounds as well.
 _PLAIN = ErrorUnit("", 1.0)
 
-#: Parameters that say how large a finding is, the first that it has; by how much it is multiplied,
-#: and its unit where that is not the unit of errors.
+#: Parameters that state how large a finding is, the first that it has; by how much it is
+#: multiplied, and its unit where that is not the unit of errors.
 _SIZED: dict[str, tuple[float, str]] = {
     **{
         f"{name}_arcsec": (1.0, "")
@@ -49,7 +49,7 @@ _SIZED: dict[str, tuple[float, str]] = {
     "gear_ratio": (1.0, "is the ratio"),
 }
 
-#: Where or of what a finding is, by the parameters that say so.
+#: Where or of what a finding is, by the parameters that report it.
 _PLACES = {
     "order": "order {:g}",
     "carrier": "of order {:g}",
@@ -194,7 +194,7 @@ def _by_level(gain: LevelGain, unit: ErrorUnit) -> str:
 
 def parameter_unit(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
     """What a parameter is called in ``unit``, and the unit that it is shown in."""
-    # The amplitudes of several lines, whose name says no unit.
+    # The amplitudes of several lines, whose name states no unit.
     name = "amplitudes_arcsec" if name == "amplitudes" else name
     stem = name.removesuffix("_arcsec")
     return (name, _PLAIN) if stem == name else (f"{stem}_{unit.name}", unit)
@@ -238,7 +238,8 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
         sizes = [float(x) for x in numbers if isinstance(x, int | float)]
         if not sizes or len(sizes) < len(numbers):
             continue
-        shown = [significant_digits(factor * x, 4) if word else unit.number(x) for x in sizes[:4]]
-        more = " ..." if len(sizes) > len(shown) else ""
-        return f"{name} ({', '.join(shown)}{more} {word or unit.name})"
+        std = finding.parameters[parameter].std
+        stds = std if isinstance(std, list) else [std] * len(sizes)
+        shown = [*map((ErrorUnit(word, factor) if word else unit).number, sizes[:4], stds)]
+        return f"{name} ({', '.join(shown)}{' ...' * (len(sizes) > 4)} {word or unit.name})"
     return name

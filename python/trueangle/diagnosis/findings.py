@@ -35,7 +35,7 @@ NOT_HELD_OUT = "the account was ended before its gain on the readings held out w
 def findings_of(
     regression: Regression, spots: list[Ambiguity], with_gain: bool, unexplained: Unexplained
 ) -> tuple[list[Finding], list[Ambiguity], list[int]]:
-    """Findings of the chosen terms; those in doubt become entries of what is not told.
+    """Findings of the chosen terms; uncertain ones become entries of ``not_identifiable``.
 
     Also given are the indices of the terms of findings that are not confirmed, but for those
     that are one column with another finding: together the two explain what they do.
@@ -51,7 +51,7 @@ def findings_of(
         evidence = sum(regression.terms[k].bic_gain for k in group)
         if doubt is None:
             named.append(group)
-            # What sets it apart from the common form was seen after all.
+            # What sets it apart from the common form was detected after all.
             cause = regression.terms[group[0]].cause
             spots = [spot for spot in spots if not (spot.common and spot.hides(cause))]
             origins[group[0]] = [
@@ -202,7 +202,7 @@ def equal_scatter(item: ScatterFinding) -> Ambiguity | None:
 
 
 def scatter_doubt(item: ScatterFinding, fault: DataFault | None = None) -> Ambiguity:
-    """Scatter about a mean that is itself in doubt, or of readings that a fault has spoilt."""
+    """Scatter about a mean that is itself uncertain, or of readings that a fault made unusable."""
     because, measure = (
         "the error that the readings show has no certain cause yet, so what scatters about it "
         "has none either",

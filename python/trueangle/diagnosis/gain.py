@@ -50,11 +50,11 @@ class Gain(ShownResult):
     interval : (float, float) or None
         95 % of its bootstrap over runs.
     control_share : float or None
-        What is gained with the factor's labels shuffled over runs, of what the finding takes
-        off the same readings: should be at most 0 (given as -1 where it is below).
+        What is gained with the factor's labels shuffled over runs, of what the finding
+        subtracts from the same readings: should be at most 0 (given as -1 where it is below).
     note : str
     by_level : LevelGain or None
-        The same with whole levels of the cause's factor left out (all runs at one speed,
+        The same with whole levels of the cause's factor held out (all runs at one speed,
         temperature, load or mount); None where the cause has no such factor or it did
         not change from run to run.
     """
@@ -87,9 +87,9 @@ class Gain(ShownResult):
 
 
 def _acts_within(regression: Regression, before: Array, after: Array) -> bool:
-    """Whether zeros of the runs make most of an error, and less of what a finding takes off it.
+    """Whether zeros of the runs make most of an error, and less of what a finding subtracts it.
 
-    A pattern is then judged about the zero of each run: no pattern can take that off.
+    A pattern is then judged about the zero of each run: no pattern can subtract that.
     """
     clean = ~regression.outlying
     whole, taken = (
@@ -100,7 +100,7 @@ def _acts_within(regression: Regression, before: Array, after: Array) -> bool:
 
 
 def _about_zeros(regression: Regression, e: Array) -> Array:
-    """Residuals about the mean of each run, outliers left out of it."""
+    """Residuals about the mean of each run, outliers held out of it."""
     found = e.copy()
     for start, stop in regression.bounds:
         used = ~regression.outlying[start:stop]
@@ -109,12 +109,12 @@ def _about_zeros(regression: Regression, e: Array) -> Array:
 
 
 def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> list[Gain] | None:
-    """Gain of every finding (its terms' indices) beside the others, by leaving out runs.
+    """Gain of every finding (its terms' indices) together with the others, by holding out runs.
 
     In every fold the model is fitted to the other runs alone, and what was searched for
     (orders, lengths, places) is searched there again, for the first `SEARCHED` findings.
-    A single run is left out in stretches of its record. Causes of a factor with levels
-    are measured on left out levels as well. None where the time is up before
+    A single run is held out in segments of its record. Causes of a factor with levels
+    are measured on held-out levels as well. None where the time is up before
     (`trueangle.support.deadline`).
     """
     rng = np.random.default_rng(_SEED)
@@ -195,10 +195,10 @@ def measure_belief_gains(
     columns: Sequence[slice],
     changes: Sequence[tuple[Array, Array]] = (),
 ) -> list[Gain]:
-    """Gain of measured lines and effects in place of believed ones, by leaving out runs.
+    """Gain of measured lines and effects in place of assumed ones, by holding out runs.
 
     ``columns`` are those of the lines among the regressors of the simulation's own pattern;
-    ``changes`` are the errors of effects as believed and as measured, at every reading. The
+    ``changes`` are the errors of effects as assumed and as measured, at every reading. The
     strength of an effect is measured again in the other runs.
     """
     rng = np.random.default_rng(_SEED)
@@ -272,13 +272,13 @@ def _units(regression: Regression) -> tuple[NDArray[np.int64], str]:
 def _control(
     regression: Regression, group: Sequence[int], unit: NDArray[np.int64], rng: np.random.Generator
 ) -> float:
-    """Share of what the finding takes off that it gains with its labels shuffled over runs."""
+    """Share of what the finding subtracts that it gains with its labels shuffled over runs."""
     cause = regression.terms[group[0]].cause
     rest = regression.with_terms(t for k, t in enumerate(regression.terms) if k not in group)
     y = _within_runs(rest, regression.outlying)
     test = unit % 2 == 0
-    # What the finding takes off the same readings: against the variance of all readings the
-    # scatter of one half would stand in the denominator of a small finding.
+    # What the finding subtracts from the same readings: against the variance of all readings the
+    # scatter of one half would be in the denominator of a small finding.
     reducible = np.mean(y[test] ** 2 - _within_runs(regression, regression.outlying)[test] ** 2)
     least = 1e-3 * regression.variance
     shares = []
@@ -303,7 +303,7 @@ def _control(
 
 
 def _within_runs(regression: Regression, outlying: NDArray[np.bool_]) -> Array:
-    """What is left of the readings beside the zeros of their runs."""
+    """The residual of the readings together with the zeros of their runs."""
     left = regression.left_within_runs
     return np.where(outlying, 0.0, left)
 

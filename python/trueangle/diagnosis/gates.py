@@ -27,7 +27,7 @@ from .penalty import regression_without
 #: Standard errors by which the size of a cause must differ from zero.
 TOLD = 2.0
 
-#: Share of what can be taken off at a level left out above which more is taken than left.
+#: Share of what can be subtracted at a level held out above which more is taken than left.
 MORE_THAN_LEFT = 0.5
 
 #: Parts of the travel, of equally many readings, in each of which a ramp must be found again, and
@@ -53,7 +53,7 @@ FOLLOWED = {
 
 
 def _not_carried(finding: Finding) -> str:
-    """A law that does not carry over to a level of its factor that was left out.
+    """A law that does not carry over to a level of its factor that was held out.
 
     Nothing is gained there for certain, or more is left than taken: another law.
     """
@@ -103,10 +103,10 @@ def _against_friction(finding: Finding) -> str:
 
 
 def _not_in_every_part(regression: Regression, finding: Finding) -> str:
-    """A ramp whose slope over the rest of its travel does not carry over to a part of it.
+    """A ramp whose slope over the remainder of its travel does not carry over to a part.
 
-    A ratio is wrong at every angle alike. What rises for a while and then stays (a wide hysteresis,
-    a creep) is another law, of which the ramp is the mean.
+    A ratio is equally wrong at every angle. What rises for a while and then stays (a wide
+    hysteresis, a creep) is another law, of which the ramp is the mean.
     """
     if finding.cause != ScaleError.kind or not finding.group:
         return ""
@@ -138,7 +138,7 @@ def _not_in_every_part(regression: Regression, finding: Finding) -> str:
 def not_the_only_ratio(finding: Finding) -> str:
     """A ratio that is one of several with the same lines at these positions.
 
-    The nearest to the believed one is the likeliest, but nothing of the readings says so, and
+    The nearest to the assumed one is the likeliest, but the readings do not show it, and
     between the positions each has other lines.
     """
     aliases = finding.parameters.get("aliases")
@@ -168,7 +168,7 @@ assert _NOUNS.keys() == UNITS.keys()
 def gated_findings(
     regression: Regression, findings: Sequence[Finding]
 ) -> tuple[list[Finding], list[Ambiguity], set[int]]:
-    """Findings as the gates leave them, the pairs that are not told apart, and their terms."""
+    """Findings as the gates leave them, the pairs that are not separated, and their terms."""
     found = []
     for finding in findings:
         reason = ""
@@ -194,7 +194,7 @@ def alike_columns(
 ) -> Iterator[tuple[int, int, float]]:
     """Pairs of confirmed findings that add nearly one column to all else; their correlation.
 
-    Of what each explains, beside the terms of neither (`trueangle.diagnosis.overlap`).
+    Of what each explains, together with the terms of neither (`trueangle.diagnosis.overlap`).
     """
     confirmed = [k for k, finding in enumerate(findings) if finding.confirmed]
     for i, j, found in finding_overlaps(regression, [findings[k].group for k in confirmed]):

@@ -50,14 +50,14 @@ MOST_READINGS = 6_000
 
 @dataclass(frozen=True)
 class GearedLinesRatio:
-    """A gear ratio that the readings show in place of the believed one.
+    """A gear ratio that the readings show in place of the assumed one.
 
     Attributes
     ----------
     gear_ratio, std : float
     believed : float
     found, left : float
-        Share of the believed power of the geared lines at this ratio, and at the believed.
+        Share of the assumed power of the geared lines at this ratio, and at the assumed.
     simulation : Simulation
         The simulation with this ratio.
     alike : tuple of float
@@ -120,7 +120,7 @@ class GearedLines:
 
     @property
     def step(self) -> float:
-        """Step of ratios that the travel of a run tells apart several times over."""
+        """Step of ratios that the travel of a run separates several times over."""
         top = max(float(line.order) for line in self.lines)
         return 1.0 / (OVERSAMPLING * self.turns * top)
 
@@ -130,7 +130,7 @@ class GearedLines:
         return [joint.output_order(line.shaft, line.order) for line in self.lines]
 
     def share(self, ratio: float) -> float:
-        """Share of the believed power that the lines have at a ratio."""
+        """Share of the assumed power that the lines have at a ratio."""
         starts = np.array([start for start, _ in self.bounds])
         sizes = np.array([stop - start for start, stop in self.bounds], dtype=np.float64)
         total = wanted = 0.0
@@ -138,7 +138,7 @@ class GearedLines:
             z = np.add.reduceat(self.y * np.exp(-1j * order * self.theta), starts)
             believed = line.amplitude_arcsec**2
             power = 4.0 * np.abs(z) ** 2 / sizes
-            # More than is believed counts as much as is believed.
+            # More than is assumed counts as much as is assumed.
             total += float(np.minimum(power, sizes * believed).sum())
             wanted += float(sizes.sum()) * believed
         return total / wanted
@@ -159,7 +159,7 @@ class GearedLines:
         return float(self.shares(ratio) @ self._believed / self._believed.sum())
 
     def out_of_step(self, common: bool) -> float:
-        """Standard errors by which the lines fall out of step at the believed ratio."""
+        """Standard errors by which the lines fall out of step at the assumed ratio."""
         departure, std = self._departure(self.sim.joint.gear_ratio, common)
         return departure / std if std else 0.0
 
@@ -222,7 +222,7 @@ class GearedLines:
         return self.refined(best, common=True, width=step)
 
     def left(self, ratio: float, common: bool) -> float:
-        """Sum of squares left beside the lines: one phase for all runs, or one for each."""
+        """Sum of squares left together with the lines: one phase for all runs, or one for each."""
         columns = np.hstack([line_columns(self.theta, m) for m in sorted(set(self.orders(ratio)))])
         known, error = self._centred(columns), self._error
         left = 0.0
@@ -233,14 +233,14 @@ class GearedLines:
         return left
 
     def keeps_phase(self, ratio: float) -> bool:
-        """Phases of each run's own explain no more than noise does beside one for all."""
+        """Separate phases of each run explain at most what noise does, jointly with one for all."""
         apart = self.left(ratio, common=False)
         more = self.left(ratio, common=True) / max(apart, 1e-300) - 1.0
         extra = 2.0 * len(self.lines) * (len(self.bounds) - 1)
         return bool(self.y.size * more < extra + STEADY * np.sqrt(2.0 * extra))
 
     def at(self, ratio: float, common: bool) -> GearedLinesRatio:
-        """What is known of a ratio, by phases common to all runs or not."""
+        """What is known about a ratio, by phases common to all runs or not."""
         believed = self.sim.joint.gear_ratio
         sim = replace(self.sim, joint=replace(self.sim.joint, gear_ratio=ratio))
         _, std = self._departure(ratio, common)

@@ -1,4 +1,4 @@
-"""One hypothesis for a wrong gear ratio: all lines of the geared shafts stand elsewhere.
+"""One hypothesis for a wrong gear ratio: all lines of the geared shafts are elsewhere.
 
 Where the lines that the simulation claims of motor and wave generator are not in the readings,
 the ratio is searched that brings all of them together (`find_ratio`). One that is wrong by less
@@ -18,12 +18,12 @@ from ..simulation.simulation import Simulation
 from ..support.arrays import Array
 from .gearedlines import OVERSAMPLING, PLAIN, GearedLines, GearedLinesRatio, gear_denominators
 
-#: Share of the believed lines up to which they are missing at the believed ratio, and share of
+#: Share of the assumed lines up to which they are missing at the assumed ratio, and share of
 #: their power that must be found at another one for that to be the ratio: where less is found,
 #: further lines would make it up.
 MISSING, FOUND = 0.5, 0.9
 
-#: Ratios searched: within this share of the believed one.
+#: Ratios searched: within this share of the assumed one.
 REACH = 0.25
 
 #: Standard errors from which on a near ratio is tried at all. Correlated noise and other causes
@@ -38,15 +38,16 @@ ANOTHER_TURN = 9.0
 
 
 def find_ratio(geared: GearedLines) -> GearedLinesRatio | None:
-    """The gear ratio at which the believed lines are, where they are not at the believed one.
+    """The gear ratio at which the assumed lines are, where they are not at the assumed one.
 
-    None where the believed lines are where they should be, or nowhere. At even steps several
-    ratios give the same numbers: the nearest to the believed one is meant, and the others are told.
+    None where the assumed lines are where they should be, or nowhere. At even steps several
+    ratios give the same numbers: the nearest to the assumed one is meant, and the others are
+    reported.
     """
     believed = geared.sim.joint.gear_ratio
-    # Each line counts alike: where one is believed another may stand, of the wave generator where
-    # the motor's is believed if the ratio is a tooth less. Next to a large line a small one is
-    # found in any case: the large one tells.
+    # Each line counts alike: where one is assumed another may be, of the wave generator where
+    # the motor's is assumed if the ratio is a tooth less. Next to a large line a small one is
+    # found in any case: the large one shows.
     there = float(np.mean(geared.shares(believed)))
     if there > MISSING and geared.together(believed) > MISSING:
         return None
@@ -79,9 +80,9 @@ def _alike(geared: GearedLines, trials: Array, shares: Array, best: float) -> li
 
 
 def near_ratio(geared: GearedLines) -> GearedLinesRatio | None:
-    """A ratio near the believed one at which the geared lines stay in step, to be tried.
+    """A ratio near the assumed one at which the geared lines stay in step, to be tried.
 
-    None where they stay in step at the believed ratio, or are not there.
+    None where they stay in step at the assumed ratio, or are not there.
     """
     believed = geared.sim.joint.gear_ratio
     apart, together = (abs(geared.out_of_step(common)) > OUT_OF_STEP for common in (False, True))
@@ -97,10 +98,10 @@ def near_ratio(geared: GearedLines) -> GearedLinesRatio | None:
 
 
 def signals_at_ratio(sim: Simulation, signals: Signals, error: Array) -> Signals:
-    """Signals whose runs start in the turn in which the geared lines have the believed phase.
+    """Signals whose runs start in the turn in which the geared lines have the assumed phase.
 
     Where the ratio is not a whole number the lines come back after several turns of the output
-    only, and a reference that was wrapped does not say in which of them a run began.
+    only, and a reference that was wrapped does not state in which of them a run began.
     """
     turns = _turns_until_back(sim.joint.gear_ratio)
     if turns == 1:

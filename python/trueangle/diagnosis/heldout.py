@@ -9,7 +9,7 @@ from ..simulation import Simulation
 from .correction import without_terms
 from .diagnose import diagnose
 
-#: Most diagnoses: with more runs several are left out together.
+#: Most diagnoses: with more runs several are held out together.
 MOST_DIAGNOSES = 3
 
 
@@ -21,7 +21,7 @@ def hold_out_extended(fit: FitResult, sim: Simulation) -> HeldOut:
     Raises
     ------
     ArgumentError
-        One run only, or none that can be left out.
+        One run only, or none that can be held out.
     """
     runs = fit.runs
     if len(runs) < 2:

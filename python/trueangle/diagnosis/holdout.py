@@ -58,12 +58,12 @@ def held_out_residuals(
 
 @dataclass(frozen=True)
 class HoldOutModel:
-    """What a fit says of readings that it has not seen.
+    """What a fit states about readings that it was not fitted to.
 
     Attributes
     ----------
     base : ndarray
-        Coefficients of the zero and of the lines that the simulation believes.
+        Coefficients of the zero and of the lines that the simulation assumes.
     terms : list of (Extension, ndarray)
         With their coefficients.
     around : Surroundings
@@ -131,7 +131,7 @@ def residual_at_held_out(
 ) -> Array:
     """Residual at other readings: lines and every regressor that can be rebuilt there.
 
-    ``base`` are the columns of the zero and of the believed lines; ``columns`` keeps those that
+    ``base`` are the columns of the zero and of the assumed lines; ``columns`` keeps those that
     follow from the motion alone, for other laws of these readings.
     """
     columns = {} if columns is None else columns
@@ -154,10 +154,10 @@ def reducible_share(
 ) -> tuple[float, tuple[float, float]]:
     """Reducible share and its bootstrap interval over the units held out.
 
-    A draw without any unit that shows more than noise has nothing to take off, and no share: loads
+    A draw without any unit that shows more than noise has nothing to subtract, and no share: loads
     in two of four runs are in all but 6 % of the draws.
     """
-    _, unit = np.unique(unit, return_inverse=True)  # a run all of outliers says nothing
+    _, unit = np.unique(unit, return_inverse=True)  # a run all of outliers contains nothing
     count = np.bincount(unit).astype(np.float64)
     power0 = np.bincount(unit, weights=before**2)
     power1 = np.bincount(unit, weights=after**2)

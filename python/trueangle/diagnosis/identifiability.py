@@ -1,4 +1,4 @@
-"""Which causes this design of runs can tell apart, and which origins stay open, before any name."""
+"""Which causes this design of runs can separate, and which origins stay open, before any name."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def ambiguity_of_cause(
     """The reason not to name a supported cause, or None.
 
     Where all that it may be have one form, and it is that, only its origin is open
-    (`open_origins`): what is seen has a size, and is named.
+    (`open_origins`): what is detected has a size, and is named.
     """
     cause = extension.cause
     if effect_or_unnamed(cause).is_doubted:
         for spot in spots:
-            # What is seen of a crossing is none of a delay.
+            # What is detected of a crossing is none of a delay.
             may_be_told = spot.common or "turns_first" in extension.shape
             if spot.hides(cause) and not (
                 may_be_told and effect_or_unnamed(cause).told(extension, regression)
@@ -53,7 +53,7 @@ def open_origins(
     """What else may make an error of this form, in the order of `DOUBTS`."""
     cause = extension.cause
     shared = (spot for spot in spots if spot.common == cause and cause in spot.causes)
-    # What is supported already is told of another finding.
+    # What is supported already is reported of another finding.
     found = [spot for spot in shared if not spot.supported]
     for doubt in _doubts(extension, regression, spots):
         if doubt.common == cause and doubt not in found:
@@ -81,7 +81,7 @@ def _doubts(
 
 
 def in_common_form(regression: Regression, spots: Sequence[Ambiguity]) -> Regression:
-    """The regression with the common form in place of causes that are not told apart.
+    """The regression with the common form in place of causes that are not separated.
 
     A reversal error may be play or a spring, a ramp the ratio's or a clock's: which of them is
     open, but not that it is there, nor its size for motion like this.

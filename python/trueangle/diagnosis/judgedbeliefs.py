@@ -1,4 +1,4 @@
-"""The lines and effects that a simulation claims, held against the readings."""
+"""The lines and effects that a simulation claims, compared with the readings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
 from .unnamed import effect_or_unnamed
 
-#: Fields of effects, beside those in arcsec, that their signal is proportional to.
+#: Fields of effects, together with those in arcsec, that their signal is proportional to.
 LINEAR = ("delay_s", "relative_error", "pattern_per_K", "coefficient")
 
 #: Departure of a scaled effect's signal from the scaled signal, of its largest value.
@@ -60,8 +60,8 @@ def effects_as_measured(
 ) -> Simulation | None:
     """The simulation with the strength of one refuted effect as measured; None where none is.
 
-    A term of the same cause counts with it, and so does one that these runs cannot tell from it
-    (``spots``): a correction of a belief is no further cause.
+    A term of the same cause counts with it, and so does one that these runs cannot distinguish from
+    it (``spots``): a correction of an assumed value is no further cause.
     """
     signals, around = regression.signals, sim.surroundings
     worst: tuple[float, Simulation] | None = None
@@ -94,7 +94,7 @@ def effects_as_measured(
 
 
 def _factor(regression: Regression, column: Array) -> tuple[float, float] | None:
-    """How many times a column is in the readings beside all else, and its standard error."""
+    """How many times a column is in the readings together with all else, and its standard error."""
     if not np.any(column) or float(np.abs(column).max()) < ROUNDING:
         return None
     x, excited = regression.projected(column[:, None])
@@ -114,7 +114,7 @@ def judged_beliefs(
     """Verdicts on every line and effect, and the simulation with refuted ones as measured.
 
     Lines that something else acts on, or that may hide behind another cause in these runs,
-    are not judged; the latter become entries of what cannot be told.
+    are not judged; the latter become entries of what cannot be determined.
     """
     lines, harmonics = _lines(regression, sim, spots, with_gain)
     effects: list[Belief] = []
@@ -202,7 +202,7 @@ def _doubt(
 ) -> bool:
     """Whether a line may be another one behind the positions.
 
-    That, or what else may have changed it, is then told among ``spots``.
+    That, or what else may have changed it, is then reported among ``spots``.
     """
     log_grid = float(np.log(regression.belief.pattern.orders.size))
     extension = Extension(

@@ -1,4 +1,4 @@
-"""Gain of findings at levels of their factor that were left out as a whole.
+"""Gain of findings at levels of their factor that were held out as a whole.
 
 The speeds, temperatures, loads and mounts at which runs were made.
 """
@@ -50,7 +50,7 @@ LEAST_CARRIED, LEAST_SHOWN = 9.0, 100.0
 
 @dataclass(frozen=True)
 class LevelGain:
-    """What a finding gains at a level of its factor that was left out as a whole.
+    """What a finding gains at a level of its factor that was held out as a whole.
 
     Attributes
     ----------
@@ -58,9 +58,9 @@ class LevelGain:
     levels : list of float
         Every level of the factor in the data.
     held_out : list of float
-        Those that were left out in turn; none where the rest never shows the cause alone.
+        Those that were held out in turn; none where the remainder never shows the cause alone.
     rms_before, rms_after : float or None
-        Arcsec at the levels left out, together.
+        Arcsec at the levels held out, together.
     reducible_share : float or None
     interval : (float, float) or None
         95 % of its bootstrap over runs.
@@ -157,9 +157,9 @@ def gains_by_level(
     unit: NDArray[np.int64],
     rng: np.random.Generator,
 ) -> dict[int, LevelGain]:
-    """Gain of the findings (by their place) at levels of their factor that were left out.
+    """Gain of the findings (by their place) at levels of their factor that were held out.
 
-    Of a factor whose levels were not all asked when the time was up, nothing is said.
+    Of a factor whose levels were not all tested when the time was up, nothing is reported.
     """
     found: dict[int, LevelGain] = {}
     at = current_deadline()
@@ -174,7 +174,7 @@ def gains_by_level(
         if split is None:
             continue
         level, values = split
-        # With the finding and without it at every level left out; NaN where it cannot be.
+        # With the finding and without it at every level held out; NaN where it cannot be.
         left = np.full((len(concerned), 2, regression.n), np.nan)
         for j in range(len(values)):
             at.at(f"holding out levels of {factor}", j, len(values))
@@ -184,7 +184,7 @@ def gains_by_level(
             able = [k for k in concerned if _is_tested_by(regression, groups[k], test)]
             if not able:
                 continue
-            # Two mounts do not tell which way a mount counts: what all tell is kept.
+            # Two mounts do not show which way a mount counts: what all show is kept.
             after, *before = held_out_residuals(
                 regression, [groups[k] for k in able], test, own_zero, search=factor != "mount"
             )
@@ -230,7 +230,7 @@ def _reach(levels: list[float], held_out: list[float]) -> str:
 def _is_tested_by(regression: Regression, group: Sequence[int], test: Rows) -> bool:
     """Leaving some readings out tests the law of a finding.
 
-    The others tell it from all else, and well enough to say what it does in those left out; and
+    The others distinguish it from all else, and well enough to predict it in those held out; and
     there it shows.
     """
     train = regression.of_rows(~test)

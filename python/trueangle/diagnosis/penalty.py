@@ -52,7 +52,7 @@ def _exact_terms(regression: Regression) -> list[Extension]:
 def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
     """As `form_misfit`, by how much smaller the readings' scatter has become.
 
-    Correlated noise takes up a part of what is not yet explained, and hides it from a likelihood.
+    Correlated noise explains a part of what is not yet explained, and hides it from a likelihood.
     """
     exact = _exact_terms(chosen)
     before, after = (
@@ -64,7 +64,7 @@ def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
 
 
 def deviance_of_form_errors(deviance: float, readings: int) -> float:
-    """Deviance of a share of the energy that a deviance stands for.
+    """Deviance of a share of the energy that a deviance represents.
 
     n readings of noise 1 with an error of energy n E give a deviance of
     ``n ln(1 + E)``; `FORM` of that energy one of ``n ln(1 + FORM E)``.
@@ -75,7 +75,7 @@ def deviance_of_form_errors(deviance: float, readings: int) -> float:
 
 def penalty_of(terms: Sequence[Extension], left: float) -> float:
     """Of causes beyond that of their parameters; their forms may leave ``left``."""
-    # A line of a declared shaft is expected, and stands where it was said to stand.
+    # A line of a declared shaft is expected, and is where it was reported to be.
     declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
     effects = [effect_or_unnamed(term.cause) for term in terms]
     separate = [effect for effect in effects if effect.is_separate]
@@ -119,7 +119,7 @@ def net_deviance_lost(regression: Regression, group: Sequence[int]) -> float:
 
 
 def deviance_lost(regression: Regression, group: Sequence[int]) -> float:
-    """Deviance that the terms ``group`` save beside all the others (Wald, or without them)."""
+    """Deviance that the terms ``group`` save with all the others (Wald, or without them)."""
     if any(regression.terms[k].run_effect is not None for k in group):
         without: float = regression.cache.of_fit(
             ("lost", *group), lambda: regression_without(regression, group).deviance

@@ -1,4 +1,4 @@
-"""The `Diagnosis`: what was found, what is left, what could not be seen."""
+"""The `Diagnosis`: what was found, the residual, what could not be detected."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Diagnosis(DiagnosisData):
     findings : list of Finding
         In the order found; empty where the simulation is enough.
     not_identifiable : list of Blindness
-        What this data cannot tell, and the measurement that would.
+        What this data cannot show, and the measurement that would.
     extended : Simulation
         The simulation with every finding.
     gain : dict
@@ -38,19 +38,19 @@ class Diagnosis(DiagnosisData):
     correlation : float
         Of the noise of neighbouring readings.
     unexplained : Unexplained or None
-        What is left beyond the noise after all findings, by tests that need no name.
+        The residual beyond the noise after all findings, by tests that need no name.
     unexplained_before : Unexplained or None
         The same tests before anything was added to the simulation.
     beliefs : list of Belief
         Verdicts on what the simulation already claims.
     data_faults : list of DataFault
-        As `trueangle.check` tells them.
+        As `trueangle.check` shows them.
     notes : list of str
-        What else must be known of the account.
+        What else must be known about the account.
     complete : bool
         False where it was ended early: by the time given, or by Ctrl-C.
     simulated : MeasuredMinusSimulated or None
-        The log of another simulator that the simulation stands on.
+        The log of another simulator that the simulation is on.
     runs : list of CalibrationRun
         The readings, as given.
     factors : list of Factor
@@ -78,6 +78,6 @@ class Diagnosis(DiagnosisData):
             Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         verbose : bool
-            Tell in full what the readings could not have shown and nobody asked.
+            Show in full what the readings could not have shown and nobody requested.
         """
         return diagnosis_summary(self, errors_in, verbose)

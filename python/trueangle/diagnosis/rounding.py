@@ -1,9 +1,9 @@
-"""What readings tell that were rounded: causes that the rounding itself would show are none.
+"""What readings show that were rounded: causes that the rounding itself would show are none.
 
-On the same positions a sensor that rounds errs alike in every run, by up to half a step, and that
-has orders, follows the direction, and has a period in time. So the causes that were chosen are
-asked again of the steps in which the readings are (`trueangle.estimation.rounded`), the strongest
-first; and what is left is held against noise as it was before it was rounded.
+On the same positions a sensor that rounds has the same error in every run, by up to half a step,
+and that has orders, follows the direction, and has a period in time. So the causes that were chosen
+are tested again against the steps of the readings (`trueangle.estimation.rounded`), the strongest
+first; and the residual is compared with noise as it was before it was rounded.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .unnamed import effect_or_unnamed, is_named
 
 
 def rounding_of(regression: Regression) -> float:
-    """Standard deviation of the rounding where it is a good part of what is left, else 0."""
+    """Standard deviation of the rounding where it is a good part of the residual, else 0."""
     readings, left = regression.readings, regression.variance
     is_part = is_rounding_visible(readings.rounding**2, left, readings.scatter**2)
     return readings.rounding if is_part and not regression.is_explained else 0.0

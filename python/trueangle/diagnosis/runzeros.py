@@ -1,4 +1,4 @@
-"""What a cause is worth where the zeros of the runs scatter by more than the noise explains."""
+"""The evidence of a cause where the zeros of the runs scatter by more than the noise explains."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from .goodness.zeros import ZEROS
 from .penalty import NEW_CAUSE, regression_without
 from .selection import acts_on_runs
 
-#: Chance above which what unexplained zeros scatter by may as well have made a cause.
+#: Probability above which what unexplained zeros scatter by may as well have made a cause.
 CHANCE = 0.01
 
 
 def chance_between_runs(
     regression: Regression, group: Sequence[int], unexplained: Unexplained
 ) -> float:
-    """Chance that the scatter of the runs' zeros makes what a finding explains between runs.
+    """Probability that the scatter of the runs' zeros makes what a finding explains between runs.
 
-    0 where they do not scatter, and where readings within the runs tell the cause; else that of
+    0 where they do not scatter, and where readings within the runs show the cause; else that of
     `scatter_chance` times the laws that could have been taken in its place. Where no run is left
-    over to tell whether they scatter, 1.
+    over to show whether they scatter, 1.
     """
     scatter = zeros_scatter(unexplained)
     if not (scatter or _has_no_run_to_spare(regression)):
@@ -63,14 +63,14 @@ def _has_no_run_to_spare(regression: Regression) -> bool:
 
 
 def scatter_chance(regression: Regression, group: Sequence[int]) -> float:
-    """Chance of what a finding explains of the means of runs, by what these scatter beside it.
+    """Probability of what a finding explains of the means of runs, by what these scatter with it.
 
     ::
 
         m_j = a + Σ_i b_i x̄_ij + u_j,   F = (Δ Σ n_j u_j² / k) / (Σ n_j u_j² / ν)
 
-    m_j are the means of the runs beside the lines, x̄_ij those of the terms that change from run
-    to run, ν the runs less the coefficients. To a cause that changes from run to run alone all
+    m_j are the means of the runs together with the lines, x̄_ij those of the terms that change from
+    run to run, ν the runs less the coefficients. To a cause that changes from run to run alone all
     readings of a run are one: a delay takes one of four runs.
     """
     without, told, count = _between(regression, group)
@@ -125,6 +125,6 @@ def _weighted_means(columns: Array, runs: NDArray[np.int64]) -> Array:
 
 
 def _mostly_between(columns: Array, runs: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Columns that change from run to run more than within: not lines, say."""
+    """Columns that change from run to run more than within: not lines, for example."""
     between = np.sum(_weighted_means(columns - columns.mean(axis=0), runs) ** 2, axis=0)
     return np.asarray(between > 0.5 * len(columns) * np.var(columns, axis=0))

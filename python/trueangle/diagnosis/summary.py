@@ -15,7 +15,7 @@ from .finding import brief_finding, finding_lines, named_quantity, parameter_uni
 from .goodness.evidence import Evidence
 from .goodness.scatter import AGAINST_STATED
 
-#: Share by which the noise must differ from what the simulation states to be told first.
+#: Share by which the noise must differ from what the simulation states to be reported first.
 MATERIAL = 0.1
 
 #: What adds an entry to a text: how far its further lines are set in, and the first one.
@@ -27,7 +27,7 @@ def diagnosis_summary(
 ) -> str:
     """The account of a diagnosis: what is wrong, why, the evidence, the gain, what is open.
 
-    ``verbose`` tells in full what the readings could not have shown, and nobody asked.
+    ``verbose`` shows in full what the readings could not have shown, and nobody requested.
     """
     d = diagnosis.discrepancy
     unit = error_unit(errors_in, sine_of_rms(d.rms))
@@ -46,9 +46,7 @@ def diagnosis_summary(
     ]
     if diagnosis.structure:
         shares = [f"{cause} {100.0 * s:.0f} %" for cause, s in diagnosis.structure.items()]
-        lines += _wrapped(
-            f"Share of the variance that each would explain alone: {', '.join(shares[:6])}.", 2
-        )
+        lines += _wrapped(f"Variance explained by each alone: {', '.join(shares[:6])}.", 2)
     if diagnosis.readings_used < diagnosis.readings:
         used = f"{diagnosis.readings_used} of the readings were used: spread evenly, and none"
         lines += _wrapped(f"{used} at a turning point, where the direction is not known.", 0)
@@ -89,7 +87,7 @@ def _if_it_is(spot: Ambiguity, unit: ErrorUnit) -> Iterator[str]:
 
 
 def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
-    """What a reader must know first: faults, what is not understood, what is seen or wrong."""
+    """What a reader must know first: faults, what is not understood, what is detected or wrong."""
     lines: list[str] = []
     for note in diagnosis.notes:
         lines += _wrapped(f"{note}.", 2)
@@ -139,12 +137,12 @@ def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
 
 
 def _is_material(item: Evidence) -> bool:
-    """Whether what a test says of the noise is more than a few percent of the stated one."""
+    """Whether what a test states about the noise is more than a few percent of the stated one."""
     return item.test != AGAINST_STATED or abs(item.statistic - 1.0) > MATERIAL
 
 
 def _seen(spot: Ambiguity, unit: ErrorUnit) -> str:
-    """Causes of which one is seen, each with the size that it would have."""
+    """Causes of which one is detected, each with the size that it would have."""
     sizes = []
     for cause in spot.causes:
         first = next(
@@ -180,20 +178,20 @@ def _chance(p: float) -> str:
 
 
 def _ambiguity_matters(spot: Ambiguity, diagnosis: DiagnosisData) -> bool:
-    """Something is seen, or one of the causes is believed or found beside it."""
+    """Something is detected, or one of the causes is assumed or found with it."""
     asked = {effect.kind for effect in diagnosis.extended.effects}
     asked |= {belief.what for belief in diagnosis.beliefs}
     asked |= {finding.cause for finding in diagnosis.findings}
-    # A line beside it is no reason to speak of all that may make one.
+    # A line with it is no reason to speak of all that may make one.
     return spot.supported or bool(set(spot.causes) & (asked - {MissingOrder.kind}))
 
 
 def _ambiguity_entries(
     diagnosis: DiagnosisData, verbose: bool, sizes: Callable[[Ambiguity], Iterator[str]]
 ) -> Iterator[Entry]:
-    """Entries on what cannot be told, what is seen first.
+    """Entries on what cannot be determined, what is detected first.
 
-    What was not asked, and is not seen either, is named in one line, but where ``verbose``.
+    What was not tested, and is not detected either, is named in one line, but where ``verbose``.
     ``sizes`` gives what each cause of a blind spot would amount to.
     """
     plan = diagnosis.next_runs

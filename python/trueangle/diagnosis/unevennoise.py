@@ -1,10 +1,10 @@
-"""What the noise follows: forms that explain it alike are told together, and none is named.
+"""Forms that the noise follows: those that explain it equally well are reported together.
 
 Noise may follow the speed as ``exp(a + b |v|)`` (friction, which has no law) or as the square
-``a + b v²`` (time stamps that scatter), beside what follows the angle and the load, which may stand
-for either. Neither form holds the other. So every account, with and without what is not the speed,
-with either form or none, has its likelihood and its penalty; and each part of the best account is
-held against the best account in which another cause is in its place.
+``a + b v²`` (time stamps that scatter), together with what follows the angle and the load, which
+may represent either. Neither form holds the other. So every account, with and without what is not
+the speed, with either form or none, has its likelihood and its penalty; and each part of the best
+account is compared with the best account in which another cause is in its place.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def _parts(
     def is_instead(one: _NoiseAccount) -> bool:
         if one.is_even or (one.form == JITTER) == is_jitter:
             return False
-        # Beside the same angles the speed would come as well, not in the place of anything.
+        # Together with the same angles the speed would come as well, not in the place of anything.
         return bool(best.form) or one.blocks != best.blocks
 
     gap, rival = gain_over(is_instead)

@@ -31,7 +31,7 @@ BANDS = (4, 8)
 #: Orders of a pattern that every run draws anew.
 OWN_ORDERS = (4, 10)
 
-#: Channels beside the direction.
+#: Channels together with the direction.
 CHANNELS = ("speed", "temperature", "torque", "load")
 
 #: False-alarm probability of a line in time from which on it is offered.
@@ -144,7 +144,7 @@ class UnnamedLine(Effect):
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
-        """Low orders of the angle of each run's own, or the line in time that stands out."""
+        """Low orders of the angle of each run's own, or the line in time that is significant."""
         if regression.signals.runs < 2:
             return None
         trials = [cls._own_orders(regression, top) for top in OWN_ORDERS]
@@ -155,7 +155,7 @@ class UnnamedLine(Effect):
 
     @staticmethod
     def _own_orders(regression: Regression, top: int) -> Extension:
-        """Orders of the angle, beside those that all runs have in common: these have names."""
+        """Orders of the angle, with those that all runs have in common: these have names."""
         theta = regression.signals.theta
         columns = np.hstack([line_columns(theta, m) for m in range(1, top + 1)])
         return regression.jointly_with(columns).propose_run_effect(
@@ -164,7 +164,7 @@ class UnnamedLine(Effect):
 
     @staticmethod
     def _line_in_time(regression: Regression) -> Extension | None:
-        """The line that stands out, unless one with a name is hardly told from it."""
+        """The line that is significant, unless one with a name is hardly distinguished from it."""
         signals = regression.signals
         left = regression.left_within_runs
         left = left * ~regression.outlying

@@ -10,17 +10,17 @@ from ..simulation.simulation import Simulation
 from .beliefs import Belief
 from .finding import Finding
 
-#: Share of its amplitude by which a line at another order may differ from the believed one.
+#: Share of its amplitude by which a line at another order may differ from the assumed one.
 AS_LARGE = 0.15
 
 
 def misplaced_beliefs(
     beliefs: Sequence[Belief], findings: Sequence[Finding], sim: Simulation
 ) -> tuple[list[Belief], list[Finding]]:
-    """Beliefs with ``wrong_place`` where what is absent was found elsewhere, and other findings.
+    """Assumed values found elsewhere (``wrong_place``), and the other findings.
 
     An effect of the same kind, or a line of the same shaft that is as large, is no further
-    cause: it is the one that is believed, at another place or order.
+    cause: it is the one that is assumed, at another place or order.
     """
     effects = {effect.kind: effect for effect in sim.effects}
     left, found = list(findings), []
@@ -64,7 +64,7 @@ def misplaced_beliefs(
 
 
 def _is_line_of_shaft(finding: Finding, shaft: str, belief: Belief) -> bool:
-    """The finding is a line of this shaft as large as the believed one."""
+    """The finding is a line of this shaft as large as the assumed one."""
     if finding.cause != MissingOrder.kind or finding.parameters["shaft"].value != shaft:
         return False
     size, measured = belief.believed.get("amplitude_arcsec"), finding.parameters["amplitude_arcsec"]

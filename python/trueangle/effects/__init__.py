@@ -1,7 +1,7 @@
 """The physical effects: one file each, and the list of them.
 
-An effect is one frozen dataclass with everything that is known of it: its parameters, the
-physics in one sentence, what it needs and is taken for, its signal (simulate), its columns
+An effect is one frozen dataclass with everything that is known about it: its parameters, the
+physics in one sentence, what it needs and is confused with, its signal (simulate), its columns
 and the search for it (diagnose), and its term (`trueangle.model.terms`) or the reason why it has
 none (correct). To add one, write its file and add its line below.
 """

@@ -13,7 +13,7 @@ from ..estimation.regression import Regression
 from ..support.arrays import Array
 from ..support.plainresult import ShownResult
 
-#: Share of velocity that direction must leave for latency and backlash to be told apart.
+#: Share of velocity that direction must leave for latency and backlash to be separated.
 OWN_OF_VELOCITY = 0.10
 
 #: The same for velocity against the zero, torque against order 1, its cube against it.
@@ -22,13 +22,13 @@ OWN_POWER = 0.02
 #: Kelvin of change below which temperature counts as constant.
 LEAST_KELVIN = 2.0
 
-#: Runs per level that a level of a whole run needs to stand out from their own zeros.
+#: Runs per level that a level of a whole run needs to be significant from their own zeros.
 RUNS_PER_LEVEL = 3
 
 
 @dataclass(frozen=True)
 class Ambiguity(ShownResult):
-    """Causes that this data cannot tell apart, or not see at all.
+    """Causes that this data cannot separate, or not detect at all.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Ambiguity(ShownResult):
     evidence : float or None
         By how much BIC is better with it.
     estimates : dict of str to Parameters
-        What each of the causes would be if it alone were the one; where something is seen.
+        What each of the causes would be if it alone were the one; where something is detected.
     hypotheses : dict of str to tuple of Effect
         The same as effects of a simulation, lines too: what a plan of further runs assumes.
     factor : str
@@ -48,7 +48,7 @@ class Ambiguity(ShownResult):
         "temperature", "direction", "run", "time".
     common : str
         The cause whose form is what all of them share, where there is one: naming it claims
-        no more than is seen. Another one is named where the readings show what the design does
+        at most is detected. Another one is named where the readings show what the design does
         not promise to (`Effect.told`).
     """
 
@@ -86,7 +86,7 @@ class Ambiguity(ShownResult):
 
 
 def share_left(regression: Regression, columns: Array, *others: Array) -> float:
-    """Largest share of power that columns keep beside the simulation's lines and others."""
+    """Largest share of power that columns keep together with the simulation's lines and others."""
     q = orthonormal_basis(np.hstack([regression.base, *others]))
     rest = columns - q @ (q.T @ columns)
     before = np.einsum("ij,ij->j", columns, columns)

@@ -25,11 +25,11 @@ from .search import Array, Fitted
 #: for; steps until the half width and the travel over which it is crossed agree.
 SEEN, SETTLING = 0.5, 5
 
-#: Evidence of a crossing from which on it is told from a sharp step: "very strong" on the scale of
-#: Kass and Raftery.
+#: Evidence of a crossing from which on it is distinguished from a sharp step: "very strong" on the
+#: scale of Kass and Raftery.
 TOLD = 10.0
 
-#: Radians by which an angle that stands may change: rounding.
+#: Radians by which an angle at rest may change: rounding.
 STANDS = 1e-9
 
 ONE_WAY = "all runs go in one direction: a constant reversal error is part of the zero"
@@ -44,10 +44,10 @@ class Backlash(Effect):
     half_width_arcsec : float
         b: half of forward minus reverse, on average over a turn.
     lines : list of [output order, arcsec, phase_deg]
-        How b varies with the place (as a cause of its own: a pattern of the direction).
+        How b varies with the place (a separate cause: a pattern of the direction).
     turns_first : {"", "indicated", "reference"}
-        The side that crosses the play while the other one stands: the indicated angle (b > 0:
-        the reference stands, and the error changes meanwhile), or the reference (b < 0: the error
+        The side that crosses the play while the other one rests: the indicated angle (b > 0:
+        the reference rests, and the error changes meanwhile), or the reference (b < 0: the error
         changes over a travel of 2 b). Neither: between two readings.
     start_state : float
         Where in the play a run starts, where the reference turns first: 0 in its middle, 1 at the
@@ -96,7 +96,7 @@ class Backlash(Effect):
         best = sharp
         for start_state in (1.0, 0.0) if first == "reference" else (1.0,):
             width = abs(mean)
-            # The play itself says over which travel it is crossed: no further parameter.
+            # The play itself states over which travel it is crossed: no further parameter.
             for _ in range(SETTLING if first == "reference" else 1):
                 shape = {
                     "turns_first": first,
@@ -124,7 +124,7 @@ class Backlash(Effect):
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
-        """Whether the crossing itself is seen: a delay has none."""
+        """Whether the crossing itself is detected: a delay has none."""
         if not extension.shape:
             return False
         rest = regression.with_terms(
@@ -157,7 +157,7 @@ class Backlash(Effect):
 
 
 def _shows_crossing(signals: Signals, first: str, width: float) -> bool:
-    """Readings lie where one side has turned and the other still stands."""
+    """Readings lie where one side has turned and the other still rests."""
     if first == "indicated":
         return bool((_crossing_at_rest(signals) != signals.direction).any())
     play = signals.play(abs(float(width)) / ARCSEC_PER_DEG)
@@ -165,7 +165,7 @@ def _shows_crossing(signals: Signals, first: str, width: float) -> bool:
 
 
 def _crossing_at_rest(signals: Signals) -> Array:
-    """The direction, going evenly from one to the other where the reference stands between them."""
+    """The direction, going evenly from one to the other where the reference is between them."""
     crossing = signals.direction.copy()
     for start, stop in signals.run_bounds():
         moved = np.abs(np.diff(signals.theta[start:stop])) > STANDS
@@ -175,7 +175,7 @@ def _crossing_at_rest(signals: Signals) -> Array:
         clock, direction = signals.clock[start:stop], signals.direction[start:stop]
         apart = np.flatnonzero(np.diff(moving) > 1)
         for last, following in zip(moving[apart], moving[apart + 1], strict=True):
-            # The last reading before, and the first one after, still stand where they turn.
+            # The last reading before, and the first one after, still are where they turn.
             ends = direction[[max(last - 1, 0), min(following + 1, stop - start - 1)]]
             if ends[0] != ends[1]:
                 inside = slice(start + last, start + following + 1)

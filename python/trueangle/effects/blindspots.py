@@ -1,4 +1,4 @@
-"""`blind_spots`: which causes a design of runs can tell apart, the readings not looked at."""
+"""`blind_spots`: which causes a design of runs can separate, the readings not looked at."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from ..estimation.regression import Regression
 from .ambiguity import Ambiguity
 from .effect import EFFECTS
 
-#: Factors of a design in the order in which their blind spots are told.
+#: Factors of a design in the order in which their blind spots are reported.
 FACTORS = (
     "direction",
     "velocity",
@@ -23,7 +23,7 @@ FACTORS = (
 
 
 def blind_spots(regression: Regression) -> list[Ambiguity]:
-    """What the design of the runs cannot tell; the readings are not looked at."""
+    """What the design of the runs cannot show; the readings are not looked at."""
     found: list[Ambiguity] = []
     for effect in EFFECTS.values():
         found += effect.blind_spots(regression, found)
@@ -31,5 +31,5 @@ def blind_spots(regression: Regression) -> list[Ambiguity]:
 
 
 def blind_spot_place(factors: tuple[str, ...], spot: Ambiguity) -> int:
-    """Where the factor of a blind spot stands among others; behind all where it does not."""
+    """Where the factor of a blind spot is among others; behind all where it is not."""
     return factors.index(spot.factor) if spot.factor in factors else len(factors)

@@ -47,7 +47,7 @@ class ChannelSkew(Effect):
     order : float
         m.
     phase_deg : float
-        Where the sensor's periods stand on the joint.
+        Where the sensor's periods are on the joint.
     """
 
     delay_s: float
@@ -101,7 +101,7 @@ class ChannelSkew(Effect):
         def gain(turned: float) -> float:
             return regression.gain(cls.columns(signals, around, {"phase": turned}))[0]
 
-        # The constant part is as large as the line: which of the two signs, the data say. And it
+        # The constant part is as large as the line: which of the two signs, the data state. And it
         # leaves its mark in the phase of a line that is fitted without it.
         tried = []
         for start in (phase, phase + np.pi):
@@ -156,7 +156,7 @@ class ChannelSkew(Effect):
 
 
 def _is_part_of_a_line(regression: Regression) -> bool:
-    """The line times the velocity is not told from the line."""
+    """The line times the velocity is not distinguished from the line."""
     signals = regression.signals
     assert signals.velocity is not None
     line = line_columns(signals.theta, skewed_order(regression.belief.joint))

@@ -23,8 +23,8 @@ from .search import Array, Fitted
 #: Arcsec that one degree per second makes of a second's millionth.
 ARCSEC_PER_PPM = 3600.0 * 1e-6
 
-#: By how much its BIC must beat that of a ramp in angle to be told from one in runs whose design
-#: does not promise to: "very strong" on the scale of Kass and Raftery.
+#: By how much its BIC must beat that of a ramp in angle to be distinguished from one in runs whose
+#: design does not promise to: "very strong" on the scale of Kass and Raftery.
 TOLD = 10.0
 
 
@@ -99,5 +99,5 @@ class ClockDrift(Effect):
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
-        """Whether the speeds of the runs, unlike for a ramp in angle, stand out."""
+        """Whether the speeds of the runs, in contrast to a ramp in angle, are significant."""
         return cls.beats(ScaleError, regression, TOLD)

@@ -26,13 +26,13 @@ from .presliding_hysteresis import PreslidingHysteresis
 from .search import Array, Fitted, line_parameters
 from .shapes import best_shape
 
-#: Orders that play has where a gear is eccentric or worn on one side: half of the belief.
+#: Orders that play has where a gear is eccentric or worn on one side: half of the prior.
 LIKELY = 3
 
 #: Lines at most.
 MOST_LINES = 6
 
-#: Travel (turns) over less than which only low orders are told apart.
+#: Travel (turns) over less than which only low orders are separated.
 TOLD_APART = 0.5
 
 
@@ -44,7 +44,7 @@ class DirectionalPattern(Effect):
 
         ε = d Σ_m C_m sin(mθ + φ_m)
 
-    with the direction of travel d. Its mean over the turn is `Backlash`, a cause of its own.
+    with the direction of travel d. Its mean over the turn is `Backlash`, a separate cause.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What effects drawn for a rehearsal have in common: lines, places and speeds of these runs."""
+"""What effects sampled for a rehearsal have in common: lines, places and speeds of these runs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 
-#: Low orders of the output that are drawn beside those of its gear.
+#: Low orders of the output that are sampled together with those of its gear.
 LOW_ORDERS = tuple(("output", k) for k in range(1, 9))
 
 

@@ -42,14 +42,14 @@ DRIFT_TERMS, MOST_TERMS = 24, 96
 #: Power of the last of them, in variances of one reading, from which on more are needed.
 SEEN = 0.5
 
-#: Evidence of a drift beside a ramp from which on it is more than one: "very strong" on the scale
-#: of Kass and Raftery.
+#: Evidence of a drift together with a ramp from which on it is more than one: "very strong" on the
+#: scale of Kass and Raftery.
 TOLD = 10.0
 
 #: Time constants of settling, in shares of the mean run.
 SETTLING = {"early settling": 0.12, "settling": 0.4}
 
-#: Half periods over a run of a bend.
+#: Half periods over a run of a curve.
 BENT = 3
 
 #: Forms of a drift: from the start of the run, or about its mean.
@@ -69,7 +69,7 @@ FORMS = (
 #: Forms of which every path is one: they describe the noise (Kennedy and O'Hagan 2001).
 FREE = ("walk", "flicker", "centred walk", "centred flicker")
 
-#: Of these as many are unlike each other: a slope, a relaxation, a bend, a free path.
+#: Of these as many differ: a slope, a relaxation, a curve, a free path.
 UNLIKE_FORMS = 4.0
 
 
@@ -157,7 +157,7 @@ class DriftWithinRun(Effect):
     def _finer(cls, regression: Regression, best: Extension) -> Extension:
         """With as many half periods as are above the noise: where they end, an edge is left.
 
-        Asked under white noise, as correlated noise stands for what is finer; of one run under
+        Tested under white noise, as correlated noise includes what is finer; of one run under
         the noise found, for there a drift that is taken too fine takes the lines of the place.
         """
         form, terms = best.shape["form"], int(best.shape["terms"])
@@ -199,7 +199,7 @@ class DriftWithinRun(Effect):
         """Columns of a drift, scaled so that it ends at variance 1 or about that.
 
         A ramp and a relaxation have one rate and one time constant in runs of any span, where
-        times tell it; a bend and a free path end where the run does.
+        times show it; a curve and a free path end where the run does.
         """
         timed, mean = regression.signals.time is not None, cls._mean_span(regression)
         u, passed = np.zeros(regression.n), np.zeros(regression.n)
@@ -265,7 +265,7 @@ class DriftWithinRun(Effect):
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
-        """Whether it drifts: beside a ramp in angle, which a ramp in time is, too."""
+        """Whether it drifts: together with a ramp in angle, which a ramp in time is, too."""
         assert extension.run_effect is not None
         others = [term for term in regression.terms if term.cause != cls.kind]
         rest = regression.with_terms(others, regression.whiten.rho)

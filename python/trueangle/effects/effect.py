@@ -25,7 +25,7 @@ from .search import Array, Fitted
 #: defined. Where two explain equally much the first is named.
 EFFECTS: dict[str, type[Effect]] = {}
 
-#: What a simulation can hold: every effect, and the curves that stand for forms without a name.
+#: What a simulation can hold: every effect, and the curves that represent forms without a name.
 KINDS: dict[str, type[Effect]] = {}
 
 #: Turns of travel up to which a flexible cause can imitate others: any.
@@ -35,9 +35,9 @@ ALWAYS = math.inf
 class Effect(TabledParameters):
     """Base of the effects; each is a frozen dataclass whose fields are its parameters.
 
-    A class with a ``kind`` joins the vocabulary by being defined. What it must say is its
+    A class with a ``kind`` joins the vocabulary by being defined. What it must state is its
     `signal`; with `propose`, `columns` and `report` a diagnosis looks for it, with a
-    ``term`` (or lines) it is corrected, otherwise ``not_at_run_time`` says why not.
+    ``term`` (or lines) it is corrected, otherwise ``not_at_run_time`` states why not.
 
     Class attributes
     ----------------
@@ -46,7 +46,7 @@ class Effect(TabledParameters):
     sentence : str
         The physics in one sentence.
     needs : tuple of str
-        Columns without which it cannot be seen: "time", "temperature", "torque", "mount".
+        Columns without which it cannot be detected: "time", "temperature", "torque", "mount".
     factor : str
         What has to take several values for it to show, and whose labels are shuffled in
         the negative control: "direction", "velocity", "temperature", "torque", "mount",
@@ -56,8 +56,8 @@ class Effect(TabledParameters):
     is_cause : bool
         It has a name, by which a diagnosis looks for it.
     confused_with : mapping of Effect class to str
-        Causes before it in the list that it can be taken for, each with the measurement
-        that tells them apart.
+        Causes before it in the list that it can be confused with, each with the measurement
+        that separates them.
     measure : str
         What to measure where the data cannot show it at all.
     contains : tuple of Effect classes
@@ -72,15 +72,15 @@ class Effect(TabledParameters):
         Turns of travel up to which it can imitate specific causes, which are then tried
         first: `ALWAYS` for one that always can.
     is_separate : bool
-        Its every term is a finding of its own.
+        Its every term is a separate finding.
     draws_zeros : bool
-        It leaves each run with a zero of its own, which held-out runs then get too.
+        It leaves each run with a separate zero, which held-out runs then get too.
     has_exact_form : bool
         Its form leaves nothing of it, however large it is: steps of a zero, ratios of teeth.
     changes_lines : bool
         It takes or gives a part of the pattern's own lines on average.
     form_follows : bool
-        Its form follows what else is fitted, and is asked for again when that has changed.
+        Its form follows what else is fitted, and is proposed again when that has changed.
     is_doubted : bool
         A blind spot that names it is reason enough not to name it.
     weighs : bool
@@ -90,9 +90,9 @@ class Effect(TabledParameters):
     of_motion : bool
         Its columns follow from the shape and the motion alone, whatever the pattern.
     not_at_run_time : str
-        Why no corrector can take it off while the joint runs; empty where one can.
+        Why no corrector can subtract it while the joint runs; empty where one can.
     size_name : str
-        The parameter that says how large it is, for a rehearsal; the first where not given.
+        The parameter that states how large it is, for a rehearsal; the first where not given.
     size_grows : bool
         It shows the more the larger that is; False where the less.
     size_most : float
@@ -159,7 +159,7 @@ class Effect(TabledParameters):
     def drawn(
         cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
-        """One of this size with all else drawn at random, to be hidden in readings of ``signals``.
+        """One of this size, all else random, to be hidden in readings of ``signals``.
 
         None where these runs of this joint cannot have it. Here the first parameter is the size,
         and there is nothing else to draw.
@@ -168,21 +168,21 @@ class Effect(TabledParameters):
 
     @classmethod
     def alike(cls, other: Effect, around: JointPattern) -> Self | None:
-        """The same error from this cause, where one design cannot tell it from ``other``."""
+        """The same error from this cause, where one design cannot distinguish it from ``other``."""
         return None
 
     # -- diagnose ------------------------------------------------------------------
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
-        """The best extension of this cause beside what is known; None where it cannot act."""
+        """The best extension of this cause with what is known; None where it cannot act."""
         return None
 
     @classmethod
     def imitate(cls, regression: Regression) -> Extension | None:
         """What it would explain in the place of another cause, where it is not named itself.
 
-        None where `propose` has all of it.
+        None where `propose` has everything.
         """
         return None
 
@@ -217,12 +217,12 @@ class Effect(TabledParameters):
 
     @classmethod
     def form_limits(cls, regression: Regression, terms: Sequence[Fitted]) -> Parameters:
-        """How far its error may depart from its form, by what the readings tell of that."""
+        """How far its error may depart from its form, by what the readings show of that."""
         return {}
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
-        """What the design of the runs cannot tell of it; the readings are not looked at.
+        """What the design of the runs cannot show of it; the readings are not looked at.
 
         ``found`` are those of the effects before it in the list.
         """
@@ -237,14 +237,14 @@ class Effect(TabledParameters):
 
     @classmethod
     def describes_noise(cls, extension: Extension) -> bool:
-        """Whether a term in this form only says how the noise goes, and is no cause."""
+        """Whether a term in this form only states how the noise behaves, and is no cause."""
         return False
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
-        """Whether the readings show what the design alone does not promise to tell.
+        """Whether the readings show what the design alone does not promise to show.
 
-        Asked of a blind spot whose causes have a common form (`Ambiguity`).
+        Tested for a blind spot whose causes have a common form (`Ambiguity`).
         """
         return False
 
@@ -265,7 +265,7 @@ class Effect(TabledParameters):
         factor: str | None = None,
         common: type[Effect] | None = None,
     ) -> Ambiguity:
-        """Blind spot of this effect, or of it and ``others`` which it is taken for.
+        """Blind spot of this effect, or of it and ``others`` which it is confused with.
 
         ``first=False`` names the others before it; ``factor`` is what in the design is at
         fault, where that is not the effect's own; ``common`` has the form that all share.
@@ -300,7 +300,7 @@ class Effect(TabledParameters):
         return self
 
     def to_lines(self) -> Sequence[tuple[str, float]]:
-        """(shaft, order) of the lines that a correction has to take up."""
+        """(shaft, order) of the lines that a correction has to explain."""
         return ()
 
     @property
@@ -346,5 +346,5 @@ class ScatterFinding:
 
 
 def telling_apart(one: type[Effect], other: type[Effect]) -> str | None:
-    """The measurement that tells two effects apart; declared by the later of them."""
+    """The measurement that separates two effects; declared by the later of them."""
     return one.confused_with.get(other) or other.confused_with.get(one)

@@ -166,5 +166,5 @@ def _about_means(signals: Signals, angle: Array) -> Array:
     centred = angle.copy()
     for start, stop in signals.run_bounds():
         centred[start:stop] -= angle[start:stop].mean()
-    # What is left of a joint at rest is rounding.
+    # The residual of a joint at rest is rounding.
     return np.where(np.abs(centred) > 1e-12 * np.abs(angle).max(initial=0.0), centred, 0.0)

@@ -52,7 +52,7 @@ ON_BUMP = 0.1
 LEAST_READINGS = 4.0
 
 #: Travel (turns) from which on lines and bumps differ for certain: over less a bump can
-#: stand for several lines at once.
+#: represent several lines at once.
 WHOLE_TURN = 0.9
 
 
@@ -197,11 +197,11 @@ class LocalDefect(Effect):
 
     @classmethod
     def _settled(cls, regression: Regression, shape: dict[str, Any]) -> dict[str, Any]:
-        """Refined again with a tall bump in the model, until that saves no more.
+        """Refined again with a tall bump in the model, until that saves nothing more.
 
-        Without it its top is clipped at so many standard deviations and looks flat and wide, and
+        Without it its top is clipped at this many standard deviations and looks flat and wide, and
         the noise seems to be correlated over the bump. The readings on it are taken as they are,
-        once; from then on outliers among them are told from the bump.
+        once; from then on outliers among them are distinguished from the bump.
         """
         best, least = shape, np.inf
         for k in range(MOST_ROUNDS):

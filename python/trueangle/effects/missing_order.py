@@ -34,11 +34,11 @@ FREE_ANGLES = (
     "off the grid (`ta.plan_mounts(...)` proposes them; about 2.14 deg for 36 positions)"
 )
 
-#: Orders up to which an alias is told at least, whatever lines the joint is known for.
+#: Orders up to which an alias is reported at least, whatever lines the joint is known for.
 HIGHEST = 100.0
 
 #: Orders closer than this share of one over the turns covered, that explain at least this
-#: much of what the best one does, are hardly told apart.
+#: much of what the best one does, are hardly separated.
 UNRESOLVED, ALIKE = 0.5, 0.9
 
 
@@ -91,14 +91,14 @@ class MissingOrder(Effect):
         penalties = 2.0 * np.log(np.where(lines.plausible, 2 * expected, 2 * gains.size))
         gains = np.where(shows_line(regression.signals, lines.orders), gains, 0.0)
         # At equal steps higher orders are the same numbers as low ones, but for the error by
-        # which the angles miss the steps: what tells them apart there is the noise.
+        # which the angles miss the steps: what separates them  there is the noise.
         grid = regression.signals.grid
         if grid is not None:
             gains = np.where(2.0 * lines.orders > grid.positions, 0.0, gains)
         best = int(np.argmax(gains - penalties))
         if gains[best] <= 0.0:
             return None
-        # Over a part of a turn neighbouring orders are hardly told apart: a fast shaft's
+        # Over a part of a turn neighbouring orders are hardly separated: a fast shaft's
         # own order is then the likelier one.
         away = np.abs(lines.orders - lines.orders[best]) * regression.signals.run_turns().max()
         alike = np.flatnonzero((away < UNRESOLVED) & (gains > ALIKE * gains[best]))

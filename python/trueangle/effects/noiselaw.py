@@ -13,8 +13,8 @@ from .search import Array
 #: standard deviation is more than noise of one kind does.
 WIDEST = 2.0 * float(np.log(1e3))
 
-#: Scoring steps at most, the change of a logarithm below which there are no more, and the largest
-#: change in one step.
+#: Scoring steps at most, the change of a logarithm below which there are no further, and the
+#: largest change in one step.
 STEPS, SETTLED, LARGEST_STEP = 30, 1e-8, 2.0
 
 #: Ratios of the variance that grows to the other one, to start from.
@@ -40,7 +40,7 @@ class NoiseLaw:
     log_variance : ndarray, shape (n,)
     log_likelihood : float
         Normal up to `SQUARE_CLIP`, beyond with the tail of which clipped squares are the slope: so
-        laws of unlike form are compared by what the same readings weigh in the fit of either.
+        laws of different form are compared by what the same readings weigh in the fit of either.
     """
 
     coefficients: Array

@@ -34,7 +34,7 @@ from .search import (
 #: Trial orders per resolution cell (one order over the turns of a run).
 OVERSAMPLING = 3
 
-#: Lowest order searched, and cycles that a run must show: fewer are a bend, not a line.
+#: Lowest order searched, and cycles that a run must show: fewer are a curve, not a line.
 LOWEST, LEAST_CYCLES = 0.3, 2.0
 
 #: Trial orders at most; beyond, the grid stops at a lower order.
@@ -43,7 +43,7 @@ MOST_TRIALS = 4096
 #: Orders nearer than this to a known line belong to that line: it changes from run to run.
 OWN_LINE = 0.1
 
-#: Cycles over the travel within which orders are hardly told apart: a line between two whole ones
+#: Cycles over the travel within which orders are hardly separated: a line between two whole ones
 #: is a mixture of both there.
 UNRESOLVED = 1.0
 
@@ -139,7 +139,7 @@ class NonIntegerOrder(Effect):
         """The searched orders about it, where the travel does not resolve them, explain as much.
 
         Phases that are new in each of R runs leave a share of 1/R to one phase for all; half way
-        between that and all of it is the limit.
+        between that and everything is the limit.
         """
         away = regression.lines.orders - found.shape["order"]
         sides = (away[away <= 0.0].max(initial=-np.inf), away[away > 0.0].min(initial=np.inf))
@@ -157,7 +157,7 @@ class NonIntegerOrder(Effect):
         cages = np.zeros(orders.size, dtype=bool)
         for cycles in regression.around.joint.shafts.values():
             cages |= (orders > CAGE[0] * cycles) & (orders < CAGE[1] * cycles)
-        # Half of the belief goes to either; the maximum over an order is like that of two
+        # Half of the prior goes to either; the maximum over an order is like that of two
         # independent ones.
         counts = 4.0 * np.where(cages, cages.sum(), orders.size) / OVERSAMPLING
         return np.asarray(np.log(np.maximum(counts, 2.0)))
@@ -176,7 +176,7 @@ class NonIntegerOrder(Effect):
         sizes = np.array([stop - start for start, stop in regression.bounds], dtype=np.float64)
         turns = regression.signals.run_turns()
         usual = float(np.median(turns))
-        if sizes.min() < 8 or usual <= 0.0:  # most runs stand still
+        if sizes.min() < 8 or usual <= 0.0:  # most runs are at rest
             return np.zeros(0), np.zeros(0)
         top = float(regression.lines.orders.max()) * 0.75
         # At equal steps higher orders are the same numbers: the lowest is meant. But where the
@@ -186,7 +186,7 @@ class NonIntegerOrder(Effect):
         hides = grid is not None and 2.0 * known > grid.positions
         top = min(top, 0.5 * rate) if rate and not hides else top
         low = max(LOWEST, LEAST_CYCLES / usual)
-        # Half the mean rate of readings is as far as a run can tell.
+        # Half the mean rate of readings is as far as a run can show.
         step = 1.0 / (OVERSAMPLING * usual)
         count = int(min((top - low) / step, MOST_TRIALS))
         if count < 3:

@@ -27,7 +27,7 @@ class OrderSpectrum:
 
         F_k = Σ_j y_j e^(-i (m₀ + k Δ) θ_j),    0 ≤ k < K
 
-    Of y only a transform depends: what the angles ask for is kept.
+    Of y only a transform depends: what the angles need is kept.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class OrderSpectrum:
 
 
 def _kernel(away: Array) -> Array:
-    """What a reading gives a place of the grid so many places away."""
+    """What a reading gives a place of the grid this many places away."""
     share = np.clip(1.0 - (away / (0.5 * WIDTH)) ** 2, 0.0, None)
     return np.asarray(np.exp(SHAPE * (np.sqrt(share) - 1.0)))
 

@@ -27,12 +27,12 @@ from .search import Array
 TAILS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0)
 SIZES = (3.0, 10.0, 100.0)
 
-#: What stands next to outliers is smaller by this factor; of the stretches of
+#: What is near outliers is smaller by this factor; of the segments of
 #: outliers at least this share must be such short ones.
 BESIDE = 0.5
 ISOLATED = 0.5
 
-#: Pairs of outliers in a row, beyond three times those by chance, that tell a burst from a
+#: Pairs of outliers in a row, beyond three times those at random, that distinguish a burst from a
 #: manoeuvre, and the share of them that must change sides: half do so at random.
 LEAST_PAIRS = 8
 TURNING = 0.3
@@ -40,8 +40,8 @@ TURNING = 0.3
 #: Readings on either side of a reversal that are near it.
 NEAR_REVERSAL = 3
 
-#: Readings after a start or a reversal within which outliers may gather, and the chance that as
-#: many do, below which they are not independent of it.
+#: Readings after a start or a reversal within which outliers may gather, and the probability that
+#: as many do, below which they are not independent of it.
 AFTER = (1, 2, 4, 8)
 GATHERED = 1e-3
 
@@ -50,7 +50,7 @@ GATHERED = 1e-3
 #: wide normal supplies and no reading shows. It counts as the fraction's uncertainty.
 HIDDEN = 3.0
 
-#: Standard deviations from which on a reading that stands out alone is not its neighbours'.
+#: Standard deviations from which on a reading that is significant alone is not its neighbours'.
 WILD = 6.0
 
 #: Scale below which no normal is narrow: readings that are all alike have none.
@@ -66,16 +66,16 @@ BEYOND_TAILS = 2.0
 
 
 #: Ratio of the largest of readings with a tail ``x^(-nu)`` to the next that is passed by a
-#: chance of ``8^(-nu)``: 0.2 % for nu = 3, 3e-5 for nu = 5. Such a reading is of another kind.
+#: probability of ``8^(-nu)``: 0.2 % for nu = 3, 3e-5 for nu = 5. Such a reading is of another kind.
 APART = 8.0
 
-#: Share of the readings that may stand apart so.
+#: Share of the readings that may be apart so.
 MOST_APART = 0.01
 
 
 @dataclass(frozen=True)
 class Outliers(Effect):
-    """Isolated outliers and bursts: a share of the readings gets a normal error of its own.
+    """Isolated outliers and bursts: a share of the readings gets a separate normal error.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class Outliers(Effect):
 
     @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
-        """Wild readings: a narrow and a wide normal must beat one normal and heavy tails."""
+        """Outliers: a narrow and a wide normal must beat one normal and heavy tails."""
         if regression.is_explained:
             return None
         e, deviation = _beside_neighbours(regression)
@@ -139,7 +139,7 @@ class Outliers(Effect):
             share = rows.size / n
             size = float(np.sqrt(np.sum(e[rows] ** 2) / max(rows.size, 1))) / scale
         if rows.size == 0:
-            return None  # the form of the noise, and no reading that stands out of it
+            return None  # the form of the noise, and no outlying reading
         kept = _glitches(_unfiltered(regression), rows, regression.bounds)
         if _is_scattered(regression, rows):
             kept = rows
@@ -156,7 +156,7 @@ class Outliers(Effect):
             "fraction": quantity(
                 float(share), max(std, float(share) * float(np.clip(HIDDEN / size, 0.2, 1.0)))
             ),
-            # A deviation of so many readings.
+            # A deviation of this many readings.
             "size_arcsec": quantity(float(spread), float(spread / np.sqrt(2.0 * rows.size))),
             **({"bursts": quantity(bursts)} if bursts else {}),
             "rows": quantity(
@@ -191,15 +191,15 @@ def _apart(e: Array) -> NDArray[np.int64]:
 
 
 def _beside_neighbours(regression: Regression) -> tuple[Array, float]:
-    """Residuals less what both neighbours tell of them, in a robust standard deviation; and that.
+    """Residuals less what both neighbours show of them, in a robust standard deviation; and that.
 
     ::
 
         e_k - (ρ / (1 + ρ²))(e_{k-1} + e_{k+1})
 
     is what a correlation leaves of one reading. Whitened residuals show an outlier twice,
-    and what lasts over many readings as large as it is. White noise stays as it is. Wild
-    readings are held against the level about them, and tell nothing of their neighbours.
+    and what lasts over many readings as large as it is. White noise stays as it is.
+    Outliers are compared with the level about them, and show nothing of their neighbours.
     """
     left = _unfiltered(regression)
     away = less_local_level(left, regression.bounds)
@@ -218,13 +218,13 @@ def _beside_neighbours(regression: Regression) -> tuple[Array, float]:
 
 
 def _unfiltered(regression: Regression) -> Array:
-    """What is left, weighed and not whitened."""
+    """The residual, weighed and not whitened."""
     left = regression.left_within_runs
     return np.asarray(left * regression.root_weights)
 
 
 def _interpolated(left: Array, rho: float, bounds: list[tuple[int, int]]) -> Array:
-    """What is left of every reading beside its neighbours in the run, all of one deviation.
+    """The residual of every reading together with its neighbours in the run, all of one deviation.
 
     The first and the last one have one neighbour only, and scatter more about it.
     """
@@ -242,7 +242,7 @@ def _interpolated(left: Array, rho: float, bounds: list[tuple[int, int]]) -> Arr
 def _glitches(
     left: Array, rows: NDArray[np.int64], bounds: list[tuple[int, int]]
 ) -> NDArray[np.int64]:
-    """Those of ``rows`` that stand in short stretches with an abrupt beginning and end.
+    """Those of ``rows`` that are in short segments with an abrupt beginning and end.
 
     A glitch is over within a few readings, and those next to it in its run are far smaller;
     what lasts (a transition at a reversal, a manoeuvre) or fades is an error of the mean.
@@ -266,7 +266,7 @@ def _flags(rows: NDArray[np.int64], n: int) -> NDArray[np.bool_]:
 
 
 def _lengths(regression: Regression, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Lengths of the stretches of rows that follow each other."""
+    """Lengths of the segments of rows that follow each other."""
     starts, stops = flagged_segments(_flags(rows, regression.n), regression.bounds)
     return stops - starts
 
@@ -295,7 +295,7 @@ def _at_reversals(regression: Regression, rows: NDArray[np.int64]) -> bool:
 def _gathered(regression: Regression, rows: NDArray[np.int64]) -> str:
     """Why outliers are not independent of each other, as they gather where a motion begins.
 
-    Stretches of them are counted, each once: independent ones fall anywhere.
+    Segments of them are counted, each once: independent ones fall anywhere.
     """
     signals = regression.signals
     begins = np.diff(signals.segment, prepend=-1) != 0

@@ -13,7 +13,7 @@ from ..support.suggestions import did_you_mean
 
 
 class TabledParameters:
-    """What stands as a table of a simulation file: a dataclass whose fields are its parameters."""
+    """A table of a simulation file: a dataclass whose fields are its parameters."""
 
     kind: ClassVar[str]
 
@@ -42,7 +42,7 @@ class TabledParameters:
         return cls(**values)
 
     def to_table(self) -> dict[str, Any]:
-        """The table `from_table` reads, ``kind`` first, defaults left out."""
+        """The table `from_table` reads, ``kind`` first, defaults omitted."""
         table: dict[str, Any] = {"kind": self.kind}
         for field in fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)

@@ -40,7 +40,7 @@ _AFTER_REVERSAL = (
 #: nature.
 OWN_OF_TRANSITION = 1e-3
 
-#: By how much a transition's BIC must beat that of two branches alone to be seen in readings
+#: By how much a transition's BIC must beat that of two branches alone to be detected in readings
 #: whose design does not promise to show one: "very strong" on the scale of Kass and Raftery.
 TOLD = 10.0
 
@@ -267,7 +267,7 @@ class PreslidingHysteresis(Effect):
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
-        """Whether the transition itself stands out, as after a start from a relaxed joint."""
+        """Whether the transition itself is significant, as after a start from a relaxed joint."""
         return cls.beats(Backlash, regression, TOLD)
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:

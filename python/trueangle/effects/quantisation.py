@@ -45,7 +45,7 @@ class Quantisation(Effect):
     not_at_run_time: ClassVar[str] = "what was rounded away is not in the reading"
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
-        # Rounding follows the noise (`written`): beside enough of it its mean is zero.
+        # Rounding follows the noise (`written`): with enough of it its mean is zero.
         return np.zeros(len(signals))
 
     def written(self, degrees: Array) -> Array:
@@ -58,7 +58,7 @@ class Quantisation(Effect):
         variance, rounding = regression.variance, step**2 / 12.0
         if regression.is_explained or not is_rounding_visible(rounding, variance, variance):
             return None
-        # Of n readings each falls on the lattice by a chance of its tolerance.
+        # Of n readings each falls on the lattice by a probability of its tolerance.
         gain = 2.0 * regression.n * float(np.log(10.0)) - regression.log_n
         parameters = {
             "step_arcsec": quantity(step, 0.0),

@@ -18,7 +18,7 @@ class RandomPhaseLine:
     regression : Regression
         With the line among its terms.
     cause : str
-        Its cause; what others drew is taken off.
+        Its cause; what others explain is subtracted.
     waves : ndarray, shape (n, 2)
         Cosine and sine of the line.
     """
@@ -41,9 +41,9 @@ class RandomPhaseLine:
 
             σ_f⁻² = |P M x (b_r cos f x - a_r sin f x) |² / σ²
 
-        M makes the noise and the drawn phases white, and P takes out what is fitted: the bound
+        M makes the noise and the sampled phases white, and P takes out what is fitted: the bound
         of Cramer and Rao with the phases unknown, ``√6 σ/(π A T √n)`` for
-        places evenly over a span T of one run. None where the readings do not tell f.
+        places evenly over a span T of one run. None where the readings do not show f.
         """
         slope = np.empty_like(along)
         for (start, stop), (a, b) in zip(self._regression.bounds, self._drawn, strict=True):
@@ -64,7 +64,7 @@ class RandomPhaseLine:
             A² = mean(a_r² + b_r²) - 4 R σ² / n,
             σ_A² = max(var_r(a_r² + b_r²) / (4 A² R), 2 σ² / n)
 
-        What the noise of n readings adds is taken off; the error is by how much the runs differ,
+        What the noise of n readings adds is subtracted; the error is by how much the runs differ,
         and no less than what the noise makes them.
         """
         squares = (self._drawn**2).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Lines beside a gear order: its amplitude or phase is modulated."""
+"""Lines next to a gear order: its amplitude or phase is modulated."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .shapes import best_shape
 RESOLVED = 0.75
 
 
-#: What tells a sideband from a line of another shaft at the same order.
+#: What distinguishes a sideband from a line of another shaft at the same order.
 TURNED = (
     "clamp the output turned against the gear and repeat: the phase of a sideband turns with it, "
     "that of a shaft's own line does not"
@@ -38,7 +38,7 @@ ONE_LINE = 0.1
 
 @dataclass(frozen=True)
 class Sidebands(Effect):
-    """Lines beside a gear order: its amplitude or phase is modulated once or twice a turn.
+    """Lines next to a gear order: its amplitude or phase is modulated once or twice a turn.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class Sidebands(Effect):
         travel = regression.signals.run_turns().max()
         known = set(known_orders(regression.around))
         shapes: list[dict[str, Any]] = []
-        # Over less than that the pair and the line between them are hardly told apart.
+        # Over less than that the pair and the line between them are hardly separated.
         offsets = [k for k in (1, 2) if k * travel > RESOLVED]
         grid = regression.signals.grid
         for m in carriers:
@@ -103,8 +103,8 @@ class Sidebands(Effect):
                 forms = ["free"]
                 if not {m - k, m + k} & known:
                     forms = ["AM", "PM", "free"] if m in present else ["free"]
-                # A line of another shaft at the same order, where it is known, takes up the
-                # sideband: only the other one is seen.
+                # A line of another shaft at the same order, where it is known, explains the
+                # sideband: only the other one is detected.
                 elif {m - k, m + k} & present:
                     forms = [f for f, x in (("lower", m - k), ("upper", m + k)) if x not in known]
                 shapes += [{"carrier": m, "offset": k, "form": form} for form in forms]
@@ -150,7 +150,7 @@ class Sidebands(Effect):
     def _bands(
         cls, around: JointPattern, extension: Extension, coefficients: Array, covariance: Array
     ) -> tuple[Array, Array]:
-        """Cosine and sine of the lines that are seen and their covariance."""
+        """Cosine and sine of the lines that are detected and their covariance."""
         shape = extension.shape
         if shape["form"] in _SEEN:
             return coefficients, covariance

@@ -35,7 +35,7 @@ MOST_TRIALS = 2**17
 #: Bins of time per period of the highest frequency: the quick search then loses 2 % there.
 BINS = 8
 
-#: Cycles that a run must show: fewer are a bend, not a line.
+#: Cycles that a run must show: fewer are a curve, not a line.
 LEAST_CYCLES = 3.0
 
 #: Share of its frequency by which a line may differ from run to run (a converter's clock).
@@ -48,13 +48,13 @@ LEAST_READINGS = 16
 #: there is one of time.
 BEARINGS = 12.0
 
-#: Share of its level by which the speed must change to tell a line in time from an order.
+#: Share of its level by which the speed must change to distinguish a line in time from an order.
 ONE_SPEED = 0.1
 
 #: Golden sections of a search about a trial frequency.
 SECTIONS = 14
 
-#: Share of a resolution cell within which an order and a frequency are hardly told apart.
+#: Share of a resolution cell within which an order and a frequency are hardly separated.
 UNRESOLVED = 0.5
 
 
@@ -217,7 +217,7 @@ class TimePeriodic(Effect):
 def _periodogram(
     regression: Regression,
 ) -> tuple[Array, Array, Array] | None:
-    """Frequencies, normalised power (frequency, run) of what is left, readings per run."""
+    """Frequencies, normalised power (frequency, run) of the residual, readings per run."""
     signals, bounds = regression.signals, regression.bounds
     sizes = np.array([stop - start for start, stop in bounds], dtype=np.float64)
     spans = np.array([float(np.ptp(signals.clock[a:b])) for a, b in bounds])
@@ -275,7 +275,7 @@ def _drifting(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, f
     padded = np.vstack([p, np.full((1, p.shape[1]), -np.inf)])
     deviances = np.maximum.reduceat(padded, np.column_stack([low, high]).ravel())[::2].sum(axis=1)
     cells = (high - low) / OVERSAMPLING
-    # A band of so many cells has one point more at which its power is of its own.
+    # A band of this many cells has one more independent point.
     log_grids = np.log(2.0 * bands) + p.shape[1] * np.log(cells + 1.0)
     k = int(np.argmax(deviances - 2.0 * log_grids))
     places = low[k] + p[low[k] : high[k]].argmax(axis=0)
@@ -285,7 +285,7 @@ def _drifting(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, f
 def _refined(regression: Regression, frequencies: list[float], step: float) -> list[float]:
     """Frequencies between the trial ones: one for all runs, or one a run.
 
-    That of all runs by what it saves jointly with what is fitted, which has taken up a part of it.
+    That of all runs by what it saves jointly with what is fitted, which has explained a part.
     """
     if len({*frequencies}) == 1:
         f, turn = frequencies[0], 2.0 * np.pi * regression.signals.clock

@@ -102,7 +102,7 @@ class TorsionalCompliance(FactorEffect):
     def form_limits(cls, regression: Regression, terms: Sequence[Fitted]) -> Parameters:
         """``departure_arcsec``: of a cube of the torque from proportion, where that is largest.
 
-        A spring that stiffens too little to be seen is a linear one to within so much.
+        A spring that stiffens too little to be detected is a linear one to that accuracy.
         """
         torque = torque_of(regression.signals)
         top = float(np.abs(torque).max())
@@ -112,7 +112,7 @@ class TorsionalCompliance(FactorEffect):
         low = np.hstack([line_columns(regression.signals.theta, k) for k in (1, 2, 3)])
         cube = (share**3)[:, None]
         if share_left(regression, cube, low, share[:, None]) < OWN_POWER:
-            return {}  # too few loads to tell
+            return {}  # too few loads to show
         column, _ = regression.projected(cube)
         power = float(column[:, 0] @ column[:, 0])
         cubic = float(column[:, 0] @ regression.r) / power
@@ -154,7 +154,7 @@ def torque_of(signals: Signals) -> Array:
 
 
 def unloaded(signals: Signals) -> str:
-    """Why no effect of torque can be seen in any case; empty where one may be."""
+    """Why no effect of torque can be detected in any case; empty where one may be."""
     if signals.torque is None:
         return "no torque was recorded"
     return "" if signals.torque.any() else "all runs are unloaded"

@@ -25,11 +25,11 @@ from .load_dependent_gear_error import LoadDependentGearError
 from .search import Array, Fitted, grid_ambiguity, is_gear_order, line_parameters
 from .shapes import best_shape
 
-#: Lines at most, and the price of a broad cause: one of so many beside every narrow one.
+#: Lines at most, and the price of a broad cause: one of this many together with every narrow one.
 MOST_LINES = 2
 BROAD = 8.0
 
-#: Turns from which on whole orders are told apart; periods that a line needs over less, and
+#: Turns from which on whole orders are separated; periods that a line needs over less, and
 #: periods by which orders must differ there.
 WHOLE_TURN, RESOLVED, UNRESOLVED = 0.9, 1.0, 0.5
 
@@ -118,7 +118,7 @@ class VaryingLine(Effect):
             return None
         if best.bic_gain < regression.least:
             return best
-        # What varies is told by what it leaves of the line as it is, which comes first.
+        # What varies is judged by what it leaves of the constant line, which comes first.
         steady = regression.jointly_with(line_columns(signals.theta, best.shape["order"]))
         beyond = steady.gain(best.columns)[0]
         return replace(best, deviance=min(best.deviance, beyond))
@@ -156,7 +156,7 @@ class VaryingLine(Effect):
 
 
 def _resolved(regression: Regression) -> Array:
-    """Orders that are lines over the travel, without those hardly told from a fast shaft's own.
+    """Orders that are lines over the travel, without those close to a fast shaft's own.
 
     Over less of a period a line times the speed is the speed itself.
     """

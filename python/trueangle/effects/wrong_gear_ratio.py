@@ -26,7 +26,7 @@ from .sidebands import Sidebands
 #: Lines of geared shafts that one ratio must explain at once: one alone is a missing order.
 LEAST_LINES = 2
 
-#: Share of the power of the believed lines that may be left at their own places.
+#: Share of the power of the assumed lines that may be left at their own places.
 ABSENT = 0.3
 
 #: Share by which what ratios explain at even steps may differ: by rounding.
@@ -35,7 +35,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class WrongGearRatio(Effect):
-    """The geared lines stand at the orders of another ratio.
+    """The geared lines are at the orders of another ratio.
 
     ::
 
@@ -105,7 +105,7 @@ class WrongGearRatio(Effect):
         if not ratios:
             return None
         scores = np.array([score(ratio) for ratio in ratios])
-        # At even steps several are the same numbers: the nearest to the believed one is meant.
+        # At even steps several are the same numbers: the nearest to the assumed one is meant.
         alike = [ratios[k] for k in np.flatnonzero(scores > (1.0 - SAME) * scores.max())]
         ratio = min(alike, key=lambda ratio: abs(ratio - joint.gear_ratio))
         orders = np.array(_moved(joint, pattern, ratio))[geared]
@@ -117,7 +117,7 @@ class WrongGearRatio(Effect):
 
     @staticmethod
     def _are_there(regression: Regression) -> bool:
-        """The believed lines are where they are believed to be."""
+        """The assumed lines are where they are assumed to be."""
         pattern = regression.belief.pattern
         geared = _geared(regression.belief.joint, pattern)
         # Measured less simulated, so a line that is not there leaves its negative.

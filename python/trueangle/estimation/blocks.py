@@ -1,4 +1,4 @@
-"""Blocks of regressors that are scored together: all lines of one cause, say."""
+"""Blocks of regressors that are scored together: all lines of one cause, for example."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class BlockProducts:
     """Products of the columns within blocks of one width, under any noise.
 
     With X a block and M the map that makes the noise white, ``Xᵀ Mᵀ M X``. Correlated
-    noise asks for the products of neighbouring readings as well: these are kept, so that
+    noise needs the products of neighbouring readings as well: these are kept, so that
     another correlation costs no pass over the readings.
 
     Parameters

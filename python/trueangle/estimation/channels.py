@@ -19,7 +19,7 @@ from .linear import least_squares
 #: Cells of a period in which readings are counted: coverage, and weights of rests.
 CELLS: Final = 64
 
-#: Readings of one cell count for at most so many times those of the median cell.
+#: Readings of one cell count for at most this many times those of the median cell.
 _MOST_IN_CELL: Final = 4.0
 
 #: Harmonics ``z_(-m)`` that are tried: radius of order up to 8.
@@ -44,7 +44,7 @@ _CONFIDENCE: Final = 0.99
 
 
 class ChannelEstimate(NamedTuple):
-    """Constants with what is known of them.
+    """Constants with what is known about them.
 
     ``limit`` is the standard deviation of the decoded angle by that of the constants, over the
     phases covered and without its mean; ``takes`` what the correction takes there, in radians of
@@ -116,7 +116,7 @@ def estimate_channels(
     ------
     NoModelError
         A channel is constant, both are one, too few readings, an arc that is too short: one line
-        that says which.
+        that states which.
     """
     check_channels(sine, cosine, named)
     kept, clipped = unclipped(sine, cosine, named)
@@ -268,7 +268,7 @@ class _Fit:
 
     @property
     def correlated(self) -> float:
-        """How many readings carry the information of one: neighbours' residuals are alike."""
+        """How many readings carry the information of one: neighbours' residuals are correlated."""
         return inflation(self.residuals)
 
     def _fit_noise_ratio(self) -> None:

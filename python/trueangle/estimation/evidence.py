@@ -15,7 +15,7 @@ from ..support.arrays import Array
 #: Correlation times of the noise's exponential terms, in median steps of a run's time.
 CORRELATION_TIMES = tuple(Evidence.CORRELATION_TIMES)
 
-#: Part of the variance of the curve that orders left out of a model may take from its mean.
+#: Part of the variance of the curve that orders omitted of a model may take from its mean.
 _LEFT_OUT: Final = 0.25
 
 #: Singular values of columns, over the largest, below which they are one column at the angles.
@@ -32,7 +32,7 @@ class RunReadings(NamedTuple):
 
 
 class RunZero(NamedTuple):
-    """What the readings tell of the zero of a run."""
+    """What the readings show of the zero of a run."""
 
     information: float  #: Inverse variance, where the coefficients are known.
     columns: Array  #: Weighted mean of each column, as that of ``level``.
@@ -48,7 +48,7 @@ class WeightedModel(NamedTuple):
 
 
 class Alone(NamedTuple):
-    """One order by itself, beside those of the most probable model."""
+    """One order by itself, together with those of the most probable model."""
 
     cosine: float
     sine: float
@@ -85,7 +85,7 @@ class EvidenceEstimate:
         Of the runs in turn.
     readings : int
     alone : tuple of Alone or None
-        Each of ``orders`` by itself; None where the readings do not tell it from the others.
+        Each of ``orders`` by itself; None where the readings do not distinguish it from the others.
     runs : tuple of RunReadings
         What it is the estimate of.
     prior : ndarray, shape (K,)
@@ -152,7 +152,7 @@ class EvidenceEstimate:
         """The fewest orders that hold the curve at these angles.
 
         These are the orders that are there with more than half of the probability, and, where
-        orders stand for each other, the likeliest of the others, until what they leave out of
+        orders represent each other, the likeliest of the others, until what they omit of
         the mean curve has less than a quarter of the curve's variance.
 
         Parameters
@@ -212,7 +212,7 @@ class EvidenceEstimate:
         return onto @ self.mean, onto @ self.covariance @ onto.T
 
     def gain_of_a_run(self, theta: Array) -> tuple[float, float]:
-        """Mean and standard deviation of what the mean curve takes off a further run's mean square.
+        """Mean and standard deviation of the gain of the mean curve on a further run.
 
         ::
 
@@ -235,7 +235,7 @@ class EvidenceEstimate:
             1 / ν = p² / 2 (R - 1) + (1 - p)² / f,    p = ω / R var b
 
         with the part p of a variance that comes from what differs between R runs, two
-        coefficients of which tell ω, and f degrees of freedom of the readings.
+        coefficients of which show ω, and f degrees of freedom of the readings.
         """
         runs = len(self.runs)
         mean = np.sum([m.weight * m.omega for m in self.models], axis=0)
@@ -280,7 +280,7 @@ def estimate_by_evidence(
     ----------
     runs : sequence of RunReadings
     orders : sequence of float
-        Positive, increasing; as many as one likes, for those that do not stand out cost a pass.
+        Positive, increasing; as many as one likes, for those that are not significant cost a pass.
     probability : sequence of float, optional
         Prior probability of each order, above 0 and below 1; 1/K of each by default, or 1/2 of one.
 

@@ -1,8 +1,8 @@
 """Linear least squares by the core's one solver: rows, normal equations, groups, clusters.
 
-Columns are scaled to unit length. Directions of which less is left than rounding makes are left
-out, ``32 n ε`` of the greatest singular value (of rows) or eigenvalue (of sums) of
-n columns: every other limit here is a statement about the readings, and says which.
+Columns are scaled to unit length. Directions of which less is left than rounding makes are
+omitted, ``32 n ε`` of the greatest singular value (of rows) or eigenvalue (of sums) of
+n columns: every other limit here is a statement about the readings, and states which.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def least_squares(design: Array, target: Array, weights: Array | None = None) ->
     Returns
     -------
     ndarray, shape (m,) or (m, k)
-        Of least norm in scaled columns, where the rows do not tell all of them apart.
+        Of least norm in scaled columns, where the rows do not separate all of them.
 
     Raises
     ------
@@ -222,7 +222,7 @@ def cluster_covariance(
     Raises
     ------
     numpy.linalg.LinAlgError
-        All clusters together do not tell the coefficients apart.
+        All clusters together do not separate the coefficients.
 
     Examples
     --------

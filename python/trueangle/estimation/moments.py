@@ -42,7 +42,7 @@ class Moments(ShownResult):
     Parameters
     ----------
     orders : iterable of int, or mapping of shaft name to such
-        All orders that may ever be asked for.
+        All orders that may ever be requested.
     period : float
         One turn of ``theta`` and ``error``.
     forgetting : float, optional
@@ -160,7 +160,7 @@ class Moments(ShownResult):
         argument: Argument = "reference",
         run: Hashable = None,
     ) -> int:
-        """Add readings given by both angles, in one pass that leaves missing ones out.
+        """Add readings given by both angles, in one pass that omits missing ones.
 
         Parameters
         ----------
@@ -189,7 +189,7 @@ class Moments(ShownResult):
     def subtract(self, other: Moments) -> Moments:
         """Take away the readings of another accumulator that were added to this one before.
 
-        What is left is that of the others to the rounding of the sums: a window that moves along
+        The residual is that of the others to the rounding of the sums: a window that moves along
         a log is the sum of its parts less the oldest.
 
         Parameters
@@ -205,7 +205,7 @@ class Moments(ShownResult):
         Raises
         ------
         ArgumentError
-            Other orders, a run that is not here or has fewer readings, sums that forget.
+            Other orders, a run that is not here or has fewer readings, sums with forgetting.
 
         Examples
         --------
@@ -239,7 +239,7 @@ class Moments(ShownResult):
         return self.merge(other)
 
     def copy(self) -> Moments:
-        """An accumulator of its own with the same readings."""
+        """A separate accumulator with the same readings."""
         fresh = Moments.__new__(Moments)
         fresh._shafts, fresh._sums = self._shafts, self._sums.copy()
         fresh._forgetting = None if self._forgetting is None else self._forgetting.copy()
@@ -271,7 +271,7 @@ class Moments(ShownResult):
         Raises
         ------
         RankError
-            The readings cannot tell the orders apart.
+            The readings cannot separate the orders.
         ArgumentError
             Orders that were not accumulated.
         """

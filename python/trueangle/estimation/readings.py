@@ -1,4 +1,4 @@
-"""What is fitted: errors, the signals of their readings, and what is believed of the joint."""
+"""What is fitted: errors, the signals of their readings, and the assumed model of the joint."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Readings:
     residual : ndarray
         Measured minus simulated error, arcsec, unfolded.
     belief : Surroundings
-        The joint and the pattern that the simulation believes.
+        The joint and the pattern that the simulation assumes.
     lines : LineBasis
         Shared by readings of the same motion.
     weights : ndarray or None
@@ -100,7 +100,7 @@ class Readings:
         return float(np.log(runs)) if runs >= ENOUGH_RUNS else self.log_n
 
     def less(self, error: Array) -> Readings:
-        """The readings with a known error taken off; what follows from the motion is kept."""
+        """The readings with a known error subtracted; what follows from the motion is kept."""
         other = replace(self, residual=self.residual - error)
         made = vars(self)
         vars(other).update((name, made[name]) for name in OF_MOTION if name in made)

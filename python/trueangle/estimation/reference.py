@@ -1,7 +1,7 @@
 """The slow truth in plain numpy: error and slope, correction and least-squares fit.
 
 Every function here does the obvious thing with one sine and one cosine per order and
-the whole design matrix in memory. Tests hold the compiled core against it, benchmarks
+the whole design matrix in memory. Tests compare the compiled core with it, benchmarks
 measure the core's gain over it; use the core for work.
 """
 

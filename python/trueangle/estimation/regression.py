@@ -29,13 +29,13 @@ T = TypeVar("T")
 BEYOND_SHOWN = 3.0
 
 #: Times what a coarse search finds that the refined one may. Where the noise is correlated a
-#: search that does not whiten has its peaks elsewhere: three times was seen.
+#: search that does not whiten has its peaks elsewhere: three times was detected.
 REFINED = 4.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Regression(Solution):
-    """A fit of readings, and proposals of causes beside its terms.
+    """A fit of readings, and proposals of causes together with its terms.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Regression(Solution):
         return self.with_solution(solution, least=0.0, cache=self.cache.for_other_terms())
 
     def with_evidence(self, terms: Iterable[Extension]) -> Self:
-        """The same terms with another deviance, say."""
+        """The same terms with another deviance, for example."""
         terms = tuple(terms)
         if sum(term.run_effect is not None for term in terms) > 1:
             return self.with_terms(terms)  # ratios of variance settle among each other
@@ -102,7 +102,7 @@ class Regression(Solution):
     def with_least(self, least: float) -> Self:
         """The same where only candidates of more evidence matter.
 
-        No figure depends on that: what searches ask of a fit is worked out once for all causes.
+        No figure depends on that: what searches need of a fit is computed once for all causes.
         """
         if least == self.least:
             return self
@@ -115,7 +115,7 @@ class Regression(Solution):
         """The readings without terms under other weights.
 
         What terms explain is counted from the likeliest noise without any, even or uneven: where
-        what they explain is still in the readings, a correlation may describe it by chance.
+        what they explain is still in the readings, a correlation may describe it at random.
         """
         readings = replace(self.readings, weights=weights)
         found = self.of_readings(readings, cache=self.cache.for_other_errors())
@@ -168,7 +168,7 @@ class Regression(Solution):
         """Extension of regressors with their evidence in this regression.
 
         None is given for an error larger than the readings show: it would only be there to
-        be taken off again by another one.
+        be subtracted again by another one.
         """
         saved, coefficients = self.gain(columns)
         error = columns @ coefficients

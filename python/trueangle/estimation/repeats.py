@@ -18,7 +18,7 @@ REPEATED = 4.0
 def repeated_part(residual: Array, signals: Signals, by_direction: bool = False) -> Array:
     """The part of a residual that is the same on every pass of a place.
 
-    A pass is a stretch of one direction in one run. With the means of cells (place i,
+    A pass is a segment of one direction in one run. With the means of cells (place i,
     pass j), each pass about its own mean, the places differ if
 
     ::
@@ -26,7 +26,7 @@ def repeated_part(residual: Array, signals: Signals, by_direction: bool = False)
         F = Σ_ij ē_i² / (I - 1) / (Σ_ij (e_ij - ē_i)² / (IJ - I - J)) > 4
 
     Noise that is correlated in time differs from pass to pass; an error that is a
-    function of angle does not, and its neighbours in time are alike for that reason.
+    function of angle does not, and its neighbours in time are equal for that reason.
 
     Parameters
     ----------

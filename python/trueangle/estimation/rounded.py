@@ -1,4 +1,4 @@
-"""Errors of readings that were rounded: a reading tells in which step the angle was, no more.
+"""Errors of readings that were rounded: a reading shows in which step the angle was, no further.
 
 A reading rounded to whole steps q holds its own error to an interval,
 
@@ -6,11 +6,11 @@ A reading rounded to whole steps q holds its own error to an interval,
 
     ε_i ∈ [e_i - q/2, e_i + q/2],    e_i = y_i - x_i β,
 
-and is fitted by the chance of that interval under ``ε ~ N(0, σ²)``. What it tells of β is the
+and is fitted by the probability of that interval under ``ε ~ N(0, σ²)``. What it shows of β is the
 expected error within it, whose mean is zero at every angle. That of ``e_i`` is not, unless noise
 moves readings by half a step and more: on the same positions the rounding is the same in every
 run, and looks like a property of the joint. Source: Gourieroux, Monfort, Renault and Trognon
-(1987), J. Econometrics 34; residuals drawn within the intervals: Dunn and Smyth (1996), J. Comp.
+(1987), J. Econometrics 34; residuals sampled within the intervals: Dunn and Smyth (1996), J. Comp.
 Graph. Stat. 5.
 """
 
@@ -25,18 +25,18 @@ import trueangle._core as _core
 
 from ..support.arrays import Array
 
-#: Share of what is left from which on the rounding of the readings is a part that matters.
+#: Share of the residual from which on the rounding of the readings is a part that matters.
 LEAST_SHARE = 0.2
 
 #: Times the variance that is there which the rounding of a sensor may have: on few positions it
 #: errs by other numbers than on all, but on none that does not scatter.
 MOST_SHARE = 2.0
 
-#: Standard deviation of the noise, in steps, below which readings tell of none: only one in a
+#: Standard deviation of the noise, in steps, below which readings show of none: only one in a
 #: dozen is then within two of them of the border of its step.
 LEAST_NOISE = 0.03
 
-#: Standard deviations of it by which a reading may stand outside of its step.
+#: Standard deviations of it by which a reading may be outside of its step.
 WITHIN = 2.0
 
 #: Passes at most, and the change of the fit, in steps, at which it has settled.
@@ -71,10 +71,10 @@ class Rounded:
     within: bool
 
     def drawn(self, rng: np.random.Generator) -> Array:
-        """Errors before the rounding, drawn among those that the steps allow.
+        """Errors before the rounding, sampled among those that the steps allow.
 
         Where the fit is right, they are independent and normal of standard deviation ``sigma``,
-        wherever readings stand in their steps.
+        wherever readings are in their steps.
         """
         shares = rng.uniform(size=self.left.size)
         return _core.rounded_drawn(self.left, self.step, self.sigma, shares)
@@ -93,7 +93,7 @@ def fit_rounded(
         The readings less what they are expected to be.
     step : float
     aside : ndarray of bool, shape (n,), optional
-        Readings that say nothing: outliers.
+        Readings that state nothing: outliers.
 
     Returns
     -------
@@ -129,5 +129,5 @@ def fit_rounded(
 
 
 def is_rounding_visible(rounding: float, left: float, scatter: float) -> bool:
-    """A variance of rounding is a good part of that left, and no more than the readings' may be."""
+    """A variance of rounding is a good part of that left, and at most the readings' may be."""
     return LEAST_SHARE * left < rounding < MOST_SHARE * scatter

@@ -24,7 +24,7 @@ class _Exclusive:
     """One thread at a time; the others wait, unless nobody can ever be done.
 
     A process that is forked while another of its threads is at it inherits sums that are
-    half added: there it is told so.
+    half added: there it is reported so.
     """
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class RunSums:
     ----------
     period : float
     shafts : sequence of ShaftOrders
-        All orders that may be asked for.
+        All orders that may be requested.
 
     Raises
     ------
@@ -146,7 +146,7 @@ class RunSums:
             return {label: sums.copy() for label, sums in self._runs.items()}
 
     def copy(self) -> RunSums:
-        """Sums of their own of the same readings."""
+        """Separate sums of the same readings."""
         fresh = RunSums(self.period, self._shafts)
         fresh._runs = self._copies()
         return fresh

@@ -20,7 +20,7 @@ REACH = MOST_IN_ROW + 1
 def flagged_segments(
     flags: NDArray[np.bool_], bounds: list[tuple[int, int]]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First and one-past-last reading of every stretch of true flags; none goes over two runs.
+    """First and one-past-last reading of every segment of true flags; none goes over two runs.
 
     Examples
     --------
@@ -37,7 +37,7 @@ def flagged_segments(
 
 
 def short_segments(flags: NDArray[np.bool_], bounds: list[tuple[int, int]]) -> NDArray[np.bool_]:
-    """The flags that stand in stretches of at most `MOST_IN_ROW`.
+    """The flags that are in segments of at most `MOST_IN_ROW`.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def short_segments(flags: NDArray[np.bool_], bounds: list[tuple[int, int]]) -> N
 def within_segments(
     starts: NDArray[np.int64], stops: NDArray[np.int64], n: int
 ) -> NDArray[np.bool_]:
-    """Which of n readings are in one of some stretches.
+    """Which of n readings are in one of some segments.
 
     Examples
     --------
@@ -64,7 +64,7 @@ def within_segments(
 
 
 def less_local_level(values: Array, bounds: list[tuple[int, int]]) -> Array:
-    """Readings less the median of those about each: a glitch stands out, what is slow does not.
+    """Readings less the median of those about each: a glitch is significant, what is slow does not.
 
     About 5 ms for 10 000 readings.
     """

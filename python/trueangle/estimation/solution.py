@@ -33,7 +33,7 @@ class Solution(Projection):
     readings : Readings
     terms : tuple of Extension
     fixed_rho : float or None
-        Correlation of the noise where it is given; else that of what is left.
+        Correlation of the noise where it is given; else that of the residual.
     blocks : tuple of ndarray
         What the design is made of: the readings' own columns, those of every term.
     design : ndarray, shape (n, p)
@@ -140,7 +140,7 @@ class Solution(Projection):
 
     @property
     def belief(self) -> JointPattern:
-        """What the simulation believes of the joint."""
+        """What the simulation assumes of the joint."""
         return self.readings.belief
 
     @property
@@ -172,24 +172,24 @@ class Solution(Projection):
 
     @cached_property
     def left(self) -> Array:
-        """What is left of the readings, arcsec."""
+        """The residual of the readings, arcsec."""
         return np.asarray(self.residual - self.design @ self.coefficients)
 
     @cached_property
     def left_within_runs(self) -> Array:
-        """What is left less what is taken for drawn anew in every run, arcsec."""
+        """The residual less what is assumed to be random in every run, arcsec."""
         return np.asarray(self.left - self.whiten.run_part(self.left))
 
     @property
     def variance_within_runs(self) -> float:
-        """Variance of `left_within_runs`, outliers left out: readings as they are, not whitened."""
+        """Variance of `left_within_runs`, outliers omitted: readings as they are, not whitened."""
         clean = ~self.outlying
         freedom = max(int(np.count_nonzero(clean)) - self.rank, 1)
         return float(np.sum(self.left_within_runs[clean] ** 2)) / freedom
 
     @cached_property
     def around(self) -> JointPattern:
-        """The joint, with the believed pattern and the missing orders among the terms."""
+        """The joint, with the assumed pattern and the missing orders among the terms."""
         return self.surroundings(self.fitted())
 
     @property
@@ -200,7 +200,7 @@ class Solution(Projection):
 
     @property
     def size(self) -> int:
-        """Numbers that it holds beside the readings, about."""
+        """Numbers that it holds together with the readings, about."""
         return self.design.size + self.n * sum(factor.rank for factor in self.factors)
 
     def has(self, cause: str) -> bool:
@@ -240,7 +240,7 @@ class Solution(Projection):
 
             V_s = (R / (R - 1))Σ_j s_j s_jᵀ,    s_j = X⁺_j r_j
 
-        with the residuals r of run j: no form is exact, and what it leaves is alike within a
+        with the residuals r of run j: no form is exact, and what it leaves is equal within a
         run. Coefficients whose variance is larger by this than by the noise alone are
         widened to it; from `ENOUGH_RUNS` runs on. `form_errors`, where known, come on top.
         """
@@ -270,7 +270,7 @@ class Solution(Projection):
             β - C_{·g} C_gg⁻¹ β_g,    C = (Xᵀ Mᵀ M X)⁻¹
 
         under the noise of this fit, which may have a fixed correlation and none of the terms
-        ``group`` a run effect of its own; outliers are clipped as in the fit of the others.
+        ``group`` a separate run effect; outliers are clipped as in the fit of the others.
         """
         readings = self.readings
         return self.factor.without(
@@ -282,10 +282,10 @@ class Solution(Projection):
         )
 
     def surroundings(self, fitted: Sequence[tuple[Extension, Array]]) -> JointPattern:
-        """The joint, with the believed pattern and the missing orders among the terms.
+        """The joint, with the assumed pattern and the missing orders among the terms.
 
         Not with the fitted corrections: an effect on the pattern (a filter) would be
-        taken for one in part, and then act on a pattern that it has already changed.
+        confused with one in part, and then act on a pattern that it has already changed.
         """
         belief = self.belief.pattern
         orders = [*belief.orders]
@@ -300,7 +300,7 @@ class Solution(Projection):
 
 
 def fields_of_solution(solution: Projection, of: type[Projection]) -> dict[str, Any]:
-    """Fields of a class of results, as they stand in one."""
+    """Fields of a class of results, as they are in one."""
     return {field.name: getattr(solution, field.name) for field in fields(of)}
 
 

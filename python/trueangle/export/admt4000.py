@@ -44,9 +44,7 @@ class Admt4000(Target):
         "model of the device's arithmetic exists; measure after writing"
     )
     arithmetic_known = False
-    options = {
-        "bits": Option(int, 24, "bits of a reading: all values are evaluated, up to 24 bits")
-    }
+    options = {"bits": Option(int, 24, "bits of a reading, at most 24: all are evaluated")}
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         pattern.check_one_turn(self.name)

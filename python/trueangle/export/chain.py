@@ -1,7 +1,7 @@
 """Several shafts without iteration: a chain of inverted tables, slow shaft first.
 
-Subtract the output's table, then look up the motor's table, inverted beforehand as a function
-of its own reading, at what is left. One look-up a shaft, and what the order neglects is the
+Subtract the output's table, then look up the motor's table, inverted beforehand as a
+function of its reading, at the remainder. One look-up a shaft, and what the order neglects is the
 slope of the slow pattern times the fast one: 0.03 arcsec where one pass of the plain error
 leaves 4.
 """

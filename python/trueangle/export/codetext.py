@@ -39,7 +39,7 @@ def code_parts(name: str) -> dict[str, str]:
 def filled_code(text: str, **values: object) -> str:
     r"""``text`` with values in the places of ``@name@``, one after the other.
 
-    What stands alone in a line has that line's indentation in every line of it, and takes the
+    What is alone in a line has that line's indentation in every line, and takes the
     line with it where it is empty.
 
     Examples

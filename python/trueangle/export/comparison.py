@@ -51,18 +51,19 @@ class Comparison(PlainResult):
         Angle of which it is a function: the reading where one of them was read from a table that
         is looked up there, which knows no other zero.
     table_rms_arcsec, table_max_abs_arcsec : float or None
-        What tables that were read do beside their models: the lines between their entries and
-        their whole numbers add at most so much; None where neither was read from one.
+        What tables that were read do in addition to their models: the lines between their entries
+        and their whole numbers add at most so much; None where neither was read from one.
     differ_in : list of str
         Terms that only one of them has, or with other parameters: not compared.
     verdict : {"same", "changed"} or None
         Whether they differ by more than the noise of their readings, in the orders that both
-        have and without the zero; None where that cannot be told: a model without a covariance,
-        or with another argument.
+        have and without the zero; None where that cannot be determined: a model without a
+        covariance, or with another argument.
     p : float or None
-        Chance of as large a difference between two calibrations of one pattern.
+        Probability of as large a difference between two calibrations of one pattern.
     false_alarms : float
-        Below which ``p`` is "changed": the share of unchanged patterns that are told to have.
+        Below which ``p`` is "changed": the share of unchanged patterns that are reported as
+        changed.
     """
 
     orders: list[dict[str, float | None]]
@@ -79,7 +80,7 @@ class Comparison(PlainResult):
     false_alarms: float = FALSE_ALARMS
 
     def to_dict(self) -> dict[str, Any]:
-        """All of it."""
+        """Everything."""
         return dict(vars(self))
 
     def _brief(self) -> str:
@@ -98,9 +99,10 @@ class Comparison(PlainResult):
             number is the counts of a turn.
         """
         unit = error_unit(errors_in, self.max_abs_arcsec)
+        verdicts = {"changed": "Changed: ", "same": "Not distinguishable in their noise: "}
         lines = [
-            f"difference: {unit.text(self.rms_arcsec)} rms, {unit.number(self.max_abs_arcsec)} "
-            f"max abs, zero {zero_text(self.zero_deg, 360.0)}"
+            f"{verdicts.get(self.verdict or '', '')}difference {unit.text(self.rms_arcsec)} rms, "
+            f"{unit.number(self.max_abs_arcsec)} max abs, zero {zero_text(self.zero_deg, 360.0)}"
             + ("" if self.std_arcsec is None else f"; known to {unit.text(self.std_arcsec)}"),
             *self._verdict(),
             *self._arithmetic(unit),
@@ -123,11 +125,8 @@ class Comparison(PlainResult):
     def _verdict(self) -> list[str]:
         if self.verdict is None or self.p is None:
             return []
-        told = "changed" if self.verdict == "changed" else "not distinguishable in their noise"
-        return [
-            f"{told}: p = {self.p:.2g}, and below {self.false_alarms:g} it counts as changed "
-            "(without the zero)"
-        ]
+        below = f"below {self.false_alarms:g} it counts as changed (without the zero)"
+        return [f"p = {self.p:.2g}; {below}"]
 
     def _arithmetic(self, unit: ErrorUnit) -> list[str]:
         if self.table_max_abs_arcsec is None or self.table_rms_arcsec is None:

@@ -86,7 +86,7 @@ def c_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -> s
     start = "@n@_pattern(reading)" if at_indicated else "reading"
     bumps = [form for form in terms.smooth if isinstance(form, forms.Bump)]
     if at_indicated and bumps:
-        # The table holds them at its own angle: what is searched is what they were taken off.
+        # The table holds them at its own angle: what is searched has them subtracted.
         sums = [
             line for form in bumps for line in _form(form, RunTimeWaves((), (), ()), "", _FIXED)[1]
         ]
@@ -190,7 +190,7 @@ def c_search(
 
 
 def _springs(terms: RunTimeTerms, arithmetic: CArithmetic) -> str:
-    """Error of the springs on a stretch, and the stretch that begins."""
+    """Error of the springs on a segment, and the segment that begins."""
     number = arithmetic.number
     wound = [
         f"sum += {number(s.amplitude)} * (d - (d - s->wound[{i}])"
@@ -229,7 +229,7 @@ def _travel(terms: RunTimeTerms, arithmetic: CArithmetic, zero: float) -> list[s
 
 
 def _function(name: str, arguments: tuple[str, ...], sums: list[str]) -> str:
-    """A function that adds up; what it is given and does not use is said to the compiler."""
+    """A function that adds up; what it is given and does not use is reported to the compiler."""
     used = "\n".join(sums)
     names = [argument.split()[-1].lstrip("*") for argument in arguments]
     unused = [f"(void){word};" for word in names if not re.search(rf"\b{word}\b", used)]

@@ -11,13 +11,13 @@ from ..model.model import HarmonicModel
 from ..support.arrays import Array
 from ..support.distributions import f_tail
 
-#: Chance that two calibrations of one pattern are told to differ.
+#: Probability that two calibrations of one pattern are reported to differ.
 FALSE_ALARMS: Final = 0.01
 
-#: Orders of which one stands out by chance: those that a selection looks at in two models.
+#: Orders of which one is significant at random: those that a selection looks at in two models.
 _LOOKED_AT: Final = 220
 
-#: Degrees of freedom of a scatter at least: so few tell nothing.
+#: Degrees of freedom of a scatter at least: fewer show nothing.
 _FEWEST: Final = 0.1
 
 #: Least pivot of the covariance, its rows scaled, with which it is inverted.
@@ -25,7 +25,7 @@ _TOLD: Final = 1e-10
 
 
 class Equality(NamedTuple):
-    """``statistic`` is T^2 over the orders that were tested, ``p`` its chance by noise alone."""
+    """``statistic`` is T^2 over the tested orders, ``p`` its probability by noise alone."""
 
     verdict: Literal["same", "changed"]
     p: float
@@ -42,7 +42,7 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
 
     with the degrees of freedom of both residual variances together (Satterthwaite). Where a
     covariance comes from the scatter of few runs none of its numbers is known, not only their
-    size: each order then stands for itself,
+    size: each order is then independent,
 
     ::
 
@@ -50,8 +50,8 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
 
     (Hotelling 1931; Sidak 1967). An order that
     one of them lacks was chosen by its size in the other: it is tested by itself, with twice its
-    covariance (the other's readings know it as well) and its chance multiplied by the orders that
-    a selection looks at. The zero, which mounting moves, is kept out.
+    covariance (the other's readings know it as well) and its probability multiplied by the orders
+    that a selection looks at. The zero, which mounting moves, is kept out.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
 
 
 def _by_orders(apart: Array, scaled: Array, freedom: float) -> float:
-    """Chance of the order that differs most, of a covariance of which nothing is known."""
+    """Probability of the order that differs most, of a covariance of which nothing is known."""
     least = 1.0
     for i in range(0, apart.size, 2):
         pair = apart[i : i + 2]
@@ -123,7 +123,7 @@ def _by_orders(apart: Array, scaled: Array, freedom: float) -> float:
 
 
 def _pair_tail(squares: float, freedom: float) -> float:
-    """Chance of Hotelling's T² of two numbers whose covariance has so many degrees of freedom."""
+    """Probability of Hotelling's T² of two numbers whose covariance has n degrees of freedom."""
     left = max(freedom - 1.0, _FEWEST)
     return f_tail(squares * left / (2.0 * freedom), 2.0, left)
 
@@ -134,7 +134,7 @@ def _known_tail(squares: float, freedom: float) -> float:
 
 
 def _coefficients(model: HarmonicModel) -> dict[float, tuple[tuple[int, int], tuple[float, float]]]:
-    """Of each output order: rows of the covariance, cosine and sine. Twice told, it is left out."""
+    """Of each output order: rows of the covariance, cosine and sine. Twice given, it is omitted."""
     found: dict[float, tuple[tuple[int, int], tuple[float, float]]] = {}
     twice = set()
     at = 1
@@ -149,7 +149,7 @@ def _coefficients(model: HarmonicModel) -> dict[float, tuple[tuple[int, int], tu
 
 
 def _freedom(model: HarmonicModel) -> float:
-    """Of the covariance, or readings less unknowns; infinite where the model does not say."""
+    """Of the covariance, or readings less unknowns; infinite where the model does not state."""
     if model.fit is None:
         return math.inf
     if model.fit.freedom is not None:

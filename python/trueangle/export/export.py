@@ -64,7 +64,7 @@ def export_model(
     path : path, optional
         File to write; without, the text is in the result only.
     max_arcsec : float, optional
-        Take the smallest table that differs by at most this, what is left out included, or
+        Take the smallest table that differs by at most this, what is omitted included, or
         refuse.
     **options
         Of the target: ``entries``, ``bits``, ``method``, ``number`` ...
@@ -192,7 +192,7 @@ def import_model(
     output : path, optional
         Model file to write.
     **options
-        Of the target, where the file does not say: ``variant``, ``bits`` ...
+        Of the target, where the file does not state: ``variant``, ``bits`` ...
 
     Returns
     -------
@@ -268,7 +268,7 @@ def _share(
     if beside >= max_arcsec:
         names = ", ".join(f"{row['term']} {row['size_arcsec']:.4g} arcsec" for row in rows)
         raise ArgumentError(
-            f"a table of the angle leaves out {names}, and at most {max_arcsec:g} is allowed"
+            f"a table of the angle omits {names}, and at most {max_arcsec:g} is allowed"
         )
     left = (max_arcsec - beside - rounding) / steep
     if left <= 0.0:

@@ -1,4 +1,4 @@
-"""What an export has made: figures, what it leaves out and by how much, the text of the file."""
+"""What an export has made: figures, what it omits and by how much, the text of the file."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _SUMMARY_DIGITS = 4
 _GRID = 4096
 _AHEAD = 2
 
-#: What a signal goes over where the model does not say: one unit, about the temperature that a
+#: What a signal goes over where the model does not state: one unit, about the temperature that a
 #: term counts from. Velocities are in degrees per second.
 _UNITS = {"velocity": "deg/s", "temperature": "degC", "torque": "Nm", "current": "A"}
 
@@ -59,7 +59,7 @@ class Exported(PlainResult):
         Of the corrected angle at the joint from what the harmonics of the model give, over every
         input, in the target's own arithmetic; the maximum rounded up.
     max_difference_total_arcsec : float
-        With all that is left out, and with the rounding of what is computed at run time.
+        With all that is omitted, and with the rounding of what is computed at run time.
     floor_arcsec : float
         rms that the number format alone leaves.
     lost : list of dict
@@ -127,7 +127,7 @@ class Exported(PlainResult):
         first = where + self.difference(unit, _SUMMARY_DIGITS)
         if not self.left_out:
             first = laid_out([first])
-        # Else it stays one line, however wide: who reads one reads all that is left out.
+        # Else it stays one line, however wide: who reads one reads all that is omitted.
         lines: list[str] = []
         if self.entries:
             lines.append(
@@ -148,7 +148,7 @@ class Exported(PlainResult):
         return f"{first}\n{further}" if further else first
 
     def difference(self, unit: ErrorUnit, digits: int) -> str:
-        """One line: how far the corrected angle is from the model's, with all that is left out."""
+        """One line: how far the corrected angle is from the model's, with all that is omitted."""
 
         def shown(arcsec: float) -> str:
             return f"{rounded_up(arcsec * unit.per_arcsec, digits):.{digits}g}"
@@ -223,7 +223,7 @@ def run_time_bound(
     if slope + own >= 1.0:
         raise ArgumentError(
             f"the terms {', '.join(terms.kinds)} are as steep as {own:.3g} over the signals that "
-            f"the model records, and the pattern adds {slope:.3g}; the sum must "
+            f"the model records, the pattern adds {slope:.3g}: the sum must "
             "be below 1"
         )
     largest = sum(row["size_arcsec"] for row in rows) / ARCSEC_PER_TURN

@@ -58,7 +58,7 @@ class LinuxCnc(Target):
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         travel = SetpointTravel.of(pattern, self.name, options, MOST, usual=180)
-        # The motor is told position + trim: the trim is the error.
+        # The motor is reported position + trim: the trim is the error.
         forward, reverse = (
             np.round(values * 360.0, _DECIMALS) for values in (travel.forward, travel.reverse)
         )

@@ -56,7 +56,7 @@ class Moteus(Target):
     )
     options = {
         "source": Option(int, 0, "position source 0, 1 or 2 that reads this encoder"),
-        "bits": Option(int, 24, "bits of a reading: all values are evaluated, up to 24 bits"),
+        "bits": Option(int, 24, "bits of a reading, at most 24: all are evaluated"),
         "variant": Option(
             ("table", _COMMON), "table", "compensation table, or the offset of sine and cosine"
         ),
@@ -145,7 +145,7 @@ class Moteus(Target):
 
 
 def _device(table: NDArray[np.int8], scale: np.float32, bits: int) -> tuple[Correction, ...]:
-    """What the firmware takes off, without and with contracted products."""
+    """What the firmware subtracts, without and with contracted products."""
 
     def correction(angles: Places, contracted: bool) -> NDArray[np.float64]:
         reading = angles % 2**32 >> (32 - bits)

@@ -1,4 +1,4 @@
-"""MuJoCo: a fragment of MJCF with what it has of its own, and the model for the rest."""
+"""MuJoCo: a fragment of MJCF with MuJoCo's own effects, and the model for the others."""
 
 from __future__ import annotations
 

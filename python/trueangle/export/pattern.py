@@ -16,7 +16,7 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 
 #: Steps of regula falsi. A bracket that holds a line needs one; of a curve each step leaves
-#: the share of it by which the bracket is bent, a hundredth and less.
+#: the share of it by which the bracket is curved, a hundredth and less.
 _STEPS = 8
 
 #: Turns: the rounding of a double.
@@ -61,7 +61,7 @@ class TurnPattern:
         return np.asarray(indicated - corrected - self.zero)
 
     def taken_off(self, indicated: Array) -> Array:
-        """All that correcting takes off readings in turns: ``g`` and the constant."""
+        """All that correcting subtracts readings in turns: ``g`` and the constant."""
         return self.correction(indicated) + self.zero
 
     def error(self, theta: Array) -> Array:
@@ -97,7 +97,7 @@ class TurnPattern:
 
     @property
     def has_direction(self) -> bool:
-        """Whether something of what is left out follows the direction of travel alone."""
+        """Whether something of what is omitted follows the direction of travel alone."""
         return any(of_direction(term) for term in self.source.terms)
 
     # -- what it consists of ----------------------------------------------------------
@@ -128,7 +128,7 @@ class TurnPattern:
 
     @property
     def is_periodic(self) -> bool:
-        """Whether one turn of the output holds all of it."""
+        """Whether one turn of the output holds everything."""
         return self.model.is_periodic
 
     def least_entries(self) -> int:
@@ -239,12 +239,12 @@ def inverse_rising(rising: Callable[[Array], Array], wanted: Array, points: int)
     wanted : ndarray
         Its values, over any number of turns.
     points : int
-        Brackets to a turn; corners of the function should stand between two of them.
+        Brackets to a turn; corners of the function should be between two of them.
 
     Raises
     ------
     NotInvertibleError
-        It falls somewhere: one value would stand for several angles.
+        It decreases somewhere: several angles would give one value.
 
     Examples
     --------

@@ -75,7 +75,7 @@ class Pmac(Target):
                 f"are {', '.join(map(str, near)) or 'none'}"
             )
         whole_turn = {"entries": entries, "start": 0.0, "stop": 360.0}
-        # One column for both directions: what follows the direction is left out.
+        # One column for both directions: what follows the direction is omitted.
         pattern = TurnPattern(pattern.model)
         travel = SetpointTravel.of(pattern, self.name, whole_turn, _MOST + 1, divided=counts)
         entries = travel.entries

@@ -27,7 +27,7 @@ from .target import CommentBlock, Made, Option, TablePart, Target
 
 Places = NDArray[np.int64]
 
-#: Sizes that are tried, where none is asked for up to the largest default.
+#: Sizes that are tried, where none is requested up to the largest default.
 _SIZES = tuple(1 << bits for bits in range(3, 17))
 _LARGEST_DEFAULT = 4096
 
@@ -40,7 +40,7 @@ _SHARE = 1.0 / 3.0
 #: Readings of the self-test: spread, and none of them a knot.
 _TEST_ANGLES = tuple((i * 0x1F123BB5 + 0x01234567) % 2**32 for i in range(8))
 
-#: A knot of 16 bits counts no more than 2^31 units of an angle of 32 bits.
+#: A knot of 16 bits counts at most 2^31 units of an angle of 32 bits.
 _LARGEST_SHIFT: Final = 31
 
 _TABLE = re.compile(
@@ -56,7 +56,7 @@ class PortableTarget(Target):
 
     sign = "subtract"
     options = {
-        "bits": Option(int, 24, "bits of a reading: all values are evaluated, up to 24 bits"),
+        "bits": Option(int, 24, "bits of a reading, at most 24: all are evaluated"),
         "entries": Option(int, None, "of each table, a power of two (default: by the model)"),
         "method": Option(METHODS, None, "of interpolation"),
         "number": Option(NUMBERS, None, "int16, int32 or float (default: the first that holds it)"),
@@ -137,7 +137,7 @@ class PortableTarget(Target):
 
 
 def table_lines(chain: Chain) -> list[str]:
-    """What the comment says of each table; `import` reads it back."""
+    """What the comment states about each table; `import` reads it back."""
     lines = [
         f"Table {source_identifier(table.shaft)}: {table.entries} entries, {table.bytes} bytes, "
         f"{table.method}, {table.number}, shift {table.shift}, {table.cycles:.17g} cycles per "

@@ -1,4 +1,4 @@
-"""Tables that are there become models, which say what they correct."""
+"""Tables that are there become models, which state what they correct."""
 
 from __future__ import annotations
 
@@ -28,10 +28,11 @@ Function = Callable[[Array], Array]
 _FINE = 64
 _LARGEST_GRID = 1 << 18
 
-#: Readings at which a table's own arithmetic is held against the model made of it.
+#: Readings at which a table's own arithmetic is compared with the model made of it.
 _PROBES = 1 << 18
 
-#: Orders smaller than so many standard deviations of the table's rounding are not told from it.
+#: Orders smaller than this many standard deviations of the table's rounding are not distinguished
+#: from it.
 _SIGNIFICANT = 3.0
 
 
@@ -108,8 +109,8 @@ def function_model(
     ``r = θ + T(r)``, and that becomes harmonics up to the table's Nyquist order.
     Where those are too steep to be corrected by, they are of T itself, at the indicated angle.
     The standard deviation of their coefficients is that of numbers rounded to the table's
-    step; orders that do not exceed three of it are left out. What ``device``, the target's own
-    arithmetic, does beside the harmonics is in the record of the fit.
+    step; orders that do not exceed three of it are omitted. What ``device``, the target's own
+    arithmetic, does next to the harmonics is in the record of the fit.
 
     ``travel``, in degrees, is what the table covers where that is less than a turn.
 
@@ -195,7 +196,7 @@ def _arithmetic(
     turns: int,
     travel: tuple[float, float] | None,
 ) -> tuple[float, float]:
-    """Rms and maximum, in turns, of what a device does beside its model, their zeros apart."""
+    """Rms and maximum, in turns, of what a device does next to its model, their zeros apart."""
     probes = np.arange(_PROBES, dtype=np.int64)
     places = probes * (turns * 2**32 // _PROBES)
     if travel is not None:

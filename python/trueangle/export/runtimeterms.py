@@ -25,7 +25,7 @@ from ..model.term import Term
 from ..model.terms import LocalDefect
 from ..support.signals import coupled_joint
 
-#: What tells the direction of travel.
+#: What shows the direction of travel.
 DIRECTIONS = ("auto", "angle", "velocity", "signal")
 
 #: Units of 2^-32 turns by which rounding to them moves an angle, and of its sum by which float
@@ -67,7 +67,7 @@ class RunTimeWaves(NamedTuple):
 
 
 def is_own_signal(term: Term) -> bool:
-    """Whether the joint's own signals tell it: a program of one has no angles of others."""
+    """Whether the joint's own signals show it: a program of one has no angles of others."""
     return not any(coupled_joint(name) for name in term.needs)
 
 
@@ -80,12 +80,12 @@ class RunTimeTerms:
     kinds : tuple of str
         What they are, by name.
     signals : tuple of str
-        Those they need, and the direction where it is asked for.
+        Those they need, and the direction where it is requested.
     limits : dict of str to float
         Of the numbers among them, either way: a power of two at which the terms are below half a
         turn, or the range on record where that is larger. Signals beyond it are faults.
     way : str
-        What tells the direction of travel: "angle", "velocity" or "direction"; empty where no
+        What shows the direction of travel: "angle", "velocity" or "direction"; empty where no
         term follows it.
     delay : float
         Seconds.
@@ -119,7 +119,7 @@ class RunTimeTerms:
         Raises
         ------
         ArgumentError
-            The direction is asked of the angle, which does not tell it.
+            The direction is taken from the angle, which does not show it.
         """
         period = model.period
         lines = [
@@ -176,7 +176,7 @@ class RunTimeTerms:
 
     @property
     def whole(self) -> bool:
-        """Whether one turn of the output tells every place."""
+        """Whether one turn of the output shows every place."""
         ramps = any(isinstance(form, forms.Ramp) for form in self.smooth)
         return not ramps and all(w.whole for w in (*self.waves, self.places))
 

@@ -73,7 +73,7 @@ def _part(part: str, **values: object) -> str:
 
 def _table(table: Table) -> str:
     name = source_identifier(table.shaft)
-    # An ending of its own: no shaft has the name of another constant.
+    # A separate ending: no shaft has the name of another constant.
     knots = f"{name.upper()}_KNOTS"
     values = np.asarray(table.knots)
     kind = _TYPES[table.number]
@@ -100,7 +100,7 @@ def _element(value: Any, number: str) -> str:
 
 
 def _step(chain: Chain, table: Table) -> str:
-    """What a table takes off ``left``, an expression in it and in ``start``."""
+    """What a table subtracts ``left``, an expression in it and in ``start``."""
     at, name = "start" if chain.at_indicated else "left", source_identifier(table.shaft)
     if table.cycles != int(table.cycles):
         at = f"{name}_place({at})"
@@ -138,7 +138,7 @@ def _different(tables: tuple[Table, ...]) -> list[Table]:
 
 
 def _arithmetic(table: Table) -> str:
-    """The functions this table needs, as they stand in the core."""
+    """The functions this table needs, as they are in the core."""
     source = _core.table_source(table.method)
     wanted = {f"{table.method}_{_TYPES[table.number]}"}
     if table.method == "cubic" and table.number != "f32":
@@ -193,7 +193,7 @@ def _rust_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) 
     parts += [find, *_travel(terms, zero)]
     start = "pattern(reading)" if at_indicated else "reading"
     if at_indicated and bumps:
-        # The table holds them at its own angle: what is searched is what they were taken off.
+        # The table holds them at its own angle: what is searched has them subtracted.
         sums = [line for form in bumps for line in _form(form, RunTimeWaves((), (), ()), "")[1]]
         parts.append(_function("bumps", ["x: i64"], sums))
         start += " + to_angle(bumps(pattern(reading)))"
@@ -315,7 +315,7 @@ def _form(form: Form, waves: RunTimeWaves, name: str) -> tuple[list[str], list[s
 
 
 def _springs(terms: RunTimeTerms) -> str:
-    """Error of the springs on a stretch, and the stretch that begins."""
+    """Error of the springs on a segment, and the segment that begins."""
     wound, begun = "", ""
     for i, s in enumerate(terms.springs):
         slope = _number(1.0 / s.length)

@@ -69,7 +69,7 @@ class SimpleFoc(Target):
             "minus-u16",
             "version of the library, or the LinearHall sensor",
         ),
-        "bits": Option(int, 24, "bits of a reading: all values are evaluated, up to 24 bits"),
+        "bits": Option(int, 24, "bits of a reading, at most 24: all are evaluated"),
         "entries": Option(int, 200, "of the table"),
     }
 
@@ -207,7 +207,7 @@ class SimpleFoc(Target):
 
 
 def _device(variant: str, table: NDArray[Any]) -> tuple[Correction, ...]:
-    """What a version of the library takes off, without and with contracted products."""
+    """What a version of the library subtracts, without and with contracted products."""
 
     def correction(angles: Places, contracted: bool) -> NDArray[np.float64]:
         raw = (angles * (2.0 * math.pi / 2.0**32)).astype(np.float32)

@@ -36,14 +36,14 @@ class Option(NamedTuple):
 
 @dataclass(frozen=True)
 class CommentBlock:
-    """What is known when a file is written and stands in its comment.
+    """What is known when a file is written and is in its comment.
 
     Attributes
     ----------
     name : str
         Of the functions, where there are any.
     difference : str
-        One line: how far the corrected angle is from the model's, all that is left out with it.
+        One line: how far the corrected angle is from the model's, all that is omitted with it.
     proof : Proof
     source : tuple of str
         Lines on the model: its file and sha256, what it was made from, where it holds.
@@ -57,7 +57,7 @@ class CommentBlock:
     notes: tuple[str, ...]
 
     def comment(self, lead: str, *own: str) -> list[str]:
-        """Lines of a file's comment: the difference first, ``own`` words on the table, the rest."""
+        """Lines of a file's comment: the difference first, ``own`` words on the table, rest."""
         parts = [self.difference, *own, *self.source, *(f"Note: {note}." for note in self.notes)]
         return [line for part in parts for line in _comment_lines(98, part, lead)]
 
@@ -152,7 +152,7 @@ class Target(ABC):
     argument : str
         The angle at which it looks up: ``"indicated"`` or ``"reference"``.
     unknown : str
-        What is not known of the target, in a sentence; empty where nothing is.
+        What is not known about the target, in a sentence; empty where nothing is.
     options : dict
     """
 
@@ -175,7 +175,7 @@ class Target(ABC):
     #: It takes what the sensor reads, not the joint's own angle.
     at_sensor: ClassVar[bool] = True
 
-    #: It takes what follows the direction of travel besides the pattern.
+    #: It takes what follows the direction of travel in addition to the pattern.
     takes_direction: ClassVar[bool] = False
 
     def holds(self, term: Term) -> bool:

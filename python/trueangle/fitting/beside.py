@@ -2,8 +2,8 @@
 
 By Frisch and Waugh the coefficients of a pattern are those of its columns less what nuisances
 explain of them. Of a drift, which each run has for itself, that is done run by run; what runs share
-(ramp, direction, velocity, lines of the reference) stays beside the pattern. Noise, its degrees of
-freedom, and what runs scatter by are those of this joint fit:
+(ramp, direction, velocity, lines of the reference) is fitted jointly with the pattern. Noise, its
+degrees of freedom, and what runs scatter by are those of this joint fit:
 
 ::
 
@@ -26,12 +26,12 @@ from .problem import PlainSolution, Problem, SolvedProblem
 if TYPE_CHECKING:
     from .nuisance import Nuisance
 
-#: Size of what runs share, beside columns of size 1: no penalty on the pattern holds it.
+#: Size of what runs share, together with columns of size 1: no penalty on the pattern holds it.
 _FREE: Final = 100.0
 
 
 class BesideProblem(Problem):
-    """The problem of a pattern beside nuisances, of which nothing is left in the readings.
+    """The problem of a pattern together with nuisances, of which nothing is left in the readings.
 
     ``shared`` and ``own`` are columns of each run: of all runs together, and of itself.
     """
@@ -66,7 +66,7 @@ class BesideProblem(Problem):
         return np.hstack([super().columns(index), _FREE * self._shared[index]])
 
     def private(self, index: int) -> Array:
-        """The zero of a run, and a drift of its own."""
+        """The zero of a run, and a separate drift."""
         return np.hstack([super().private(index), self._own[index]])
 
     def products(self, weights: Sequence[Array | None], index: int, count: int) -> list[Array]:

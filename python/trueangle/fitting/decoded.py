@@ -48,7 +48,7 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
 
 
 def channel_notes(runs: Sequence[CalibrationRun]) -> Iterator[str]:
-    """What a reader must know of the channels of runs: clipped readings, a phase that falls."""
+    """What a reader must know about the channels of runs: clipped readings, a phase that falls."""
     if (channels := common_channels(runs)) is None:
         return
     from ..estimation.channels import clipped_rows

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from .summed import SummedReadings
 
 #: Rounding of angles around a whole turn, in parts of a turn: smaller deviations are
-#: never taken for outliers.
+#: never rejected as outliers.
 ROUNDING = 1e-12
 
 
@@ -86,30 +86,30 @@ def fit(
     argument : {"auto", "reference", "indicated"}
         Which angle the error is a function of. The true angle is right physically and is
         what ``"auto"`` takes, unless the reference has an arbitrary zero in every run: then
-        the pattern repeats in the indicated angle only, and the notes say so.
+        the pattern repeats in the indicated angle only, and the notes report it.
     loss : {"auto", "linear", "huber", "tukey"}
         ``"auto"``: least squares, after readings more than 8 robust standard deviations
-        off are set aside (and reported); ``"linear"``: least squares on all readings.
+        off are rejected (and reported); ``"linear"``: least squares on all readings.
     ridge : float, optional
         Tikhonov penalty relative to the sum of weights. By default 0 on a full turn, and
         chosen by held-out error on partial travel and where orders of several shafts nearly
         cancel over the travel (`trueangle.fitting.ridge.choose_ridge`).
     covariance : {"auto", "white", "cluster", "hac"}
         ``"white"``: independent readings; ``"cluster"``: by the scatter between whole runs,
-        right for any correlation within them; ``"hac"``: by stretches of readings, right
+        right for any correlation within them; ``"hac"``: by segments of readings, right
         where the correlation dies out. ``"auto"``: white unless the residuals correlate in
-        time or the runs scatter by more, then clusters (three runs and more) or stretches; eight
-        runs and more that scatter by less tell the noise by that. The notes say so. Intervals:
+        time or the runs scatter by more, then clusters (three runs and more) or segments; eight
+        runs and more that scatter by less show the noise by that. The notes report it. Intervals:
         `FitResult.interval`.
     nuisance : {"none", "auto"} or iterable of str
         What is fitted jointly with the pattern and kept out of the model (`FitResult.nuisance`):
         ``"ramp"`` in the angle, ``"direction"``, ``"velocity"``, ``"drift"`` in time.
-        ``"auto"``: those that lower the error of stretches held out and can be told from the
-        pattern; the notes say which.
+        ``"auto"``: those that lower the error of segments held out and can be distinguished from
+        the pattern; the notes state which.
     reference_orders : iterable of float, optional
-        Lines that the reference makes (50 and 100 of a stepper of 200 steps): fitted beside
+        Lines that the reference makes (50 and 100 of a stepper of 200 steps): fitted jointly with
         the pattern, and not in the model. With several runs each line has one amplitude, and a
-        phase of its own in every run where that lowers the held-out error: a reference that was
+        separate phase in every run where that lowers the held-out error: a reference that was
         mounted anew has a new zero.
     method : {"plain", "moments", "qr", "counts"}, optional
         Forces a way of solving: QR of all rows, one pass of piecewise moments with normal
@@ -117,10 +117,10 @@ def fit(
         numbers, at most 2^17 to a turn). By default the fastest that keeps QR's accuracy.
     threads : int, optional
     prior : Fleet, optional
-        Units of the same design (`trueangle.fleet`): the coefficients are drawn to theirs as far
+        Units of the same design (`trueangle.fleet`): the coefficients are sampled to theirs as far
         as the readings leave them open, so that ten readings may do. Without ``orders`` those of
         the fleet are fitted. Standard errors and intervals hold what the prior may take, and a note
-        says how much is the unit's own. Goes with no ``ridge``, ``nuisance``, ``covariance`` or
+        states how much is the unit's own. Goes with no ``ridge``, ``nuisance``, ``covariance`` or
         loss but the usual ones.
     **reading
         ``signals``, ``period``, ``by`` ... of files and tables, as in `trueangle.read_runs`.
@@ -132,9 +132,9 @@ def fit(
     Raises
     ------
     RankError
-        The readings cannot tell the orders apart; names those at fault.
+        The readings cannot separate the orders; names those at fault.
     NoModelError
-        Orders were to be selected and the data support none; says why.
+        Orders were to be selected and the data support none; states why.
     ArgumentError
         Runs in different units, an indicated angle that does not follow the reference
         (wrong unit or sign), unknown shafts, and the like.
@@ -219,7 +219,7 @@ def fitted_to(
 ) -> FitResult:
     """As `fit`; with ``summed`` of all readings of which the runs are some.
 
-    ``evidence`` stands for a selection of orders among ``candidates`` that was made before.
+    ``evidence`` represents a selection of orders among ``candidates`` that was made before.
     """
     check_choice("argument", argument, ARGUMENTS)
     check_covariance(covariance, len(found))
@@ -340,7 +340,7 @@ def fitted_to(
 
 
 class _Beside(NamedTuple):
-    """Nuisances asked for (None: to be chosen), and lines of the reference."""
+    """Nuisances requested (None: to be chosen), and lines of the reference."""
 
     kinds: tuple[str, ...] | None
     reference: tuple[float, ...]
@@ -351,7 +351,7 @@ class _Beside(NamedTuple):
         return self.kinds != () or bool(self.reference)
 
 
-#: Where the pattern alone is asked for.
+#: Where the pattern alone is requested.
 _NOTHING = _Beside((), ())
 
 

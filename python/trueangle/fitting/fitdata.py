@@ -46,7 +46,7 @@ class FitData(PlainResult):
 
     @property
     def weights(self) -> list[Array] | None:
-        """Weights that a robust loss ended with; 0 marks readings set aside as wild."""
+        """Weights that a robust loss ended with; 0 marks readings rejected as outlying."""
         return self.weighted.weights
 
     @property
@@ -161,7 +161,7 @@ class FitData(PlainResult):
 
     @property
     def wild(self) -> tuple[tuple[str, int], ...]:
-        """Label and row (from 0) of every reading that was set aside."""
+        """Label and row (from 0) of every reading that was rejected."""
         if self.weights is None:
             return () if self._summed is None else self._summed.outliers
         return tuple(

@@ -1,4 +1,4 @@
-"""What a fit gains on readings that took no part in it: runs or folds of them left out in turn."""
+"""What a fit gains on readings that took no part in it: runs or folds of them omitted in turn."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["HeldOut", "HeldOutRun", "correct_held_out", "folds", "hold_out", "in_order"]
 
 #: Most refits, and most of them with a selection of orders, which costs more: with more
-#: runs several are left out together.
+#: runs several are held out together.
 _MOST_FOLDS, _MOST_SELECTIONS = 12, 5
 #: Resamples of the runs for the interval of the reduction, and the fewest runs for one.
 _RESAMPLES, _FEWEST_RUNS = 2000, 3
@@ -68,7 +68,7 @@ class HeldOut(ShownResult):
     ----------
     runs : tuple of HeldOutRun
     left_in : tuple of (str, str)
-        Runs that could not be left out, and why: without them the orders are not
+        Runs that could not be held out, and why: without them the orders are not
         separable, for example.
     """
 
@@ -104,9 +104,9 @@ class HeldOut(ShownResult):
 
 
 def hold_out(fit: FitResult) -> HeldOut:
-    """Leave out each run of a fit, fit the others the same way, correct the one left out.
+    """Hold out each run of a fit, fit the others the same way, correct the one held out.
 
-    With many runs several are left out together (five or twelve parts, with and without
+    With many runs several are held out together (five or twelve parts, with and without
     a selection of orders).
 
     Where the orders were selected by evidence they are selected anew without the run, from the
@@ -115,7 +115,7 @@ def hold_out(fit: FitResult) -> HeldOut:
     Raises
     ------
     ArgumentError
-        One run only, or none that can be left out.
+        One run only, or none that can be held out.
 
     Examples
     --------
@@ -137,7 +137,7 @@ def hold_out(fit: FitResult) -> HeldOut:
         labels = [runs[i].label or str(i + 1) for i in fold]
         try:
             with warnings.catch_warnings():
-                # Said of all runs already.
+                # Reported for all runs already.
                 warnings.simplefilter("ignore", UnlikeRunsWarning)
                 model: HarmonicModel | None = _others(fit, fold)
         except NoModelError:
@@ -160,7 +160,7 @@ def in_order(found: Sequence[HeldOutRun], runs: Sequence[CalibrationRun]) -> tup
 
 
 def folds(count: int, most: int) -> list[list[int]]:
-    """Places of the runs that are left out together, at most ``most`` parts."""
+    """Places of the runs that are omitted together, at most ``most`` parts."""
     folds = min(count, most)
     return [list(range(start, count, folds)) for start in range(folds)]
 
@@ -180,7 +180,7 @@ def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
         return _refit(fit, train, orders, shafts)
     estimate = fit.evidence.estimate
     if estimate is None or len(estimate.runs) != len(fit.runs):
-        # Readings of one run have several zeros: which are left out with it is not known.
+        # Readings of one run have several zeros: which are omitted with it is not known.
         return _refit(fit, train, None, fit.evidence.shafts)
     others = estimate.without(fold)
     problem = fit.problem
@@ -190,7 +190,7 @@ def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
     chosen = others.carriers(travel, beside)
     if not chosen:
         raise NoOrderError("no order is supported by the other runs")
-    # An order need not be a whole number: each is the first of a shaft of its own.
+    # An order need not be a whole number: each is the first of a separate shaft.
     lines = {f"order {k:g}": k for k in chosen}
     if fit.known is None:
         return _refit(fit, train, dict.fromkeys(lines, (1,)), lines)

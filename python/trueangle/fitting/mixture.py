@@ -1,7 +1,7 @@
 """The fit of orders that were chosen by evidence: the mixture over models and noises.
 
-Outliers are readings more than 8 robust standard deviations off its curve. They are set aside,
-and orders and coefficients are estimated anew, until the same readings are set aside twice.
+Outliers are readings more than 8 robust standard deviations off its curve. They are rejected,
+and orders and coefficients are estimated anew, until the same readings are rejected twice.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def fit_mixture(
 
 
 def check_new_run(estimate: EvidenceEstimate, travel: Array, orders: Sequence[float]) -> None:
-    """Raise where what differs from run to run makes the gain of a further one doubtful."""
+    """Raise where what differs from run to run makes the gain of a further one uncertain."""
     gain, spread = estimate.gain_of_a_run(travel)
     if gain <= _SURE * spread:
         listed = ", ".join(f"{order:g}" for order in orders[:6])
@@ -128,7 +128,7 @@ def _fitted(
     wanted = [k * shaft.cycles_per_turn for shaft in problem.shafts for k in shaft.orders]
     # Orders of shafts and of the estimate differ by rounding.
     named = [next((k for k in estimate.told if math.isclose(k, m)), m) for m in wanted]
-    # What is left out on purpose is left out: no other order holds it.
+    # What is omitted on purpose is omitted: no other order holds it.
     beside = selection.left_out
     mean, covariance = estimate.among(named, travel, beside)
     offsets, means, squares = [], [], 0.0

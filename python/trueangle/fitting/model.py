@@ -1,4 +1,4 @@
-"""The model that a fit makes: its coefficients and their worth, its record, what not to trust."""
+"""The model that a fit makes: its coefficients and covariance, its record, its limits."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
     """What not to trust and why, one sentence each."""
     span, weighted = fit.span, fit.weighted
     if not span.full:
-        # In degrees, as zeros and positions are told beside it.
+        # In degrees, as zeros and positions are reported with it.
         turn = 360.0 / fit.problem.period
         travel = span._replace(start=span.start * turn, stop=span.stop * turn)
         yield f"Fitted on {travel.describe(360.0)} only: outside it is extrapolated."
@@ -191,7 +191,7 @@ class FittedCoefficients(FitData):
             b_i ± t_{(1+p)/2,ν_i} u(b_i)
 
         with Student's quantile for the effective degrees of freedom of each standard error:
-        few runs tell a standard error roughly.
+        few runs show a standard error roughly.
 
         Parameters
         ----------

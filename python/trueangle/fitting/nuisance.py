@@ -1,4 +1,4 @@
-"""What is in the readings beside a pattern: ramp, drift, direction, velocity, the reference.
+"""Effects other than a pattern: ramp, drift, direction, velocity, the reference.
 
 ::
 
@@ -6,7 +6,7 @@
 
 with the unwrapped angle ``u``, the sense and the speed of travel, and a cubic spline ``g`` of
 the time of each run. They are fitted jointly with the pattern and taken out of the readings;
-what is left is fitted as ever, which gives the same pattern as one fit of all (Frisch and
+the residual is fitted as ever, which gives the same pattern as one fit of all (Frisch and
 Waugh).
 """
 
@@ -23,7 +23,7 @@ from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 from ..support.suggestions import did_you_mean
 
-#: What may be asked for, in the order in which it is told.
+#: What may be requested, in the order in which it is reported.
 KINDS: Final = ("ramp", "direction", "velocity", "drift")
 
 
@@ -50,9 +50,9 @@ class Nuisance:
     shares : mapping of str to float
         Part of the held-out sum of squares that each kind took away.
     unseparated : tuple of str
-        Kinds that lower the error as much but cannot be told from the pattern.
+        Kinds that lower the error as much but cannot be distinguished from the pattern.
     inflation : tuple of float
-        By how much the standard errors of ``A, B`` of each order grow beside them.
+        By how much the standard errors of ``A, B`` of each order grow with them.
     """
 
     kinds: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""Columns of what is beside a pattern in the readings, one group for each nuisance.
+"""Columns of effects in addition to a pattern in the readings, one group for each nuisance.
 
 Each is taken about its run's mean, which the zero of that run takes.
 """
@@ -19,7 +19,7 @@ from .nuisancechoice import FOLDS, FoldRows
 #: Intervals of the spline of a run's time that are tried, from a cubic on.
 _INTERVALS: Final = (1, 2, 4, 6)
 
-#: Stretches of each run that are held out, every third together: twice as long as the memory
+#: Segments of each run that are held out, every third together: twice as long as the memory
 #: of the stiffest spline that they may judge. An odd number: way and return differ in fold.
 _STRETCHES: Final = 13
 

@@ -1,6 +1,6 @@
 """Nuisances fitted jointly with the pattern and taken out of the runs.
 
-What is left is fitted as ever, which gives the same pattern as one fit of all (Frisch and Waugh).
+The residual is fitted as ever, which gives the same pattern as one fit of all (Frisch and Waugh).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .nuisancechoice import (
 )
 from .nuisancecolumns import looked_at_stride, nuisance_columns, time_spline
 
-#: Orders of each shaft that nuisances are looked for beside.
+#: Orders of each shaft that nuisances are looked for together with.
 _LIKELY: Final = tuple(range(1, 9))
 
 _MISSING: Final = {
@@ -44,7 +44,7 @@ def orders_beside_nuisance(
     fixed_member: str,
     shafts: Mapping[str, float] | None,
 ) -> list[ShaftOrders]:
-    """Orders beside which nuisances are looked for before any are chosen.
+    """Orders together with which nuisances are looked for before any are chosen.
 
     Those that come at least half a cycle over the travel: lower ones are a ramp there.
     """
@@ -65,7 +65,7 @@ def take_out_nuisance_beside(
     argument: str,
     reference_orders: Sequence[float] = (),
 ) -> tuple[list[CalibrationRun], Nuisance]:
-    """`take_out_nuisance` beside the orders wanted, chosen beside the likely ones as well.
+    """`take_out_nuisance` with the wanted and the likely orders.
 
     What an order that is not in the model leaves is no ramp, though a ramp lowers it.
     """
@@ -88,9 +88,9 @@ def take_out_nuisance(
     argument: str,
     reference_orders: Sequence[float] = (),
 ) -> tuple[list[CalibrationRun], Nuisance]:
-    """The runs without their nuisances, which are fitted beside these orders.
+    """The runs without their nuisances, which are fitted jointly with these orders.
 
-    ``kinds`` of None are chosen by the error of stretches held out.
+    ``kinds`` of None are chosen by the error of segments held out.
     """
     stride = looked_at_stride(runs)
     orders = [k * s.cycles_per_turn for s in shafts for k in s.orders]

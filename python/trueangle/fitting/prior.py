@@ -8,7 +8,7 @@ With ``b ~ N(μ, T)`` and readings of noise s the coefficients are normal about
 
 with the covariance ``V = (X'X/s² + T⁻¹)⁻¹``: few readings suffice for what the units
 differ in little. Where runs of one unit differ by more than such noise makes them, by variances Q
-of their coefficients, a run tells its unit no better than that, and the covariance is
+of their coefficients, a run shows its unit no better than that, and the covariance is
 
 ::
 
@@ -39,7 +39,7 @@ from .argument import ARGUMENTS, AnyArgument
 from .problem import PlainSolution, Problem, SolvedProblem
 from .robust import Loss, RobustFit
 
-#: Rounds in which what is set aside settles, and the noise: each takes off a part of what is left.
+#: Rounds in which what is rejected settles, and the noise: each subtracts a part of the residual.
 _ROUNDS: Final = 20
 _STEPS: Final = 200
 
@@ -66,7 +66,7 @@ class Prior:
     freedom : float
         Degrees of freedom of the variances.
     noise_variance, noise_freedom : float
-        Of one reading, and the degrees of freedom that it is worth.
+        Of one reading, and its degrees of freedom.
     units : int
         From which it is known.
     run_variance : ndarray, shape (2 K,), or None
@@ -126,7 +126,7 @@ class Posterior(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Of all orders together, each counting alike."""
+        """Of all orders together, with equal weights."""
         return float(np.mean(self.own)) if self.own else 1.0
 
     def note(self) -> str:
@@ -160,7 +160,7 @@ def fleet_prior(given: Any, period: float) -> Prior:
 
 
 def posterior(problem: Problem, prior: Prior, loss: str) -> tuple[RobustFit, Posterior]:
-    """The fit under a prior; readings more than 8 deviations off set aside but with ``"linear"``.
+    """The fit under a prior; readings more than 8 deviations off rejected but with ``"linear"``.
 
     Raises
     ------

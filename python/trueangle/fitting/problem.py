@@ -50,7 +50,7 @@ class PlainSolution(NamedTuple):
 
 
 class SolvedProblem:
-    """A solution and the series it stands for."""
+    """A solution and the series it represents."""
 
     def __init__(
         self,
@@ -114,7 +114,7 @@ def _series(solution: PlainSolution, shafts: Sequence[ShaftOrders], period: floa
 
 
 class Problem:
-    """The readings of several runs and the regressors asked for.
+    """The readings of several runs and the regressors requested.
 
     The runs are of one period; ``method`` and ``threads`` are the core's.
     """
@@ -219,7 +219,7 @@ class Problem:
         return np.ones((len(self.runs[index]), 1))
 
     def products(self, weights: Sequence[Array | None], index: int, count: int) -> list[Array]:
-        """Sums of products of ``[1, columns, error]`` of a run, in so many segments in a row."""
+        """Sums of products of ``[1, columns, error]`` of a run, in this many segments in a row."""
         run, weight = self.runs[index], weights[index]
         zero = circular_mean(run.indicated - run.reference, self.period)
         found = []

@@ -1,7 +1,7 @@
 """What errors that repeat at the positions put into a fit, however often they are read again.
 
 At a position p that is read in every run two errors come back each time: that of a sensor which
-rounds (variance v, `trueangle.fitting.rounding`), and that of all orders which the fit leaves out.
+rounds (variance v, `trueangle.fitting.rounding`), and that of all orders which the fit omits.
 With ``S_p = Σ_(i at p) w_i x̃_i`` and the normal matrix G they move the coefficients by
 ``G⁻¹ Σ_p S_p e_p``, whose covariance is
 
@@ -9,10 +9,10 @@ With ``S_p = Σ_(i at p) w_i x̃_i`` and the normal matrix G they move the coeff
 
     G⁻¹ Sᵀ K S G⁻¹,    K_pq = v δ_pq + s² (2/N) Σ_k cos(2πk (t_p - t_q))
 
-The sum is over all orders that are not fitted and that N positions on the turn can tell, taken as
-equally strong: on a whole grid of N they are orthogonal to those fitted and add nothing, over part
-of it, and at places on no grid, they leak. What the residual at the positions is beyond the
-scatter of the runs there tells ``s²`` (a test of lack of fit, Seber and Lee, Linear Regression
+The sum is over all orders that are not fitted and that N positions on the turn can show, taken as
+equally strong: on a whole grid of N they are orthogonal to those fitted and add nothing, over
+part, and at places on no grid, they leak. What the residual at the positions is beyond the
+scatter of the runs there shows ``s²`` (a test of lack of fit, Seber and Lee, Linear Regression
 Analysis, 2003, section 4.4).
 """
 
@@ -37,10 +37,10 @@ from .problem import Problem, SolvedProblem
 from .rounding import COUNTED, rounding_variance
 from .uncertainty import CovarianceKind, Uncertainty
 
-#: Share of a variance from which what orders left out add to it is worth a sentence.
+#: Share of a variance from which what orders omitted add to it is worth a sentence.
 _TOLD: Final = 0.1
 
-#: Positions times orders up to which those left out are looked at: 1000 places of a turn.
+#: Positions times orders up to which those omitted are looked at: 1000 places of a turn.
 _MOST: Final = 1_000_000
 
 
@@ -75,8 +75,8 @@ def covariance_with_repeats(
     What ``found`` holds of them by itself is not added again: one share of the readings at each
     position is among white residuals, and between runs scatters what differs from run to run.
     Of more than `COUNTED` readings positions are not counted, and where no position was read
-    again nothing is known of what repeats. Orders left out count where the positions scatter more
-    than their readings (chance below `SCATTER`), and not for who asks for white noise.
+    again nothing is known about what repeats. Orders omitted count where the positions scatter more
+    than their readings (probability below `SCATTER`), and not for who needs white noise.
     """
     kept = sum(map(len, problem.runs))
     if kept < problem.readings or kept > COUNTED or not problem.is_periodic:
@@ -122,7 +122,7 @@ def _repeats(
     weights: Sequence[Array | None],
     penalty: float,
 ) -> _Repeats | None:
-    """The sums; None where the positions do not tell the coefficients apart."""
+    """The sums; None where the positions do not separate the coefficients."""
     place = positions.index
     sizes = [len(run) for run in problem.runs]
     run = np.repeat(np.arange(len(sizes)), sizes)
@@ -133,7 +133,7 @@ def _repeats(
     of_run = _added(run, w, len(sizes))
     used = of_run > 0.0
     whole = np.where(used, of_run, 1.0)
-    # Of a single run each reading stands for itself.
+    # Each reading of a single run counts by itself.
     units = run if used.sum() > 1 else np.arange(w.size)
     pairs, pair = np.unique((units * len(positions) + place)[w > 0.0], return_inverse=True)
     pair_unit, pair_place = np.divmod(pairs, len(positions))
@@ -174,9 +174,9 @@ def _added(index: NDArray[np.intp], rows: Array, count: int) -> Array:
 
 
 def _orders_left_out(problem: Problem, positions: Positions) -> Array | None:
-    """``U`` of ``s² U Uᵀ`` at the positions: orders left out; None where none leaks.
+    """``U`` of ``s² U Uᵀ`` at the positions: orders omitted; None where none leaks.
 
-    Of several shifted grids those fitted are kept apart from all that one of them tells.
+    Of several shifted grids those fitted are kept apart from all that one of them shows.
     """
     turns = positions.turns
     if positions.divisions is not None and len(positions.offsets) > 1:

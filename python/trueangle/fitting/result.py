@@ -31,21 +31,21 @@ class FitResult(FittedCoefficients):
     weighted : Weighted
         What the loss did to the weights.
     loss : str
-        The loss asked for.
+        The loss requested.
     ridge : float
         Tikhonov penalty relative to the sum of weights; 0 on a full turn.
     span : Span
-        Stretch of the turn that was travelled.
+        Segment of the turn that was travelled.
     evidence : OrderSelection or None
         What was searched, when the orders were chosen by evidence; `selection` is what it found.
     joint : tuple
-        Gear ratio (or None) and fixed member, as told.
+        Gear ratio (or None) and fixed member, as reported.
     remarks : tuple of str
         What the choice of the angle, of the weights and of the runs found; among `notes`.
     covariance_asked : {"auto", "white", "cluster", "hac"}
-        The covariance asked for; `uncertainty` has the one taken.
+        The covariance requested; `uncertainty` has the one taken.
     nuisance : Nuisance or None
-        What was taken out of the readings beside the pattern: `runs` are without it.
+        What was taken out of the readings together with the pattern: `runs` are without it.
     posterior : Posterior or None
         What a prior did: the share of each order that is the unit's own (`fit`, ``prior=``).
     known : Uncertainty or None
@@ -71,7 +71,7 @@ class FitResult(FittedCoefficients):
         return axes
 
     def to_dict(self) -> dict[str, Any]:
-        """The object that ``trueangle fit`` prints as JSON beside the model."""
+        """The object that ``trueangle fit`` prints as JSON together with the model."""
         return plain_fit(self)
 
     def summary(self, errors_in: ErrorsIn = "auto") -> str:

@@ -1,6 +1,6 @@
 """What a robust loss makes of variances: Huber's covariance of an M-estimate.
 
-Where the weights of a loss are taken for those of the readings, a reading far off counts in the
+Where the weights of a loss are treated as those of the readings, a reading far off counts in the
 noise by its distance, though it moves the coefficients by a bounded step.
 """
 
@@ -31,7 +31,7 @@ class Sandwich(NamedTuple):
 def sandwich(
     problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], loss: str
 ) -> Sandwich:
-    """The factors of an M-estimate; 1 of least squares, with readings set aside or not.
+    """The factors of an M-estimate; 1 of least squares, with readings rejected or not.
 
     With ``ψ = w r`` and the weights b as given, its covariance is
 

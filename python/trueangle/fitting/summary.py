@@ -10,7 +10,7 @@ import numpy as np
 from ..support.angles import arcsec, zero_text
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, rounded_phase, sine_of_rms
 from ..support.distributions import student_quantile
-from ..support.layout import laid_out
+from ..support.layout import counted, laid_out
 from ..support.plainresult import finite_or_none
 from .model import FittedCoefficients
 
@@ -20,22 +20,23 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
     model = fit.model
     runs = len(fit.problem.runs)
     shown = fit_error_unit(fit, errors_in)
+    left = "none left: as many unknowns as readings"
+    if math.isfinite(fit.residual_variance):
+        left = f"{_residual(fit, shown)} standard deviation"
     head = [
         ("readings", f"{fit.readings} in {runs} run{'s' if runs > 1 else ''}"),
         ("argument", f"{model.argument} angle"),
         ("zero", zero_text(model.constant, model.period) + _spread(fit, shown)),
-        ("residual", f"{_residual(fit, shown)} standard deviation, ")
-        if math.isfinite(fit.residual_variance)
-        else ("residual", "none left: as many unknowns as readings, "),
+        ("residual", f"{left}, {fit.degrees_of_freedom:.6g} degrees of freedom"),
         ("solved by", f"{fit.method}, condition number {fit.condition_number:.3g}"),
     ]
-    label, text = head[3]
-    head[3] = (label, text + f"{fit.degrees_of_freedom:.6g} degrees of freedom")
     if model.covariance is not None:
         head.append(("intervals", _intervals(fit)))
     if model.indicated_sign < 0:
         head.append(("indicated", "minus what the sensor reads"))
-    lines = ["Harmonic model of the angle error (error = indicated - reference)", ""]
+    before, after = _sizes(fit)
+    sizes = f"{shown.number(before)} -> {shown.text(after)} rms in the readings fitted"
+    lines = [f"{counted(model.orders, 'order')} fitted: error {sizes}.", ""]
     lines += [f"  {label:<10} {text}" for label, text in head]
     if model.channels is not None:
         lines += ["", *(f"  {line}" for line in model.channels.constant_lines())]
@@ -47,12 +48,15 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
 
 
 def fit_error_unit(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> ErrorUnit:
-    """One unit for all that is told and drawn of a fit, by the rms of pattern and residual."""
-    period = fit.model.period
-    pattern = 0.5 * float(fit.model.amplitudes @ fit.model.amplitudes)
+    """One unit for all that is given and sampled of a fit, by the rms of pattern and residual."""
+    return error_unit(errors_in, sine_of_rms(_sizes(fit)[0]), fit.model.period)
+
+
+def _sizes(fit: FittedCoefficients) -> tuple[float, float]:
+    """Rms of pattern and residual together, and of the residual, arcsec."""
     left = fit.residual_std if math.isfinite(fit.residual_std) else 0.0
-    rms = arcsec(math.sqrt(pattern + left * left), period)
-    return error_unit(errors_in, sine_of_rms(rms), period)
+    both = math.hypot(*math.sqrt(0.5) * fit.model.amplitudes, left)
+    return arcsec(both, fit.model.period), arcsec(left, fit.model.period)
 
 
 def _residual(fit: FittedCoefficients, shown: ErrorUnit) -> str:
@@ -171,7 +175,7 @@ def _evidence(found: FittedCoefficients) -> list[dict[str, Any]]:
 
 
 def _standard_error(found: FittedCoefficients, n: int) -> dict[str, Any]:
-    """Standard error and 95 % interval of one amplitude; null where nothing tells them."""
+    """Standard error and 95 % interval of one amplitude; null where nothing shows them."""
     if found.model.covariance is None:
         return {"std_arcsec": None, "interval_arcsec": None}
     period = found.model.period

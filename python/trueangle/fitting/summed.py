@@ -36,7 +36,7 @@ class SummedReadings:
     readings, missing : int
         All readings, and rows of the files that an empty cell kept out.
     outliers : tuple of (str, int)
-        Label and row of every reading that was set aside.
+        Label and row of every reading that was rejected.
     """
 
     moments: Moments

@@ -43,7 +43,7 @@ class Uncertainty(NamedTuple):
     """Covariance of ``[constant, A, B, ...]``, its kind, and freedom of each variance.
 
     ``noise_freedom``: the fewest degrees of freedom of any variance, what a penalty takes from
-    the coefficients set aside; None for those of ``freedom``.
+    coefficients; None for those of ``freedom``.
     """
 
     kind: Literal["white", "cluster", "hac", "evidence"]
@@ -64,7 +64,7 @@ class Uncertainty(NamedTuple):
         )
 
     def beside(self, bias: Array, known: float = math.inf) -> Uncertainty:
-        """The same with the covariance of a bias of so many degrees of freedom.
+        """The same with the covariance of a bias of this many degrees of freedom.
 
         ::
 
@@ -109,15 +109,15 @@ def coefficient_uncertainty(
 ) -> Uncertainty:
     """Covariance of this kind; ``"auto"``: white unless correlation is found.
 
-    A ``nuisance`` that was taken out of the runs is fitted beside the pattern
+    A ``nuisance`` that was taken out of the runs is fitted jointly with the pattern
     (`trueangle.fitting.beside`). What a robust ``loss`` weighs down is no less known for it
     (`trueangle.fitting.sandwich`).
 
     Where eight runs and more repeat better than white noise of the residual lets expect, their
     scatter pooled over the coefficients is the noise. Whole runs are the clusters where there are
-    three or more. With fewer, stretches are, eight times as long as the memory of the residuals:
-    right where the correlation dies out within a run, which one run cannot prove, so that a note
-    says it. What a penalty takes from the coefficients is added to either
+    three or more. With fewer, segments are, eight times as long as the correlation time of the
+    residuals: right where the correlation dies out within a run, which one run cannot prove, so
+    that a note states it. What a penalty takes from the coefficients is added to either
     (`trueangle.fitting.ridge`).
     """
     bent = sandwich(problem, fitted, weights, loss)
@@ -203,9 +203,9 @@ _SUMMED: Final = "One pass keeps no segments"
 def _thinned(
     white: Array, independent: float, unknowns: int, memory: float, said: str, why: str
 ) -> Uncertainty:
-    """As if one reading in so many as the noise remembers were there, and independent.
+    """As if n correlated readings were one independent reading.
 
-    The scatter of a few stretches has fewer directions than there are coefficients: its
+    The scatter of a few segments has fewer directions than there are coefficients: its
     standard errors may come out as small as they like.
     """
     told = "standard errors as for independent readings"
@@ -214,7 +214,7 @@ def _thinned(
     note = (
         f"{said}{told}. {why}, and the covariance is not known: measure {ENOUGH_RUNS} runs and more"
     )
-    # Of so many independent readings the fit takes its unknowns, and the residuals are smaller.
+    # Of this many independent readings the fit takes its unknowns, and the residuals are smaller.
     left = max(independent - unknowns, 1.0)
     wider = memory * max(independent / left, 1.0)
     return Uncertainty("hac", white * wider, np.full(len(white), left), note)
@@ -286,9 +286,9 @@ _CANCEL: Final = "the covariance is that of white noise: orders nearly cancel"
 
 
 def _with_constant(white: Array, covariance: Array, freedom: Array) -> tuple[Array, Array]:
-    """The constant beside the coefficients: wider by as much as they are in the middle.
+    """The constant together with the coefficients: wider by as much as they are in the middle.
 
-    How the zeros of the runs scatter tells nothing of it, for each may be another.
+    How the zeros of the runs scatter shows nothing of it, for each may be another.
     """
     ratio = np.sqrt(np.diag(covariance) / np.diag(white)[1:])
     scale = np.concatenate([[max(1.0, float(median(ratio)))], ratio])

@@ -24,7 +24,7 @@ _RUNS: Final = 512
 #: A run is unlike the others when their pattern misses this share of the energy that its own
 #: would explain (its coefficients are about half of the pattern off) ...
 _SHARE: Final = 0.2
-#: ... and by so many times what its noise, correlated as it is, lets coefficients scatter.
+#: ... and by this many times what its noise, correlated as it is, lets coefficients scatter.
 _SCATTER: Final = 25.0
 
 #: Where no direction of a run's design is shorter than this part of the longest, each
@@ -50,7 +50,7 @@ def unlike_runs(problem: Problem, fitted: SolvedProblem) -> list[int]:
 
 
 def far_runs(runs: Sequence[NormalEquations]) -> list[tuple[int, float]]:
-    """Places of runs that are unlike the others, and by how many times their noise.
+    """Places of runs that differ from the others, and by how many times their noise.
 
     With ``S_r(b)`` the sum of squares of run r about its own zero, the runs for which
 
@@ -87,7 +87,7 @@ def far_runs(runs: Sequence[NormalEquations]) -> list[tuple[int, float]]:
 
 
 def _solved(sums: NormalEquations) -> tuple[Array, int, bool]:
-    """Least squares from normal equations: directions seen, and whether all clearly."""
+    """Least squares from normal equations: directions observed, and whether all clearly."""
     found = sums.solved()
     values = np.linalg.eigvalsh(sums.gram)
     clear = bool(values[0] > _SPEAKS**2 * values[-1])
@@ -95,7 +95,7 @@ def _solved(sums: NormalEquations) -> tuple[Array, int, bool]:
 
 
 def run_names(runs: Sequence[CalibrationRun]) -> list[str]:
-    """What to call each run: its label, or its file where that tells runs apart, or its number."""
+    """What to call each run: its label, or its file where that separates runs, or its number."""
     labels = [run.label or "" for run in runs]
     files = ["" if run.source is None else run.source.file for run in runs]
     several = len(set(files)) > 1
@@ -108,7 +108,7 @@ def run_names(runs: Sequence[CalibrationRun]) -> list[str]:
 
 
 def unlike_runs_sentence(labels: Sequence[str], count: int) -> str:
-    """What to tell of runs, out of so many, that are unlike the others."""
+    """A sentence on runs that differ from the others."""
     more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
     which = f"run{'s' if len(labels) > 1 else ''} {', '.join(labels[:_NAMED])}{more}"
     return (

@@ -51,14 +51,14 @@ def _blocks(size: int) -> Iterator[slice]:
 
 @dataclass
 class CalibrationSums:
-    """Sums over the runs of one unit on one day; each run has a zero of its own."""
+    """Sums over the runs of one unit on one day; each run has a separate zero."""
 
     runs: list[NormalEquations] = field(default_factory=list)
     means: list[Array] = field(default_factory=list)
     when: str | None = None
 
     def add(self, run: CalibrationRun, orders: Array, periodic: bool) -> None:
-        """Take in a run, its isolated outliers left out."""
+        """Take in a run, its isolated outliers omitted."""
         run = without_spikes(run if periodic else over_turns(run))
         error = run.centred_error
         share = np.ones(error.size) if run.weights is None else run.weights
@@ -118,7 +118,7 @@ class CalibrationSums:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What one day's readings tell of a unit.
+    """What one day's readings show of a unit.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class Calibration:
 
     @classmethod
     def of(cls, unit: str, sums: CalibrationSums, period: float) -> Calibration | None:
-        """Of one day's sums; None where they do not tell the orders apart."""
+        """Of one day's sums; None where they do not separate the orders."""
         every = total(sums.runs)
         model = every.solved()
         size = every.moment.size
@@ -200,7 +200,7 @@ class Calibration:
     def blocks(self) -> Array:
         """Covariance of each order's cosine and sine for readings of unit variance, (K, 2, 2).
 
-        Where runs tell that the readings are not independent, that of such readings.
+        Where runs show that the readings are not independent, that of such readings.
         """
         k = 2 * np.arange(self.coefficients.size // 2)
         rows = np.array([[k, k], [k + 1, k + 1]]).transpose(2, 0, 1)

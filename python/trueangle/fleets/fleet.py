@@ -41,7 +41,7 @@ def fleet(
     shafts: Mapping[str, float] | None = None,
     **reading: Any,
 ) -> Fleet:
-    """Units of one design: who stands out, what all share, what moved since the last time.
+    """Units of one design: who is significant, what all share, what moved since the last time.
 
     ::
 
@@ -58,7 +58,7 @@ def fleet(
         As `trueangle.read_runs`, with the columns ``unit`` and ``when`` (ISO 8601) where there
         are several dates. Files are summed one after the other and not kept.
     by : {"unit", "run"}
-        What tells the units apart. Where no column ``unit`` does, the files or the labels of
+        What separates the units. Where no column ``unit`` does, the files or the labels of
         the runs, whichever are more.
     orders : iterable of int, or mapping, optional
         Default: those that the first 32 units together support by evidence, and 1 and 2.
@@ -79,7 +79,7 @@ def fleet(
     Raises
     ------
     ArgumentError
-        Runs in different units, no unit whose readings tell the orders apart, shares that are none.
+        Runs in different units, no unit whose readings separate the orders, shares that are none.
     FileError
         As `trueangle.read_runs`.
 

@@ -17,7 +17,7 @@ from ..support.times import parsed_time
 from .calibration import Calibration, order_columns
 from .outliers import LEVEL, Deviates, deviates, level_by_order
 
-#: Units with a second date from which their changes tell what an ordinary change is.
+#: Units with a second date from which their changes show what an ordinary change is.
 _FEWEST: Final = 4
 
 #: Places of a turn at which a change of the pattern is looked at.
@@ -42,7 +42,7 @@ class HistoryOrder(NamedTuple):
 
 
 class HistoryRow(NamedTuple):
-    """What one further calibration of a unit says.
+    """What one further calibration of a unit states.
 
     ``order`` is the order that moved most (None: the zero); ``statistic`` its T^2 and ``limit``
     what it stays below in 99 % of fleets in which nothing moved. ``bound`` is that of 95 % of the
@@ -81,7 +81,7 @@ class Change(NamedTuple):
     ``orders`` are places of the orders that moved, the first the most; ``grows`` whether a slow
     drift explains the dates between better than a step (None with two dates); ``leaps`` whether
     it moved farther than two units of the fleet are apart, in 99 % of fleets. ``level`` is the
-    chance at or below which it is told.
+    probability at or below which it is reported.
     """
 
     unit: str
@@ -267,7 +267,7 @@ def next_calibration(
 ) -> tuple[str | None, bool]:
     """The day at which a drift of this bound reaches the permitted error, straight in time.
 
-    And whether that is extrapolated: beyond twice the time seen.
+    And whether that is extrapolated: beyond twice the time observed.
     """
     if permitted is None:
         return None, False

@@ -12,18 +12,19 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from .variance import robust_variance
 
-#: Chance that a fleet without an outlier is told of one.
+#: Probability that a fleet without an outlier is reported of one.
 LEVEL: Final = 0.01
 
-#: Shares of that chance: of a unit by one of its orders, the rest by all together; and of outliers
-#: that hide behind others (a later step, where an earlier one told none), the rest by themselves.
+#: Shares of that probability: of a unit by one of its orders, the remainder by all together; and of
+#: outliers that hide behind others (a later step, where an earlier one reported none), the
+#: remainder by themselves.
 _BY_ORDER: Final = 0.9
 _HIDDEN: Final = 0.2
 
 #: Shares of the level of those orders of the output in which damage shows: eccentricity and tilt.
 _DAMAGE: Final = {1.0: 0.4, 2.0: 0.2}
 
-#: This share of the units and one more can be outliers: by the others they are told.
+#: This share of the units and one more can be outliers: by the others they are reported.
 _MOST: Final = 0.25
 
 #: Degrees of freedom of the scale that an order needs.
@@ -40,12 +41,12 @@ class Deviates(NamedTuple):
     size : ndarray, shape (n, K)
         Distance from the others' mean in standard deviations between units.
     unit : ndarray, shape (n,)
-        Chance of the unit as a whole, its orders allowed for.
+        Probability of the unit as a whole, its orders allowed for.
     outlying : ndarray of bool, shape (n,)
     variances : ndarray, shape (K,)
         Between units, by the median.
     limit : float
-        Chance of a unit at or below which it is an outlier, unless a quarter of the units are.
+        Probability of a unit at or below which it is an outlier, unless a quarter of the units are.
     """
 
     chance: Array
@@ -95,11 +96,11 @@ def deviates(
         e_u = w_u |b_u - b̄|² / (1 - h_u),
         N = d (n - 1)
 
-    is Fisher's F with d and N - d degrees of freedom for normal units. A unit's chance is that of
-    the smallest of its orders', each over its share of the level (weighted Bonferroni), or of all
-    together (Fisher's sum of logarithms). The
-    farthest unit is set aside again and again; as many are outliers as the last whose chance,
-    times the units then left, is below the level, but those that are none beside the units left.
+    is Fisher's F with d and N - d degrees of freedom for normal units. A unit's probability is that
+    of the smallest of its orders', each over its share of the level (weighted Bonferroni), or of
+    all together (Fisher's sum of logarithms). The farthest unit is rejected again and again; as
+    many are outliers as the last whose probability, times the units then left, is below the level,
+    but those that are none together with the units left.
 
     Parameters
     ----------
@@ -110,13 +111,13 @@ def deviates(
     aligned : bool
         Whether the units share a mean; else it is 0.
     level : float
-        Chance of naming a unit where none is outlying.
+        Probability of naming a unit where none is outlying.
     shares : ndarray, shape (K,), optional
-        Of the level, by order; they sum to 1. Default: all alike.
+        Of the level, by order; they sum to 1. Default: all equal.
 
     Notes
     -----
-    n times orders for every unit set aside, a quarter of them and one more at most.
+    n times orders for every unit rejected, a quarter of them and one more at most.
     """
     n = len(values[0])
     variances = np.array([_variance(v, s, aligned) for v, s in zip(values, own, strict=True)])
@@ -147,7 +148,7 @@ def deviates(
         chance, size = _chances(values, weights, ~outlying, aligned)
         unit = _combined(chance, share_of)
         limit = (1.0 - _HIDDEN) * level / float((~outlying).sum())
-        # What was set aside before one that hid is an outlier by itself, or none.
+        # What was rejected before one that hid is an outlier by itself, or none.
         back = outlying & (unit > limit)
         if not back.any():
             return Deviates(chance, size, unit, outlying, variances, limit)
@@ -199,7 +200,7 @@ def _f_tail(f: Array, d: int, free: Array) -> Array:
 
 
 def _combined(chance: Array, shares: Array) -> Array:
-    """Chance of a unit by the least of its orders' or by all together."""
+    """Probability of a unit by the least of its orders' or by all together."""
     orders = chance.shape[1]
     least = (chance / shares).min(axis=1)
     if orders == 1:

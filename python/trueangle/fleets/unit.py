@@ -34,7 +34,7 @@ class FleetUnit:
     unit : str
     verdict : {"fine", "outlier", "recalibrate", "changed", "zero_moved"}
     because : str
-        What stands out, and what it is likely to be; empty where nothing does.
+        What is significant, and what it is likely to be; empty where nothing does.
     orders : tuple of UnitOrder
         Of the last calibration.
     peak_to_peak : float
@@ -42,10 +42,10 @@ class FleetUnit:
     left : float
         Standard deviation of the readings about the unit's own pattern.
     p : float
-        Chance of as much where nothing is the matter, the unit's orders allowed for: of its
+        Probability of as much where nothing is the matter, the unit's orders allowed for: of its
         distance from the other units or, where it moved, of its change.
     limit : float
-        At or below which ``p`` is told: 1 % of fleets for all units together.
+        At or below which ``p`` is reported: 1 % of fleets for all units together.
     """
 
     unit: str

@@ -40,7 +40,7 @@ _PASSES, _EXCHANGED = 4, 400
 
 @dataclass(frozen=True)
 class UnitPlan(PlainResult):
-    """Readings of a unit whose coefficients are drawn as those of its fleet.
+    """Readings of a unit whose coefficients are sampled as those of its fleet.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class UnitPlan(PlainResult):
     own : dict of order to float
         Share of each order's spread between units that the readings take away.
     readings_without : int or None
-        Readings that the same uncertainty takes without the fleet; None where the arc tells the
+        Readings that the same uncertainty takes without the fleet; None where the arc shows the
         orders by no number of them.
     units : int
         From which the prior is known.
@@ -225,7 +225,7 @@ def plan_unit(
 
 
 def _without(start: float, stop: float, known: Spread, uncertainty: float) -> int | None:
-    """Readings that the same takes where nothing is known of the unit."""
+    """Readings that the same takes where nothing is known about the unit."""
     try:
         plan = plan_arc(start, stop, known.orders, noise=known.noise, uncertainty=uncertainty)
     except ArgumentError:
@@ -235,7 +235,7 @@ def _without(start: float, stop: float, known: Spread, uncertainty: float) -> in
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """What is known of a unit, and the columns of its coefficients over a grid; arcsec.
+    """What is known about a unit, and the columns of its coefficients over a grid; arcsec.
 
     ``between`` is by how much runs of one unit differ in a coefficient at most, beyond their noise.
     """

@@ -17,10 +17,10 @@ from .calibration import Calibration, order_columns, output_orders
 from .outliers import Deviates, deviates, level_by_order
 from .variance import BetweenUnits, held_out_score, reml
 
-#: Units below which none is told to be an outlier: the others are what it is told by.
+#: Units below which none is reported to be an outlier: the others are what it is reported by.
 FEWEST: Final = 5
 
-#: Share of the units that are set aside as outliers, at most (one may always be).
+#: Share of the units that are rejected as outliers, at most (one may always be).
 FEW: Final = 0.05
 
 #: Places of a turn for each cycle of the highest order.
@@ -158,7 +158,7 @@ def run_variance(calibrations: Sequence[Calibration], noise: Array, louder: Arra
 class UnitNoise(NamedTuple):
     """Variance of a reading, of every unit, and what a further unit's is like.
 
-    ``variance`` is that of all units together, ``freedom`` the degrees of freedom that it is worth
+    ``variance`` is that of all units together, ``freedom`` its degrees of freedom
     as a guess of a further unit's (infinite where units do not differ).
     """
 

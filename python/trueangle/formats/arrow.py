@@ -38,7 +38,7 @@ _CODECS = {0: "lz4", 1: "zstd"}
 _DICTIONARY, _RECORD_BATCH = 2, 3
 #: Rows at once.
 _ROWS = 1 << 20
-#: Bytes of a stretch that is read on its own, and parts of a larger batch at most.
+#: Bytes of a segment that is read on its own, and parts of a larger batch at most.
 _STRETCH = 1 << 24
 _MOST_PARTS = 64
 
@@ -56,7 +56,7 @@ def unread(path: Path) -> list[str]:
 
 
 class BatchRange(NamedTuple):
-    """Neighbouring record batches, or one of so many parts of a single large one."""
+    """Neighbouring record batches, or one of this many parts of a single large one."""
 
     batches: range
     part: int = 0
@@ -86,7 +86,7 @@ def stretches(path: Path) -> list[BatchRange | None]:
         size = path.stat().st_size
         each = max(1, batches * _STRETCH // size)
         parts = 1
-        # A part of a packed batch needs all of it unpacked.
+        # A part of a packed batch needs everything unpacked.
         if batches * _STRETCH < size and _compression(path, True) is None:
             parts = min(-(-size // (max(batches, 1) * _STRETCH)), _MOST_PARTS)
     return [
@@ -212,7 +212,7 @@ def _cut(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
 
 
 class _Packed(NamedTuple):
-    """What the header of a record batch says: rows, codec, bytes of all columns once unpacked."""
+    """What the header of a record batch states: rows, codec, bytes of all columns once unpacked."""
 
     rows: int
     codec: str | None
@@ -238,12 +238,12 @@ def _check_batches(path: Path, is_file: bool) -> None:
 
 
 def _compression(path: Path, is_file: bool) -> str | None:
-    """Codec of the first record batch, which only the message's own header tells."""
+    """Codec of the first record batch, which only the message's own header shows."""
     return next((batch.codec for batch in _packed(path, is_file) if batch.rows >= 0), None)
 
 
 def _header(header: bytes, body: pa.Buffer) -> _Packed:
-    """What the flatbuffer of a record batch says (Message.fbs of Arrow).
+    """What the flatbuffer of a record batch states (Message.fbs of Arrow).
 
     A buffer that is packed begins with the bytes that it unpacks to, -1 where it is none.
     """
@@ -317,7 +317,7 @@ class PlacedBatch(NamedTuple):
     places: dict[str, ColumnBuffers]
 
     def read(self, file: FileIO, part: int, parts: int) -> Iterator[dict[str, NDArray[Any]]]:
-        """One of so many parts of the rows, in blocks."""
+        """One of this many parts of the rows, in blocks."""
         first, last = (self.rows * k // parts for k in (part, part + 1))
         for start in range(first, last, ROWS):
             stop = min(start + ROWS, last)
@@ -337,7 +337,7 @@ def placed_batch(
     base = mapped.read_buffer(1).address  # of more, the system would look at every page
 
     def place(part: pa.Buffer | None, least: int) -> int | None:
-        """The byte of the file that a part of so many bytes starts at."""
+        """The byte of the file that a part of this many bytes starts at."""
         if part is None or part.size < least:
             return None
         start = part.address - base

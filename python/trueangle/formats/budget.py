@@ -1,7 +1,7 @@
 """What a file holds before it is read and decoded: extents, sizes, one budget of memory for all.
 
-A packed file says nothing of what it unpacks to: kilobytes stand for gigabytes. It is asked
-before memory is taken, from what the file says of itself, and again while it is read.
+A packed file contains nothing of what it unpacks to: kilobytes represent gigabytes. It is checked
+before memory is taken, from what the file states about itself, and again while it is read.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def check_decoded(path: Path, size: int, columns: int) -> None:
     Raises
     ------
     DecodedSizeError
-        Says how large the file is, how large its columns are, and what reads them.
+        States how large the file is, how large its columns are, and what reads them.
     """
     if size > DECODED_BYTES:
         raise DecodedSizeError(

@@ -1,4 +1,4 @@
-"""Checksums that tell whether what was read back is what was written."""
+"""Checksums that show whether what was read back is what was written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands before the readings of a text file: preamble, names, units."""
+"""What is before the readings of a text file: preamble, names, units."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from .csvcells import (
     line_cells,
 )
 
-#: Lines looked at to tell readings from a preamble.
+#: Lines looked at to distinguish readings from a preamble.
 _LOOKED_AT = 4
 
 #: A name at the head of a time column of TwinCAT's exports, before the names it is for.
 _SCOPE = "Name"
 #: What a line of units holds: units in brackets, or short words without digits.
 _UNIT = r"[\[(].*[\])]|[^\d\s]{0,8}(?:/[^\d\s]{1,4}\d?)?|-"
-# Compiled where a line asks for it: that takes longer than to read a small file.
+# Compiled where a line needs it: that takes longer than to read a small file.
 _KNOWN_UNITS = (
     r"[\[(]?(deg(rees?)?|rad(ians?)?|turns?|rev(olutions?)?|counts?|arcsec|arcmin|[°\u2032\u2033\"']|"
     r"m?s|us|µs|ns|sec(onds?)?|volts?|m?v|m?a|[mc]?nm|n·?m|°?c|k|rpm|(deg|rad|turn|°)/s)[\])]?"
@@ -44,7 +44,7 @@ class Header:
 
     The line of names is the last one before the readings that has as many cells; without
     one the columns are called ``column1``, ``column2`` and so on. A line of units may
-    stand between, notes that begin with # anywhere. A file whose first line has the names
+    be between, notes that begin with # anywhere. A file whose first line has the names
     of this package's columns is taken at its word.
 
     Parameters
@@ -155,7 +155,7 @@ class Header:
                     if i != before[-1]:
                         continue
                 cells = self._cells(text)
-                off = abs(len(cells) - width)  # blanks say nothing of an end of the line
+                off = abs(len(cells) - width)  # blanks state nothing of an end of the line
                 if off > (delimiter != " ") or self._is_talk(cells, lines[begin]):
                     continue
                 if _units_of(cells, width) is None:
@@ -226,7 +226,7 @@ class Header:
         decimal = decimal_of(delimiter)
 
         def is_words(cells: list[str], width: int) -> bool:
-            blanks = delimiter == " "  # which tell nothing of how many cells were meant
+            blanks = delimiter == " "  # which show nothing of how many cells were meant
             return (blanks or len(cells) != width) and not any(
                 cell_number(cell, decimal) is not None for cell in cells
             )
@@ -276,7 +276,7 @@ _STANDARD = re.compile(r"(reference|indicated|corrected)_(deg|rad|turn|count)\b|
 
 
 def _units_of(cells: Sequence[str], width: int) -> list[str] | None:
-    """Units of a line of units under so many names, or None for another line."""
+    """Units of a line of units under this many names, or None for another line."""
     if abs(len(cells) - width) > 1 or not any(
         re.fullmatch(_KNOWN_UNITS, cell, re.IGNORECASE) for cell in cells
     ):

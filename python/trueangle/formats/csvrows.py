@@ -150,7 +150,7 @@ def line_too_long(header: Header, line: int) -> FileError:
 
 
 def quoted_blocks(data: bytes, file: IO[bytes], header: Header, line: int) -> Iterator[QuotedBlock]:
-    """``data`` and the rest of ``file`` in blocks of whole rows; ``line`` is its first."""
+    """``data`` and the remainder of ``file`` in blocks of whole rows; ``line`` is its first."""
     read: list[str] = []
     block = QuotedBlock(header)
     size, width = 0, len(header.names)

@@ -1,4 +1,4 @@
-"""Whatever a library raises over a damaged file, told with the file's name."""
+"""Whatever a library raises over a damaged file, reported with the file's name."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..errors import FileError, TrueAngleError
 def damage_told(path: object, name: str, hint: str = "") -> Iterator[None]:
     """Errors of a library that reads ``path`` as a file of the format ``name``.
 
-    Libraries raise almost anything over damaged bytes, so everything is taken for damage
+    Libraries raise almost anything over damaged bytes, so everything is read as damage
     but errors of this package and of the operating system; the cause stays attached. A
-    length that was damaged asks for memory that no file of this size can need.
+    length that was damaged needs memory that no file of this size can need.
     """
     try:
         yield
@@ -37,7 +37,7 @@ def damage_told(path: object, name: str, hint: str = "") -> Iterator[None]:
         raise FileError(path, f"is damaged or not {name}: {_told(cause)}{hint}") from cause
 
 
-#: What libraries say of a full disk, or of too little memory, in errors of their own kinds.
+#: What libraries state about a full disk, or of too little memory, in errors of their own kinds.
 _DISK_FULL = ("disk is full", "no space left", "errno = 28")
 _NO_MEMORY = ("out of memory", "cannot allocate memory", "malloc of size", "can't start new thread")
 

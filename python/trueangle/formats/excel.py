@@ -16,7 +16,7 @@ from ..errors import FileError, MissingExtraError
 from .budget import DECODED_BYTES, DecodedSizeError, check_part
 from .damage import damage_told
 
-#: Where a cell or a row stands: ``r="AB12"``, ``r="12"``.
+#: Where a cell or a row is: ``r="AB12"``, ``r="12"``.
 _PLACE = re.compile(rb"""\br=["']([A-Z]{0,3})(\d{1,7})["']""")
 #: Bytes in memory of a cell, empty ones among them, and of its text.
 _CELL = 64

@@ -1,4 +1,4 @@
-"""What a format is: how its files are told, selected and read, copied with columns and a note."""
+"""What a format is: how its files are given, selected and read, copied with columns and a note."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..errors import FileError, MissingExtraError
 from .budget import FileExtent
 from .textfile import text_extent
 
-#: Columns that are texts whatever they look like, in formats that do not say.
+#: Columns that are texts whatever they look like, in formats that do not state.
 TEXTS = ("run", "unit")
 
 #: Called after every batch with the rows done and the part of the file done, 0 to 1.
@@ -45,7 +45,7 @@ class Contents(NamedTuple):
 
 
 class Addition(Protocol):
-    """A column that a copy gets beside those of its source."""
+    """A column that a copy gets next to those of its source."""
 
     @property
     def column(self) -> str:
@@ -82,7 +82,7 @@ def note(additions: Sequence[Addition]) -> str:
 def refuse_corrected(
     path: Path, columns: Mapping[str, NDArray[Any]], addition: Addition, corrected: NDArray[Any]
 ) -> None:
-    """Refuse a table whose columns have no names of their own and hold what is to be added.
+    """Refuse a table whose columns have no separate names and hold what is to be added.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def check_lengths(path: Path, kind: str, sizes: Mapping[str, int]) -> None:
 
 
 class Selection(NamedTuple):
-    """What is read of a file: columns, of a topic and of one of its stretches, if it has them.
+    """What is read of a file: columns, of a topic and of one of its segments, if it has them.
 
     Formats of text take ``texts`` for labels and refuse, where ``strict``, numbers that are not
     finite.
@@ -138,13 +138,13 @@ class CopyTask(NamedTuple):
 class FormatModule(Protocol):
     """What the module of a format defines.
 
-    Beside these a module may define ``stretches(path)``, parts of a file that `read` takes one
+    Next to these a module may define ``stretches(path)``, parts of a file that `read` takes one
     of: then the batches of that part only, and parts may be read side by side; ``line_of(path,
     row)`` and ``header_line(path)``, formats of text, the line that a row or the names come
     from; and ``together(path, needed, others)``, formats whose columns need not be equally
     long, those of ``others`` that are; and ``unread(path)``, formats of further types, the names
-    of the columns that hold neither numbers nor labels. Formats of text that know no more of
-    their length than their first lines tell need no ``extent``.
+    of the columns that hold neither numbers nor labels. Formats of text that know no further of
+    their length than their first lines show need no ``extent``.
     """
 
     def columns(self, path: Path, topic: str | None) -> list[str]:
@@ -154,7 +154,7 @@ class FormatModule(Protocol):
         """Some columns in batches of bounded size, NaN where a value is missing."""
 
     def extent(self, path: Path, names: Sequence[str] = (), topic: str | None = None) -> FileExtent:
-        """Rows of a file and bytes of columns in memory, by what the file says of itself."""
+        """Rows of a file and bytes of columns in memory, by what the file states about itself."""
 
     def copy(self, task: CopyTask) -> Contents:
         """Write the target as the source with the chosen columns added.
@@ -168,7 +168,7 @@ class FormatModule(Protocol):
 
 @dataclass(frozen=True)
 class Format:
-    """A format: its module, how its files are told and the extra that it needs.
+    """A format: its module, how its files are reported and the extra that it needs.
 
     ``promises`` holds its endings by what each is called; those of "" promise nothing.
     ``magics`` are first bytes of its files, ``pattern`` matches them; ``unit`` is that of all
@@ -229,7 +229,7 @@ class Format:
 
     @contextmanager
     def at_header(self, path: Path) -> Iterator[None]:
-        """Let errors of the header, told of line 1, name the line where the names stand."""
+        """Let errors of the header, reported of line 1, name the line where the names are."""
         try:
             yield
         except FileError as error:

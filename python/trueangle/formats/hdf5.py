@@ -33,14 +33,14 @@ from .stored import ROWS
 _BLOCK = 1 << 17
 #: Rows of a part that is read on its own, and parts at most: each opens the file.
 _PART, _MOST_PARTS = 1 << 20, 64
-#: A multiple of so many parts, where there are as many: two or four threads end together.
+#: A multiple of this many parts, where there are as many: two or four threads end together.
 _EVEN = 4
-#: Attribute of a corrected data set that says how it was made.
+#: Attribute of a corrected data set that states how it was made.
 _ATTRIBUTE = "trueangle"
 
 
 class RowRange(NamedTuple):
-    """One of so many parts of every data set, in their order."""
+    """One of this many parts of every data set, in their order."""
 
     number: int
     parts: int
@@ -173,7 +173,7 @@ def together(path: Path, needed: Sequence[str], others: Sequence[str]) -> list[s
 
 @contextmanager
 def _opened(path: Path, output: _WrittenFile | None = None) -> Iterator[h5py.File]:
-    """The file, to be read or written, its errors told with its name."""
+    """The file, to be read or written, its errors reported with its name."""
     hint = "; MATLAB saves HDF5 with -v7.3 only" if path.suffix == ".mat" else ""
     with damage_told(path, "HDF5", hint):
         try:
@@ -227,7 +227,7 @@ def _names(
     found: list[str] = []
 
     def visit(name: str | bytes, item: Any) -> None:
-        if isinstance(name, bytes):  # it is no text, and nobody can ask for it
+        if isinstance(name, bytes):  # it is no text, and nobody can need it
             return
         if isinstance(item, h5py.Dataset) and item.ndim and is_wanted(item):
             found.append(name)
@@ -237,7 +237,7 @@ def _names(
 
 
 def _create_like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) -> None:
-    """Make an empty data set beside ``indicated``, laid out and compressed like it."""
+    """Make an empty data set next to ``indicated``, laid out and compressed like it."""
     kind = (
         np.float32
         if indicated.dtype.kind == "f" and indicated.dtype.itemsize == 4
@@ -264,7 +264,7 @@ def _create_like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) ->
 
 
 def _text(data: h5py.Dataset, attribute: str) -> Any | None:
-    """What an attribute says, one or more texts; None where it is something else.
+    """What an attribute states, one or more texts; None where it is something else.
 
     Of values that are no text the library may end the process where the file is damaged.
     """

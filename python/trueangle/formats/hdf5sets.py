@@ -1,4 +1,4 @@
-"""Data sets of an HDF5 file: whether and where their values may be read, and stretches of them."""
+"""Data sets of an HDF5 file: whether and where their values may be read, and segments of them."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def is_elsewhere(data: h5py.Dataset) -> bool:
     """Whether its values are those of other data sets or files.
 
     The library follows such a chain without an end where it leads back to itself, until the
-    process ends; nothing is asked of its values before this.
+    process ends; its values are not read before this.
     """
     return bool(data.is_virtual or data.external)
 
@@ -115,7 +115,7 @@ def cached(file: h5py.File, name: str) -> h5py.Dataset:
 
 
 def _place(data: h5py.Dataset, start: int, stop: int) -> tuple[slice, ...]:
-    """Selection of a stretch of a vector, also of one stored as 1 x n or n x 1 (MATLAB)."""
+    """Selection of a segment of a vector, also of one stored as 1 x n or n x 1 (MATLAB)."""
     along = int(np.argmax(data.shape))
     return tuple(slice(start, stop) if i == along else slice(None) for i in range(data.ndim))
 
@@ -139,7 +139,7 @@ def part(data: h5py.Dataset, start: int, stop: int) -> Any:
 
 
 def put(data: h5py.Dataset, start: int, stop: int, values: NDArray[Any]) -> None:
-    """Write a stretch of a vector, in whatever direction it lies."""
+    """Write a segment of a vector, in whatever direction it lies."""
     place = _place(data, start, stop)
     shape = tuple(
         stop - start if s.start is not None else n for s, n in zip(place, data.shape, strict=True)

@@ -1,6 +1,6 @@
 """Joint states as their messages hold them: read, and written with other positions, by the block.
 
-Messages of one robot are alike but for times and numbers: a layout is read from one of them, and
+Messages of one robot differ in times and numbers only: a layout is read from one of them, and
 those that have the same lengths and names are an array of bytes. What is not changed keeps
 its bytes.
 """
@@ -20,7 +20,7 @@ _LONGEST = 1 << 20
 
 
 class _Layout(NamedTuple):
-    """Where everything of a message stands.
+    """Where everything of a message is.
 
     Attributes
     ----------

@@ -92,7 +92,7 @@ class ChunkReader(McapReader):  # type: ignore[misc]
 
 
 def _messages(data: bytes, wanted: dict[int, Any]) -> Iterator[tuple[Any, int, bytes]]:
-    """Messages of wanted channels as they stand in a chunk."""
+    """Messages of wanted channels as they are in a chunk."""
     place, end = 0, len(data)
     head_of, record_of = _HEAD.unpack_from, _RECORD.unpack_from
     last_head = end - _HEAD.size
@@ -216,7 +216,7 @@ class _ChunkWriter(McapWriter):  # type: ignore[misc]
                 self.close_chunk()
 
     def close_chunk(self) -> None:
-        """Write the messages that wait, and where they stand."""
+        """Write the messages that wait, and where they are."""
         chunk = self.chunk
         if not chunk.bio.tell():
             return

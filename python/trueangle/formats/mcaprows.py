@@ -1,6 +1,6 @@
 """Messages of one channel and one length, as a chunk of an MCAP file holds them: an array of bytes.
 
-A robot's joint states are alike but for their numbers, and a chunk holds thousands: as rows of
+A robot's joint states differ in their numbers only, and a chunk holds thousands: as rows of
 an array they are read, checked and written without a step of Python for each.
 """
 
@@ -67,7 +67,7 @@ class RecordRows:
 
     @classmethod
     def of_chunk(cls, data: bytes, mixed: bool = False) -> list[RecordRows] | None:
-        """The records of a chunk, some thousands at a time; None where they are not all alike.
+        """The records of a chunk, some thousands at a time; None where they are not all equal.
 
         Of several channels where ``mixed``, one channel after the other.
         """
@@ -94,7 +94,7 @@ class RecordRows:
 
 
 def interleaved_rows(parts: Sequence[tuple[int, RecordRows]]) -> RecordRows:
-    """Row 0 of every part, row 1 of every part ..., each on the channel that stands before it.
+    """Row 0 of every part, row 1 of every part..., each on the channel that is before it.
 
     Numbers are 0 and times of publishing those of logging, as for messages written one by one.
     """

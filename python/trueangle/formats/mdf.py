@@ -1,4 +1,4 @@
-"""MDF4 logs: channels read in parts, corrected ones added in a channel group of their own."""
+"""MDF4 logs: channels read in parts, corrected ones added in a separate channel group."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from .openmdf import HAS_MARKS, OF_TEXTS, opened_mdf
 _BLOCK = 1 << 19
 #: Acquisition name of the groups of corrected channels.
 _GROUP = "trueangle"
-#: Channels of values of any length stand elsewhere in the file.
+#: Channels of values of any length are elsewhere in the file.
 _ELSEWHERE = 1
 #: Compression argument of asammdf by the type of data block found.
 _COMPRESSIONS = {0: 0, 1: 1, 2: 2, 3: 5, 4: 6, 5: 3, 6: 4}
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
-    """Names of the channels that occur once; time channels left out."""
+    """Names of the channels that occur once; time channels omitted."""
     with opened_mdf(path) as mdf:
         return _names(mdf)
 
@@ -55,7 +55,7 @@ def copy(task: CopyTask) -> Contents:
             for channel in channels
         ]
         rows = [_cycles(mdf, group) for group in groups]
-    # What is added is kept beside the output until it is saved.
+    # What is added is kept next to the output until it is saved.
     with opened_mdf(task.source, temporary_folder=str(task.target.parent)) as mdf:
         sums = _kept(task.source, mdf)
         compression = _compression(mdf)
@@ -79,7 +79,7 @@ def copy(task: CopyTask) -> Contents:
 
 
 def _history(mdf: MDF, comment: str) -> FileHistory:
-    """What is told of the copy; of the time of the last entry, so that a log gives one copy."""
+    """What is reported of the copy; of the time of the last entry, so that a log gives one copy."""
     known = mdf.file_history
     made = FileHistory()
     made.comment = f"<FHcomment><TX>{escape(comment)}</TX><tool_id>trueangle</tool_id></FHcomment>"
@@ -152,7 +152,7 @@ def _parts(path: Path, mdf: MDF, places: Sequence[tuple[int, int]]) -> Iterator[
             raise FileError(path, "numbers are needed, one to a record", column=channel.name)
     head = group.channel_group
     record = int(head.samples_byte_nr) + int(head.invalidation_bytes_nr)
-    # Its own reading of a stretch of records goes through all of them.
+    # Its own reading of a segment of records goes through all of them.
     mdf.configure(read_fragment_size=_BLOCK * max(record, 1))
     said, found = _cycles(mdf, places[0][0]), 0
     for records in mdf._mdf._load_data(group):
@@ -181,7 +181,8 @@ def _part(path: Path, mdf: MDF, place: tuple[int, int], records: Any) -> Signal:
             column=part.name,
         )
     if part.invalidation_bits is None and mdf.groups[group].channels[index].flags & HAS_MARKS:
-        # Of records without a mark none are given, which a group that has them cannot be told.
+        # Of records without a mark none are given, which a group that has them cannot be
+        # determined.
         part.invalidation_bits = np.zeros(part.samples.size, dtype=bool)
     if part.invalidation_bits is not None and part.invalidation_bits.any():
         kind = np.float32 if part.samples.dtype == np.float32 else np.float64

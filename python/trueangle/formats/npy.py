@@ -112,7 +112,7 @@ def write_header(file: IO[bytes], kind: np.dtype[Any], shape: tuple[int, ...]) -
 
 @contextmanager
 def _opened(path: Path) -> Iterator[NDArray[Any]]:
-    """The array in mapped memory, its errors told with its name."""
+    """The array in mapped memory, its errors reported with its name."""
     with damage_told(path, "an array of numpy"):
         with path.open("rb") as file:
             read_header(file)

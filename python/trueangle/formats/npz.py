@@ -21,7 +21,7 @@ from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, check_lengths, note, row_labels
 from .npy import BLOCK, read_header, write_header
 
-#: Member of a copy that tells how its arrays were made.
+#: Member of a copy that shows how its arrays were made.
 _NOTE = "trueangle.json"
 
 
@@ -87,7 +87,7 @@ def copy(task: CopyTask) -> Contents:
                 shutil.copyfileobj(given, put, 1 << 20)
             sums[member.filename] = f"{member.CRC:08x}"
         total = max(sum(found[a.column].size for a in additions), 1)
-        # As `contents` finds them: arrays beside the corrected ones may be longer.
+        # As `contents` finds them: arrays next to the corrected ones may be longer.
         rows, done = max((column.size for column in found.values()), default=0), 0
         for addition in additions:
             name = f"{addition.added}.npy"
@@ -130,7 +130,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """The archive, its errors told with its name."""
+    """The archive, its errors reported with its name."""
     with damage_told(path, "an archive of numpy"), zipfile.ZipFile(path) as archive:
         yield archive
 

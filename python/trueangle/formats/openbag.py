@@ -1,6 +1,6 @@
-"""An open bag of ROS 1 or ROS 2: where its joint states are, what it says of its correction.
+"""An open bag of ROS 1 or ROS 2: where its joint states are, what it states about its correction.
 
-Bags of ROS 2 hold the note of a correction among the custom data of their metadata, which stand in
+Bags of ROS 2 hold the note of a correction among the custom data of their metadata, which are in
 ``metadata.yaml`` and once more inside every storage file; bags of ROS 1 in the headers of the
 corrected connections.
 """
@@ -49,7 +49,7 @@ _FOOTER_BYTES, _MOST = 20, 1 << 24
 
 
 def made_note(before: list[dict[str, Any]], additions: Sequence[Addition], topic: str) -> str:
-    """The note of a bag whose ``topic`` takes the corrected positions, with what it said before."""
+    """The note of a bag whose ``topic`` takes the corrected positions, and its old note."""
     told = json.loads(note(additions))
     told["corrected"] = [*before, *({**entry, "topic": topic} for entry in told["corrected"])]
     return json.dumps(told)
@@ -211,7 +211,7 @@ class _Bag1(Reader1):  # type: ignore[misc]
 
 
 class MessageGroup(NamedTuple):
-    """Messages of a connection that are alike in length."""
+    """Messages of a connection with equal length."""
 
     connection: Any
     rows: RecordRows
@@ -232,7 +232,7 @@ class OpenBag:
             if not isinstance(connection.topic, str) or not isinstance(connection.msgtype, str):
                 told = f"{connection.topic!r:.40} of the type {connection.msgtype!r:.40}"
                 raise FileError(path, f"is damaged: a topic is called {told}")
-        #: What the writer of a bag of ROS 2 noted beside the messages.
+        #: What the writer of a bag of ROS 2 noted next to the messages.
         self.custom = {} if self.is_ros1 else _bag_custom_data(reader)
         self.types = get_typestore(Stores.ROS1_NOETIC if self.is_ros1 else Stores.LATEST)
         self.chunked = [] if self.is_ros1 else list(_chunked(reader))
@@ -268,7 +268,7 @@ class OpenBag:
         return [] if first is None else self.states(first).joints
 
     def blocks(self, connections: Sequence[Any] = ()) -> Iterator[list[Any] | MessageGroup]:
-        """Messages of these connections, or of all: some thousands, or such as are alike."""
+        """Messages of these connections, or of all: some thousands, or equal ones."""
         block: list[Any] = []
         for message in self.reader.messages(connections):
             rows = message[2]
@@ -300,7 +300,7 @@ class OpenBag:
 
 @contextmanager
 def opened_bag(path: Path) -> Iterator[OpenBag]:
-    """The bag, its errors told with its name."""
+    """The bag, its errors reported with its name."""
     with (
         damage_told(path, "a bag"),
         _Bag1(path) if path.suffix == ".bag" else BagReader(path) as bag,

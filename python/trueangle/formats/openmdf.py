@@ -17,26 +17,26 @@ from ..errors import FileError
 from ..support.layout import counted
 from .damage import damage_told
 
-#: Bytes that one byte of a file can stand for: deflate reaches 1032.
+#: Bytes that one byte of a file can represent: deflate reaches 1032.
 _MOST_COMPRESSED = 2000
-#: Bytes of a data block read at once: asammdf reads a block whole for each part of it.
+#: Bytes of a data block read at once: asammdf reads a block whole for each part.
 _PIECE = 1 << 22
 #: Types of channels that have no place in a record: virtual master and data.
 _VIRTUAL = (3, 6)
 #: Flag of a channel whose readings may be marked invalid.
 HAS_MARKS = 2
 #: Flag of a group of records of any length: texts of a channel of another group, no channels. The
-#: library writes them beside that channel, and no such group.
+#: library writes them next to that channel, and no such group.
 OF_TEXTS = 1
 #: First bytes of a file, also of one that was not finished.
 _MAGIC = (b"MDF     ", b"UnFinMF ")
 
-#: Where the header block stands.
+#: Where the header block is.
 _HEADER: Final = 0x40
 #: Bytes before the links of a block: kind, length, number of links.
 _HEAD: Final = 24
 
-#: Links of a block that lead to its successor or to what it holds, and what must stand there
+#: Links of a block that lead to its successor or to what it holds, and what must be there
 #: (ASAM MDF 4.2; None: any): a tree, but for conversions that channels share. Those that refer
 #: back (master, scope, element) are not among them. Further links of a conversion lead to
 #: conversions or texts.
@@ -59,7 +59,7 @@ _LEADS: Final[Mapping[bytes, Mapping[int, bytes | None]]] = {
 
 @contextmanager
 def opened_mdf(path: Path, **options: Any) -> Iterator[MDF]:
-    """The file, its errors told with its name."""
+    """The file, its errors reported with its name."""
     with path.open("rb") as file:
         if file.read(8) not in _MAGIC:
             raise FileError(path, "is not MDF4")
@@ -79,7 +79,7 @@ def opened_mdf(path: Path, **options: Any) -> Iterator[MDF]:
 
 @contextmanager
 def _told_once() -> Iterator[None]:
-    """Without what the library prints of damage beside the error that it raises."""
+    """Without what the library prints of damage next to the error that it raises."""
 
     def nothing(record: logging.LogRecord) -> bool:
         return False
@@ -93,7 +93,7 @@ def _told_once() -> Iterator[None]:
 
 
 def _check_sizes(path: Path, mdf: MDF) -> None:
-    """Refuse groups that say they hold more than the file can: reading them would not end."""
+    """Refuse groups that state they hold more than the file can: reading them would not end."""
     size = path.stat().st_size
     for group in mdf.groups:
         record = group.channel_group.samples_byte_nr + group.channel_group.invalidation_bytes_nr
@@ -106,9 +106,7 @@ def _check_sizes(path: Path, mdf: MDF) -> None:
         if said > _MOST_COMPRESSED * size:
             raise FileError(path, f"is damaged: it has {size} bytes and declares {said}")
         if record > _MOST_COMPRESSED * size:
-            raise FileError(
-                path, f"is damaged: it has {size} bytes and declares records of {record}"
-            )
+            raise FileError(path, f"is damaged: {size} bytes and declares records of {record}")
         marks = 8 * int(group.channel_group.invalidation_bytes_nr)
         for channel in group.channels:
             if channel.channel_type not in _VIRTUAL:
@@ -138,7 +136,7 @@ def _take_in_pieces(mdf: MDF) -> None:
 
 def _pieces(block: DataBlockInfo) -> list[DataBlockInfo]:
     size = block.original_size or 0
-    # What is compressed, has marks beside it or is cut short is taken as it is.
+    # What is compressed, has marks with it or is cut short is taken as it is.
     whole = block.block_type or block.invalidation_block or block.block_limit is not None
     if whole or size <= _PIECE:
         return [block]
@@ -196,7 +194,7 @@ def _leads(path: Path, file: BinaryIO, block: int, size: int) -> list[int]:
     file.seek(min(block, size))
     kind, length, count = struct.unpack("<4s4xQQ", file.read(_HEAD).ljust(_HEAD, b"\0"))
     leads = _LEADS.get(kind, {})
-    # The library reads the links of most kinds where they must stand, whatever number is said.
+    # The library reads the links of most kinds where they must be, whatever number is reported.
     room = 8 * (max(leads, default=-1) + 1)
     if kind == b"##CC":
         room = min(8 * count, max(length, _HEAD) - _HEAD, size)

@@ -33,14 +33,14 @@ _BYTES = 1 << 25
 _BUFFER = 1 << 20
 #: Rows at once of texts that take more than `_BYTES` in the file.
 _FEW = 64
-#: Rows, at least, of a stretch that is read on its own, and of the batches it is read in:
+#: Rows, at least, of a segment that is read on its own, and of the batches it is read in:
 #: these stay in the cache until they are used.
 _STRETCH = 1 << 20
 _BATCH = 1 << 15
 
 
 class RowGroupRange(NamedTuple):
-    """Neighbouring row groups, and the footer that tells where they are."""
+    """Neighbouring row groups, and the footer that shows where they are."""
 
     groups: list[int]
     footer: pq.FileMetaData
@@ -83,7 +83,7 @@ def stretches(path: Path) -> list[RowGroupRange | None]:
 def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Columns ``names`` in batches; see `format.FormatModule`.
 
-    A stretch is read from mapped memory, by the calling thread alone.
+    A segment is read from mapped memory, by the calling thread alone.
     """
     tops = [name for name in wanted.names if "[" not in name]  # elements of lists are no columns
     stretch: RowGroupRange | None = wanted.stretch
@@ -144,7 +144,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
 
 @contextmanager
 def _opened(path: Path, **options: Any) -> Iterator[pq.ParquetFile]:
-    """The file, its errors told with its name."""
+    """The file, its errors reported with its name."""
     options = {"page_checksum_verification": True, "buffer_size": _BUFFER, **options}
     with damage_told(path, "Parquet"), pq.ParquetFile(path, **options) as file:
         yield file
@@ -164,8 +164,8 @@ def _whole(path: Path) -> Iterator[tuple[pq.ParquetFile, Iterator[pa.Table]]]:
 def _tables(file: pq.ParquetFile, schema: pa.Schema, rows: int) -> Iterator[pa.Table]:
     """The rows in tables of a bounded size in memory, none across a border of row groups.
 
-    Texts come as dictionaries, which take no more memory than the file, and are decoded
-    for as many rows as fit: pages of a few bytes can stand for gigabytes.
+    Texts come as dictionaries, which take no further memory than the file, and are decoded
+    for as many rows as fit: pages of a few bytes can represent gigabytes.
     """
     for group in range(file.metadata.num_row_groups):
         for batch in file.iter_batches(batch_size=rows, row_groups=[group], use_threads=False):
@@ -183,7 +183,7 @@ def _decoded(column: pa.Array, kind: pa.DataType) -> pa.Array:
 
 
 def _cuts(batch: pa.RecordBatch, schema: pa.Schema) -> Iterator[tuple[int, int]]:
-    """Stretches of rows whose texts take a bounded size once they are decoded."""
+    """Segments of rows whose texts take a bounded size once they are decoded."""
     size = np.zeros(batch.num_rows, dtype=np.int64)
     for column, field in zip(batch.columns, schema, strict=True):
         if column.type != field.type:
@@ -203,7 +203,7 @@ def _cuts(batch: pa.RecordBatch, schema: pa.Schema) -> Iterator[tuple[int, int]]
 def _rows_at_once(file: pq.ParquetFile, schema: pa.Schema) -> int:
     """Rows of which the columns of fixed width, decoded, take a bounded size.
 
-    Other columns (lists, long texts without a dictionary) are as wide as their file says,
+    Other columns (lists, long texts without a dictionary) are as wide as their file states,
     though a few rows of them may be far wider than the others.
     """
     width, rows = 0, 1 << 20
@@ -229,10 +229,10 @@ def _encoded(file: pq.ParquetFile, name: str) -> int:
 def _chunks(
     file: pq.ParquetFile, group: int, name: str | None = None
 ) -> list[pq.ColumnChunkMetaData]:
-    """What the footer says of a row group's columns, or of one, whose first row is read before.
+    """What the footer states about a row group's columns.
 
     Damage there (a codec that is none, statistics of another length) ends the process where
-    it is asked for, and raises where it is read.
+    it is requested, and raises where it is read.
     """
     columns = None if name is None else [name]
     next(file.iter_batches(1, row_groups=[group], columns=columns, use_threads=False), None)
@@ -290,7 +290,7 @@ def _codec(name: str) -> str:
 def _overflowed(chunk: Any) -> bool:
     """A dictionary that grew too large is followed by pages without it.
 
-    The dictionary's own page is PLAIN in files of today, so encodings alone do not tell:
+    The dictionary's own page is PLAIN in files of today, so encodings alone do not show:
     a chunk that stays well below its plain size was kept in its dictionary.
     """
     width = {"DOUBLE": 8, "INT64": 8, "FLOAT": 4, "INT32": 4}.get(chunk.physical_type)

@@ -1,4 +1,4 @@
-"""ROS 1 and ROS 2 bags: joint states corrected on a topic of their own, all else copied."""
+"""ROS 1 and ROS 2 bags: joint states corrected on a separate topic, all else copied."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ class _Digest:
             self._sum(topic)
 
     def update_rows(self, topic: str, rows: RecordRows) -> None:
-        """Add messages that are alike."""
+        """Add messages of equal layout."""
         if topic in self._waiting:
             self._sum(topic)
         count, check = self._sums.get(topic, (0, 0))
@@ -205,7 +205,7 @@ def _corrected(
 
 
 class BagWriter:
-    """A bag being written beside the one read."""
+    """A bag being written next to the one read."""
 
     def __init__(self, bag: OpenBag, writer: Any, note: str) -> None:
         self._bag = bag
@@ -219,12 +219,12 @@ class BagWriter:
         """A connection like one that was read, perhaps of another topic.
 
         In bags of ROS 1, which hold notes nowhere else, the header of one whose positions are
-        corrected says so: its caller is the note, in which the caller stands that it had.
+        corrected reports it: its caller is the note, in which the caller is that it had.
 
         Raises
         ------
         FileError
-            An old bag holds no definition of a type of its own.
+            An old bag holds no definition of a separate type.
         """
         if self._bag.is_ros1:
             caller = connection.ext.callerid
@@ -260,7 +260,7 @@ class BagWriter:
 
 @contextmanager
 def _opened_writer(bag: OpenBag, target: Path, note: str) -> Iterator[BagWriter]:
-    """A writer of the kind of ``bag``; ``note`` says where the corrected topic is from."""
+    """A writer of the kind of ``bag``; ``note`` states where the corrected topic is from."""
     if bag.is_ros1:
         made = _ros1(bag, target)
         try:

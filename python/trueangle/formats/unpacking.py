@@ -1,4 +1,4 @@
-"""Packed parts and files of bags, unpacked up to a limit, whatever their headers say of them.
+"""Packed parts and files of bags, unpacked up to a limit, whatever their headers state about them.
 
 A file that is packed as a whole is read at places all over, so it is unpacked to a temporary
 folder before; a few kilobytes can fill a disk there.
@@ -30,7 +30,7 @@ else:
 
 #: Bytes on the disk that the files of a bag may unpack to: hours of a robot's sensors with images.
 UNPACKED_BYTES: Final = 1 << 36
-#: The variable of the environment that says another limit.
+#: The variable of the environment that states another limit.
 LIMIT: Final = "TRUEANGLE_UNPACKED_BYTES"
 
 _METADATA = "metadata.yaml"
@@ -41,7 +41,7 @@ _PART = 1 << 20
 
 
 def unpacked(path: Path, codec: str, part: str, data: bytes) -> bytes:
-    """``data`` unpacked by ``codec``: bz2, lz4 or zstd; no more than the budget at a time.
+    """``data`` unpacked by ``codec``: bz2, lz4 or zstd; at most the budget at a time.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def unpacked_folder(folder: Path) -> TemporaryDirectory[str] | None:
 
 
 def _unpack(path: Path, target: Path, room: int) -> int:
-    """Unpack one file to no more than ``room`` bytes, and count them."""
+    """Unpack one file to at most ``room`` bytes, and count them."""
     size = 0
     with zstd.open(path, "rb") as packed, target.open("wb") as file:
         while part := packed.read(_PART):
@@ -125,7 +125,7 @@ def _limit() -> int:
     Raises
     ------
     ArgumentError
-        The environment says something else than a number.
+        The environment states something else than a number.
     """
     said = os.environ.get(LIMIT, "")
     if not said:

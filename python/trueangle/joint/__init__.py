@@ -1,1 +1,1 @@
-"""What is known of the machine: shafts, gear lines, the pattern, what happened at every reading."""
+"""The machine: shafts, gear lines, the pattern, and signals at every reading."""

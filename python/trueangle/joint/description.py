@@ -1,4 +1,4 @@
-"""What a robot file says: the joints of a robot, their gears and the columns of their signals."""
+"""What a robot file states: the joints of a robot, their gears and the columns of their signals."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ class _DescriptionReader(Decoder):
             member,
             self.signals(table.get("signals", _NOTHING), f"{at}.signals"),
             self.shafts(table.get("shafts", _NOTHING), f"{at}.shafts"),
-            # Beside the robot file, wherever the command is called.
+            # Together with the robot file, wherever the command is called.
             None
             if simulation is None
             else self.path.parent / self.text(simulation, f"{at}.simulation"),

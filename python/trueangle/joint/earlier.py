@@ -16,7 +16,7 @@ def earlier_signals(signals: Signals, delay_s: float) -> Signals:
 
         θ(t - τ) ≈ θ(t) - vτ
 
-    Where the readings of a run stand closer than the delay, the angle is read off their own record
+    Where the readings of a run are closer than the delay, the angle is read off their own record
     instead, so that the joint may gather speed meanwhile.
 
     The signals need a velocity; ``delay_s`` is τ, negative for a time after.

@@ -14,7 +14,7 @@ from .shafts import shaft_cycles
 #: Gear ratios of common strain wave gears, tried where none is declared.
 COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
 
-#: Low orders wanted by default: what 36 positions can hold beside the constant.
+#: Low orders wanted by default: what 36 positions can hold together with the constant.
 HIGHEST_LOW_ORDER: Final = 17
 
 
@@ -128,7 +128,7 @@ def explain_order(
 ) -> tuple[Explanation, ...]:
     """Known lines of the joint that ``order`` or one of its ``aliases`` may be.
 
-    Without ``gear_ratio`` the common ratios are tried and each explanation says for
+    Without ``gear_ratio`` the common ratios are tried and each explanation states for
     which ratio it holds.
 
     Examples
@@ -149,7 +149,7 @@ def explain_order(
 def explain_as_harmonic(order: float, amplitudes: Mapping[float, float]) -> tuple[Explanation, ...]:
     """The larger line that ``order`` is a multiple of: what is not sinusoidal has harmonics.
 
-    ``amplitudes`` are those of every retained order, in any unit. Order 1 is left out: all are
+    ``amplitudes`` are those of every retained order, in any unit. Order 1 is omitted: all are
     multiples of it.
 
     Examples

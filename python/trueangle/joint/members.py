@@ -1,4 +1,4 @@
-"""Which member of a strain wave gear stands still."""
+"""Which member of a strain wave gear is still."""
 
 from __future__ import annotations
 

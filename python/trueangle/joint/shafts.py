@@ -1,4 +1,4 @@
-"""The shafts of a joint: turns per output turn, their harmonics, orders asked of them."""
+"""The shafts of a joint: turns per output turn, their harmonics, their orders."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Shaft:
     Parameters
     ----------
     name : str
-        ``"output"``, ``"motor"``, ``"wave_generator"`` or a name of your own.
+        ``"output"``, ``"motor"``, ``"wave_generator"`` or another name.
     cycles_per_turn : float
         Turns of the shaft per output turn; any positive real.
     orders : iterable of int
@@ -76,7 +76,7 @@ class Shaft:
 
 
 class ShaftOrders(NamedTuple):
-    """Orders asked of one shaft."""
+    """Orders of one shaft."""
 
     name: str
     cycles_per_turn: float

@@ -45,11 +45,11 @@ class Signals:
     travel : ndarray
         Degrees moved since the last reversal (or since the start of the run).
     segment : ndarray of int
-        Stretch of one direction that the reading belongs to.
+        Segment of one direction that the reading belongs to.
     segment_direction, segment_length : ndarray, shape (segments,)
-        Direction and whole length (degrees) of every stretch.
+        Direction and whole length (degrees) of every segment.
     segment_first : ndarray of bool
-        The stretch opens its run.
+        The segment opens its run.
     clock : ndarray
         Seconds since the start of the run, or the row number without time.
     velocity, time, temperature, torque, mount, current : ndarray or None
@@ -115,7 +115,7 @@ class Signals:
         return even_rate([self.theta[a:b] / (2.0 * np.pi) for a, b in self.run_bounds()])
 
     def take(self, rows: NDArray[np.bool_] | Index) -> Signals:
-        """The readings ``rows``; runs keep their index and stretches their history."""
+        """The readings ``rows``; runs keep their index and segments their history."""
         changes = {
             name: getattr(self, name)[rows]
             for name in ("theta", "run", "row", "direction", "travel", "segment", "clock")
@@ -194,7 +194,7 @@ class Signals:
         )
 
     def play(self, half_width_deg: float, start_state: float = 1.0) -> Array:
-        """Where the angle stands in a play of that half width, in [-1, 1].
+        """Where the angle is in a play of that half width, in [-1, 1].
 
         It goes from one side to the other over twice the half width after each reversal; a run
         starts at ``start_state * d``: 0 in the middle, 1 at the side of its direction.
@@ -243,7 +243,7 @@ def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
 
 
 def _common_table(first: Signals, later: Signals) -> int:
-    """Positions of a turn on which all readings stand; 0 where later ones stand beside them."""
+    """Positions of a turn on which all readings are; 0 where later ones are with them."""
     grid = uniform_grid(np.concatenate([first.theta, later.theta]))
     if grid is not None or first.table != later.table:
         return 0 if grid is None else grid.positions
@@ -303,7 +303,7 @@ RECORDED: dict[str, Callable[[CalibrationRun, Array], Array | None]] = {
 
 
 def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:
-    """Direction, travel, stretch of every reading; direction and length of every stretch."""
+    """Direction, travel, segment of every reading; direction and length of every segment."""
     angle = run.unwrapped_reference * (360.0 / run.period)
     direction = run.direction
     steps = np.diff(angle)
@@ -321,7 +321,7 @@ def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:
     cuts = np.flatnonzero(np.diff(direction)) + 1
     edges = np.concatenate([[0], cuts, [len(run)]])
     segment = np.repeat(np.arange(edges.size - 1), np.diff(edges))
-    # A stretch starts at the turning point: the farther of the readings on both sides.
+    # A segment starts at the turning point: the farther of the readings on both sides.
     before, after = angle[np.maximum(edges[:-1] - 1, 0)], angle[edges[:-1]]
     old = np.concatenate([direction[:1], direction[edges[:-2]]])
     origin = np.where((after - before) * old > 0.0, after, before)

@@ -1,4 +1,4 @@
-"""Direction and speed of readings about a turning point, where the reference alone tells them.
+"""Direction and speed of readings about a turning point, where the reference alone shows them.
 
 The step that leads to the reading farthest out may hold the turning point: the joint then moves
 the other way already. Of the two lines that the readings before and after it make in time,
@@ -7,7 +7,7 @@ the other way already. Of the two lines that the readings before and after it ma
 
     θ₋(t), θ₊(t),
 
-it belongs to the one that says its angle. A difference of angles across the turning point is no
+it belongs to the one that states its angle. A difference of angles across the turning point is no
 speed either: the last reading before it and the first one after it have the slope of the
 parabola through the readings on their own side.
 """
@@ -58,7 +58,7 @@ def direction_at_turns(angle: Array, clock: Array, direction: Array) -> Array:
 
 
 def velocity_at_turns(angle: Array, time: Array, direction: Array, velocity: Array) -> Array:
-    """Velocities by central differences, put right beside turning points.
+    """Velocities by central differences, put right together with turning points.
 
     Examples
     --------

@@ -38,14 +38,14 @@ from ..support.files import partition_keys
 from ..support.times import local_day
 from .keeping import SAMPLE, KeptReadings
 
-#: Roles whose columns tell runs apart.
+#: Roles whose columns separate runs.
 LABELS = ("unit", "run")
 
 #: Readings taken together: what is computed of them stays in the cache.
 _BLOCK = 1 << 16
 #: Readings, at most, of the first batch that are checked for wrong units and signs.
 _LOOKED_AT = 4096
-#: Bytes that a reading takes, to tell how much of a log is done.
+#: Bytes that a reading takes, to show how much of a log is done.
 _BYTES = 16
 
 #: Called after every batch with its rows and the bytes that those took.
@@ -56,9 +56,9 @@ Advance: TypeAlias = Callable[[int, float], None]
 class LogFitSettings:
     """What to accumulate; sent to the workers of a cluster.
 
-    ``orders`` maps shaft names to all orders that may be asked for, ``shafts`` shaft names
+    ``orders`` maps shaft names to all orders that may be requested, ``shafts`` shaft names
     to their turns per output turn. Of every log ``kept`` readings are kept, a ``part`` of the
-    blocks at most, and outliers left out where it is told what they are.
+    blocks at most, and outliers omitted where it is reported what they are.
     """
 
     orders: Mapping[str, tuple[int, ...]]
@@ -108,7 +108,7 @@ class RunTally:
     low, high : float
         Ends of its angles over the turns, where the error does not repeat after one.
     outliers : list of int
-        Rows among the known readings of those that were left out.
+        Rows among the known readings of those that were omitted.
     """
 
     rows: int = 0
@@ -132,7 +132,7 @@ class Accumulated:
     moments : Moments
         Runs are labelled ``(file, unit, run)``, and with the day where there is a ``when``.
     files, sha256 : tuple of str
-        Checksums are empty where they were not asked for, and of folders.
+        Checksums are empty where they were not requested, and of folders.
     rows, missing : int
         Readings, and those without a reference or indicated angle.
     tallies : dict
@@ -153,7 +153,7 @@ class Accumulated:
     indicated_sign: int = 1
 
     def add(self, other: Accumulated) -> Accumulated:
-        """Itself with the next stretch of the same log, or the next log, taken in."""
+        """Itself with the next segment of the same log, or the next log, taken in."""
         self.moments.merge(other.moments)
         self.kept.add(other.kept)
         self.rows += other.rows
@@ -192,9 +192,9 @@ def log_moments(path: Path, settings: LogFitSettings) -> Accumulated:
 def accumulate_each(
     paths: Iterable[Path], settings: LogFitSettings, advance: Advance = lambda rows, size: None
 ) -> Iterator[Accumulated]:
-    """Moments of every log in turn, stretches of logs read side by side.
+    """Moments of every log in turn, segments of logs read side by side.
 
-    A log is always cut in the same stretches, merged in their order: the sums are the same,
+    A log is always cut in the same segments, merged in their order: the sums are the same,
     bit for bit, whatever the number of threads.
     """
     workers = _core.thread_count(settings.threads)
@@ -240,7 +240,7 @@ def _stretches(path: Path, settings: LogFitSettings) -> Iterator[_LogPart]:
 
 
 def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -> Accumulated:
-    """Moments of one stretch of a log."""
+    """Moments of one segment of a log."""
     path, period, argument = stretch.path, stretch.angles.period, settings.argument
     is_first = stretch.number == 0
     found = Accumulated(

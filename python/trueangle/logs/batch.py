@@ -70,7 +70,7 @@ def correct_logs(
     scheduler : str, optional
         Address of a Dask scheduler whose workers share the file system.
     threads : int, optional
-        At most so many for the correction itself.
+        At most this many for the correction itself.
     progress : {"auto", "text", "json", "none"}
         On stderr; see `Progress`.
     report : callable
@@ -137,7 +137,7 @@ def correct_logs(
 
 
 def _warn_of_units(logs: Sequence[LogReport]) -> None:
-    """Tell once of each column whose readings look like another unit, and of how many logs."""
+    """Show once of each column whose readings look like another unit, and of how many logs."""
     told: dict[str, list[str]] = {}
     for log in logs:
         for joint in (log.result or {}).get("joints", ()):
@@ -187,7 +187,7 @@ def _one_by_one(
             except (TrueAngleError, OSError) as error:
                 log.status, log.error = "failed", _without_locals(error)
         finished(log)
-        # Without the turns of this log, those of the logs after it cannot be told.
+        # Without the turns of this log, those of the logs after it cannot be determined.
         if log.error is not None and (is_disk_full(log.error) or settings.counts_turns):
             return
         before = states_after(log.result)

@@ -60,21 +60,21 @@ def fit_logs(
 
     by least squares with one zero per run: what `fit` gives for the runs of these files. Up to
     2^20 readings are read into runs and fitted so. Of more, all are summed (`Moments`) and some
-    65 000 are kept, in blocks at random: these tell what needs readings in their order, the sums
-    all else, and a note says so.
+    65 000 are kept, in blocks at random: these show what needs readings in their order, the sums
+    all else, and a note reports it.
 
     Parameters
     ----------
     logs : path or iterable of paths
         Files or folders with the columns ``reference_deg`` and ``indicated_deg`` (or
-        ``_rad``, ``_turn``, ``indicated_count``), see `read_runs`; missing readings are left
-        out and counted.
+        ``_rad``, ``_turn``, ``indicated_count``), see `read_runs`; missing readings are
+        omitted and counted.
     orders : iterable of int, mapping of shaft to orders, "auto" or None
     gear_ratio, fixed_member, shafts, argument, covariance
-        As in `fit`. ``"hac"`` takes whole runs apart, which sums do not: as if one in so many
-        readings as the noise remembers were independent.
+        As in `fit`. ``"hac"`` takes whole runs apart, which sums do not: as if one in this many
+        correlated readings were one independent reading.
     loss : {"auto", "linear"}
-        As in `fit`: ``"auto"`` sets outliers aside, which takes a second pass where there are
+        As in `fit`: ``"auto"`` rejects outliers, which takes a second pass where there are
         some.
     counts_per_turn, counts_per_turn_reference : float, optional
     signals : mapping of role to column, optional

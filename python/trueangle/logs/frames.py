@@ -19,7 +19,7 @@ from .joints import JointChannel, JointState, LogSettings, logged_joints
 _DATA = "data"
 
 
-#: What says how a joint, or the joints of a robot, are corrected.
+#: What states how a joint, or the joints of a robot, are corrected.
 _Models: TypeAlias = HarmonicModel | str | PathLike[str] | Mapping[str, Any]
 
 
@@ -327,7 +327,7 @@ _OUT_OF_ORDER = (
     "follow the direction of travel. {} does not keep the order: {}"
 )
 
-#: Library -> what corrects its data, or says NotImplemented to that of others.
+#: Library -> what corrects its data, or states NotImplemented to that of others.
 _KINDS: Sequence[tuple[str, Callable[[Any, Any, LogSettings], Any]]] = (
     ("dask.dataframe", _from_dask_frame),
     ("dask.array", _from_dask_array),

@@ -1,4 +1,4 @@
-"""The list of logs that are done, kept beside the outputs so that a run can go on."""
+"""The list of logs that are done, kept next to the outputs so that a run can go on."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Manifest:
             "result": dict(result),
         }
         # One write at the end of the file: processes of a cluster append side by side. The
-        # first line end closes the half line of a killed process; blank lines are skipped.
+        # first line end is periodic the half line of a killed process; blank lines are skipped.
         handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         try:
             os.write(handle, b"\n" + json.dumps(entry).encode() + b"\n")

@@ -1,4 +1,4 @@
-"""Passes over logs whose readings are summed: one, and more where outliers ask for it."""
+"""Passes over logs whose readings are summed: one, and more where outliers need it."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ from .report import Progress
 
 #: Orders per order of the table that sums of segments hold to a part in 1e10.
 _REACH = 2.89
-#: With more logs, each with its sums, the scan beyond the low orders is left out.
+#: With more logs, each with its sums, the scan beyond the low orders is omitted.
 _MOST_SCANNED = 64
 #: Places across a segment at which the model is looked at.
 _ACROSS = np.linspace(0.0, 1.0, 5)
-#: Passes, at most, in which outliers are set aside and looked for anew.
+#: Passes, at most, in which outliers are rejected and looked for anew.
 _PASSES = 4
 
 
 class Passes:
-    """Passes over logs: one, and more where outliers or the angle of the errors ask for it."""
+    """Passes over logs: one, and more where outliers or the angle of the errors need it."""
 
     def __init__(
         self,
@@ -102,7 +102,7 @@ class Passes:
     def settled(
         self, argument: AnyArgument, fitted: Callable[[SummedReadings], FitResult]
     ) -> FitResult:
-        """The fit of all readings but the outliers, which `weigh` would set aside as well."""
+        """The fit of all readings but the outliers, which `weigh` would rejected as well."""
         plain = _Judged(self.first(argument), fitted)
         start = plain.start()
         if start is None:

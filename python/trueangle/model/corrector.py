@@ -88,7 +88,7 @@ class _Velocity:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past."""
+        """Reset the state."""
         self._angle = self._time = np.nan
         self._last = np.nan
 
@@ -179,17 +179,17 @@ class Corrector:
         """
         return self._core.step
 
-    def __reduce__(self) -> tuple[Any, ...]:  # copies go on from where this one stands
+    def __reduce__(self) -> tuple[Any, ...]:  # copies go on from where this one is
         return _rebuild, (self._model, self.state)
 
     def reset(self) -> None:
-        """Forget the past: the next sample is the first one."""
+        """Reset the state: the next sample is the first one."""
         self._core.reset()
         self._velocity.reset()
 
     @property
     def state(self) -> tuple[float, ...]:
-        """All that later samples need to know of the past, as numbers to keep and to set.
+        """All that later samples need to know about the past, as numbers to keep and to set.
 
         Raises
         ------

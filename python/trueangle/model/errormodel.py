@@ -159,7 +159,7 @@ class ErrorModel(Evaluation):
 
     @property
     def partial_span(self) -> tuple[float, float] | None:
-        """The stretch the model was fitted on when that was not the whole turn.
+        """The segment the model was fitted on when that was not the whole turn.
 
         First and last angle, whole turns kept, where the error does not repeat after a turn: of
         a term that holds over its own travel only (`Term.travel`), else of the fit.

@@ -1,6 +1,6 @@
 """Forms that the compiled core corrects by: play, friction, lag, filter, scaled, spring, bump.
 
-They have no physical names: a term says what it stands for and which forms it takes.
+They have no physical names: a term states what it represents and which forms it takes.
 Angles are in the unit of the model's period; lines are ``(order, cosine, sine)`` with the
 output order and ``cosine cos + sine sin``.
 """

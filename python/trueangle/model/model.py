@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Argument", "HarmonicModel", "Step", "check_invertible"]
 
-#: Lines that a summary lists before it says how many more there are.
+#: Lines that a summary lists before it states how many more there are.
 _LISTED = 40
 
 #: Names that one line lists, and their letters.
@@ -58,7 +58,7 @@ class HarmonicModel(ErrorModel):
     covariance : array_like, optional
         Of ``[C_0, A, B of each order of each shaft in turn]``.
     condition_number : float, optional
-        Of the design the fit has seen.
+        Of the design the fit has observed.
     fit : FitRecord, optional
     provenance : Provenance, optional
     terms : iterable of Term, optional
@@ -114,7 +114,7 @@ class HarmonicModel(ErrorModel):
 
         ``step.swap(model)`` corrects by another model from the next step on, in every thread that
         holds the step: a step in another thread ends with the model it began with. Both have the
-        same period and ``indicated_sign``, and terms or none. What is known of the travel stays
+        same period and ``indicated_sign``, and terms or none. What is known about the travel stays
         where the terms of the other model can hold it, else it begins anew. The new model is made
         ready first (some tenths of a millisecond), by the thread that swaps.
 
@@ -149,7 +149,7 @@ class HarmonicModel(ErrorModel):
         return _line(self)
 
     def summary(self) -> str:
-        """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
+        """The harmonics by shaft and order, in arcseconds, and what is known about the fit."""
         return _summary(self)
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
@@ -216,7 +216,7 @@ def _line(model: ErrorModel) -> str:
 
 
 def _summary(model: ErrorModel) -> str:
-    """The harmonics by shaft and order, in arcseconds, and what is known of the fit."""
+    """The harmonics by shaft and order, in arcseconds, and what is known about the fit."""
     period, unit = model.period, unit_name(model.period)
     rms = math.sqrt(0.5 * float(model.amplitudes @ model.amplitudes))
     shown = error_unit("auto", sine_of_rms(arcsec(rms, period)))

@@ -27,7 +27,7 @@ from .model import HarmonicModel
 _MARGIN: Final = 1.25
 
 #: Share of the model's largest line that the sums of a window may lack of it, at one spacing of the
-#: readings in every window: within a bin the model is told to second order.
+#: readings in every window: within a bin the model is reported to second order.
 _ROUNDING: Final = 1e-4
 
 #: Highest order that is watched: a window's sums grow with it.
@@ -54,14 +54,14 @@ class Monitor(ShownResult):
 
     alarms above the h that gives the run length to all charts together. The zero, which
     remounting and temperature move, has a chart of its steps. The mean of the first eight windows
-    is held against the model itself.
+    is compared with the model itself.
 
     Parameters
     ----------
     model : HarmonicModel
         Its orders are watched; shafts turn a whole number of times per turn of the output.
     every : float
-        Turns of travel of a window. One whose places do not tell the orders apart goes on.
+        Turns of travel of a window. One whose places do not separate the orders goes on.
     shift : float
         That is looked for, in standard deviations of a window's coefficient.
     run_length : float
@@ -165,7 +165,7 @@ class Monitor(ShownResult):
         ----------
         angle, error : float or array_like
             Of one shape, in the order they were taken: angle that the error is a function of, and
-            indicated less reference, with any zero. What is not finite is left out.
+            indicated less reference, with any zero. What is not finite is omitted.
         time : float or array_like, optional
             Seconds.
         **signals

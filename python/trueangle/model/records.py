@@ -1,4 +1,4 @@
-"""What a model file says of its making: the record of the fit, its provenance, also as read."""
+"""What a model file states about its origin: record of the fit and provenance."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 from ..support.decoding import Decoder, shown_value
 from ..support.files import InputFile
 
-#: Ends of a span are within so many turns.
+#: Ends of a span are within this many turns.
 MOST_TURNS = 1e9
 
 #: Ranges of signals and runs or files that a record lists, at most.
 MAX_TERMS = 64
 MAX_OFFSETS = 1_000_000
-#: Sentences that a record says of what its model is blind to.
+#: Sentences that a record states about what its model is blind to.
 _MOST_SENTENCES = 1000
 
 
@@ -24,7 +24,7 @@ class TableRecord:
 
     ``target`` is the machine's name in `trueangle.export_model`, ``argument`` the angle at which it
     looks up; ``rms`` and ``max_abs`` are what its own arithmetic (lines between its entries,
-    whole numbers) does beside the model, in the unit of the model's period.
+    whole numbers) does next to the model, in the unit of the model's period.
     """
 
     target: str
@@ -35,16 +35,16 @@ class TableRecord:
 
 @dataclass(frozen=True)
 class FitRecord:
-    """How a model was fitted: what its file says under ``fit``.
+    """How a model was fitted: what its file states under ``fit``.
 
-    ``span`` is the stretch of angles the fit has seen, ``(0, period)`` for a full turn;
+    ``span`` is the segment of angles the fit has observed, ``(0, period)`` for a full turn;
     ``residual`` is the residual standard deviation (None where no reading is left over to
     take it from), ``offsets`` the zero of every run and ``offset_spread`` their standard
     deviation, all in the unit of the model's period. ``positions`` counts the distinct
-    angles within a turn; ``note`` says where the model is verified and where not.
+    angles within a turn; ``note`` states where the model is verified and where not.
     ``calibrated_without_reference`` marks a model of `trueangle.selfcal`, and ``blind`` what
     such a model cannot know, one sentence each. ``freedom`` is there where the covariance was taken
-    from how runs or stretches of readings scatter: its degrees of freedom, the fewest of any
+    from how runs or segments of readings scatter: its degrees of freedom, the fewest of any
     coefficient, which are far fewer than readings less unknowns. ``signals`` holds the range of
     each signal that the terms of the model were found over, ``(name, lowest, highest)``, and
     ``table`` is there where the model was read from a machine.

@@ -23,7 +23,7 @@ from .corrector import JointsStep, exchangeable_step
 from .model import HarmonicModel
 from .writing import save_robot
 
-#: Columns of a log by role, each with its unit where its name does not tell it.
+#: Columns of a log by role, each with its unit where its name does not show it.
 Columns: TypeAlias = Mapping[str, tuple[str, str | None]]
 
 
@@ -121,7 +121,7 @@ class Robot(ShownResult, Mapping[str, HarmonicModel]):
         **signals : array_like
             ``velocity``, ``torque`` ... where terms of a model need them: of the shape of the
             positions or one that numpy spreads to it (a value per joint, ``(N, 1)`` for all).
-            What a joint is coupled to is taken from the positions; ``coupled_JOINT`` stands for
+            What a joint is coupled to is taken from the positions; ``coupled_JOINT`` represents
             a joint that is not among them.
 
         Returns
@@ -187,7 +187,7 @@ class Robot(ShownResult, Mapping[str, HarmonicModel]):
         joint is coupled to is taken from the positions.
 
         ``step.swap(robot)`` corrects by the models of another robot of the same joints from the
-        next step on; what is known of the travel stays where all its models can hold it.
+        next step on; what is known about the travel stays where all its models can hold it.
 
         Raises
         ------
@@ -233,8 +233,7 @@ class Robot(ShownResult, Mapping[str, HarmonicModel]):
             terms = "".join(f", {term.kind}" for term in model.terms)
             lines.append(
                 f"  {joint}: {orders}{terms}, at most {most:.4g} arcsec"
-                f"{' without its terms' if model.terms else ''}, angles in "
-                f"{unit_name(model.period)}"
+                f"{' plus terms' if model.terms else ''}, angles in {unit_name(model.period)}"
             )
         return laid_out(lines)
 

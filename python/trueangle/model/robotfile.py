@@ -40,7 +40,7 @@ def is_robot_file(path: str | PathLike[str]) -> bool:
 
 
 class _RobotReader(Decoder):
-    """Checks the file key by key, every model as a file of its own would be."""
+    """Checks the file key by key, every model as a separate file would be."""
 
     def robot(self) -> Robot:
         content = model_file_content(self.path, ROBOT_FORMAT)

@@ -31,7 +31,7 @@ class Term:
         Signals it cannot do without: "velocity", "temperature", "torque" (`needs`, where
         that depends on the parameters).
     follows_travel : bool
-        It remembers the direction of travel from sample to sample.
+        It keeps the direction of travel from sample to sample.
     is_built_on_harmonics : bool
         It contains the harmonics of its model.
     optional : tuple of str
@@ -92,7 +92,7 @@ class Term:
 
     @property
     def travel(self) -> tuple[float, float] | None:
-        """Stretch, over the turns, outside of which the term is held; None where it has none."""
+        """Segment, over the turns, outside of which the term is held; None where it has none."""
         return None
 
     def check(self) -> None:

@@ -1,4 +1,4 @@
-"""Where to measure so that the wanted orders can be told apart."""
+"""Where to measure so that the wanted orders can be separated."""
 
 from .arc import plan_arc
 from .limits import Limits, load_limits

@@ -23,10 +23,10 @@ READINGS = 60
 #: Readings of a plan at most: more take minutes to place, and nobody that long to read.
 MOST = 1_000_000
 
-#: Orders asked for where none are named, as far as the arc tells them.
+#: Orders requested where none are named, as far as the arc shows them.
 USUAL = (1.0, 2.0, 3.0, 4.0)
 
-#: Noise factor from which on an order is said not to be told: a thousand times the readings of a
+#: Noise factor from which on an order is not determined: a thousand times the readings of a
 #: whole turn.
 HOPELESS = math.sqrt(1000.0)
 
@@ -72,11 +72,11 @@ def plan_arc(
     start, stop : float
         Ends of the arc, degrees; at most one turn apart.
     orders : iterable of float, optional
-        Output orders wanted; by default 1 to 4, as far as the arc tells them.
+        Output orders wanted; by default 1 to 4, as far as the arc shows them.
     readings : int, optional
         In all runs together; by default 60, or as many as the wanted error needs.
     runs : int
-        Runs of equal design, each with a zero of its own.
+        Runs of equal design, each with a separate zero.
     both_directions : bool
         Read every place from either side, so that a reversal error is known as well.
     apart : float
@@ -95,8 +95,8 @@ def plan_arc(
     Raises
     ------
     ArgumentError
-        An arc of no length or beyond a turn; orders that look alike over it; too few readings for
-        the coefficients or more than a million; a wanted error without ``noise``.
+        An arc of no length or beyond a turn; orders that are collinear over it; too few readings
+        for the coefficients or more than a million; a wanted error without ``noise``.
 
     Notes
     -----
@@ -175,7 +175,7 @@ def check_arc(start: float, stop: float) -> None:
 def _columns(
     wanted: tuple[float, ...], start: float, stop: float, usual: bool, notes: list[str]
 ) -> tuple[OrthonormalColumns, tuple[float, ...]]:
-    """Columns of the orders; of the usual ones those that the arc tells."""
+    """Columns of the orders; of the usual ones those that the arc shows."""
     while True:
         try:
             columns = OrthonormalColumns(wanted, start / 360.0, stop / 360.0)
@@ -250,7 +250,7 @@ _GOOD = 0.985
 
 
 def _spread(turns: Array, apart: float, columns: OrthonormalColumns) -> Array:
-    """Readings that stand at least so far apart, as near their places as the arc allows."""
+    """Readings that are at least so far apart, as near their places as the arc allows."""
     if not (math.isfinite(apart) and apart >= 0.0):
         raise ArgumentError(f"apart must be a distance in degrees, got {apart * 360.0!r}")
     if apart == 0.0:

@@ -102,7 +102,7 @@ class ExpectedEvidence:
 def evidence_between(
     regression: Regression, rivals: Sequence[Hypothesis], noise: ReadingNoise, searched: bool = True
 ) -> list[ExpectedEvidence]:
-    """Every cause against every other that may be taken for it, and against none.
+    """Every cause against every other that may be confused with it, and against none.
 
     Parameters
     ----------
@@ -156,9 +156,9 @@ def evidence_between(
 
 
 def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Ambiguity]) -> bool:
-    """Whether readings with this cause would leave it in doubt, whatever their evidence.
+    """Whether readings with this cause would leave it uncertain, whatever their evidence.
 
-    ``spots`` are what the design of the readings cannot tell.
+    ``spots`` are what the design of the readings cannot show.
     """
     error = one.errors(regression.signals, regression.belief)[0]
     shown, found = _shown(regression, one, 0, error)
@@ -174,7 +174,7 @@ def _shown(
 ) -> tuple[Regression, Extension | None]:
     """The same readings with the error of a hypothesis, and what its cause proposes of them.
 
-    What follows from the motion is worked out once, and the rest once for each draw.
+    What follows from the motion is worked out once, and the remainder once for each draw.
     """
 
     def build() -> tuple[Regression, Extension | None]:
@@ -187,7 +187,7 @@ def _shown(
 
 
 def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:
-    """Causes that may be taken for another.
+    """Causes that may be confused with another.
 
     Those in question, its confounders, and all that act on whole runs; not what it is a special
     case of, as the simpler one is named.
@@ -209,7 +209,7 @@ def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:
 def deviance_left(
     regression: Regression, error: Array, noise: ReadingNoise, imitation: Extension | None = None
 ) -> float:
-    """Deviance of an error beside all that a regression fits, and an imitation."""
+    """Deviance of an error together with all that a regression fits, and an imitation."""
     if imitation is None:
         squares = float(np.sum(regression.projected(error[:, None])[0] ** 2))
     else:

@@ -18,7 +18,7 @@ from .further import run_steps
 
 @dataclass(frozen=True)
 class RivalEvidence:
-    """What the next runs are expected to say of causes.
+    """What the next runs are expected to state about causes.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class RivalEvidence:
     seen : bool
         One of them is; otherwise each is taken to be three times as large as the noise.
     told : bool
-        With these runs the design tells them, and the chance is as wanted.
+        With these runs the design shows them, and the probability is as wanted.
     expected_bic : float or None
         The least expected difference of BIC, of any cause over any other.
     chance_named : float or None
@@ -54,20 +54,20 @@ class NextRuns(PlainResult):
     Attributes
     ----------
     runs : tuple of RunDesign
-        None where no run within the limits tells anything more.
+        None where no run within the limits shows anything more.
     between : tuple of RivalEvidence
-        First what these runs are for, then what else they would tell.
+        First what these runs are for, then what else they would show.
     alone : bool
-        To be diagnosed by themselves: the earlier runs did not record what tells.
+        To be diagnosed by themselves: the earlier runs did not record what shows.
     beyond : tuple of str
-        What these runs need beyond all that was seen.
+        What these runs need beyond all that was detected.
     seconds : float
         What the runs take, without what is done between them.
     simulation : Simulation
-        What is believed, with these runs: ready to be simulated.
+        The assumed model, with these runs: ready to be simulated.
     notes : tuple of str
     hypotheses : tuple
-        Of every entry of ``between`` that was asked, what each of its causes would be.
+        Of every entry of ``between`` that was requested, the size of each of its causes.
     """
 
     runs: tuple[RunDesign, ...]
@@ -108,7 +108,7 @@ class NextRuns(PlainResult):
         self.simulation.save(path)
 
     def summary(self) -> str:
-        """What to do at the rig, and what it would tell."""
+        """What to do at the rig, and what it would show."""
         lines = []
         if self.runs:
             lines.append(
@@ -154,7 +154,7 @@ class NextRuns(PlainResult):
 
 
 def _plain_run(design: RunDesign) -> dict[str, Any]:
-    """A ``[[run]]`` table of a simulation file; what is as usual is left out."""
+    """A ``[[run]]`` table of a simulation file; what is as usual is omitted."""
     table = {}
     for f in fields(design):
         value = getattr(design, f.name)

@@ -116,7 +116,7 @@ def mount_noise_factors(divisions: int, offsets_deg: ArrayLike, orders: Sequence
             [fold(int(orders[i]), divisions)[1] * orders[i] * offsets for i in members], axis=-1
         )
         if 2 * folded == divisions:
-            # Only cos(N/2 x) is seen, so an order takes two mounts.
+            # Only cos(N/2 x) is detected, so an order takes two mounts.
             if 2 * len(members) > mounts:
                 continue
             factors[..., members] = _half_factors(phase)
@@ -190,7 +190,7 @@ def search_offsets(positions: int, mounts: int, orders: Sequence[float]) -> list
     """Offsets in degrees with the least worst factor, the first one 0.
 
     Even parts of the pitch where none are better: of all offsets that serve the wanted orders
-    equally they tell the others apart up to the highest, that of one grid of all positions.
+    equally they separate the others up to the highest, that of one grid of all positions.
     """
     if mounts == 1:
         return [0.0]

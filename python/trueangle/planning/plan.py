@@ -111,7 +111,7 @@ def plan_mounts(
     Raises
     ------
     NoModelError
-        No offsets of so few mounts separate the orders; the message says how many do.
+        No offsets of so few mounts separate the orders; the message states how many do.
 
     Notes
     -----
@@ -189,7 +189,7 @@ def plan_tilts(
 ) -> CalibrationPlan:
     """Off-null readings of an autocollimator at equally spaced tilts, without a remount.
 
-    The joint stands ``-tilt .. +tilt`` away from every facet's null and the autocollimator
+    The joint is ``-tilt.. +tilt`` away from every facet's null and the autocollimator
     reads the tilt. Its scale must be calibrated: 0.1 % of 1200 arcsec is 1.2 arcsec.
 
     Examples
@@ -250,7 +250,7 @@ def plan_encoder(
 ) -> CalibrationPlan:
     """Jittered equispaced positions against a free reference encoder.
 
-    Each position is drawn within its own cell, so no order is an exact alias of another.
+    Each position is sampled within its own cell, so no order is an exact alias of another.
     Without ``positions`` there are ``2 * highest order + 20`` of them (820 for ratio 100).
 
     Examples

@@ -1,4 +1,4 @@
-"""Designs of further runs weighed, beside earlier runs or by themselves."""
+"""Designs of further runs weighed, together with earlier runs or by themselves."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ from .worth import (
     worth_of_evidence,
 )
 
-#: Error of a cause of which nothing is seen, in standard deviations of a reading.
+#: Error of a cause of which nothing is detected, in standard deviations of a reading.
 UNSEEN = 3.0
 
-#: Questions up to which rivals are searched for though nothing is seen of them.
+#: Questions up to which rivals are searched for though nothing is detected of them.
 SEARCHED = 3
 
 #: Standard deviations from which on readings show a cause, and the parts of which a diagnosis
@@ -52,12 +52,12 @@ SHOWN, PARTS = 3.0, 5
 #: Designs of which the evidence is worked out, at most: some ten seconds.
 MOST_WEIGHED = 250
 
-#: Earlier readings that are looked at, at most: of more, one of every so many.
+#: Earlier readings that are looked at, at most: of more, one of every this many.
 MOST_READINGS = 2000
 
 
 class DesignScales:
-    """Weighs designs for a set of questions, beside earlier runs or by themselves.
+    """Weighs designs for a set of questions, together with earlier runs or by themselves.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class DesignScales:
         self.afresh()
 
     def afresh(self) -> None:
-        """Begin a search of its own: as many designs may be weighed again."""
+        """Begin a separate search: as many designs may be weighed again."""
         self._left = MOST_WEIGHED
 
     @property
@@ -119,7 +119,7 @@ class DesignScales:
         return any(getattr(self.earlier, name) is None for name in needs)
 
     def _possible(self, question: Question, estimated: Collection[str]) -> Question:
-        """Without causes whose own estimate nobody would see: they are not what is seen."""
+        """Without causes whose own estimate nobody would see: they are not what is detected."""
         if self.earlier is None or not estimated:
             return question
         regression = self._readings(self.earlier)
@@ -138,10 +138,10 @@ class DesignScales:
         changes: int = 0,
         least: Worth = NOTHING,
     ) -> Worth:
-        """What designs tell beside earlier runs.
+        """What designs show together with earlier runs.
 
-        ``changes`` are those from the plainest run. The evidence of designs that are worth no more
-        than ``least`` whatever it is is not worked out. A search comes back to designs that it has
+        ``changes`` are those from the plainest run. The evidence of designs with at
+        most ``least`` whatever it is, is not computed. A search comes back to designs that it has
         weighed: one in six.
         """
         key = (*designs,), start is None
@@ -172,7 +172,7 @@ class DesignScales:
         return worth
 
     def answers(self, designs: Sequence[RunDesign], start: Signals | None) -> Iterator[Answer]:
-        """What designs say of each question."""
+        """What designs state about each question."""
         regression, spots = self._at(designs, start)
         for question in self.questions:
             evidence = self._evidence(question, regression)
@@ -184,21 +184,21 @@ class DesignScales:
             yield Answer(is_open and is_strong_answer(evidence), bic, chance)
 
     def blind(self, designs: Sequence[RunDesign], start: Signals | None) -> list[Ambiguity]:
-        """What nobody can tell from these runs."""
+        """What these runs cannot show."""
         return self._at(designs, start)[1]
 
     def repeated(self, designs: Sequence[RunDesign], start: Signals | None) -> bool:
-        """Whether runs that are held out will confirm every cause: the others tell it as well.
+        """Whether runs that are held out will confirm every cause: the others show it as well.
 
         A diagnosis holds a fifth of the runs out at a time. Of a cause that only those show the
-        others say nothing, and what is held out denies it; so of a form that a grid leaves open
-        and a single run off the grid tells. Of runs by themselves it leaves out one speed after
-        the other as well.
+        others state nothing, and what is held-out data contradict it; so of a form that a grid
+        leaves open and a single run off the grid shows. Of runs by themselves it omits one speed
+        after the other as well.
         """
         regression, _ = self._at(designs, start)
         runs = len(regression.bounds)
         if runs == 1:
-            return True  # stretches of it are held out
+            return True  # segments of it are held out
         if start is None:
             speeds = {design.speed_deg_s for design in designs}
             parts = [[d for d in designs if d.speed_deg_s != speed] for speed in speeds]
@@ -246,7 +246,7 @@ class DesignScales:
         return signals if start is None else start.followed_by(signals)
 
     def _readings(self, signals: Signals) -> Regression:
-        """Noise at these readings, beside what is believed."""
+        """Noise at these readings, together with the assumed model."""
         whites = np.random.default_rng(0).standard_normal(len(signals)) * self.noise.sigma
         return Regression.of(signals, whites, self.around, rho=self.noise.correlation)
 
@@ -273,7 +273,7 @@ class DesignScales:
         return any(spot.hides(cause) for spot in spots for cause in question.causes)
 
     def _unclear(self, question: Question, spots: Sequence[Ambiguity]) -> set[str]:
-        """What acts on whole runs, may be taken for a cause in question, and is not told by these.
+        """Effects on whole runs that may be confused with a cause in question.
 
         What cannot act at all, as a spring without a load, takes the place of nothing.
         """

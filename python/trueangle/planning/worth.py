@@ -1,4 +1,4 @@
-"""What designs of further runs are worth: questions that are open, answers, evidence."""
+"""The information of further runs: questions that are open, answers, evidence."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .evidence import ExpectedEvidence, Hypothesis
 
-#: Chance of a strong difference of evidence that is wanted.
+#: Probability of a strong difference of evidence that is wanted.
 WANTED = 0.95
 
 #: Standard deviations of evidence beyond which a design is not better: a tenth of the readings
@@ -34,19 +34,20 @@ MOST_EVIDENCE = round(2.0 * math.log(ENOUGH) / math.log(ALIKE))
 #: Rounds in which the size of an effect is brought to that of the noise, and how near.
 _ROUNDS, _NEAR = 12, 0.02
 
-#: Draws of a cause that has no estimate: whatever it is, it is to be told.
+#: Draws of a cause that has no estimate: whatever it is, it is to be found.
 _DRAWS = 4
 
 #: Draws of an effect before a cause counts as one that such a joint cannot have.
 _TRIES = 4
 
-#: Share of the size asked for below which a cause of bounded size is too small to be what is seen.
+#: Share of the size requested below which a cause of bounded size is too small to be what is
+#: detected.
 _REACHED = 0.5
 
 
 @dataclass(frozen=True)
 class Question:
-    """Causes to be told apart, or from none, each as it would be.
+    """Causes to be separated, or one and none, each as it would be.
 
     Attributes
     ----------
@@ -54,9 +55,9 @@ class Question:
     hypotheses : tuple of Hypothesis
         Of those that can be in readings of this joint, and so large.
     seen : bool
-        Something is seen that one of them explains: the hypotheses are estimates of it.
+        One of them explains what is detected: the hypotheses are estimates of it.
     draws : tuple of Hypothesis
-        Of causes that have no estimate, others that are drawn: another place, frequency, order.
+        Of causes that have no estimate, others that are sampled: another place, frequency, order.
     """
 
     causes: tuple[str, ...]
@@ -66,7 +67,7 @@ class Question:
 
 
 def question_of(spot: Ambiguity, rich: Signals, around: JointPattern, rms: float) -> Question:
-    """What an entry of ``not_identifiable`` asks.
+    """The question of an entry of ``not_identifiable``.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ def question_of(spot: Ambiguity, rich: Signals, around: JointPattern, rms: float
     for cause in spot.causes:
         effects = tuple(known.get(cause, ())) or _alike(cause, known, around)
         if any(special.kind in spot.causes for special in EFFECTS[cause].contains):
-            effects = ()  # its estimate is the special case, where the runs do not tell them
+            effects = ()  # its estimate is the special case, where the runs do not show them
         if not effects:
             made = [effect_of_size(cause, rms, rich, around, k * _TRIES) for k in range(_DRAWS)]
             drawn = [Hypothesis(cause, (one,)) for one in made if one is not None]
@@ -149,9 +150,9 @@ def effect_of_size(
 
 @dataclass(frozen=True, order=True)
 class Worth:
-    """What runs tell, the most important first.
+    """What runs show, the most important first.
 
-    ``clear`` counts, below zero, what could not be named though it may be taken for a cause in
+    ``clear`` counts, below zero, what could not be named though it may be confused with a cause in
     question: then neither is.
     """
 
@@ -174,7 +175,7 @@ class Worth:
         return self.opened, self.told, self.foretold, self.clear
 
 
-#: What is told before anything is tried.
+#: What is reported before anything is tried.
 NOTHING = Worth(0, 0, False, -1_000, -1_000, 0, 0.0)
 
 
@@ -185,7 +186,7 @@ def barely(reached: tuple[int, int, bool, int]) -> Worth:
 
 @dataclass(frozen=True)
 class Answer:
-    """What runs say of one question: whether it is told, and by which evidence."""
+    """What runs state about one question: whether it is decided, and by which evidence."""
 
     told: bool
     bic: float | None
@@ -200,7 +201,7 @@ def is_strong_answer(evidence: Sequence[ExpectedEvidence]) -> bool:
 def run_is_foretold(regression: Regression) -> bool:
     """Whether the zero and lines of any run follow from the others: what is held out needs that.
 
-    On average over a run they are foretold no worse than one reading tells them.
+    On average over a run they are predicted no worse than one reading shows them.
     """
     grams = [regression.base[a:b].T @ regression.base[a:b] for a, b in regression.bounds]
     every = np.sum(grams, axis=0)

@@ -36,7 +36,7 @@ _MOST_NAMED = 8
 _MOST_ANNOTATED = 12
 _LABEL_INCHES = 0.17
 
-#: Orders between which nothing was looked at over so many orders stand in groups of their own.
+#: Orders between which nothing was looked at over this many orders are in separate groups.
 _BREAK: Final = 12.0
 #: Groups side by side at most; more would leave no width for each.
 _MOST_GROUPS: Final = 6
@@ -55,7 +55,7 @@ def amplitude_spectrum(
 
     Retained orders are filled dots, others hollow: on such an axis the length of a bar would
     mean nothing. The steps are the amplitude that an order needs to be significant; aliases
-    that the positions cannot tell from a retained order stand above its dot. The orders of a
+    that the positions cannot distinguish from a retained order are above its dot. The orders of a
     fit carry 95 % intervals.
 
     Parameters
@@ -189,7 +189,7 @@ def _title(line: OrderLine, unit: ErrorUnit, name: Callable[[float], str] | None
 
 
 def _apart(ranked: Sequence[int], place: Array, room: float) -> list[int]:
-    """Of dots, the most important first, those that have room beside the ones before."""
+    """Of dots, the most important first, those that have room together with the ones before."""
     kept: list[int] = []
     for i in ranked:
         if all(abs(place[i] - place[k]) >= room for k in kept):
@@ -214,7 +214,7 @@ def _order_groups(orders: Sequence[float]) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True)
 class OrderAxis:
-    """Where orders stand on one axis with breaks.
+    """Where orders are on one axis with breaks.
 
     Attributes
     ----------
@@ -242,7 +242,7 @@ class OrderAxis:
         return cls(groups, starts, scales)
 
     def places(self, orders: ArrayLike) -> Array:
-        """Where orders stand."""
+        """Where orders are."""
         wanted = np.asarray(orders, dtype=np.float64)
         group = np.searchsorted([low for low, _ in self.groups], wanted, side="right") - 1
         first = np.array([low for low, _ in self.groups])[group]
@@ -257,7 +257,7 @@ class OrderAxis:
         return np.full(place.size, 0.75 * min(least, 0.5))
 
     def room(self, ax: Axes, inches: float) -> float:
-        """Places that so many inches take on these axes."""
+        """Places that this many inches take on these axes."""
         figure = ax.get_figure(root=True)
         wide = ax.get_position().width * figure.get_figwidth()  # type: ignore[union-attr]
         return inches * sum(self._spans()) / wide

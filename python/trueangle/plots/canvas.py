@@ -28,7 +28,7 @@ _ON_PAGE: float = 80.0
 ON_PAGE: float = 96.0
 _SMALLER: ContextVar[bool] = ContextVar("smaller", default=False)
 
-#: Entries of a legend beyond which it stands beside the picture, not inside.
+#: Entries of a legend beyond which it is next to the picture, not inside.
 _MANY: int = 5
 
 #: Entries side by side of a legend that has to stay inside, and the height of a row of them
@@ -38,7 +38,7 @@ _ROW: float = 0.09
 #: Steps of ticks on an axis of angles in degrees, and about how many there are to an inch.
 _ANGLES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 1800.0)
 _TICKS_PER_INCH: float = 1.2
-#: Width of axes that are alone in a figure, as part of it.
+#: Share of the width for axes that are alone in a figure.
 _ALONE: float = 0.9
 #: Letters of an entry, of which longer ones lose the middle.
 _LONGEST: int = 48
@@ -62,7 +62,7 @@ def new_axes(ax: Axes | None, *, polar: bool = False, height: float = 4.0) -> Ax
 
 
 def grid(ax: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
-    """Faint lines behind what is drawn."""
+    """Faint lines behind what is plotted."""
     ax.grid(True, axis=axis, color=ink(ax) + "18", linewidth=0.8)
     ax.set_axisbelow(True)
 
@@ -105,7 +105,7 @@ def as_image(drawn: Axes | Figure) -> str:
 
 
 def _subplots(rows: int, columns: int, width: float, height: float, **how: Any) -> Any:
-    """A figure of so many inches and an array of its axes."""
+    """A figure of this many inches and an array of its axes."""
     try:
         from matplotlib import pyplot
         from matplotlib.figure import Figure
@@ -120,13 +120,13 @@ def _subplots(rows: int, columns: int, width: float, height: float, **how: Any) 
 
 
 def marked(line: Line2D, **marks: Any) -> Line2D:
-    """A line with what a page knows of it: ``run``, ``titles`` of its points, ``ring``."""
+    """A line with what a page knows about it: ``run``, ``titles`` of its points, ``ring``."""
     line.on_page = marks  # type: ignore[attr-defined]
     return line
 
 
 def page_marks(artist: object) -> dict[str, Any]:
-    """What `marked` said of it."""
+    """What `marked` stated about it."""
     found: dict[str, Any] = getattr(artist, "on_page", {})
     return found
 
@@ -163,7 +163,7 @@ def turn_axis(ax: Axes, low: float, high: float) -> None:
 def described(ax: Axes, text: str, title: str = "") -> Axes:
     """The axes with a text for who does not see them: see `text_alternative`.
 
-    A title stands over axes that are alone in their figure: others have captions of theirs.
+    A title is over axes that are alone in their figure: others have separate captions.
     """
     ax.set_label(text)
     figure = ax.get_figure(root=True)
@@ -191,7 +191,7 @@ def text_alternative(ax: Axes) -> str:
 
 
 def legend(ax: Axes, title: str | None = None) -> None:
-    """The legend: inside while short, else beside the picture; inside where it has neighbours."""
+    """The legend: inside while short, else with the picture; inside where it has neighbours."""
     handles, labels = ax.get_legend_handles_labels()
     if not handles:
         return
@@ -244,7 +244,7 @@ def _shortened(name: str) -> str:
 
 
 def _opaque(made: Legend) -> None:
-    """A single mark of a cloud of faint points has to be seen; areas stay as faint as they are."""
+    """A single mark of a cloud of faint points must be visible; areas stay faint."""
     from matplotlib.patches import Patch
 
     for handle in made.legend_handles:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 #: Limits beyond which a chart has a scale of logarithms.
 _FAR: Final = 10.0
 
-#: Orders of a watched joint that are drawn at most: those whose sums rose highest.
+#: Orders of a watched joint that are plotted at most: those whose sums rose highest.
 _MOST: Final = 6
 
 

@@ -30,10 +30,10 @@ _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 #: Points of a curve for each cycle of its highest order, and the least and most of them.
 _PER_CYCLE, _FEWEST, _MOST_SAMPLES = 20, 361, 12001
 
-#: Degrees without a reading that make a travel partial, where no model says what was seen.
+#: Degrees without a reading that make a travel partial, where no model states what was detected.
 _WIDE_GAP: Final = 90.0
 
-#: Periods from which on a curve fills the picture: it is drawn as an envelope ...
+#: Periods from which on a curve fills the picture: it is plotted as an envelope...
 _DENSE: Final = 40.0
 #: ... where such orders make this part of the amplitudes; smaller ones are ripple on a line.
 _NOTABLE: Final = 0.1
@@ -41,7 +41,7 @@ _NOTABLE: Final = 0.1
 #: Places of an envelope.
 _PLACES: Final = 180
 
-#: What residuals can be drawn against ...
+#: What residuals can be plotted against...
 Signal: TypeAlias = Literal["angle", "time", "speed", "temperature", "direction", "torque"]
 #: ... and axis label by name.
 SIGNALS: Final[dict[Signal, str]] = {
@@ -88,7 +88,7 @@ def rms_amplitude(parts: Iterable[Points]) -> float:
 
 
 def thinned_points(points: Points, most: int, number: int = 0) -> Points:
-    """At most ``most`` points, evenly taken; each of runs that are alike begins elsewhere."""
+    """At most ``most`` points, evenly taken; equal runs begin at different points."""
     stride = -(-points.x.size // most)
     if stride <= 1:
         return points
@@ -120,7 +120,7 @@ def error_points(fit: FitResult) -> list[Points]:
 
 
 def model_curve(model: HarmonicModel, span: tuple[float, float] | None = None) -> ModelCurve:
-    """The model without its constant, over ``span`` (deg), the turn or the part that was seen."""
+    """The model without its constant, over ``span`` (deg), the turn or the fitted part."""
     highest = max(model.orders, default=1.0)
     low, high = fitted_degrees(model) if span is None else span
     count = int(np.clip(_PER_CYCLE * highest * (high - low) / 360.0, _FEWEST, _MOST_SAMPLES))
@@ -162,7 +162,7 @@ def curve_envelope(curve: ModelCurve) -> tuple[Array, Array, Array]:
 
 
 def fitted_degrees(model: HarmonicModel) -> tuple[float, float]:
-    """The stretch the model was fitted on, in degrees; a whole turn when it was all."""
+    """The segment the model was fitted on, in degrees; a whole turn when it was all."""
     if model.partial_span is None:
         return 0.0, 360.0
     low, high = (360.0 / model.period * x for x in model.partial_span)
@@ -172,7 +172,7 @@ def fitted_degrees(model: HarmonicModel) -> tuple[float, float]:
 
 
 def travelled_degrees(runs: Sequence[CalibrationRun]) -> tuple[float, float]:
-    """The stretch of the turn that runs hold readings of, in degrees; a turn without a wide gap."""
+    """The segment of the turn that runs hold readings of, in degrees; a turn without a wide gap."""
     angle = np.sort(np.concatenate([reference_degrees(run) for run in runs]))
     gaps = np.diff(np.append(angle, angle[0] + 360.0))
     widest = int(np.argmax(gaps))
@@ -191,7 +191,7 @@ def _about_zero(low: float, high: float) -> tuple[float, float]:
 def held_out_points(
     model: HarmonicModel, runs: Sequence[CalibrationRun]
 ) -> list[tuple[Points, Points]]:
-    """Error of runs that the model has not seen, before and after correction.
+    """Error of runs that the model was not fitted to, before and after correction.
 
     Each run keeps its own zero (`trueangle.fitting.heldout.correct_held_out`).
     """

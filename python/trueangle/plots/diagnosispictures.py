@@ -42,8 +42,8 @@ _AXES = {
 def gains(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
     """Share of the reducible error that each cause takes away, with 95 % intervals.
 
-    Reducible is what stands above the noise; 100 % leaves noise alone. Causes that are
-    drawn anew in each run (a slipped zero) have no such gain and are not drawn.
+    Reducible is what is above the noise; 100 % leaves noise alone. Causes that are
+    sampled anew in each run (a slipped zero) have no such gain and are not plotted.
 
     Parameters
     ----------
@@ -83,9 +83,9 @@ def gains(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
 
 
 def error_left(diagnosis: Diagnosis, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
-    """Rms left of held-out readings: with all causes in place, and with each one left out.
+    """Rms left of held-out readings: with all causes in place, and with each one removed.
 
-    The numbers are those of the findings' gains, so that they cannot say otherwise.
+    The numbers are those of the findings' gains, so that they cannot state otherwise.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def factors(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto") -> Figure:
     """What measured minus simulated follows: a small picture for each factor.
 
     The line is the function that was estimated, the area its 95 % band; of a product with the
-    place it is the amplitude of its orders. The title says whether a cause has that form.
+    place it is the amplitude of its orders. The title states whether a cause has that form.
 
     Parameters
     ----------

@@ -45,9 +45,9 @@ if TYPE_CHECKING:
     from ..model.model import HarmonicModel
     from ..simulation import Simulation
 
-#: Readings drawn in one picture: more do not show.
+#: Readings plotted in one picture: more do not show.
 _MOST: Final = 24_000
-#: Readings drawn of each run at least.
+#: Readings plotted of each run at least.
 _FEWEST: Final = 6
 #: Readings from which on dots are small and faint.
 _DENSE: Final = 2_000
@@ -89,7 +89,7 @@ def before_after(
 ) -> Axes:
     """Error of held-out ``runs`` before and after correction by ``model``.
 
-    Every run keeps its own zero: the mean of what is left is taken off. The legend gives
+    Every run keeps its own zero: the mean of the residual is subtracted. The legend gives
     root mean square and peak-to-peak of both.
 
     Parameters
@@ -123,7 +123,7 @@ def residuals(
     """What the model leaves of every reading, against a signal that it may depend on.
 
     The black line joins medians of bins: anything but a flat line at zero is an error
-    that the model does not hold. For ``"direction"`` the runs stand next to each other.
+    that the model does not hold. For ``"direction"`` the runs are next to each other.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def measured_and_simulated(
     unit = error_unit(errors_in, largest, found[0].period)
     picture = comparison_picture(expected, unit)
     both, apart = picture.panels
-    # The difference stands below the two, on a line of its own: nothing hides another.
+    # The difference is below the two, on a separate line: nothing hides another.
     rest = np.concatenate([cloud.points.y for cloud in apart.clouds])
     shown = np.concatenate([cloud.points.y for cloud in both.clouds])
     lowest, top = float(shown.min()), float(shown.max())
@@ -192,7 +192,7 @@ def measured_and_simulated(
     ]
     _draw_clouds(ax, moved)
     ax.axhline(down, color=palette.MUTED, linewidth=0.8, zorder=0)
-    # Numbers of the axis belong to the two above; below them stands the difference's zero.
+    # Numbers of the axis belong to the two above; below them is the difference's zero.
     ticks = [float(tick) for tick in ax.get_yticks() if lowest <= tick <= top]
     texts = [f"{tick:g}".replace("-", "\N{MINUS SIGN}") for tick in ticks]
     ax.set_yticks([down, *ticks], ["0", *texts])
@@ -293,7 +293,7 @@ def model_error(model: HarmonicModel, ax: Axes | None = None, errors_in: ErrorsI
     """Error of a model over the angle, less its constant, with its 95 % band.
 
     What depends on more than the angle (backlash, lag and other terms) is named in the text
-    alternative and not drawn; gear orders, which would fill the picture, are drawn as envelope.
+    alternative and not plotted; gear orders, which would fill the picture, are plotted as envelope.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ RADIUS_OF_95: Final = math.sqrt(-2.0 * math.log(0.05))
 #: Orders whose phasors an overview has.
 _ORDERS: Final = 3
 
-#: Units whose patterns are drawn at most, those that need attention first, and in a row.
+#: Units whose patterns are plotted at most, those that need attention first, and in a row.
 _PATTERNS: Final = 20
 _IN_A_ROW: Final = 5
 
@@ -161,14 +161,14 @@ def fleet_sizes(fleet: Fleet, ax: Axes | None = None, errors_in: ErrorsIn = "aut
 
 
 def fleet_patterns(fleet: Fleet, errors_in: ErrorsIn = "auto", most: int = _PATTERNS) -> Axes:
-    """The error over a turn of each unit in axes of its own, on one scale, the urgent first.
+    """The error over a turn of each unit in separate axes, on one scale, the urgent first.
 
     Parameters
     ----------
     fleet : Fleet
     errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
     most : int
-        Units that are drawn.
+        Units that are plotted.
 
     Returns
     -------

@@ -18,9 +18,9 @@ from .curves import CONFIDENCE
 if TYPE_CHECKING:
     from ..fitting.result import FitResult
 
-#: Orders told in words.
+#: Orders stated in words.
 _TOLD: Final = 6
-#: Least amplitude of the logarithmic axis, as part of the smallest that has to be seen.
+#: Least amplitude of the logarithmic axis, as part of the smallest that has to be detected.
 _FLOOR: Final = 0.4
 
 
@@ -47,7 +47,7 @@ class OrderLine:
 def order_lines(result: OrderSelection | FitResult) -> list[OrderLine]:
     """All candidates of a selection, that of a fit too, or the orders of a fit; ascending.
 
-    Orders that the travel does not tell apart have no size and are left out.
+    Orders that the travel does not separate have no size and are omitted.
     """
     selection = result if isinstance(result, OrderSelection) else result.selection
     if selection is not None:

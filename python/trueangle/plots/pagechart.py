@@ -1,7 +1,7 @@
 """Axes of matplotlib as a chart of a page: vectors that fill a box of any size, texts in HTML.
 
 The vectors have no size and their lines no scale: one chart fits a phone, a screen and paper.
-Colours are variables of the page's style, so that it turns dark without being drawn again.
+Colours are variables of the page's style, so that it turns dark without being plotted again.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .canvas import ON_PAGE, page_marks
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Side of the box that vectors are drawn in; pages zoom into it.
+#: Side of the box that vectors are plotted in; pages zoom into it.
 SIDE: Final = 10_000.0
 #: Height of the smaller charts of a page.
 LOW: Final = "height:11rem"
@@ -62,7 +62,7 @@ def page_chart(
     Parameters
     ----------
     ax : matplotlib Axes
-        Of `page_axes`, drawn on.
+        Of `page_axes`, plotted on.
     title : str
         Above the chart.
     grow : float
@@ -194,7 +194,7 @@ def _kind(marker: Any) -> str:
 
 
 def _strokes(ax: Axes) -> str:
-    """Everything drawn on the axes but texts, from the back to the front."""
+    """Everything plotted on the axes but texts, from the back to the front."""
     renderer = _renderer(ax)
     drawn = [*ax.collections, *ax.patches, *ax.lines]
     for artist in sorted(drawn, key=lambda one: one.get_zorder()):

@@ -1,7 +1,7 @@
 """Colours, markers and ink that survive colour blindness, grey print and dark pages.
 
-Six hues of Okabe and Ito, the two light ones darkened or exchanged, so that each stands out
-of white and of black paper by 3 to 1. What must be told apart in grey has a marker of its own.
+Six hues of Okabe and Ito, the two light ones darkened or exchanged, so that each is visible
+on white and on black paper by 3 to 1. What must be separated in grey has a separate marker.
 """
 
 from __future__ import annotations

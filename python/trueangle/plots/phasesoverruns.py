@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from ..fitting.result import FitResult
 
-#: Orders drawn by default, the largest first: beyond that colours repeat too often.
+#: Orders plotted by default, the largest first: beyond that colours repeat too often.
 _MOST_ORDERS = 12
 _TITLE = "Phase and amplitude of every order, run by run"
 #: Half of what a chart of one order shows, degrees, at least: nothing is made to look like scatter.
@@ -40,7 +40,7 @@ def phases_over_runs(
     fit : FitResult
     ax : matplotlib PolarAxes, optional
     most : int
-        Draw only so many orders, the largest.
+        Draw only this many orders, the largest.
     errors_in : {"auto", "arcsec", "deg", "mrad", "count"} or float
         Unit of the errors, as for summaries.
 
@@ -70,7 +70,7 @@ def phases_over_runs(
             color=colour,
             label=f"order {order.order:g}",
         )
-        # From the middle of the cluster to the centre: which phase it stands for.
+        # From the middle of the cluster to the centre: which phase it represents.
         mean = np.mean(order.amplitude * np.exp(1j * order.phase))
         polar.plot(
             [0.0, np.angle(mean)], [0.0, unit.per_arcsec * abs(mean)], color=colour, linewidth=0.8
@@ -82,7 +82,7 @@ def phases_over_runs(
     polar.set_xlabel(f"angle: phase / deg; radius: amplitude / {unit.name}")
     grid(polar)
     if len(polar.get_figure(root=True).axes) > 1:
-        # Below, where no neighbour of a row of axes stands.
+        # Below, where no neighbour of a row of axes is.
         polar.legend(
             loc="upper center",
             bbox_to_anchor=(0.5, -0.16),

@@ -1,4 +1,4 @@
-"""Pictures of plans and rehearsals: where to read, which orders and causes that tells apart."""
+"""Pictures of plans and rehearsals: where to read, which orders and causes that separates."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TICKS = 4
 def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     """Positions of every mount (or tilt) within the first pitch.
 
-    All pitches of a mount are alike; what separates orders is where the mounts stand
+    All pitches of a mount are equivalent; what separates orders is where the mounts are
     within one. A bar at each position is the tolerance of the plan.
 
     Parameters
@@ -73,7 +73,7 @@ def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
 def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     """Noise factor of every wanted order: 1 is as good as evenly spread readings.
 
-    Orders that vanish in the zero of every mount are marked instead of drawn.
+    Orders that vanish in the zero of every mount are marked instead of plotted.
 
     Parameters
     ----------
@@ -116,8 +116,8 @@ def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
 def detection(rehearsal: Rehearsal) -> Figure:
     """Share of the trials in which each cause was named, against its size.
 
-    Points are the sizes tried with 95 % binomial intervals, the line the chance they speak for,
-    dashed verticals the sizes named in 50 and 95 %. Causes that were never hidden are left out.
+    Points are the sizes tried with 95 % binomial intervals, the line the probability they speak
+    for, dashed verticals the sizes named in 50 and 95 %. Causes that were never hidden are omitted.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Pictures of readings as panels: errors, before and after, residuals, simulated; draws nothing.
 
-A picture is described once and drawn by `trueangle.plots.drawnreadings`, for a figure and for
+A picture is described once and plotted by `trueangle.plots.drawnreadings`, for a figure and for
 a page.
 """
 
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
 
 #: Part of a turn in degrees from which on the axis shows a whole one.
 _MOST_OF_A_TURN: Final = 300.0
-#: Part of the way between two directions over which the runs stand beside each other.
+#: Part of the way between two directions over which the runs are next to each other.
 _BESIDE: Final = 0.8
 
-#: What the colour of readings stands for: their run, or what was done to them.
+#: What the colour of readings represents: their run, or what was done to them.
 _Role: TypeAlias = Literal["run", "before", "after", "measured", "simulated"]
 
 #: Title of an axis of angles.
 ANGLE: Final = "reference angle / deg"
 
-#: Periods of the segment that is shown beside an envelope.
+#: Periods of the segment that is shown together with an envelope.
 _PERIODS: Final = 4.0
 #: Bins of a running median, and the readings that make it worth its line.
 _BINS, _ENOUGH = 36, 360
@@ -76,7 +76,7 @@ class Panel:
     angles : bool
         The x axis has ticks at whole parts of a turn.
     model : ModelCurve, optional
-        In the unit of the picture; ``dense`` where only its envelope can be drawn.
+        In the unit of the picture; ``dense`` where only its envelope can be plotted.
     medians : (ndarray, ndarray), optional
         Places and medians of the readings about them.
     zero : bool
@@ -153,7 +153,7 @@ def errors_picture(
 ) -> PanelPicture:
     """Error of every run less that run's zero, with the fitted model where there is one.
 
-    A model with gear orders would be a black surface: its envelope is drawn, and a segment
+    A model with gear orders would be a black surface: its envelope is plotted, and a segment
     of a few periods shows the curve itself.
     """
     parts = _measured(runs) if fit is None else curves.error_points(fit)
@@ -260,7 +260,7 @@ def comparison_picture(
     """Measured and simulated error of every run, and last their difference.
 
     Where the gear orders of a simulation ``known`` fill the picture, a segment of a few periods
-    stands between the two.
+    is between the two.
     """
     factor = unit.per_arcsec
     both: list[Cloud] = []

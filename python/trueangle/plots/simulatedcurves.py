@@ -1,4 +1,4 @@
-"""What the pictures of a diagnosis show: measured and simulated, gains, what is left; its names."""
+"""What the pictures of a diagnosis show: measured and simulated, gains, the residual; its names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..diagnosis import Diagnosis, Finding
     from ..simulation import Simulation
 
-#: Names of line counts that a finding may have: parameter, and how it is told.
+#: Names of line counts that a finding may have: parameter, and how it is reported.
 _PLACES: Final = {
     "order": "order {:g}",
     "carrier": "around order {:g}",

@@ -87,7 +87,7 @@ class Arrivals:
 
     @property
     def is_over(self) -> bool:
-        """The source gives no more; what it gave is there to be taken."""
+        """The source gives no more; what it gave can be taken."""
         return not self._thread.is_alive()
 
     @property

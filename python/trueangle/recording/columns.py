@@ -53,7 +53,7 @@ def written_columns(
     Raises
     ------
     FileError
-        A column that was asked for is missing, or its unit is.
+        A column that was requested is missing, or its unit is.
     """
     found = find_columns(source, names, wanted_columns(signals)).values()
     roles = {c.name: c for c in found if c.role not in LABELS and "offset" not in c.role}

@@ -23,13 +23,13 @@ from .estimate import Estimate
 from .output import RunsFile
 from .sources import SourceOptions
 
-#: Ratio of two speeds that tell a delay.
+#: Ratio of two speeds that show a delay.
 _SPEEDS = 1.5
 #: Share of lines that are rejected from which on something is wrong with the line.
 _LOSSES = 0.01
 #: Seconds between two looks for faults, and of silence that is one.
 _LOOK, _SILENT = 2.0, 2.0
-#: Readings that are looked at for faults, and how few tell nothing.
+#: Readings that are looked at for faults, and how few show nothing.
 _LATEST, _LEAST = 4000, 50
 #: Part of a turn that one angle moves before the other one is stuck.
 _MOVED = 1.0 / 36.0
@@ -214,7 +214,7 @@ class LiveRecording:
         return new
 
     def _faults_of_readings(self) -> dict[str, str]:
-        """Those of `check`, in the latest readings, and an angle that stands still."""
+        """Those of `check`, in the latest readings, and an angle that is still."""
         reference, indicated, seconds = self._latest
         if reference.size < _LEAST or self.note:
             return {}
@@ -286,7 +286,7 @@ def record(
     show : callable
         Shows what is known by a time, and why it has ended, as `Screen.show`.
     stopped : callable
-        Asked at every look whether the recording is to end.
+        Called at every look: whether the recording is to end.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What is shown of a recording while it runs: a screen that is drawn anew, or objects in lines."""
+"""What is shown of a recording while it runs: a screen that is refreshed, or objects in lines."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class Screen:
         return [line[:200] for line in (*lines, *told)]
 
     def summary(self, recording: LiveRecording) -> list[str]:
-        """What was recorded, and what it tells."""
+        """What was recorded, and what it shows."""
         file, estimate = recording.file, recording.estimate
         lines = [
             f"{file.rows.path}: {counted(recording.rows, 'reading')} in run {file.label}, "

@@ -1,4 +1,4 @@
-"""`plan_after`: the runs that tell what a diagnosis could not, planned and rehearsed."""
+"""`plan_after`: the runs that show what a diagnosis could not, planned and rehearsed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SEEDS = 10
 #: Seconds that a plan may take, where not given.
 WITHIN = 10.0
 
-#: What is said where there was no time for them.
+#: What is reported where there was no time for them.
 UNTRIED = "not rehearsed: the time limit was reached; give a longer one (`within`) to count how "
 UNTRIED += "often the true cause is named"
 
@@ -51,7 +51,7 @@ def plan_after(
     progress: str = "none",
     **reading: Unpack[ReadingOptions],
 ) -> NextRuns:
-    """Say which runs to measure next, so that causes are told apart.
+    """State which runs to measure next, so that causes are separated.
 
     The runs are diagnosed. Of the further runs that limits allow those are taken whose expected
     evidence between the causes in question is greatest, by what the one leaves that the other
@@ -69,14 +69,14 @@ def plan_after(
     runs : CalibrationRun, path, table, or iterable of them
         As `trueangle.diagnose` takes them.
     sim : Simulation
-        What is believed.
+        The assumed model.
     between : iterable of str, optional
-        Causes to be told apart; by default what is seen and was not told, and where nothing is,
-        all that these runs could not have shown.
+        Causes to be separated; by default what is detected and was not reported, and where nothing
+        is, all that these runs could not have shown.
     limits : Limits, optional
         What a run may be (`trueangle.planning.load_limits`). By default one turn or the arc
-        measured so far, 1 to 60 deg/s, the loads, temperatures and mounts seen; where no such run
-        tells, a little beyond, which the plan says (``beyond``).
+        measured so far, 1 to 60 deg/s, the loads, temperatures and mounts observed; where no such
+        run shows, a little beyond, which the plan states (``beyond``).
     seeds : int
         Simulated diagnoses of every cause; 0 for none.
     seed : int
@@ -147,7 +147,7 @@ def _rehearsed(
         failed = [bool(e.trials) and (e.chance_named or 0.0) < WANTED for e in entries]
         if not any(failed) or full or current_deadline().over:
             untried = any(e.seen and e.told and not e.trials for e in entries)
-            # What trials name too seldom these runs do not tell, whatever was expected of them.
+            # What trials name too seldom these runs do not show, whatever was expected of them.
             told = (
                 replace(e, told=False) if short else e
                 for e, short in zip(entries, failed, strict=True)
@@ -208,7 +208,7 @@ class _FurtherTrials:
         runs = simulate_along(truth, motion, rng, self.noise.correlation)
         at = current_deadline()
         left = None if at.within is None else max(at.within - at.seconds, 1e-3)
-        with under_deadline(Deadline(left)) as own:  # its shares of the time are of what is left
+        with under_deadline(Deadline(left)) as own:  # its shares are of the remaining time
             found = diagnose(runs, self.stated)
         at.stopped = at.stopped or own.stopped
         return trial_outcome(found, hypothesis.cause).is_named if found.complete else None

@@ -1,4 +1,4 @@
-"""From which size on a cause is named: the chance against size, with what is known of it.
+"""From which size on a cause is named: the probability against size, with what is known about it.
 
 ::
 
@@ -61,7 +61,7 @@ class Threshold:
 
 
 class Chance:
-    """What trials say of the chance that a cause is named.
+    """What trials state about the probability that a cause is named.
 
     Parameters
     ----------
@@ -101,12 +101,12 @@ class Chance:
         return Threshold(self._inside(middle), self._inside(low), self._inside(high))
 
     def at(self, steps: Array) -> Array:
-        """The chance at steps, averaged over what is possible."""
+        """The probability at steps, averaged over what is possible."""
         p = (1.0 - self._lapse) * _logistic((steps[:, None] - self._mu) / self._w)
         return np.asarray(p @ self._weight)
 
     def curve(self, size: Callable[[float], float]) -> list[tuple[float, float]]:
-        """Size and chance over the range tried."""
+        """Size and probability over the range tried."""
         steps = np.linspace(self._least - 2.0, self._most + 2.0, 60)
         return [(size(float(k)), float(p)) for k, p in zip(steps, self.at(steps), strict=True)]
 

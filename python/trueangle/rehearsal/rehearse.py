@@ -32,7 +32,7 @@ SEEDS = 20
 #: Share of the time given for the search for further runs.
 FOR_NEXT_RUNS = 0.2
 
-#: What must be known of every rehearsal.
+#: What must be known about every rehearsal.
 FORMS = (
     "the effects hidden have the library's own forms; real ones are never exact, so count on "
     "larger sizes than these"
@@ -41,7 +41,7 @@ FORMS = (
 #: Trials of a round while the sizes are bracketed, and steps up and down between two rounds.
 _BRACKETING, _STEP_UP, _STEP_DOWN = 2, 8, 6
 
-#: Chances at which a later round tries.
+#: Probabilities at which a later round tries.
 _AIMS = (0.3, 0.75, 0.95, 0.95)
 
 #: Trials at the largest size after which a cause that is never named is given up.
@@ -59,11 +59,11 @@ def rehearse(
     workers: int | None = None,
     progress: str = "none",
 ) -> Rehearsal:
-    """Say which causes a diagnosis of these runs would name, and from which size on.
+    """State which causes a diagnosis of these runs would name, and from which size on.
 
     Every cause in turn is hidden in readings simulated with the joint, the noise and the runs of
     ``sim`` and diagnosed against ``sim``. It counts as named where a confirmed finding (or, where
-    the simulation claims it already, a refuted belief) has its name. The chance of that
+    the simulation claims it already, a refuted assumed model) has its name. The probability of that
 
     ::
 
@@ -78,12 +78,12 @@ def rehearse(
     causes : iterable of str, optional
         Of the vocabulary; all where not given.
     seeds : int
-        Trials of a cause at most, each with noise, angles and all parameters but the size drawn
+        Trials of a cause at most, each with noise, angles and all parameters but the size sampled
         anew.
     seed : int
         Equal seeds give equal results, whatever the number of workers, where all trials are made.
     within : float, optional
-        Seconds that it may take; what was found until then is given and said to be incomplete.
+        Seconds that it may take; the result until then is returned and marked as incomplete.
     workers : int, optional
         Processes side by side, one thread each; every core where not given. 1 works in this one.
     progress : {"none", "auto", "text", "json"}
@@ -104,7 +104,7 @@ def rehearse(
     -----
     Sizes are searched in steps of a quarter of an octave: first up by a factor of 4 and down by
     2.8, two trials each, from where a perfect knowledge of the form would gain a deviance of 40;
-    then four at a time where the chance is thought to be 30, 75 and 95 % (twice). The
+    then four at a time where the probability is thought to be 30, 75 and 95 % (twice). The
     thresholds are medians of the weight that the trials give to mu, w and lambda, with 95 %
     intervals; one beyond the sizes tried is not given. It costs the trials: one diagnosis each,
     about a second for 2000 readings, ``seeds`` for every cause.
@@ -202,7 +202,7 @@ def _checked(
 def _opening(
     sim: Simulation, signals: Signals, closed: Collection[str], blind: Mapping[str, Ambiguity]
 ) -> NextRuns | None:
-    """The further runs that tell what these cannot; None where there are none."""
+    """The further runs that show what these cannot; None where there are none."""
     asked: dict[str, Ambiguity] = {}
     for cause in closed:
         spot = blind.get(cause) or Ambiguity((cause,), "", "")
@@ -286,7 +286,7 @@ def next_sizes(
 class SizeSearch:
     """The sizes of one cause, the trials made and those of the round at work.
 
-    Only what is known of the cause itself decides, in rounds, so that the sizes do not depend on
+    Only what is known about the cause itself decides, in rounds, so that the sizes do not depend on
     who else is at work.
     """
 
@@ -303,7 +303,7 @@ class SizeSearch:
     def of(
         cls, cause: str, sizes: SizeRange | None, spot: Ambiguity | None, seeds: int
     ) -> SizeSearch:
-        """The search of a cause; one that the design cannot tell is tried large, to make sure."""
+        """The search of a cause; one that the design cannot show is tried large, to make sure."""
         if spot is None or sizes is None:
             return cls(cause, sizes, spot, seeds, done=sizes is None)
         top = min(sizes.highest, 2 * _STEP_UP)
@@ -311,7 +311,7 @@ class SizeSearch:
 
     @property
     def is_blind(self) -> bool:
-        """The design of the runs cannot tell it."""
+        """The design of the runs cannot show it."""
         return self.sizes is None or self.spot is not None
 
     def next_round(self) -> list[Trial]:
@@ -330,7 +330,7 @@ class SizeSearch:
         return [Trial(self.cause, s, self.sizes.size(s), n) for n, (s, _) in self.round.items()]
 
     def answered(self, trial: Trial, outcome: TrialOutcome) -> list[Trial]:
-        """Take an answer; the next round where it was the last of its own."""
+        """Take an answer; the next round where it was the last of its round."""
         self.round[trial.number] = trial.step, outcome
         if any(answer is None for _, answer in self.round.values()):
             return []

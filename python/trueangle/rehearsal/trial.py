@@ -1,4 +1,4 @@
-"""One trial: an effect hidden in simulated readings, and what a diagnosis of them says."""
+"""One trial: an effect hidden in simulated readings, and what a diagnosis of them states."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from ..joint.pattern import JointPattern
 from ..joint.signals import Signals, join_runs
 from ..simulation.simulation import Simulation, simulate
 
-#: What a diagnosis may say of a hidden cause: it is confirmed; it is listed and not confirmed; it
-#: is one of several that are not told apart; another cause stands in its place; something is
-#: unexplained; nothing is seen. A diagnosis that failed is a defect; one that was ended no answer.
+#: What a diagnosis may state about a hidden cause: it is confirmed; it is listed and not confirmed;
+#: it is one of several that are not separated; another cause is in its place; something is
+#: unexplained; nothing is detected. A diagnosis that failed is a defect; one that was ended no
+#: answer.
 NAMED, LISTED, UNTOLD, OTHER, UNEXPLAINED, NOTHING = (
     "named",
     "not_confirmed",
@@ -50,15 +51,15 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialOutcome:
-    """What a diagnosis said of a hidden cause.
+    """What a diagnosis stated about a hidden cause.
 
     Attributes
     ----------
     verdict : str
     instead : tuple of str
-        Causes that were named in its place, or that it was not told from.
+        Causes that were named in its place, or that it was not distinguished from.
     beside : tuple of str
-        Causes that were named though they were not there, beside the true one.
+        Causes that were named though they were not there, together with the true one.
     failure : str
         Why the diagnosis failed.
     """
@@ -75,7 +76,7 @@ class TrialOutcome:
 
 
 def trial_rng(seed: int, cause: str, number: int) -> np.random.Generator:
-    """Random numbers of a trial: the same whoever asks for it, and when."""
+    """Random numbers of a trial: the same whoever needs it, and when."""
     return np.random.default_rng([seed, zlib.crc32(cause.encode()), number])
 
 
@@ -102,13 +103,13 @@ def run_trial(sim: Simulation, signals: Signals, trial: Trial, seed: int) -> Tri
         result = diagnose(runs, sim)
     except TrueAngleError:
         raise
-    except Exception as failure:  # told with the result: hours of other trials are not lost
+    except Exception as failure:  # reported with the result: hours of other trials are not lost
         return TrialOutcome(FAILED, failure=f"{type(failure).__name__}: {failure}")
     return trial_outcome(result, trial.cause) if result.complete else TrialOutcome(ENDED)
 
 
 def trial_outcome(result: Diagnosis, cause: str) -> TrialOutcome:
-    """What a diagnosis says where ``cause`` alone is hidden."""
+    """What a diagnosis states where ``cause`` alone is hidden."""
     confirmed = [finding.cause for finding in result.findings if finding.confirmed]
     refuted = [belief.what for belief in result.beliefs if belief.verdict != "confirmed"]
     others = tuple(dict.fromkeys(c for c in confirmed if c != cause))

@@ -18,7 +18,7 @@ from .trial import drawn_effect, trial_rng
 #: Steps of the search in a factor of two of size.
 STEPS = 4
 
-#: Deviance that an effect of the first size would save, were it all that is asked for: about
+#: Deviance that an effect of the first size would save, were it all that is requested: about
 #: twice what a cause of a few parameters must pay.
 FIRST = 40.0
 
@@ -34,7 +34,7 @@ ROUNDS, NEAR = 40, 1.2
 
 @dataclass(frozen=True)
 class SizeRange:
-    """Sizes of a cause that are worth trying: ``first * 2 ** (k / STEPS)`` of a step k.
+    """Sizes of a cause to be tried: ``first * 2 ** (k / STEPS)`` of a step k.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Size
 def _deviance(
     effect: Effect, regression: Regression, rng: np.random.Generator, sim: Simulation
 ) -> float:
-    """What the effect adds beside the zero and the lines, in units of the noise."""
+    """What the effect adds together with the zero and the lines, in units of the noise."""
     around = sim.surroundings
     column = effect.signal(regression.signals, around, rng)
     x, excited = regression.projected(column[:, None])

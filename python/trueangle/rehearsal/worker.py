@@ -1,4 +1,4 @@
-"""A process that asks trials: ``python -m trueangle.rehearsal.worker``, pickles in and out."""
+"""A process that runs trials: ``python -m trueangle.rehearsal.worker``, pickles in and out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .trial import measured_signals, run_trial
 
 
 def serve_trials(source: BinaryIO, target: BinaryIO) -> None:
-    """Answer every trial that comes until there are no more."""
+    """Answer every trial that comes until there are none."""
     sim, seed = pickle.load(source)
     signals = measured_signals(sim)
     while True:
@@ -23,7 +23,7 @@ def serve_trials(source: BinaryIO, target: BinaryIO) -> None:
         answer: Any
         try:
             answer = run_trial(sim, signals, trial, seed)
-        except Exception as failure:  # told by the one who asked
+        except Exception as failure:  # reported by the caller
             answer = failure
         pickle.dump(answer, target)
         target.flush()

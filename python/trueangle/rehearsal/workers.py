@@ -19,7 +19,7 @@ from ..simulation.simulation import Simulation
 from ..support.deadline import Deadline, current_deadline, under_deadline
 from .trial import ENDED, Trial, TrialOutcome, run_trial
 
-#: Variables that say how many threads a linear algebra library may use.
+#: Variables that state how many threads a linear algebra library may use.
 THREADS = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -33,7 +33,7 @@ LOOK = 0.1
 
 
 class WorkerError(TrueAngleError):
-    """A process that asked trials has ended, or could not be given the simulation."""
+    """A process that ran trials has ended, or could not be given the simulation."""
 
 
 def usable_cores() -> int:
@@ -53,7 +53,7 @@ class LocalTrials:
         self.count = 1
 
     def add(self, trial: Trial) -> None:
-        """Ask this as well."""
+        """Add this trial."""
         self._ready.append(trial)
 
     def answers(self) -> Iterator[tuple[Trial, TrialOutcome]]:
@@ -96,7 +96,7 @@ class Workers:
             threading.Thread(target=self._hand, args=(process, start), daemon=True).start()
 
     def add(self, trial: Trial) -> None:
-        """Ask this as well."""
+        """Add this trial."""
         self._outstanding += 1
         self._ready.put(trial)
 

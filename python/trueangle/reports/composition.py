@@ -166,7 +166,7 @@ def report(
     path : path, optional
         Where to write the page (HTML).
     simulation : Simulation, optional
-        What is believed of the joint: the report then says what it gets wrong and why.
+        The assumed model of the joint: the report then states what it gets wrong and why.
         Gives the gear ratio too.
     orders : optional
         As for `trueangle.fit`; by default selected by evidence.
@@ -180,8 +180,8 @@ def report(
         Nominal positions to a turn of a certificate.
     model : HarmonicModel or path, optional
         A model that is there already, such as one calibrated without a reference: the
-        report says in its first lines how it was made, what it is blind to, and what it
-        leaves of these runs. A certificate states the values as it leaves them beside those
+        report states in its first lines how it was made, what it is blind to, and what it
+        leaves of these runs. A certificate states the values as it leaves them next to those
         as found.
     errors_in : str or float
         Unit of every error on the page or in the certificate: ``"arcsec"``, ``"deg"``,

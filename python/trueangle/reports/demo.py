@@ -26,7 +26,7 @@ _RUNS = tuple(
 
 
 def demo_simulation() -> Simulation:
-    """A strain wave joint of ratio 100 as it is believed to be."""
+    """A strain wave joint of ratio 100 as it is assumed to be."""
     return Simulation(
         Joint(100.0, "circular_spline", "motor"),
         harmonics=(

@@ -1,4 +1,4 @@
-"""The diagnosis as plain values, and what these runs cannot tell."""
+"""The diagnosis as plain values, and what these runs cannot show."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ _UNITS: Final = {
 }
 
 
-#: Parameters that the name of a finding says already.
+#: Parameters that the name of a finding states already.
 _NAMED: Final = ("shaft", "order", "carrier")
 
 #: Speeds (relative), temperatures (K) and torques (Nm) that differ by less are one.
 _SPEED, _TEMPERATURE, _TORQUE = 0.05, 1.0, 0.1
 
-#: Aliases told of an order, and orders told of.
+#: Aliases and orders reported.
 _MOST_ALIASES: Final = 3
 _MOST_FOLDED: Final = 4
 
@@ -63,7 +63,7 @@ def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
         known = [q for q in finding["parameters"] if q["std"] is not None]
         sizes = [q for q in known if q["unit"].startswith("arcsec")]
         finding["sized"] = bool(sizes)
-        # The parameter that says how large it is: one that has a unit.
+        # The parameter that states how large it is: one that has a unit.
         found = sizes or [q for q in known if q["unit"]]
         finding["size"] = found[0]["index"] if found else None
         gain = finding["gain"]
@@ -73,7 +73,7 @@ def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
             low, high = (None, None) if interval is None else (100.0 * x for x in interval)
             gain["reducible_low_percent"], gain["reducible_high_percent"] = low, high
     for spot in content["not_identifiable"]:
-        # What each cause in doubt would amount to, as findings are listed.
+        # The size of each uncertain cause, as findings are listed.
         spot["options"] = [
             {
                 "name": cause.replace("_", " "),
@@ -96,7 +96,7 @@ def _parameter(index: int, name: str, entry: dict[str, Any], named: bool) -> dic
     value, std = entry["value"], entry["std"]
     number = isinstance(value, int | float) and not isinstance(value, bool)
     unit = next((u for u in _UNITS if name.endswith(f"_{u}")), "")
-    # The amplitudes of several lines, whose name says no unit.
+    # The amplitudes of several lines, whose name states no unit.
     unit = "arcsec" if name == "amplitudes" else unit
     return {
         "index": index,
@@ -120,7 +120,7 @@ def _numbers(value: Any) -> list[float] | None:
 
 def _text(value: Any) -> str:
     if isinstance(value, list) and any(isinstance(item, list | tuple) for item in value):
-        # What belongs together, a run and a row of it, stands on one line.
+        # What belongs together, a run and a row of it, is on one line.
         return "\n".join(shortened_list([" row ".join(map(_text, item)) for item in value]))
     if isinstance(value, list):
         return "; ".join(_text(item) for item in value)
@@ -152,7 +152,7 @@ def unknown_content(
 
 
 def _estimates(entry: dict[str, Any]) -> list[str]:
-    """What each cause in doubt would amount to, where something is seen."""
+    """The size of each uncertain cause, where something is found."""
     return [
         f"if {cause.replace('_', ' ')}: "
         + ", ".join(
@@ -226,7 +226,7 @@ def _conditions(runs: Sequence[CalibrationRun]) -> list[dict[str, str]]:
 
 
 def _folded(selection: OrderSelection | None) -> list[dict[str, str]]:
-    """Retained orders that these positions cannot tell from others."""
+    """Retained orders that these positions cannot distinguish from others."""
     if selection is None:
         return []
     folded = [row for row in selection.table if row.retained and row.aliases]

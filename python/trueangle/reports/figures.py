@@ -42,9 +42,9 @@ if TYPE_CHECKING:
 #: A figure of the report: its alternative text, its charts, and how these are arranged.
 Figure: TypeAlias = dict[str, Any]
 
-#: Readings drawn in one chart at most: more do not show, and make the page heavy and slow.
+#: Readings plotted in one chart at most: more do not show, and make the page heavy and slow.
 _MOST_POINTS: Final = 3_000
-#: Runs up to which as many are drawn; of more, whose tables are long, fewer: a page weighs 1 MB.
+#: Runs up to which as many are plotted; of more, whose tables are long, fewer: a page weighs 1 MB.
 _MOST_RUNS: Final = 12
 #: Width of a chart that has the page, and of one next to another, inches.
 _WIDE, _NARROW = 7.5, 3.4
@@ -52,7 +52,7 @@ _WIDE, _NARROW = 7.5, 3.4
 _MOST_PHASES: Final = 12
 #: Factors that are shown, the strongest.
 _MOST_FACTORS: Final = 9
-#: Part of the measured error that a simulation must expect to be drawn with it.
+#: Part of the measured error that a simulation must expect to be plotted with it.
 _FLAT: Final = 1e-3
 
 #: What a line of an output order is called.
@@ -84,7 +84,7 @@ def line_names(joint: Joint | None) -> LineNames:
 
 @dataclass(frozen=True)
 class ErrorScale:
-    """One unit for every error of a page; results are in arcsec, what is drawn in it.
+    """One unit for every error of a page; results are in arcsec, what is plotted in it.
 
     Attributes
     ----------
@@ -117,17 +117,17 @@ class ErrorScale:
         }[self.name]
 
     def to_dict(self) -> dict[str, Any]:
-        """For the content: the unit of the page, beside numbers that stay in arcsec."""
+        """For the content: the unit of the page, next to numbers that stay in arcsec."""
         return {"unit": self.name, "per_arcsec": self.factor, "defined": self.defined}
 
 
 def error_scale(asked: ErrorsIn, rms: float, runs: Sequence[CalibrationRun]) -> ErrorScale:
-    """The scale asked for; counts are those of the runs where no number says otherwise.
+    """The scale requested; counts are those of the runs where no number states otherwise.
 
     Raises
     ------
     ArgumentError
-        Another word; counts where nothing says how many a turn has.
+        Another word; counts where nothing states how many a turn has.
     """
     period = runs[0].period
     unit = error_unit(asked, sine_of_rms(rms), period)
@@ -166,10 +166,10 @@ def figures_of_diagnosis(
     sim: Simulation,
     scale: ErrorScale,
 ) -> dict[str, Figure]:
-    """Measured against simulated; what is left without each of several causes.
+    """Measured against simulated; the remainder without each of several causes.
 
-    A chart of one dot says less than the sentence next to it: it is omitted; so is a simulation
-    that expects no error, with which the measured one would be drawn once more.
+    A chart of one dot states less than the sentence next to it: it is omitted; so is a simulation
+    that expects no error, with which the measured one would be plotted once more.
     """
     pairs = simulated_points(runs, sim)
     expected = max(float(np.ptp(simulated.y)) for _, simulated in pairs)
@@ -183,7 +183,7 @@ def figures_of_diagnosis(
     left = error_left_of(diagnosis)
     if left is not None and len(left.rows) > 2:
         ax = page_axes(5.0, 1.0 + 0.3 * len(left.rows))
-        # The title says "without each cause".
+        # The title states "without each cause".
         rows = tuple((name.removeprefix("without "), rms) for name, rms in left.rows)
         draw_error_left(ax, replace(left, rows=rows), scale.unit)
         chart = page_chart(ax, height=f"height:{3 + 2.2 * len(left.rows):.3g}rem")
@@ -271,7 +271,7 @@ def _before_after(held: HeldOut, runs: Sequence[CalibrationRun], scale: ErrorSca
 
 
 def _signals_present(fit: FitResult) -> list[curves.Signal]:
-    """Signals that the residual can be drawn against: those that any run has and that vary."""
+    """Signals that the residual can be plotted against: those that any run has and that vary."""
     found = []
     for name in curves.SIGNALS:
         values = [v for run in fit.runs if (v := _signal(run, name)) is not None]

@@ -18,9 +18,9 @@ from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from .page import Page, filled_template
 
-#: Units whose patterns are drawn at most, those that need something first.
+#: Units whose patterns are plotted at most, those that need something first.
 _DRAWN: Final = 24
-#: Orders whose phasors are drawn: those in which units differ most.
+#: Orders whose phasors are plotted: those in which units differ most.
 _PHASORS: Final = 3
 #: Width of a chart, inches.
 _WIDTH: Final = 2.8

@@ -141,7 +141,7 @@ def given_model(
 ) -> dict[str, Any]:
     """Whether it was calibrated without a reference, what it is blind to, error on the runs.
 
-    Every run keeps a zero of its own. Models that need signals are described only.
+    Every run keeps a separate zero. Models that need signals are described only.
     """
     if not isinstance(model, HarmonicModel):
         from ..model.file import load_model
@@ -180,7 +180,7 @@ def known_joint(
     fixed_member: str,
     shafts: Mapping[str, float] | None,
 ) -> Joint | None:
-    """What is known of the shafts."""
+    """What is known about the shafts."""
     if simulation is not None:
         return simulation.joint
     if gear_ratio is None and not shafts:
@@ -218,7 +218,7 @@ def fit_or_reason(
 
 
 def gain_or_reason(fit: FitResult | None) -> tuple[HeldOut | None, str]:
-    """What the fit gains on runs left out of it; or the reason why that is not known."""
+    """What the fit gains on runs held out of it; or the reason why that is not known."""
     if fit is None:
         return None, "There is no model to compare with other runs."
     try:

@@ -86,7 +86,7 @@ def filled_template(template: str, **values: Any) -> str:
 class Page(ShownResult):
     """A result that is a page: one HTML file that needs no network.
 
-    A class says by ``_written`` what the page holds.
+    A class states by ``_written`` what the page holds.
     """
 
     #: What it is written as.
@@ -129,7 +129,7 @@ class Page(ShownResult):
 
 
 def _embedded(value: Any) -> str:
-    """JSON that cannot end the script element it stands in."""
+    """JSON that cannot end the script element it is in."""
     text = json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 

@@ -111,7 +111,7 @@ def ranking_text(title: str, rows: Sequence[JointRank], errors_in: ErrorsIn = "a
             row.joint,
             shown(row.peak_to_peak_before_arcsec),
             shown(row.rms_left_arcsec),
-            row.verdict.partition(":")[0],  # why there is no model is told beside the table
+            row.verdict.partition(":")[0],  # why there is no model is reported next to the table
             row.first_cause or "-",
         ]
         for row in rows

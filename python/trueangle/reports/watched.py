@@ -22,7 +22,7 @@ from .page import Page, filled_template
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Orders whose windows are drawn at most: those whose sums rose highest.
+#: Orders whose windows are plotted at most: those whose sums rose highest.
 _DRAWN: Final = 12
 #: Widths of charts, inches.
 _WIDE, _HALF = 7.5, 3.7
@@ -99,7 +99,7 @@ class WatchReport(Page):
         return {"windows": [window.plain(self._scale) for window in self.windows]}
 
     def summary(self) -> str:
-        """How many windows, and what the first alarm says."""
+        """How many windows, and what the first alarm states."""
         text = f"{counted(self.windows, 'window')}, {self._told()}"
         if not self.alarms:
             return text

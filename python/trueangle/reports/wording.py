@@ -18,7 +18,7 @@ FIGURE_TITLES: Final = {
     "factors": "Function of each factor",
 }
 
-#: Conditions of a run: where they stand, their name and unit.
+#: Conditions of a run: where they are, their name and unit.
 _CONDITIONS: Final = (
     ("speed_deg_s", "speed", "deg/s"),
     ("temperature_C", "temperature", "°C"),
@@ -35,21 +35,21 @@ _OTHERS: Final = 20
 #: Reduction, in percent, from which a correction is worth having.
 _WORTH: Final = 1.0
 
-#: Stands where there is no number.
+#: Is where there is no number.
 _NONE: Final = "\u2013"
 
-#: Stands before negative numbers.
+#: Is before negative numbers.
 MINUS: Final = "\u2212"
 
-#: Digits of an error that stands alone, and of the smallest of a column of them.
+#: Digits of an error that is alone, and of the smallest of a column of them.
 _DIGITS, _LEAST_DIGITS = 4, 3
 
-#: Lines of a list in a cell at most; of a longer one so many are shown.
+#: Lines of a list in a cell at most; of a longer one this many are shown.
 _MOST_LINES, _SHOWN_LINES = 12, 6
 
 
 def figure_title(name: str, modelled: bool) -> str:
-    """What stands above a figure.
+    """What is above a figure.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def joined_list(items: list[Any]) -> str:
 
 
 def residual_signals(figures: dict[str, Any]) -> list[str]:
-    """Signals that the residual is drawn against."""
+    """Signals that the residual is plotted against."""
     return [name.removeprefix("residual-") for name in figures if name.startswith("residual-")]
 
 
@@ -129,7 +129,7 @@ def by_kind(faults: list[dict[str, Any]]) -> list[tuple[dict[str, Any], list[str
 
 
 def entry_paths(pattern: str, entries: list[Any]) -> list[str]:
-    """Where the same number of every entry stands in the content.
+    """Where the same number of every entry is in the content.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def listed_orders(rows: list[dict[str, Any]]) -> list[int]:
 
 
 def gain_paths(findings: list[dict[str, Any]]) -> list[str]:
-    """Where what is left after each finding stands."""
+    """Where the remainder after each finding is."""
     every = enumerate(findings)
     return [f"diagnosis.findings.{i}.gain.rms_after_arcsec" for i, f in every if f["gain"]]
 
@@ -224,7 +224,7 @@ class Numbers:
     def error(
         self, path: str, decimals: int | None = None, digits: int = _DIGITS, unit: bool = False
     ) -> Any:
-        """An error to so many decimals, or to so many digits."""
+        """An error to this many decimals, or to this many digits."""
         value = lookup(self._content, path)
         if decimals is None:
             decimals = 0 if value is None else self.unit.decimals(value, digits)
@@ -262,7 +262,7 @@ class Numbers:
         if set(shown) == {"-"}:
             return _NONE
         texts = shortened_list([text.replace("-", MINUS) for text in shown])
-        # A stack is read beside that of the deviations; without them it is a list.
+        # A stack is read next to that of the deviations; without them it is a list.
         return ("\n" if stds else ", ").join(texts)
 
     def named(self, unit: str) -> str:

@@ -1,4 +1,4 @@
-"""What a set of positions can tell apart: distinct positions, folded orders, closure errors.
+"""What a set of positions can separate: distinct positions, folded orders, closure errors.
 
 On N equispaced positions the orders m and k are one column of numbers wherever
 ``m = k`` or ``m = -k`` modulo N: a tooth mesh 202 times per turn, read every 10
@@ -23,12 +23,12 @@ from ..support.quantiles import median
 from .run import CalibrationRun, as_runs
 
 #: Positions closer than this (turns) count as one: 0.01 degree, which turns the phase
-#: of order 202 by 2 degrees, so that no order of interest is told by the difference.
+#: of order 202 by 2 degrees, so that no order of interest is reported by the difference.
 POSITION_TOLERANCE: Final = 1.0 / 36_000.0
 
 #: Highest order that is named as an alias where no gear is declared, and the phase (radians)
 #: by which it may turn within a place that was visited again and not met exactly: no order
-#: looked for tells the two by more than a tenth of itself from their middle.
+#: looked for shows the two by more than a tenth of itself from their middle.
 _HIGHEST_ALIAS: Final = 404
 _SAME_PHASE: Final = 0.2
 
@@ -113,10 +113,10 @@ class Positions:
         return max(0, (count - 1) // 2)
 
     def has_alias(self, highest: int) -> bool:
-        """Whether orders up to ``highest`` that are not neighbours look alike here.
+        """Whether orders up to ``highest`` that are not neighbours look identical here.
 
-        Over part of a turn neighbours do anyway: those are told from aliases by the width of
-        their coherence.
+        Over part of a turn neighbours do anyway: those are distinguished from aliases by the width
+        of their coherence.
 
         Examples
         --------
@@ -158,7 +158,7 @@ def distinct_positions(
     tolerance : float, optional
         Angles closer than this count as one, in the unit of the runs; a cluster is never wider
         than it. Default: 0.01 degree (`POSITION_TOLERANCE`), and up to 0.028 degree, where
-        order 404 turns by 0.2 radians, between places that stand clear of each other.
+        order 404 turns by 0.2 radians, between places that are clear of each other.
 
     Returns
     -------
@@ -206,9 +206,9 @@ def distinct_positions(
 def closure_errors(
     runs: CalibrationRun | Iterable[CalibrationRun], tolerance: float | None = None
 ) -> Array:
-    """What the last reading of each run differs by that closes a turn at its first position.
+    """The difference of the last reading of each run that closes a turn at its first position.
 
-    Drift, slip or a lost count within a run show here; a turn that closes is no proof
+    Drift, slip or a lost count within a run show here; a closed turn is no proof
     against them at other places. Runs that do not end where they began have no entry.
 
     Returns
@@ -237,7 +237,7 @@ def closure_errors(
 
 
 def _places(ascending: Array) -> NDArray[np.intp] | None:
-    """Clusters that stand clear of each other, none wider than what an order tells; or None."""
+    """Clusters that are clear of each other, none wider than what an order shows; or None."""
     width = _SAME_PHASE / (2.0 * math.pi * _HIGHEST_ALIAS)
     gaps = np.diff(ascending)
     starts = gaps > width
@@ -302,13 +302,13 @@ def fold(order: int, divisions: int) -> tuple[int, int]:
 def position_coherence(
     positions: Positions, order: float, others: Sequence[float] | Array
 ) -> Array:
-    """How alike ``order`` and each of ``others`` look at these positions, 0 to 1.
+    """How collinear ``order`` and each of ``others`` are at these positions, 0 to 1.
 
     ::
 
         max_± |Σ_p e^(2π i (m ± k) t_p)| / P
 
-    1 means that no reading at these positions tells them apart: they are aliases.
+    1 means that no reading at these positions separates them: they are aliases.
     """
     m = np.asarray(others, dtype=np.float64)
     down, up = np.abs(m - order), m + order

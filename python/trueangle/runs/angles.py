@@ -1,4 +1,4 @@
-"""The two angles of a run: their columns and units, what is added to them, rows of their own."""
+"""The two angles of a run: their columns and units, what is added to them, separate rows."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def find_run_angles(
 ) -> RunAngles:
     """What the angles of a table are made of, and their period.
 
-    ``unit`` is that of angles whose columns state none, ``path`` stands in messages.
+    ``unit`` is that of angles whose columns state none, ``path`` is in messages.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def find_run_angles(
 
 
 def _check_alike(error: Callable[[str, str], FileError], found: Mapping[str, RoleColumn]) -> None:
-    """Refuse two angles that were found by their names and have unlike units."""
+    """Refuse two angles that were found by their names and have different units."""
     if not {"reference", "indicated"} <= found.keys():
         return
     reference, indicated = found["reference"], found["indicated"]
@@ -207,7 +207,7 @@ def _refuse_missing(path: object, header: Sequence[str], role: str) -> None:
 def two_channels(
     table: FileReadings, counts: Mapping[str, float | None], reference: Array, indicated: Array
 ) -> str:
-    """The command that joins two angles with rows of their own; empty for others.
+    """The command that joins two angles in separate rows; empty for others.
 
     ``counts`` are those of a turn, by the option that states them.
     """

@@ -64,7 +64,7 @@ class Facets(NamedTuple):
 def read_facets(path: str | PathLike[str]) -> Facets:
     """Facets of a file with the columns ``reference_deg`` and ``deviation_arcsec``.
 
-    Other units of angles may stand at the ends of the names. The true angle of a facet is its
+    Other units of angles may be at the ends of the names. The true angle of a facet is its
     nominal one and the deviation.
 
     Raises

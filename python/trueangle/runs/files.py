@@ -25,7 +25,7 @@ from .source import ReadingOptions, checked_reading_options, each_table
 
 
 class _RunLabels(NamedTuple):
-    """What tells a run from the others: its joint, when it was calibrated, and its label."""
+    """What identifies a run: its joint, when it was calibrated, and its label."""
 
     unit: str | None = None
     when: str | None = None
@@ -51,11 +51,11 @@ def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationR
         ``reference_deg`` and ``indicated_deg`` (or ``_rad``, ``_turn``, ``_count``, or a unit in
         brackets), and optionally ``run``,
         ``unit``, ``when`` (ISO 8601) and those of `trueangle.support.signals.SIGNALS`; an
-        ``error_arcsec`` (or another unit) may stand beside one of the two angles. Others are
+        ``error_arcsec`` (or another unit) may be next to one of the two angles. Others are
         kept in `CalibrationRun.columns`.
     **reading
         ``counts_per_turn``, ``counts_per_turn_reference``: counts in one turn of the output,
-        of an indicated angle or reference in counts or without a unit of its own.
+        of an indicated angle or reference in counts or without a separate unit.
         ``signals``: columns with other names,
         ``{"torque": "tau", "reference": ("pos act", "rad")}``; ``"-pos"`` is a reversed sensor
         (`CalibrationRun.indicated_sign`), and ``"reference_offset"`` (a list for several) is
@@ -63,7 +63,7 @@ def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationR
         ``deviation_arcsec``), added at its nominal angles. ``unit_from``: a regular expression;
         what it finds in the name of a file is the unit of its runs. ``period``: one turn in the
         unit of angles whose columns name none; these may then be called ``reference`` and
-        ``indicated``. ``by``: the column that tells the runs apart (default: ``run``).
+        ``indicated``. ``by``: the column that separates the runs (default: ``run``).
         ``topic``: JointState topic of a ROS bag (default: the only one). ``periods_per_turn``:
         periods in a turn of the columns ``sine`` and ``cosine``, of which the indicated angle is
         then made, as it is where no column has it.
@@ -89,7 +89,7 @@ def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationR
     Warns
     -----
     EmptyCellsWarning
-        Rows with an empty cell were left out; `CalibrationRun.left_out` counts them.
+        Rows with an empty cell were omitted; `CalibrationRun.left_out` counts them.
 
     Examples
     --------

@@ -56,7 +56,7 @@ _RESOLVED = 2.0**30
 #: How far beyond the spread of the errors a line may go that half of them are near.
 _LINE = 1.0 + 2.0 * STRAIGHT
 
-#: Highest order, and the share of the error's power left by it, by which degrees are told.
+#: Highest order, and the share of the error's power left by it, by which degrees are reported.
 _HIGHEST, _LEFT = 3, 0.25
 
 _TURNS = {"degrees": 360.0, "radians": 2.0 * math.pi, "turns": 1.0}
@@ -68,7 +68,7 @@ def check_follows(run: CalibrationRun) -> None:
     Raises
     ------
     ArgumentError
-        Says what the indicated angle looks like instead: another unit, the other sign.
+        States what the indicated angle looks like instead: another unit, the other sign.
 
     Warns
     -----
@@ -206,7 +206,7 @@ def _remedies(period: float) -> dict[str, float]:
 
 
 def _ratio(run: CalibrationRun) -> float | None:
-    """Travel of the indicated angle per travel of the reference, where readings tell it."""
+    """Travel of the indicated angle per travel of the reference, where readings show it."""
     (record,) = records_of([run])
     ratio = angle_ratio([record])
     if ratio is None or ratio == 0.0:

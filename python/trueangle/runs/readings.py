@@ -36,7 +36,7 @@ from ..support.times import elapsed_seconds, parsed_time
 
 T = TypeVar("T")
 
-#: Columns that are kept although nothing is known of them, at most: a wide log has thousands.
+#: Columns that are kept although nothing is known about them, at most: a wide log has thousands.
 _KEPT = 256
 
 
@@ -47,7 +47,7 @@ _ONCE: ContextVar[_Kept | None] = ContextVar("columns of files", default=None)
 
 @contextmanager
 def reading_files_once() -> Iterator[None]:
-    """Files that are asked for their readings again, of another joint, are not read again.
+    """Files that are requested their readings again, of another joint, are not read again.
 
     The columns of as many as a table of runs may hold are kept meanwhile.
     """
@@ -66,7 +66,7 @@ class FileReadings(NamedTuple):
     path : Path
     format : Format
     roles : dict of str to Column
-        What is known of the columns.
+        What is known about the columns.
     columns : dict of str to array
         By name; texts as arrays of objects.
     source : Source
@@ -79,7 +79,7 @@ class FileReadings(NamedTuple):
     source: InputFile
 
     def error(self, problem: str, column: str | None = None, row: int | None = None) -> FileError:
-        """The error that says ``problem`` of a column, at the line of a row."""
+        """The error that states ``problem`` of a column, at the line of a row."""
         line = 1 if row is None else self.format.line_of(self.path, row)
         return FileError(self.path, problem, line=line, column=column)
 
@@ -178,7 +178,7 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Fil
         doubled = next((name for name, n in Counter(header).items() if name and n > 1), None)
         if doubled is not None:
             raise FileError(path, "the column appears twice", line=1, column=doubled)
-    # Of a partitioned folder; what the file itself says comes first.
+    # Of a partitioned folder; what the file itself states comes first.
     keys = {k: v for k, v in partition_keys(path).items() if k not in header}
     roles = find_columns(path, [*header, *keys], wanted)
     warn_of_unread(path, kind.unread(path), roles)
@@ -187,7 +187,7 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Fil
     others = [name for name in header if name not in known][:_KEPT]
     together = getattr(kind.module, "together", None)
     if together is not None:  # formats whose columns need not be equally long
-        if not needed and len(header) > 1:  # which belong together nobody said
+        if not needed and len(header) > 1:  # which belong together nobody stated
             empty = dict.fromkeys(header, np.empty(0))
             return FileReadings(path, kind, roles, empty, _source(path))
         others = together(path, needed, others)
@@ -216,7 +216,7 @@ def _whole(
     """`_columns`, those kept of an earlier read, or without the others where they are too large."""
     kept, key = _ONCE.get(), (str(path), topic, frozenset(labels))
     found = {} if kept is None else kept.get(key, {})
-    # What was text then may be needed as numbers now: reading says what is wrong.
+    # What was text then may be needed as numbers now: reading states what is wrong.
     if needed and all(n in found and (found[n].dtype != object or n in labels) for n in needed):
         return {name: found[name] for name in (*needed, *others) if name in found}
     try:
@@ -315,7 +315,7 @@ def _joined(
 
 
 def _is_no_number(value: Any) -> bool:
-    """What stands in the way of a column of numbers, some of which may be texts of one."""
+    """What is in the way of a column of numbers, some of which may be texts of one."""
     if value is None:
         return False
     try:
@@ -336,7 +336,7 @@ def _undecoded(values: Any) -> int | None:
 def _is_text(text: str) -> bool:
     try:
         text.encode()
-    except UnicodeEncodeError:  # bytes that were no UTF-8 stand in it as halves of characters
+    except UnicodeEncodeError:  # bytes that were no UTF-8 are in it as halves of characters
         return False
     return True
 

@@ -167,7 +167,7 @@ class CalibrationRun:
         return f" ({self.label})" if self.label else ""
 
     def signal(self, name: str) -> Array | None:
-        """Values of the signal ``name``, whether a field of its own or not; None without.
+        """Values of the signal ``name``, whether a separate field or not; None without.
 
         Examples
         --------
@@ -304,7 +304,7 @@ def _resolved(angle: Array, other: Array, period: float) -> Array:
     Such a number (1e300) is no angle: whatever it wraps to is rounding, which could pass for a
     good reading. Half a period off the ``other`` angle it is an outlier to every test.
     """
-    most = 2.0**40 * period  # of so many turns a double resolves a 4096th
+    most = 2.0**40 * period  # of this many turns a double resolves a 4096th
     wild = np.abs(angle) > most
     if not wild.any():
         return angle

@@ -2,7 +2,7 @@
 
 A joint with hard stops shows its harmonics on an arc only. There they nearly cancel
 each other, and plain least squares buys a last hundredth of a degree with amplitudes of
-a hundred degrees that run wild outside the arc.
+a hundred degrees that run outlying outside the arc.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ CONDITION = 30.0
 _JUMPS = 0.1
 
 
-#: Ends of a span nearer to zero than this share of it are told as zero.
+#: Ends of a span nearer to zero than this share of it are reported as zero.
 _TOLD = 1e-4
 
 
@@ -51,14 +51,14 @@ _COMPARED = 20_000
 
 
 class Span(NamedTuple):
-    """Stretch of the turn that was travelled, in the unit of the angles."""
+    """Segment of the turn that was travelled, in the unit of the angles."""
 
     start: float
     stop: float
     full: bool
 
     def describe(self, period: float) -> str:
-        """The stretch with its unit, a turn off where it ends beyond the first.
+        """The segment with its unit, a turn off where it ends beyond the first.
 
         Examples
         --------
@@ -75,7 +75,7 @@ class Span(NamedTuple):
 def covered_span(angles: Sequence[Array], period: float) -> Span:
     """The turn without its widest gap, or the whole turn where no gap is missing travel.
 
-    A gap is missing travel when it is wider than 20 deg and than chance leaves between as
+    A gap is missing travel when it is wider than 20 deg and than probability leaves between as
     many random positions (2 %). Of more than 65 536 readings every n-th is looked at.
 
     ``start`` lies in ``[0, period)``; partial travel is narrower than ``period``, a full turn ``(0,
@@ -107,13 +107,13 @@ def travelled_span(angles: Sequence[Array], period: float, periodic: bool) -> Sp
 
 
 def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> float:
-    """Order from which on a line is told from what changes in time, over a short single pass.
+    """Order from which on a line is distinguished from drift, over a short single pass.
 
     On an arc that one run passed once, drift in time is a function of the angle as well, and a
     low order that is fitted to it makes the next run worse. So over less than a quarter of a
     turn, where neighbouring readings agree or lines were declared that the travel holds, only
     orders count that come back within the travel. 0 where every order counts; and whether
-    neighbouring readings agree beside the declared lines.
+    neighbouring readings agree next to the declared lines.
 
     Examples
     --------

@@ -55,7 +55,7 @@ def selfcal(
     method : {"auto", "spin-down", "heads", "shifts", "dual", "channels"}
         ``"auto"`` looks at the columns.
     orders : "auto" or sequence of int
-        By default those that stand out of the noise.
+        By default those above the noise.
     loop : {"open", "closed", "unknown"}
         Whether the speed was held by a loop closed on this encoder.
     loop_bandwidth : float, optional
@@ -70,7 +70,7 @@ def selfcal(
         Orders at which the speed may ripple. ``"auto"``: all, weighed by the evidence;
         ``"none"``: the motion is known to be smooth.
     head_angles : sequence of float, optional
-        Where the heads stand, in degrees, when their readings were set to one zero.
+        Where the heads are, in degrees, when their readings were set to one zero.
     period : float, optional
         One turn in the unit of the model (360), and of angles whose columns name none.
     **reading
@@ -87,13 +87,13 @@ def selfcal(
     FileError, ArgumentError
         Columns that are missing or wrong.
     NoModelError
-        A log from which nothing can be told; says what to record.
+        A log from which nothing can be determined; states what to record.
 
     Notes
     -----
     Reaches the Cramer-Rao limit of white noise where motion is smooth; standard errors
-    include what the drift of the motion, fitted beside, takes away. Never seen: the zero;
-    see `SelfCalibration.blind` for the rest. A million readings, 30 orders: about a second.
+    include what the drift of the motion, fitted jointly, takes away. Never identifiable: the zero;
+    see `SelfCalibration.blind` for the remainder. A million readings, 30 orders: about a second.
 
     References
     ----------

@@ -26,7 +26,7 @@ from .recording import Recording
 from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, blind_words
 from .spindown import spin_down
 
-#: Turns from which time stamps are asked for the orders that the curve cannot give.
+#: Turns from which time stamps are needed for the orders that the curve cannot give.
 _TURNS: Final = 5.0
 
 

@@ -31,11 +31,11 @@ _ROUNDS: Final = 4
 _GRID: Final = 8192
 
 #: Frequency below which fitted motion may take all, at most; and cycles of a series over which the
-#: power beside it is averaged, at least.
+#: power with it is averaged, at least.
 _HIGHEST_CUT: Final = 0.15
 _LEAST_BAND: Final = 10.0
 
-#: A series is continued by so many readings of nothing: beyond, noise remembers it no more.
+#: A series is continued by this many readings of nothing: beyond, noise no longer correlates.
 _BEYOND: Final = 1024
 
 
@@ -66,7 +66,7 @@ class Correlation:
 
     @cached_property
     def level(self) -> float:
-        """Variance over that of what no reading before foretells: 1 of white noise."""
+        """Variance over that of what no reading before predicts: 1 of white noise."""
         return float(self._shape((np.arange(_GRID) + 0.5) / (2.0 * _GRID)).mean())
 
     def over_lags(self, count: int) -> Array:
@@ -84,7 +84,7 @@ class Correlation:
         return np.asarray(found[: len(rows)])
 
     def whitened(self, rows: Array) -> Array:
-        """What rows of one series hold beyond what those before foretell."""
+        """What rows of one series hold beyond what those before predict."""
         p = self.terms.size
         found = rows[p:].copy()
         for lag, term in enumerate(self.terms, 1):
@@ -112,7 +112,7 @@ def lag_pairs(lengths: Sequence[int], most: int) -> Array:
 
 
 def _most_terms(lengths: Sequence[int]) -> int:
-    """Terms that series of so many readings tell, at most."""
+    """Terms that series of this many readings show, at most."""
     return min(_MOST, sum(lengths) // _PER_TERM, max(lengths, default=1) - 1)
 
 
@@ -158,8 +158,8 @@ def correlation_of(
 def correlation_above(series: Sequence[Array], cut: float) -> tuple[Correlation, float]:
     """As `correlation_of`, where slow motion was fitted that took all below a frequency.
 
-    There the power is taken for what it is above, up to twice of it; white where that is most of
-    the frequencies. With the variance of a reading, what was taken included.
+    There the power is confused with what it is above, up to twice of it; white where that is most
+    of the frequencies. With the variance of a reading, what was taken included.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def correlation_above(series: Sequence[Array], cut: float) -> tuple[Correlation,
 
 
 def _autoregression(lags: Array, count: int) -> Correlation:
-    """Levinson's recursion on correlations of neighbours, as far as BIC asks for terms."""
+    """Levinson's recursion on correlations of neighbours, as far as BIC needs terms."""
     terms, best = np.zeros(0), np.zeros(0)
     share, least = 1.0, 0.0
     for p in range(1, lags.size):

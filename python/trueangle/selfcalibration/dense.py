@@ -1,4 +1,4 @@
-"""Patterns beside plain nuisances: zeros of runs, ratios, couplings that change with clamping."""
+"""Patterns with plain nuisances: zeros of runs, ratios, couplings that change with clamping."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .densetriangle import (
 )
 from .projected import NOT_SEEN, Projected, Unknown, combinations
 
-#: Readings from which residuals tell their correlation, and blocks whose means are looked at.
+#: Readings from which residuals show their correlation, and blocks whose means are looked at.
 _TOLD: Final = 60
 _BLOCKS: Final = 40
 
@@ -33,7 +33,7 @@ _STILL: Final = 0.02
 
 @dataclass(frozen=True)
 class DenseFit:
-    """Patterns, nuisances and what is left."""
+    """Patterns, nuisances and the residual."""
 
     projected: Projected
     patterns: Array
@@ -43,7 +43,7 @@ class DenseFit:
     """Variance of a random term relative to the noise."""
     residuals: Array
     covariance: Array
-    """Of the patterns; holds what is known of the correlation and of the random term."""
+    """Of the patterns; holds what is known about the correlation and of the random term."""
     correlation: Correlation
     triangle: Array
     """Of nuisances, patterns and target: all that fits of fewer columns need."""
@@ -69,12 +69,12 @@ def fit_dense(
 ) -> DenseFit:
     """Least squares by orthogonal triangles, the nuisances eliminated first.
 
-    ``random`` nuisances are drawn anew in every run, with one variance: coefficients are averages
-    over what the evidence says of it, and their covariance holds how little few runs say. Where
-    neighbouring residuals correlate it is asked of what no reading before foretells.
-    ``freedom_lost`` counts rows that say nothing of their own (differences to a mean); combinations
-    of patterns of which less than ``floor`` is left count as not seen, whatever the random
-    nuisances hide of the others.
+    ``random`` nuisances are sampled anew in every run, with one variance: coefficients are averages
+    over what the evidence states about it, and their covariance holds how little few runs state.
+    Where neighbouring residuals correlate it is estimated from what no earlier reading predicts.
+    ``freedom_lost`` counts rows that contain no information (differences to a mean);
+    combinations of patterns of which less than ``floor`` is left count as not detected, whatever
+    the random nuisances hide of the others.
     """
     p, m = parts[0].nuisances.shape[1], len(columns)
     triangle = triangle_of(parts)
@@ -110,7 +110,7 @@ def fit_dense(
                 asked = triangle_of(rows)
                 independent = sum(part.target.size for part in rows) - freedom_lost
             possible = possible_variances(asked, p, seen, random, independent)
-            # The unit is the noise of a reading, of which neighbours foretell a share.
+            # The unit is the noise of a reading, of which neighbours predict a share.
             possible = [(v / correlation.level, chance) for v, chance in possible]
             variance = max(possible, key=lambda pair: pair[1])[0]
             solved = solved_triangle(triangle, p, m, random, variance)
@@ -128,7 +128,7 @@ def fit_dense(
             if not correlation.is_white:
                 spread, own = series.with_correlation(correlation, freedom)
                 projected = replace(projected, variance=noise * freedom / own)
-        # Where readings correlate, what a variance was said to be was said of white ones.
+        # Where readings correlate, the variance was estimated as for white ones.
         if correlation.is_white or not before.is_white or not len(random):
             break
     covariance = projected.variance * spread[p:, p:]
@@ -169,13 +169,13 @@ def _bread(solved: SolvedTriangle, projected: Projected) -> Array:
 def dense_fixed_point(fit_at: Callable[[Array, bool], DenseFit], size: int) -> DenseFit:
     """The fit at the places that its own patterns correct, from no correction on.
 
-    ``fit_at`` is told whether the places are those of a pattern: until then what is left is not
-    noise, and tells of no random nuisance.
+    ``fit_at`` is reported whether the places are those of a pattern: until then the residual is not
+    noise, and shows of no random nuisance.
     """
     coefficients = np.zeros(size)
     for number in range(_ROUNDS):
         fit = fit_at(coefficients, number >= _AT_FIRST)
-        # What is hardly seen is noise of any size: it moves no place.
+        # What is hardly observed is noise of any size: it moves no place.
         found = np.where(fit.projected.told, fit.patterns, 0.0)
         std = np.sqrt(np.maximum(np.diagonal(fit.covariance), 1e-300))
         still = np.abs((found - coefficients) / std).max(initial=0.0) < _STILL
@@ -215,8 +215,8 @@ def patterns_apart(
 def low_frequency_inflation(fit: DenseFit) -> float:
     """Variance of slow patterns relative to independent residuals; 1 at least.
 
-    By the greater of two: what neighbours say, and means over blocks, less what slow patterns take
-    up of them, for what is left that outlasts any of its neighbours.
+    By the greater of two: what neighbours state, and means over blocks, less what slow patterns
+    explain of them, for the residual that outlasts any of its neighbours.
     """
     if not fit.correlated:
         return 1.0

@@ -1,9 +1,9 @@
 """``dual``: motor and output encoder of a geared joint.
 
 ``o - m/i = error_o(theta) - error_m(i theta)/i + gear + play + c``: at every order only the sum
-is seen, and its number stands under all its names. Patterns are functions of the motor's
+is detected, and its number is under all its names. Patterns are functions of the motor's
 angle: harmonics of the reading that is explained would explain it by itself. A ratio that is
-given is a count of teeth: it is not estimated unless that is asked for.
+given is a count of teeth: it is not estimated unless that is requested.
 
 What it can never see: which of output encoder, gear and motor encoder an order belongs to;
 where the ratio is whole, output order k i and motor order k are one; the zero; orders that
@@ -57,15 +57,15 @@ from .result import (
 )
 from .verification import chance_of_parts
 
-#: A ratio is taken for another than the given or a whole one beyond so many standard errors:
-#: a chance of 6e-5.
+#: A ratio is accepted as different from the given or a whole one beyond this many standard errors:
+#: a probability of 6e-5.
 _FAR: Final = 4.0
 
 #: Over less than a turn no ratio is taken that needs orders 1 and 2 of more than this, a
-#: degree: a ratio that asks for none is likelier than an encoder so eccentric.
+#: degree: a ratio that needs none is likelier than an encoder so eccentric.
 _ECCENTRIC: Final = math.radians(1.0)
 
-#: Where nobody asked for the ratio, it is doubted beyond so many, and by such a share.
+#: Where nobody requested the ratio, it is questioned beyond this many, and by such a share.
 _DOUBTED: Final = 6.0
 _SHARE: Final = 1e-4
 
@@ -80,7 +80,7 @@ _READINGS: Final = 200
 
 
 class _UsedRatio(NamedTuple):
-    """The ratio that is used, what the readings say of it, and how that is told."""
+    """The ratio that is used, what the readings state about it, and its note."""
 
     used: float
     measured: RatioEstimate
@@ -212,7 +212,7 @@ def _ratio(
 
 
 def _eccentricity(channels: GearedChannels, ratio: float, turns: float) -> float:
-    """Amplitude, in radians, of orders 1 and 2 that a ratio asks for."""
+    """Amplitude, in radians, of orders 1 and 2 that a ratio needs."""
     lines = [line for line in lines_of_gear(BESIDE_RATIO, ratio, turns) if not line.motor]
     return float(np.linalg.norm(fit_dual_lines(channels, ratio, lines).dense.patterns))
 

@@ -1,8 +1,8 @@
-"""Both encoders of a geared joint by least squares: lines beside zero, direction and speed.
+"""Both encoders of a geared joint by least squares: lines together with zero, direction and speed.
 
 Over an arc the output's low orders, its zero and the slope of one reading over the other are
-nearly one another. So a ratio is estimated beside orders 1 and 2 whatever they bring, and of
-the output's orders no more are taken than the readings ask for, the lowest first.
+nearly one another. So a ratio is estimated together with orders 1 and 2 whatever they bring, and of
+the output's orders no further are taken than the readings need, the lowest first.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from .projected import Unknown, harmonic_unknowns
 #: Probability of taking up any line that is not there.
 _CHANCE: Final = 0.01
 
-#: Orders of the output beside which a ratio is estimated: eccentricity and ellipse.
+#: Orders of the output together with which a ratio is estimated: eccentricity and ellipse.
 BESIDE_RATIO: Final = (1, 2)
 
-#: Fits in which a ratio settles, and in which the zeros settle, beside the patterns.
+#: Fits in which a ratio settles, and in which the zeros settle, together with the patterns.
 _RATIOS: Final = 3
 _ZEROS: Final = 2
 
@@ -44,7 +44,7 @@ _CHUNK: Final = 8192
 
 
 class DualSample(NamedTuple):
-    """Readings that take part: even or odd ones of so many blocks of a run; all where 1."""
+    """Readings that take part: even or odd ones of this many blocks of a run; all where 1."""
 
     blocks: int = 1
     first: int = 0
@@ -65,7 +65,7 @@ class DualFit(NamedTuple):
 
 
 class RatioEstimate(NamedTuple):
-    """Motor turns per output turn, and its standard error; infinite where not seen."""
+    """Motor turns per output turn, and its standard error; infinite where not detected."""
 
     value: float
     std: float
@@ -156,14 +156,14 @@ def choose_dual_lines(
     slope: bool = False,
     held: Sequence[int] = (),
 ) -> tuple[list[SharedLine], list[SharedLine]]:
-    """Lines that stand out, and those of which the travel holds too little to say.
+    """Lines that are significant, and those of which the travel holds too little to state.
 
     ``held`` are orders of the output that are kept whatever they bring.
 
     Of the output's own orders the first few are taken beyond which no higher one is missed;
-    of these, and of the motor's, those are left out that do not stand out. Beside a ratio
-    (``slope``) and ``held`` none is left out, and one more is taken: over an arc orders that the
-    readings do not ask for may make it another.
+    of these, and of the motor's, those are omitted that are not significant. Together with a ratio
+    (``slope``) and ``held`` none is omitted, and one more is taken: over an arc orders that the
+    readings do not need may make it another.
     """
     fit = fit_dual_lines(channels, ratio, lines, slope=slope, settled=False).dense
     scale = fit.projected.variance * low_frequency_inflation(fit)
@@ -205,7 +205,7 @@ def choose_dual_lines(
     return told, [lines[i] for i in lost]
 
 
-#: An order of which less is left beside the others is not told.
+#: An order of which less remains with the others is not reported.
 _LEAST: Final = 0.02
 
 
@@ -223,8 +223,8 @@ def estimate_dual_ratio(
 ) -> RatioEstimate:
     """The ratio jointly with orders 1 and 2 of the output, and with what else there may be.
 
-    Of ``orders="auto"`` one more than the readings ask for is held beside it: over an arc the
-    lowest orders and the slope are nearly one another, and one that is not seen would move it.
+    Of ``orders="auto"`` one more than the readings need is held with it: over an arc the
+    lowest orders and the slope are nearly one another, and one that is not detected would move it.
 
     Examples
     --------

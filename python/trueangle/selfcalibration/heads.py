@@ -143,7 +143,7 @@ def _fit(readings: Sequence[Array], orders: Sequence[float]) -> DenseFit:
 
 
 def _common(readings: Sequence[Array]) -> float:
-    """Rows that say nothing of their own: one of each place, for the mean of the heads."""
+    """Rows without information: one of each place, for the mean of the heads."""
     return float(sum(h.shape[1] for h in readings))
 
 

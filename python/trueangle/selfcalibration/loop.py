@@ -12,7 +12,7 @@ from ..support.suggestions import check_choice
 from .methods import LOOPS
 from .result import Blind, OrderEstimate
 
-#: Below so many bandwidths a velocity loop follows more than a tenth of what it sees.
+#: Below this many bandwidths a velocity loop follows more than a tenth of what it sees.
 FOLLOWS_BELOW: Final = 2.0
 
 
@@ -29,7 +29,7 @@ def check_loop(loop: str, bandwidth: float | None) -> None:
 def followed_orders(
     orders: Sequence[float], loop: str, bandwidth: float | None, slowest: float
 ) -> tuple[tuple[float, ...], Blind | None]:
-    """Orders that the loop may have followed, and how to say so.
+    """Orders that the loop may have followed, and how to report it.
 
     With closed-loop transfer T the shaft moves by ``-Tε`` and the log shows
     ``(1 - T)ε``: hidden where T = 1, amplified where T has turned in phase.
@@ -78,7 +78,7 @@ def followed_share(hertz: float, loop: str, bandwidth: float | None) -> float:
 
 
 def widened_by_loop(estimate: OrderEstimate, share: float) -> OrderEstimate:
-    """The estimate where any part of it up to ``share`` may be the loop's doing.
+    """The estimate where any part up to ``share`` may be the loop's doing.
 
     In any phase: the standard deviation of a disc of that radius, along one direction.
     """

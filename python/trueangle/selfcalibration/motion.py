@@ -1,7 +1,7 @@
-"""Patterns beside a smooth motion, and the motion's stiffness.
+"""Patterns together with a smooth motion, and the motion's stiffness.
 
-The motion of each stretch is a cubic spline in time under a prior: smooth trends are free,
-beside them the acceleration drifts, with a memory. The stiffness (the ratio of noise to that
+The motion of each segment is a cubic spline in time under a prior: smooth trends are free,
+with them the acceleration drifts, with a memory. The stiffness (the ratio of noise to that
 drift), the memory and the knot spacing maximise the evidence, that is the likelihood with
 motion and patterns integrated out.
 """
@@ -33,7 +33,7 @@ from .splines import (
 #: Stiffness looked at, as a power of ten relative to the readings per knot.
 _STIFFEST, _SOFTEST = 7.0, -5.0
 
-#: Grids that bring no more evidence than this in a row end the search (log likelihood).
+#: Grids that bring no further evidence than this in a row end the search (log likelihood).
 _WORTH = 1.0
 _BEHIND = 2
 
@@ -41,10 +41,10 @@ _BEHIND = 2
 _GONE = 1e-13
 
 #: Close knots may show a rougher drift than distant ones allow by this factor (drift that
-#: has a memory), not by more: what coloured noise would ask for is no motion.
+#: has a memory), not by more: what coloured noise would need is no motion.
 _ROUGHER = 100.0
 
-#: Memories of the acceleration that are tried, as shares of the longest stretch.
+#: Memories of the acceleration that are tried, as shares of the longest segment.
 _MEMORIES = (0.1, 0.01)
 
 #: Stiffnesses of evidence within this of the best are still possible (log likelihood).
@@ -97,7 +97,7 @@ class MotionFit:
 class _Grid:
     """The sums on one grid, with the motion so far in terms of it.
 
-    Smooth trends of each stretch (coasting down, say) are taken out of the prior: columns
+    Smooth trends of each segment (coasting down, state) are taken out of the prior: columns
     whose third differences are Legendre polynomials join the common ones.
     """
 
@@ -136,7 +136,7 @@ class MotionSearch:
 
     The ``sums`` (with ``e = reading - motion``) and the coefficients of the ``motion`` so far are
     on the finest grid, ``columns`` names the common columns, and ``trends`` are smooth trends that
-    each stretch is free to follow.
+    each segment is free to follow.
 
     Notes
     -----

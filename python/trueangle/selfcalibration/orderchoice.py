@@ -30,7 +30,7 @@ _ROUNDS: Final = 5
 #: Distances from an order at which its neighbourhood is looked at.
 _BESIDE: Final = (-0.5, -0.41, -0.32, -0.23, 0.23, 0.32, 0.41, 0.5)
 
-#: A louder neighbourhood is believed where chance would make it once in so many orders.
+#: A louder neighbourhood is assumed where probability would make it once in this many orders.
 _COLOURED: Final = 1e-3
 
 #: Turns from which it is looked at, and readings over which a spectrum in time is averaged.
@@ -51,9 +51,9 @@ def highest_order(readings: SegmentReadings) -> int:
 
 
 def choose_selfcal_orders(readings: SegmentReadings) -> tuple[float, ...]:
-    """Orders that stand out of the noise beside them.
+    """Orders that are significant of the noise with them.
 
-    The lowest eight are fitted first, then those at which what is left peaks, until none
+    The lowest eight are fitted first, then those at which the residual peaks, until none
     does; at last those that are not significant are dropped.
     """
     most = highest_order(readings)
@@ -114,7 +114,7 @@ def significant_orders(
     source: str | None = None,
     tried: int | None = None,
 ) -> tuple[float, ...]:
-    """Orders of ``among`` whose cosine and sine together are significant, of so many tried."""
+    """Orders of ``among`` whose cosine and sine together are significant, of this many tried."""
     limit = _limit(len(among) if tried is None else tried)
     kept = []
     for order in among:
@@ -135,7 +135,7 @@ def spectrum_at(theta: Array, values: Array, orders: Array) -> Array:
     total = float(values @ values)
     if total == 0.0:
         return np.zeros(orders.size)
-    # Harmonics of the whole part of an order times those of the rest, which few share.
+    # Harmonics of the whole part of an order times those of the remainder, which few share.
     whole = np.unique(np.floor(orders))
     rests, which = np.unique(np.round(orders - np.floor(orders), 9), return_inverse=True)
     place = np.searchsorted(whole, np.floor(orders))
@@ -158,8 +158,8 @@ def noise_spectrum_at(
     """Noise power at each order relative to white noise.
 
     An order passes at a frequency that follows the speed: there what the residuals' correlation in
-    time says, on average. Where there are turns enough to look between orders, and noise beside an
-    order is louder than that, as loud as it is there.
+    time states, on average. Where there are turns enough to look between orders, and noise together
+    with an order is louder than that, as loud as it is there.
 
     Returns
     -------
@@ -192,7 +192,7 @@ def noise_spectrum_at(
 
 
 def louder_beside(theta: Array, residuals: Array, orders: Sequence[float], factors: Array) -> Array:
-    """``factors``, and of orders beside which noise is louder than these what it is there."""
+    """``factors``, and of orders with which noise is louder than these, its value there."""
     found = factors.copy()
     near = np.add.outer(np.asarray(orders, dtype=np.float64), _BESIDE)
     power = spectrum_at(theta, residuals, near.ravel()).reshape(near.shape)

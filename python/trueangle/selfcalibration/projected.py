@@ -1,4 +1,4 @@
-"""The one estimator: harmonics unknown beside nuisances, their covariance, null vectors."""
+"""The one estimator: harmonics unknown together with nuisances, their covariance, null vectors."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ import trueangle._core as _core
 
 from ..support.arrays import Array
 
-#: A column is not seen where nuisances and other columns leave less of its square.
+#: A column is not detected where nuisances and other columns leave less of its square.
 #: Below this share rounding in the sums (1e-16 of a column, times its condition) decides.
 NOT_SEEN = 1e-9
 
 
-#: A column of which less is left is not told: its standard error is 30 times that of it alone.
+#: A column of which less is left is not reported: its standard error is 30 times that of it alone.
 TOLD = 1e-3
 
-#: A column that has more of its square in combinations that are not seen is not seen.
+#: A column that has more of its square in combinations that are not detected is not detected.
 _SHARE = 0.01
 
 
@@ -80,7 +80,7 @@ def harmonic_sum(
 def combinations(
     information: Array, alone: Array, floor: float
 ) -> tuple[Array, Array, Array, Array]:
-    """Columns' scale; what is left of combinations of them that are seen, these; and the others."""
+    """Columns' scale; the residual of combinations of them that show, these; and the others."""
     scale = _scale(alone)
     values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
     kept = values >= floor
@@ -103,7 +103,7 @@ class Projected:
     right : ndarray, shape (m,)
         ``Xᵀ (I - Π) y``.
     alone : ndarray, shape (m,)
-        ``x_jᵀ x_j``: what each column would have with nothing beside it.
+        ``x_jᵀ x_j``: what each column would have with nothing with it.
     variance : float
         Of one reading, about the fit.
     freedom : float
@@ -117,13 +117,13 @@ class Projected:
     variance: float
     freedom: float
     floor: float = NOT_SEEN
-    """Combinations of which less is left count as not seen."""
+    """Combinations of which less is left count as not detected."""
     design: Projected | None = None
-    """What decides which combinations are seen, where noise of these columns' own hides them."""
+    """What decides which combinations show, where noise of these columns' own hides them."""
 
     @cached_property
     def _eigen(self) -> tuple[Array, Array, Array, Array]:
-        """Columns' scale; what is left of combinations that are seen, these; and the others."""
+        """Columns' scale; the residual of combinations that are detected, these; and the others."""
         if self.design is None:
             return combinations(self.information, self.alone, self.floor)
         scale = _scale(self.alone)
@@ -134,20 +134,20 @@ class Projected:
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
-        """Columns that take part in no combination that is not seen."""
+        """Columns that take part in no combination that is not detected."""
         lost = (self._eigen[3] ** 2).sum(axis=1)
         return np.asarray(lost < _SHARE)
 
     @cached_property
     def inverse(self) -> Array:
-        """Pseudo-inverse of the information over the combinations that are seen."""
+        """Pseudo-inverse of the information over the combinations that are detected."""
         scale, values, vectors, _ = self._eigen
         half = (scale[:, None] * vectors) / np.sqrt(values)
         return np.asarray(half @ half.T)
 
     @property
     def solution(self) -> Array:
-        """The unknowns; of least norm along what is not seen."""
+        """The unknowns; of least norm along what is not detected."""
         return np.asarray(self.inverse @ self.right)
 
     @property
@@ -158,7 +158,7 @@ class Projected:
     def retained(self, among: Sequence[int] | None = None) -> Array:
         """Share of each column's square that nothing else explains.
 
-        ``1 / (A⁻¹_jj x_jᵀ x_j)``: 1 where it stands alone, 0 where it is not seen.
+        ``1 / (A⁻¹_jj x_jᵀ x_j)``: 1 where it is alone, 0 where it is not detected.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 1.0 / (np.diagonal(self.inverse) * self.alone)
@@ -172,7 +172,7 @@ class Projected:
 
     @property
     def rank(self) -> int:
-        """Combinations that are seen."""
+        """Combinations that are detected."""
         return int(self._eigen[1].size)
 
     def index(self, source: str, order: float) -> tuple[int, int]:

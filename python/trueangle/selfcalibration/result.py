@@ -36,7 +36,7 @@ class OrderEstimate:
     std_factor: float
     """Standard error over the limit of white noise with the true angle known."""
     of: str = "the encoder"
-    """What the number is a number of: one thing, or several that cannot be told apart."""
+    """What the number is a number of: one thing, or several that cannot be separated."""
 
     @property
     def amplitude(self) -> float:
@@ -116,7 +116,7 @@ class SelfCalibration(PlainResult):
     method : str
         ``"spin-down"``, ``"heads"``, ``"shifts"``, ``"dual"`` or ``"channels"``.
     model : HarmonicModel
-        Of what may be corrected; its record says that there was no reference.
+        Of what may be corrected; its record states that there was no reference.
     orders : tuple of OrderEstimate
         Numbers that are given, each with the name of what it is.
     sums : tuple of OrderEstimate
@@ -130,7 +130,7 @@ class SelfCalibration(PlainResult):
     readings : int
     turns : float
     beside : dict
-        What was fitted beside: ripple, reversal error, head angles, facets ...
+        What was fitted jointly with: ripple, reversal error, head angles, facets...
     coverage_deg : float, optional
         Of channels: how much of their period the readings cover.
     limit_arcsec : float, optional
@@ -248,10 +248,12 @@ def blind_words(orders: Sequence[float]) -> str:
 def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
     """Numbers, what they are numbers of, what is blind, tests, notes."""
     sizes = [result.noise_arcsec, *(o.amplitude for o in (*result.orders, *result.sums))]
-    period = result.model.period
-    unit = error_unit(errors_in, max(filter(math.isfinite, sizes), default=0.0), period)
+    largest = max(filter(math.isfinite, sizes), default=0.0)
+    unit = error_unit(errors_in, largest, result.model.period)
+    rms = math.sqrt(0.5) * math.hypot(*(o.amplitude for o in result.orders))
+    answer = f"Encoder error {unit.text(rms)} rms; " if result.orders else ""
     lines = [
-        f"calibrated without a reference ({result.method}): {result.readings} readings, "
+        f"{answer}calibrated without a reference ({result.method}): {result.readings} readings, "
         f"{result.turns:.1f} turns, noise {unit.text(result.noise_arcsec)}",
     ]
     if result.channels is not None:

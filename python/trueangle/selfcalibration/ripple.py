@@ -1,9 +1,9 @@
-"""Speed ripple beside the encoder's pattern: both, weighed by what the readings say of it.
+"""Speed ripple and the encoder's pattern, weighed by the readings.
 
 A torque ``T_k cos kθ`` moves a free shaft by ``T_k / (J k² ω²)``. Where the
-speed changes, the ripple is told from the pattern, at the cost of a greater standard error.
-Where it is not there, that cost is not due. So its size is given a distribution: nothing with
-probability one half, else any size, equally probable per octave; the standard error and the
+speed changes, the ripple is distinguished from the pattern, at the cost of a greater standard
+error. Where it is not there, that cost is not due. So its size is given a distribution: nothing
+with probability one half, else any size, equally probable per octave; the standard error and the
 estimate are averages over it (empirical evidence of each order on its own).
 """
 
@@ -23,12 +23,12 @@ LARGEST_COST: Final = 10.0
 #: Sizes looked at: from a tenth of the standard error to ten thousand of it.
 _SIZES: Final = np.logspace(-1.0, 4.0, 61)
 
-#: Probability that there is none, before the readings are seen.
+#: Probability that there is none, before the readings are detected.
 _NONE: Final = 0.5
 
 
 def cost_of_ripple(ripple: Array) -> float:
-    """Factor of the standard error when ripple columns ``ρ H`` stand beside ``H``.
+    """Factor of the standard error when ripple columns ``ρ H`` are together with ``H``.
 
     ::
 
@@ -48,7 +48,7 @@ def averaged_over_ripple(
 ) -> tuple[Array, Array, Array]:
     """Pattern and covariance averaged over the size of the ripple at each order.
 
-    ``unknowns`` and ``covariance`` hold pattern, then ripple, as if nothing were known of the
+    ``unknowns`` and ``covariance`` hold pattern, then ripple, as if nothing were known about the
     ripple's size, and so does what comes back, with the probability that each order ripples.
     """
     m = 2 * len(orders)

@@ -1,4 +1,4 @@
-"""Stretches of roughly steady motion, cut from running logs, and their readings as one list."""
+"""Segments of roughly steady motion, cut from running logs, and their readings as one list."""
 
 from __future__ import annotations
 
@@ -16,32 +16,33 @@ from ..support.arrays import Array
 from .recording import Recording
 from .splines import Knots
 
-#: Motion slower than this share of the median speed is left out, as are reversals.
+#: Motion slower than this share of the median speed is omitted, as are reversals.
 SLOWEST: Final = 0.2
 
-#: Steps between readings beyond this part of a turn cannot be told from the other way round.
+#: Steps between readings beyond this part of a turn cannot be distinguished from the other way
+#: round.
 _LARGEST_STEP: Final = 0.4
 
-#: A stretch shorter than this shows no pattern of its own (turns, readings).
+#: A segment shorter than this shows no pattern of its own (turns, readings).
 _SHORTEST: Final = (0.8, 48)
 
-#: Turns in all without which motion and pattern cannot be told apart.
+#: Turns in all without which motion and pattern cannot be separated.
 TURNS_NEEDED: Final = 2.0
 
-_BLOCKS: Final = 400  # a log is looked at in about so many pieces
+_BLOCKS: Final = 400  # a log is looked at in about this many pieces
 
 #: Readings per knot of the finest grid, at least.
 PER_KNOT: Final = 6
 
-#: Smooth trends of a stretch at most: of polynomials of degree 2 to 8 a coasting shaft needs
-#: no more; and the turns that each needs, so that none comes near an order.
+#: Smooth trends of a segment at most: of polynomials of degree 2 to 8 a coasting shaft needs
+#: no further; and the turns that each needs, so that none comes near an order.
 _TRENDS: Final = 7
 _TURNS_PER_TREND: Final = 5.0
 
 
 @dataclass(frozen=True)
 class Segment:
-    """Readings of one stretch: time in seconds, reading in radians without jumps."""
+    """Readings of one segment: time in seconds, reading in radians without jumps."""
 
     time: Array
     angle: Array
@@ -75,7 +76,7 @@ class Segment:
         if last <= 1.25 * turn:
             return np.full(t.size, self.speed)
         at = np.linspace(0.0, last - turn, min(4000, max(8, int(16 * last / turn))))
-        # Where readings stand still, the mean of their times is as good as any.
+        # Where readings are still, the mean of their times is as good as any.
         left, right = np.interp(at, x, t), np.interp(at + turn, x, t)
         if not (right > left).all():  # of angles so large that rounding takes a turn
             raise _fault(
@@ -120,13 +121,13 @@ def ripple_lead(stretch: Segment, speed: Array) -> Array:
 
 
 def cut_stretches(recordings: Iterable[Recording]) -> list[Segment]:
-    """Stretches of motion in one direction, neither slow nor reversing.
+    """Segments of motion in one direction, neither slow nor reversing.
 
     Raises
     ------
     FileError, NoModelError
         No time stamps, too few readings or turns, motion that is too fast for the rate
-        of readings: each says what to record.
+        of readings: each states what to record.
     """
     found: list[Segment] = []
     recordings = list(recordings)
@@ -238,7 +239,7 @@ def _fault(recording: Recording, problem: str) -> Exception:
 
 
 class SegmentReadings:
-    """Readings of all stretches in one list, with what does not change from fit to fit."""
+    """Readings of all segments in one list, with what does not change from fit to fit."""
 
     def __init__(self, stretches: Sequence[Segment]) -> None:
         self.stretches = list(stretches)
@@ -254,13 +255,13 @@ class SegmentReadings:
         self.lead = np.concatenate(
             [ripple_lead(s, v) for s, v in zip(self.stretches, speeds, strict=True)]
         )
-        #: Smooth trends that a stretch may follow at no cost: one for every few turns.
+        #: Smooth trends that a segment may follow at no cost: one for every few turns.
         self.trends = tuple(min(_TRENDS, int(s.turns / _TURNS_PER_TREND)) for s in self.stretches)
         self.extra: Array | None = None  # further columns of motion, (r, n)
         self.extra_names: tuple[str, ...] = ()
 
     def knots(self, intervals: int) -> Knots:
-        """A grid of about so many intervals in all, each stretch a power of two times some."""
+        """A grid of about this many intervals in all, each segment a power of two times some."""
         spans = [float(s.time[-1] - s.time[0]) for s in self.stretches]
         fewest = min(self.size // PER_KNOT, intervals)
         levels = max(0, math.floor(math.log2(max(fewest / (4 * len(spans)), 1.0))))
@@ -271,7 +272,7 @@ class SegmentReadings:
         count = tuple(max(unit, unit * math.ceil(span / (spacing * unit))) for span in spans)
         spacing = max(span / n for span, n in zip(spans, count, strict=True))
         starts = tuple(
-            # Shorter stretches stand in the middle of their knots.
+            # Shorter segments are in the middle of their knots.
             0.5 * (float(s.time[0]) + float(s.time[-1]) - n * spacing)
             for s, n in zip(self.stretches, count, strict=True)
         )

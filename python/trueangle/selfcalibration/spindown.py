@@ -32,7 +32,7 @@ from .segments import SegmentReadings, cut_stretches
 from .steady import SteadyFit, fit_steady
 from .verification import held_out_patterns
 
-#: An order of which motion leaves less is not the encoder's to say.
+#: An order of which motion leaves less is not the encoder's to state.
 LEAST_RETAINED: Final = 0.02
 
 #: Below this many turns per knot's own wave a warning is due.
@@ -143,7 +143,7 @@ def spin_down(
 def _ripple_orders(
     readings: SegmentReadings, orders: tuple[float, ...], ripple: str | Sequence[float]
 ) -> tuple[tuple[float, ...], bool]:
-    """Orders that get ripple columns, and whether the speeds tell ripple from pattern."""
+    """Orders that get ripple columns, and whether the speeds distinguish ripple from pattern."""
     separable = cost_of_ripple(readings.ripple) <= LARGEST_COST
     if isinstance(ripple, str):
         return (orders if ripple == "auto" and separable else ()), separable
@@ -247,10 +247,10 @@ def _renamed(o: OrderEstimate, of: str) -> OrderEstimate:
 
 
 def _may_be_ripple(o: OrderEstimate, first: OrderEstimate | None) -> bool:
-    """Whether torque at this order, no greater than at order 1, could explain all of it.
+    """Whether torque at this order, no greater than at order 1, could explain everything.
 
     The same torque moves the shaft by 1/k^2 of what it does at order 1, and order 1 is all
-    that is seen there.
+    that is detected there.
     """
     if o.order <= 1.0 or first is None:
         return True

@@ -1,6 +1,6 @@
 """Cubic B-splines on uniform knots in time over several segments, and sums over readings of them.
 
-All stretches share one list of coefficients; a stretch of ``N`` intervals takes ``N + 3``
+All segments share one list of coefficients; a segment of ``N`` intervals takes ``N + 3``
 of them. A reading touches four neighbours, so everything is banded.
 """
 
@@ -32,17 +32,17 @@ _CHUNK = 4096
 
 @dataclass(frozen=True)
 class Knots:
-    """Intervals of every stretch, and where its coefficients begin in the common list."""
+    """Intervals of every segment, and where its coefficients begin in the common list."""
 
     start: tuple[float, ...]
-    """Time at which each stretch begins, in seconds."""
+    """Time at which each segment begins, in seconds."""
     intervals: tuple[int, ...]
     spacing: float
-    """Seconds between knots, of all stretches."""
+    """Seconds between knots, of all segments."""
 
     @property
     def first(self) -> NDArray[np.int64]:
-        """First coefficient of each stretch, and the number of all at the end."""
+        """First coefficient of each segment, and the number of all at the end."""
         return np.concatenate([[0], np.cumsum(np.array(self.intervals) + 3)])
 
     @property
@@ -64,7 +64,7 @@ class Knots:
     def parents(self) -> NDArray[np.int64]:
         """Finer coefficients behind each coarser one, shape (coarser size, 5).
 
-        ``size`` stands for those beyond the ends, which have no readings.
+        ``size`` represents those beyond the ends, which have no readings.
         """
         rows = []
         for first, n in zip(self.first[:-1], self.intervals, strict=True):
@@ -103,7 +103,7 @@ class DriftPenalty:
 
         λ Σ (Δ³ c)² + μ Σ (Δ² c)²,    μ = λ (h/τ)²
 
-    What is left free is constant speed; ``tau`` is the memory in seconds, ``h`` the spacing.
+    The residual free is constant speed; ``tau`` is the memory in seconds, ``h`` the spacing.
     """
 
     def __init__(self, knots: Knots) -> None:
@@ -188,7 +188,7 @@ def _transposed(knots: Knots, values: Array, difference: Array) -> Array:
 def smooth_trends(knots: Knots, counts: Sequence[int]) -> Array:
     """Coefficients of Legendre polynomials of degree 2 on, shape (size, sum of counts).
 
-    Scaled to time in halves of the stretch, so that they mean the same motion on every
+    Scaled to time in halves of the segment, so that they mean the same motion on every
     grid (but for polynomials of lower degree, which are there too).
     """
     columns = []
@@ -294,8 +294,8 @@ def ordered_motion_sums(
 ) -> MotionSums:
     """Sums over readings in order of time.
 
-    ``index`` and ``place`` are those of `Knots.place`, the index not decreasing; ``target`` is what
-    is left of each reading, ``weight`` the factor of the splines in its row, ``1 + error'``.
+    ``index`` and ``place`` are those of `Knots.place`, the index not decreasing; ``target`` is the
+    residual of each reading, ``weight`` the factor of the splines in its row, ``1 + error'``.
     ``columns`` writes the ``width`` common columns of a slice of readings into an array; only
     ``valid`` readings count.
     """

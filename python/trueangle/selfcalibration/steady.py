@@ -1,4 +1,4 @@
-"""Patterns of an encoder from stretches of roughly steady motion, iterated to the true angle."""
+"""Patterns of an encoder from segments of roughly steady motion, iterated to the true angle."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .splines import Knots, ordered_motion_sums, spline_basis, spline_values
 #: Readings that the first iterations look at: enough to come close.
 _FIRST_LOOK: Final = 40_000
 
-#: Intervals of the first grid; a finer one is laid where the evidence asks for it.
+#: Intervals of the first grid; a finer one is laid where the evidence needs it.
 _INTERVALS: Final = 512
 
 #: Steps of the pattern below this share of its standard error end the iteration.
@@ -31,7 +31,7 @@ _SEARCHES: Final = 3
 #: Turns between knots of a motion that leaves order 1 alone (to 1 %).
 _TURNS_PER_KNOT: Final = 2.0
 
-#: A residual beyond so many standard deviations (by the median) is an outlier.
+#: A residual beyond this many standard deviations (by the median) is an outlier.
 _WILD: Final = 7.0
 
 #: Slope of the error that no step goes beyond: at 1 an angle would be read twice.
@@ -86,7 +86,7 @@ def fit_steady(
     start : SteadyFit, optional
         Where to begin.
     groups : ndarray of int, optional
-        0 or 1 for each reading: one pattern for each group, beside one motion.
+        0 or 1 for each reading: one pattern for each group, together with one motion.
     thorough : bool
         Look at all readings in the last iteration; else at some 40 000.
     smooth : bool
@@ -133,7 +133,7 @@ def fit_steady(
         left = work.residuals(knots, spline, unknowns)
         return SteadyFit(orders, ripple, unknowns, fit, readings, left, valid)
     # Knots so far apart that no order fits between them, until the true angles are known:
-    # at wrong ones, what is left repeats every turn and would pass for motion.
+    # at wrong ones, the residual repeats every turn and would pass for motion.
     stiff = _TURNS_PER_KNOT / readings.mean_speed
     while True:
         knots = readings.knots(intervals)
@@ -221,7 +221,7 @@ class GaussNewtonSteps:
     def state(
         self, knots: Knots, spline: Array, unknowns: Array, rows: slice
     ) -> tuple[NDArray[np.int64], Array, Array, Array, Array]:
-        """Place on the knots, true angle, weight of motion and what is left."""
+        """Place on the knots, true angle, weight of motion and the residual."""
         data = self.readings
         time, stretch = data.time[rows], data.stretch[rows]
         index, place = np.empty(time.size, dtype=np.int64), np.empty(time.size)
@@ -252,7 +252,7 @@ class GaussNewtonSteps:
         shortest: float = 0.0,
         near: MotionFit | None = None,
     ) -> tuple[MotionFit, Array, Array, float]:
-        """Fit what is left; how far the pattern moved, in standard errors."""
+        """Fit the residual; how far the pattern moved, in standard errors."""
         rows = slice(None, None, stride)
         data = self.readings
         index, place, theta, weight, left = self.state(knots, spline, unknowns, rows)
@@ -312,5 +312,5 @@ class GaussNewtonSteps:
         return unknowns + step
 
     def residuals(self, knots: Knots, spline: Array, unknowns: Array) -> Array:
-        """What is left of every reading."""
+        """The residual of every reading."""
         return self.state(knots, spline, unknowns, slice(None))[-1]

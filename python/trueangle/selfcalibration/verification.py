@@ -1,4 +1,4 @@
-"""Tests of a pattern: one part of the readings predicts another; the chance of their difference."""
+"""Tests of a pattern: one part of the readings predicts another."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def chance_of_difference(gap: Array, covariance: Array, freedom: float = math.in
 def held_out_patterns(fit: SteadyFit, tested: Sequence[float]) -> dict[str, HeldOutPattern]:
     """Odd turns against even ones, fast against slow, one direction against the other.
 
-    Both parts share the motion; each has a pattern of its own. Slow against fast is made
+    Both parts share the motion; each has a separate pattern. Slow against fast is made
     without ripple columns: it is the only test that shows ripple.
     """
     readings = fit.readings
@@ -96,9 +96,9 @@ def held_out_patterns(fit: SteadyFit, tested: Sequence[float]) -> dict[str, Held
 
 
 def _turn_numbers(readings: SegmentReadings) -> NDArray[np.int64]:
-    """Turns counted from the start of each stretch, and on from stretch to stretch.
+    """Turns counted from the start of each segment, and on from segment to segment.
 
-    A part of a turn at the end of a stretch counts with the turn before.
+    A part of a turn at the end of a segment counts with the turn before.
     """
     found, before = [], 0
     for stretch in readings.stretches:

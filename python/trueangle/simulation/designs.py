@@ -49,7 +49,7 @@ class RunDesign:
         equal steps of time, as a logger reads.
     start_deg : float
     turns : float
-        Whole travel, summed over the stretches between reversals.
+        Whole travel, summed over the segments between reversals.
     reversals : list of float
         Shares of the travel, ascending in (0, 1), at which the direction turns round.
     torque_Nm : float
@@ -74,14 +74,14 @@ class RunDesign:
     imbalance_deg_s2, imbalance_phase_deg : float
         Acceleration ``u sin(theta + phase)`` by imbalance.
     friction_deg_s2, friction_memory_s : float
-        Standard deviation and memory of a friction that drifts.
+        Standard deviation and correlation time of a friction that drifts.
     deg_s2_per_A : float, optional
-        Acceleration per ampere; the current that the loop asks for joins ``current_A``.
+        Acceleration per ampere; the current that the loop needs joins ``current_A``.
     motor_sigma_arcsec : float, optional
         The motor's own angle is recorded too, not reduced, with this noise.
     coupled : mapping of str to list of float
         Other joints of a robot: the angles (degrees) that each passes in straight lines, evenly
-        spaced over the travel of the run; one angle where it stands still.
+        spaced over the travel of the run; one angle where it is still.
     """
 
     label: str | None = None
@@ -145,7 +145,7 @@ class RunDesign:
         object.__setattr__(self, "coupled", coupled)
 
     def _check_rotor(self, refuse: Callable[[str, str], ArgumentError]) -> None:
-        """What moves the shaft beside the speed asked for needs one, in one direction."""
+        """What moves the shaft together with the commanded speed needs one, in one direction."""
         for name in ("loop_bandwidth_hz", "cogging_order", "friction_memory_s", "deg_s2_per_A"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < math.inf:
@@ -164,7 +164,7 @@ class RunDesign:
 
     @property
     def is_moved(self) -> bool:
-        """Something moves the shaft beside the speed asked for."""
+        """Something moves the shaft in addition to the commanded speed."""
         pushes = (self.cogging_deg_s2, self.imbalance_deg_s2, self.friction_deg_s2)
         return self.loop_bandwidth_hz is not None or any(pushes)
 

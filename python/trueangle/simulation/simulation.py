@@ -33,7 +33,7 @@ EFFECT = "an effect of a simulation, in arcsec and degrees"
 @told_kinds
 @dataclass(frozen=True)
 class Simulation(ShownResult):
-    """What is believed of a joint, and how it is measured.
+    """The assumed model of a joint, and how it is measured.
 
     ::
 
@@ -92,7 +92,7 @@ class Simulation(ShownResult):
 
     @property
     def surroundings(self) -> JointPattern:
-        """What effects are given beyond the readings, of what is believed."""
+        """What effects are given beyond the readings, of the assumed model."""
         return JointPattern(self.joint, self.pattern)
 
     @property
@@ -110,7 +110,7 @@ class Simulation(ShownResult):
         )
 
     def summary(self) -> str:
-        """What is believed as a simulation file has it, and the names of the runs."""
+        """The assumed model as a simulation file has it, and the names of the runs."""
         named = ", ".join(design.label or str(i) for i, design in enumerate(self.runs, 1))
         told = f"\n# {counted(self.runs, 'run')}" + (f": {named}" if named else "")
         return simulation_text(self._stated._replace(source=None, runs=())) + told
@@ -168,7 +168,7 @@ def simulate(
     -------
     list of CalibrationRun
         In degrees, with time, velocity, torque, temperature and mount; with the signals
-        that joint and runs have beside: ``head1`` ..., ``motor``, ``shift``, ``current``.
+        that joint and runs have together with: ``head1`` ..., ``motor``, ``shift``, ``current``.
 
     Raises
     ------
@@ -293,7 +293,7 @@ def _effects(effects: Iterable[Effect]) -> tuple[Effect, ...]:
 
 
 def _meant(value: object) -> str:
-    """The effect that stands for what was given."""
+    """The effect that represents what was given."""
     effect = KINDS.get(getattr(value, "kind", ""))
     if effect is None:
         return ""
@@ -322,7 +322,7 @@ def _refuse_endless(sim: Simulation, what: str) -> NoReturn:
 
 
 def _written(sim: Simulation, degrees: Array) -> Array:
-    """What is recorded of readings: rounded, where an effect says so."""
+    """What is recorded of readings: rounded, where an effect reports it."""
     for effect in sim.effects:
         degrees = effect.written(degrees)
     return degrees
@@ -339,7 +339,7 @@ def _beside(
     """What heads and the motor's own encoder read, degrees; not a number where not recorded.
 
     ``own`` is what the joint's own head reads. A further head sees lines and effects where
-    it stands, random effects by their mean.
+    it is, random effects by their mean.
     """
     found = {}
     for i, head in enumerate(sim.joint.heads, 1):

@@ -34,7 +34,7 @@ T = TypeVar("T")
 
 
 class StatedSimulation(NamedTuple):
-    """What a simulation file says, the fields of `Simulation` in their order."""
+    """What a simulation file states, the fields of `Simulation` in their order."""
 
     joint: Joint
     harmonics: tuple[Harmonic, ...]
@@ -124,7 +124,7 @@ def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
 
 
 def _geared(joint: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A gear is a strain wave gear behind a motor encoder unless the file says otherwise."""
+    """A gear is a strain wave gear behind a motor encoder unless the file states otherwise."""
     if joint.get("gear_ratio", 1.0) == 1.0:
         return joint
     return {"fixed_member": "circular_spline", "encoder_side": "motor"} | dict(joint)
@@ -235,7 +235,7 @@ def guarded_build(path: str | Path, where: str, build: Callable[[], T]) -> T:
 
 
 def simulation_table(sim: StatedSimulation) -> dict[str, Any]:
-    """The tables of a simulation file; keys at their defaults are left out of ``run``."""
+    """The tables of a simulation file; keys at their defaults are omitted of ``run``."""
     runs = []
     for design in sim.runs:
         values = {field.name: getattr(design, field.name) for field in fields(design)}
@@ -264,7 +264,7 @@ def _given(entry: Any) -> dict[str, Any]:
 
 
 def write_simulation(sim: StatedSimulation, path: str | Path) -> None:
-    """Write a simulation file, beside and then renamed; floats round-trip exactly.
+    """Write a simulation file, together with and then renamed; floats round-trip exactly.
 
     Where the simulation was read from a file, that file's text is kept and only what
     is new is appended, so comments and layout stay. Otherwise the whole is written.

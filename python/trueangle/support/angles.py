@@ -34,7 +34,7 @@ _BLOCK: Final = 512
 
 
 def check_period(period: float) -> float:
-    """``period`` as a float, or an `ArgumentError` that says what it must be."""
+    """``period`` as a float, or an `ArgumentError` that states what it must be."""
     try:
         value = float(period)
     except (TypeError, ValueError):
@@ -48,7 +48,7 @@ def check_period(period: float) -> float:
 
 
 def checked_sign(sign: int) -> int:
-    """``indicated_sign`` as it is, or an `ArgumentError` that says what it must be."""
+    """``indicated_sign`` as it is, or an `ArgumentError` that states what it must be."""
     if isinstance(sign, bool) or sign not in (1, -1):
         raise ArgumentError(
             "indicated_sign must be 1, or -1 where the indicated angle is minus what the sensor "
@@ -139,7 +139,7 @@ def circular_mean(
 ) -> float:
     """Direction of the mean of unit vectors at ``angle``, in ``(-period/2, period/2]``.
 
-    Unlike the arithmetic mean it does not depend on where the turn is cut.
+    In contrast to the arithmetic mean it does not depend on where the turn is cut.
 
     Examples
     --------
@@ -180,7 +180,7 @@ def power_sums(
         right = columns[part] + 0j
         for first in range(0, count, _RESEED):
             powers = np.empty((min(_RESEED, count - first), within.size), dtype=np.complex128)
-            # The product m * t loses what lies before the point: take it off first.
+            # The product m * t loses what lies before the point: subtract it  first.
             phase = first * within
             powers[0] = np.exp(2j * math.pi * (phase - np.round(phase)))
             filled, stride = 1, step

@@ -19,7 +19,7 @@ _ALIKE = 1e-7
 
 
 def first_largest(values: NDArray[np.floating[Any]]) -> int:
-    """Where the first value stands that is as large as the largest, to 1e-7 of it.
+    """Where the first value is that is as large as the largest, to 1e-7 of it.
 
     Mirror images are equally good; which of them wins would else be up to the last digit, and
     differ between processors.

@@ -1,7 +1,7 @@
-"""Time of long work: how far it is, what is left, when it must end.
+"""Time of long work: how far it is, the remainder, when it must end.
 
 What works consults the `Deadline` that is in force (`current_deadline`) and needs no argument for
-it; who asked for the work enters one with `with_deadline`, and may let Ctrl-C end it early
+it; who requested the work enters one with `with_deadline`, and may let Ctrl-C end it early
 (`ending_early`).
 """
 
@@ -23,7 +23,7 @@ from ..errors import ArgumentError
 from .suggestions import check_choice
 
 #: Work that may be done where no time was given, in numbers of columns that are fitted or scored:
-#: so many, or so many for each item of many. Ordinary readings take a tenth to a third of that.
+#: this many, or this many for each item of many. Ordinary readings take a tenth to a third of that.
 LEAST, PER_ITEM = 1e8, 6e3
 
 #: Ways of showing progress.
@@ -52,7 +52,7 @@ class Deadline:
     ----------
     within : float or None
     stopped : bool
-        Ctrl-C asked for its end.
+        Ctrl-C requested its end.
 
     Raises
     ------
@@ -105,12 +105,12 @@ class Deadline:
         return late or self.stopped
 
     def spend(self, numbers: int) -> None:
-        """So many numbers of columns are fitted or scored."""
+        """Count numbers of columns that are fitted or scored."""
         self._spent += numbers
 
     @property
     def why(self) -> str:
-        """Why work was told to end."""
+        """The reason for ending the work."""
         if self.stopped:
             return "it was interrupted"
         if self.within is not None:
@@ -122,7 +122,7 @@ class Deadline:
 
     @contextlib.contextmanager
     def bounded(self, items: int) -> Iterator[None]:
-        """Work on so many items that must come to an end where no time was given.
+        """Work on this many items that must come to an end where no time was given.
 
         What is done is counted (`spend`), and no clock looked at: the same readings give the same
         account on any machine, however busy.
@@ -136,12 +136,12 @@ class Deadline:
 
     @property
     def cut(self) -> str:
-        """What was being done when the work was first told to end; empty where it never was."""
+        """What was being done when the end was first requested; empty where it never was."""
         return self._cut
 
     @contextlib.contextmanager
     def part(self, share: float) -> Iterator[None]:
-        """Work that must end when ``share`` of the time is up: the rest is for what follows."""
+        """Work that must end when ``share`` of the time is up: rest is for what follows."""
         before, self._share = self._share, min(share, self._share)
         try:
             yield
@@ -153,7 +153,7 @@ class Deadline:
     ) -> None:
         """``done`` of ``total`` are done of a stage; seconds that follow it, where known.
 
-        ``bound`` says what the time left is where none was given.
+        ``bound`` states what the time left is where none was given.
         """
         now = self._clock()
         if stage != self._stage or done == 0:
@@ -216,9 +216,9 @@ def under_deadline(own: Deadline) -> Iterator[Deadline]:
 
 @contextlib.contextmanager
 def with_deadline(within: float | None = None, style: str = "none") -> Iterator[Deadline]:
-    """Work at a pace of its own; parameters are those of `Deadline`.
+    """Work at a separate pace; parameters are those of `Deadline`.
 
-    Work inside other work that asks for neither has the pace of that.
+    Work inside other work that needs neither has the pace of that.
     """
     outer = _CURRENT.get()
     if outer is not None and within is None and style == "none":
@@ -236,7 +236,7 @@ class _Interruption:
 
 @contextlib.contextmanager
 def ending_early() -> Iterator[_Interruption]:
-    """Let a first Ctrl-C ask the work at its pace to end with what it has; a second is as before.
+    """Let a first Ctrl-C request the work to end with what it has; a second is as before.
 
     Where no pace is in force, outside the main thread, or where Ctrl-C is ignored (a job in the
     background), it is what it always is.

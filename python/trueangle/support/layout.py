@@ -18,16 +18,16 @@ _NARROWEST, _WIDEST, _USUAL = 60, 100, 80
 _ENDLESS: Final = 1_000_000
 _UNFOLDED: Final = ContextVar("unfolded", default=False)
 
-#: Columns that words have behind a label at least; else they stand below it.
+#: Columns that words have behind a label at least; else they are below it.
 _ROOM: Final = 20
 
 #: How a line begins that is there to be copied, and stays whole.
 _COPIED: Final = ("--", "trueangle ")
 
-#: What stands for a blank at which no line is cut.
+#: What represents a blank at which no line is cut.
 _JOINED: Final = "\0"
 
-#: What further lines of an entry stand under: the text behind a mark, a number or a label.
+#: What further lines of an entry are under: the text behind a mark, a number or a label.
 _LEAD: Final = re.compile(r"\s*(?:- |! |\[\d+\] |\d+\. |note: |\S.{0,28}? {2,}(?=\S))?")
 
 
@@ -72,7 +72,7 @@ def text_columns() -> int:
 
 
 def wrapped_lines(text: str, indent: int = 0, first: int = 0) -> list[str]:
-    """Lines of a paragraph; ``first`` and ``indent`` are how far the first and others stand in.
+    """Lines of a paragraph; ``first`` and ``indent`` are how far the first and others are in.
 
     Words are never broken, so that options and paths can be copied.
 

@@ -18,7 +18,7 @@ _SHORT = 30
 class ShownResult:
     """A result that shows itself: one line as ``repr``, its summary as text and in notebooks.
 
-    A class says what its line holds by ``_brief``, the two or three numbers that matter, and has
+    A class states what its line holds by ``_brief``, the two or three numbers that matter, and has
     a ``summary``; without them its plain fields are shown.
     """
 
@@ -31,7 +31,7 @@ class ShownResult:
             cls.__repr__ = ShownResult.__repr__  # type: ignore[method-assign]
 
     def _brief(self) -> str:
-        """What stands in the brackets of the line."""
+        """What is in the brackets of the line."""
         return ", ".join(self._plain_fields())
 
     def _plain_fields(self) -> Iterator[str]:

@@ -26,7 +26,7 @@ def median(values: ArrayLike, axis: int = -1) -> Any:
 
 
 def quantile(values: ArrayLike, share: float, axis: int = -1) -> Any:
-    """What `numpy.quantile` gives: the straight line between the two ranks beside ``share``.
+    """What `numpy.quantile` gives: the straight line between the two ranks next to ``share``.
 
     Examples
     --------
@@ -41,7 +41,7 @@ def quantile(values: ArrayLike, share: float, axis: int = -1) -> Any:
 
 
 def _beside(values: ArrayLike, share: float, axis: int) -> tuple[Any, Any, float, Any]:
-    """The values of the two ranks beside ``share``, how far between them it lies, the last."""
+    """The values of the two ranks next to ``share``, how far between them it lies, the last."""
     given = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
     last = given.shape[-1] - 1
     if last < 0:
@@ -49,5 +49,5 @@ def _beside(values: ArrayLike, share: float, axis: int) -> tuple[Any, Any, float
         return nothing, nothing, 0.0, nothing
     low = int(share * last)
     high = min(low + 1, last)
-    ranked = np.partition(given, sorted({low, high, last}), axis=-1)  # NaN stands last
+    ranked = np.partition(given, sorted({low, high, last}), axis=-1)  # NaN is last
     return ranked[..., low], ranked[..., high], share * last - low, ranked[..., last]

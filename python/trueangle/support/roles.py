@@ -54,15 +54,15 @@ _SPELLINGS = {
     "a": "A",
     "ma": "mA",
 }
-#: A name and what stands in brackets behind it.
+#: A name and what is in brackets behind it.
 BRACKET = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
-#: Roles beside the angles and the signals.
+#: Roles next to the angles and the signals.
 LABELS: Final = ("run", "unit", "when")
 #: Angles that are no signals; a second thing that is added to the reference is reference_offset2.
 ANGLES = ("reference", "indicated", "error")
 _OFFSET = re.compile(r"reference_offset[1-9]?[0-9]?")
 
-#: Columns asked for: by role, the name and the unit where it is told.
+#: Columns requested: by role, the name and the unit where it is reported.
 Wanted: TypeAlias = Mapping[str, tuple[str, str | None]]
 
 
@@ -73,7 +73,7 @@ class RoleColumn(NamedTuple):
     ----------
     role, name : str
     unit : str or None
-        None where nothing tells it.
+        None where nothing shows it.
     is_asked : bool
         It was named, not found by its name.
     is_reversed : bool
@@ -132,7 +132,7 @@ def role_kind(role: str) -> str:
     Raises
     ------
     ArgumentError
-        There is no such role; says what may be meant.
+        There is no such role; states what may be meant.
     """
     if role in ANGLES or _OFFSET.fullmatch(role):
         return "angle"

@@ -87,9 +87,7 @@ def test_every_file_is_told_in_its_order(exported, capsys):
 
 @pytest.mark.parametrize("runs", [None, ()])
 def test_a_plan_without_runs_is_not_written(runs, capsys):
-    with pytest.raises(
-        ValueError, match=r"^no further run would distinguish anything: p\.toml not"
-    ):
+    with pytest.raises(ValueError, match=r"^no further run would .* anything: p\.toml not"):
         written(capsys, runs=runs or (), plan="p.toml")
 
 

@@ -173,7 +173,7 @@ def test_a_ratio_that_is_one_of_several_is_not_confirmed():
         if aliases is not None:
             parameters["aliases"] = quantity(aliases)
         told = reason(finding("wrong_gear_ratio", parameters))
-        assert told.startswith(f"at these positions {said} would show") == bool(said)
+        assert told.startswith(f"at these positions {said} would give") == bool(said)
         assert (told == "") == (not said)
         # Of other causes aliases are told, and are no doubt.
         assert reason(finding("non_integer_order", parameters)) == ""

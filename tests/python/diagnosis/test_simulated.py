@@ -162,7 +162,7 @@ def test_what_is_no_table_is_refused():
             ta.read_runs(data)
     with pytest.raises(ArgumentError, match="equally long"):
         ta.read_runs({"reference_deg": [1.0, 2.0], "indicated_deg": [1.0]})
-    with pytest.raises(ArgumentError, match="nothing is believed"):
+    with pytest.raises(ArgumentError, match="no simulation"):
         ta.diagnose(measured())
 
 

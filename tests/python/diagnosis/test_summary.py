@@ -117,7 +117,7 @@ def test_the_account_says_each_of_its_numbers_in_one_unit(result, unit, per_arcs
     # An angle of phase is in degrees whatever the errors are in.
     assert "phase deg 90.0 +- 1.5, assumed 60.00" in text
     assert "motor order 2: wrong phase" in text
-    assert "alone accounts for: backlash 78 %, latency 8 %" in text
+    assert "explained by each alone: backlash 78 %, latency 8 %" in text
 
 
 def test_what_is_not_understood_is_told_by_size_share_and_chance(result) -> None:

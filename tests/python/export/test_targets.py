@@ -269,7 +269,7 @@ def test_tables_name_the_orders_they_cannot_hold(target, limit, orders, joint):
 
 
 def test_max_arcsec_of_a_fixed_table_is_kept_or_refused(tmp_path):
-    with pytest.raises(ta.errors.ArgumentError, match=r"moteus differs by up to .* 2 is asked for"):
+    with pytest.raises(ta.errors.ArgumentError, match=r"moteus differs by up to .* 2 is allowed"):
         ta.export_model(golden_model(), "moteus", tmp_path / "a.cfg", max_arcsec=2.0, bits=14)
     assert list(tmp_path.iterdir()) == []
     made = ta.export_model(

@@ -104,7 +104,5 @@ def test_what_leads_to_the_end_of_the_file_or_beyond_leads_to_nothing(beyond: in
     written(path, block("DG", [0, 0, size + beyond]), bytes(24))
     check_chains(path)
     written(path, block("DG", [0, size + beyond, 0]), bytes(24))
-    with pytest.raises(
-        FileError, match=f"leads to byte {size + beyond}, where there is no CG block"
-    ):
+    with pytest.raises(FileError, match=f"leads to byte {size + beyond}, where .* no CG block"):
         check_chains(path)

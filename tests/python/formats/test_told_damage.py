@@ -98,8 +98,8 @@ TOLD = {
     "a circle": ("a.mf4", mdf_block(b"##CG", 0),
                  "is damaged: the block at byte HERE leads back to that at HERE"),
     "another block": ("a.mf4", mdf_block(b"##CG", 1),
-                      "is damaged: the CG block at byte HERE leads to byte 8, where no CN block "
-                      "stands"),
+                      "is damaged: the CG block at byte HERE leads to byte 8, where there is no "
+                      "CN block"),
     "no mdf": ("a.mf4", of_bytes(b"x" * 100), "is not MDF4"),
     "virtual": ("a.h5", virtual,
                 "column 'reference_deg': its values are in other data sets or files (a virtual "

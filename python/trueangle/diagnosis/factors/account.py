@@ -17,13 +17,13 @@ from .extension import curves_of
 from .factor import Factor, FactorCurve
 from .group import FACTORS, Group
 
-#: Readings used at most; of more, one of every so many in a row.
+#: Readings used at most; of more, one of every this many in a row.
 MOST_READINGS: Final = 2500
 
 #: Part of the variance that each factor may have where the noise is first looked for.
 AT_FIRST: Final = 0.3
 
-#: Columns and orders of groups that the noise is first looked for beside.
+#: Columns and orders of groups that the noise is first looked for together with.
 FEW: Final = 4
 LOWEST: Final = 4.0
 
@@ -58,7 +58,7 @@ HELD: Final = 1e-7
 
 
 def _prior(groups: Sequence[Group]) -> list[float]:
-    """Of each group: one of them is expected, and as much of what stood out of many as of one."""
+    """Of each group: one of them is expected, and the strongest of many counts as one."""
     each = 1.0 / max(len(groups), 2)
     return [0.0 if group.factor == NAME else each / group.alternatives for group in groups]
 
@@ -100,7 +100,7 @@ class FactorAccount:
     def less(self, given: Sequence[float], tau: Sequence[float]) -> FactorAccount:
         """Of what groups that are given leave by themselves: the others of a model.
 
-        Where both are the same columns, all of it is theirs.
+        Where both are the same columns, everything is theirs.
         """
         _, mean, _ = self.sums.posterior(list(given))
         others = np.where(np.array(given) > 0.0, 0.0, tau).tolist()
@@ -131,7 +131,7 @@ class FactorAccount:
     def best_beside(
         self, given: Sequence[float], allowed: Iterable[int], start: Sequence[float] | None = None
     ) -> tuple[float, list[float]]:
-        """Score and model of the best of some groups beside those given."""
+        """Score and model of the best of some groups together with those given."""
         probabilities = [0.0] * len(self.groups)
         for k in allowed:
             if given[k] == 0.0:
@@ -191,7 +191,7 @@ def _above_rounding(noise: Array, total: float) -> Array:
 
 
 def _is_first(group: Group) -> bool:
-    """Groups that the noise is first looked for beside: no strong error is taken for slow noise."""
+    """Groups that the noise is first estimated with, so that no strong error enters it."""
     low = len(group.orders) == 0 or max(group.orders) <= LOWEST
     return group.factor == NAME or (group.columns.shape[1] <= FEW and low and not group.is_product)
 
@@ -288,7 +288,7 @@ def _alike(
 ) -> tuple[str, ...]:
     """Factors any of which explains as much in the place of one, or is nearly the same columns.
 
-    Of the latter the evidence may tell, and tells of errors of the signals.
+    The evidence may choose the latter, and shows errors of the signals.
     """
     rest = account.without(members)
     own, _ = account.best_beside(rest, members)

@@ -92,7 +92,7 @@ class Factor(PlainResult):
         Factors that are the same columns in these runs.
     curve : FactorCurve
     effects : list of Curve
-        What stands for it in a simulation; none of what other runs do not show.
+        What represents it in a simulation; none of what other runs do not show.
     """
 
     factor: str

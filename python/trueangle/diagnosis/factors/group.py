@@ -57,7 +57,7 @@ class Group:
         of a group that is none.
     unit : str
     alternatives : float
-        Groups of which it was the one that stood out.
+        Groups of which it was the one that was out.
     once : bool
         It is of one run, and no other will show it.
     """

@@ -1,4 +1,4 @@
-"""The groups of columns that readings of these runs can tell of."""
+"""The groups of columns that readings of these runs can show."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from .group import GRID, Group
 LOW: Final = 12
 BANDS: Final = ((13, 24), (25, 48))
 
-#: Lines that products with a factor are always asked for.
+#: Lines that products with a factor are always requested.
 ALWAYS: Final = (1.0, 2.0)
 
-#: Lines of a spectrum that are asked for beside, and by how much each must stand out of the mean
-#: power: of noise alone about one of 500 does.
+#: Lines of a spectrum that are requested together with, and by how much each must be significant of
+#: the mean power: of noise alone about one of 500 does.
 PEAKS: Final = 5
 STANDS_OUT: Final = 8.0
 
@@ -42,7 +42,7 @@ ONE_SIZE: Final = 0.02
 #: Share of a turn below which the place is a smooth function, too.
 ARC: Final = 0.98
 
-#: Lengths of transitions after a reversal, in shares of the median stretch of one direction.
+#: Lengths of transitions after a reversal, in shares of the median segment of one direction.
 LENGTHS: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
 
 #: Lengths of what rises before an event and settles after it, in shares of the longest run.
@@ -137,7 +137,7 @@ def factor_groups(
 
 
 class _PeakSpectrum:
-    """Lines that stand out, of values at angles in radians."""
+    """Lines that are significant, of values at angles in radians."""
 
     def __init__(self, theta: Array) -> None:
         self.count = int(min(ORDERS, theta.size / SAMPLED))
@@ -332,7 +332,7 @@ def _longest(signals: Signals, x: Array) -> Array:
 
 
 def _clock(signals: Signals) -> Iterator[Axis]:
-    """Time in the run: what all runs show of it; what each has of its own is noise."""
+    """Time in the run: what all runs show of it; what only one has is noise."""
     spans = [float(np.ptp(signals.clock[a:b])) for a, b in signals.run_bounds()]
     whole = max(spans, default=0.0)
     if not whole > 0.0:
@@ -347,7 +347,7 @@ def _clock(signals: Signals) -> Iterator[Axis]:
 
 
 def _of_runs(signals: Signals, lines: Sequence[float]) -> Iterator[Group]:
-    """Zeros of the runs, their trend, and patterns of their own."""
+    """Zeros of the runs, their trend, and separate patterns."""
     if signals.runs < 2:
         return
     run = signals.run.astype(np.float64)
@@ -385,7 +385,7 @@ def _in_order(x: Array) -> Array:
 
 
 def _of_frequencies(signals: Signals, frequencies: Sequence[float]) -> Iterator[Group]:
-    """Lines in time, of a phase of its own in every run."""
+    """Lines in time, with a new phase in every run."""
     if signals.time is None:
         return
     for hertz in frequencies:

@@ -1,4 +1,4 @@
-"""Is a finding's form right? It is held against the free functions of all factors."""
+"""Is a finding's form right? It is compared with the free functions of all factors."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ FAMILIES: Final = (
     {"run", "run_time", "temperature"},
 )
 
-#: The factor of how an error settles after a reversal, which is told of any: no name stands by it.
+#: The factor of how an error settles after a reversal, which is reported of any: no name is by it.
 TRANSITION: Final = "reversal_time"
 
 #: Bumps of one place from which on they are one function of it; and how near, in their widths,
 #: two are that are one.
 MOST_BUMPS, NEAR = 3, 3.0
 
-#: Part of columns that is left beside others that are the same.
+#: Part of columns that is left together with others that are the same.
 _SAME: Final = 1e-6
 
 #: Standard errors within which a step is a whole number of counts, or as large as another.
@@ -53,7 +53,7 @@ SAME: Final = 3.0
 def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]) -> Group | None:
     """A finding's own columns at some readings as a group; None of what has none.
 
-    What says how the noise goes has none: the account has a noise of its own.
+    What states how the noise goes has none: the account has a separate noise.
     """
     parts = []
     for k in finding.group:
@@ -84,7 +84,7 @@ def _group(columns: Array, sought: float) -> Group | None:
 
 
 class NamedForms:
-    """Findings as groups beside the free functions of an account.
+    """Findings as groups together with the free functions of an account.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class NamedForms:
     places : dict of int to int
         Group of a finding by its place in the list of findings.
     base : int or None
-        Group that is in beside all others.
+        Group that is in together with all others.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class NamedForms:
         start: Sequence[float] | None = None,
         without: Sequence[str] = (),
     ) -> tuple[float, list[float]]:
-        """Score and groups of the best free functions, without some factors, beside findings."""
+        """Score and groups of the best free functions, without some factors, with findings."""
         allowed = [k for k in self.free if not self.is_of(k, without)]
         if start is not None:
             start = [0.0 if self.is_of(k, without) else tau for k, tau in enumerate(start)]
@@ -136,7 +136,7 @@ class NamedForms:
         return score - sum(self.price(name) for name in names if name in self.places), tau
 
     def price(self, name: int) -> float:
-        """What a finding costs beside free functions, of which it is one, of one size."""
+        """What a finding costs together with free functions, of which it is one, of one size."""
         own = self.account.groups[self.places[name]].alternatives
         return float(np.log(len(self.account.groups) * SIZES * own))
 
@@ -147,7 +147,7 @@ class NamedForms:
         tau: Sequence[float],
         factors: Sequence[str],
     ) -> tuple[float, float]:
-        """Variance that some findings take, and that free functions of factors take of the rest."""
+        """Variance that some findings take, and that free functions of factors take of rest."""
         given = self.given(sure)
         rest = self.account.less(given, tau)
         free = [k for k in self.free if self.is_of(k, factors)]
@@ -180,9 +180,9 @@ def names_by_form(
 ) -> list[Finding]:
     """The findings, those not confirmed whose form is not better than the free function.
 
-    One is confirmed where a free function of any factors in its place has no more than a log
-    Bayes factor of 3 in its favour, and where beside it the free functions of its own factors
-    take no more than 5 % of what both take.
+    One is confirmed where a free function of any factors in its place has at most a log
+    Bayes factor of 3 in its favour, and where with it the free functions of its own factors
+    take at most 5 % of what both take.
     """
     found = list(findings)
     for reason_of in (_one_function, _no_counts):
@@ -275,7 +275,7 @@ def _bump(finding: Finding) -> tuple[float, float]:
 
 
 def _no_counts(findings: Sequence[Finding], regression: Regression) -> dict[int, str]:
-    """Steps that are taken back, or neither alike nor whole numbers of the sensor's counts."""
+    """Steps that are taken back, or neither equal nor whole numbers of the sensor's counts."""
     found = {}
     for k, finding in enumerate(findings):
         if not finding.confirmed or finding.cause != MissedCounts.kind:

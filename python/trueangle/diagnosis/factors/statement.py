@@ -1,4 +1,4 @@
-"""The factors of a diagnosis, and its findings held against them."""
+"""The factors of a diagnosis, and its findings compared with them."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def stated_factors(
 
 
 def _factors(names: NamedForms, found: Sequence[Finding], shafts: dict[str, float]) -> list[Factor]:
-    """What the readings follow with its names, and beside all names what has none."""
+    """What the readings follow with its names, and together with all names what has none."""
     account = names.account
     stated, named = [], set()
     for factor in factors_of(account, shafts):
@@ -109,7 +109,7 @@ def _less_what_no_factor_is(regression: Regression) -> Array:
 
 
 def _rows(regression: Regression) -> NDArray[np.int64]:
-    """Readings that take part: no outliers, and one of every so many where there are many."""
+    """Readings that take part: no outliers, and one of every this many where there are many."""
     rows = np.flatnonzero(~regression.outlying)
     if rows.size <= MOST_READINGS:
         return rows

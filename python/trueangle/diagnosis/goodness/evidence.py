@@ -1,4 +1,4 @@
-"""One test of a goodness of fit; p values of the largest of many, made even, by drawn signs."""
+"""One test of a goodness of fit; p values of the largest of many, made even, by sampled signs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DRAWS, ENOUGH_UNITS = 32, 6
 
 @dataclass(frozen=True)
 class Evidence:
-    """What one test says.
+    """What one test states.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Evidence:
         Its name.
     statistic : float
     p : float
-        Chance that noise alone gives as large a statistic, the search included.
+        Probability that noise alone gives as large a statistic, the search included.
     says : str
         What it means, in one sentence.
     decides : bool
@@ -61,7 +61,7 @@ class Evidence:
 
 
 def largest_of(p: float, count: float) -> float:
-    """Chance that the smallest of ``count`` independent p values is ``p`` or less.
+    """Probability that the smallest of ``count`` independent p values is ``p`` or less.
 
     Examples
     --------
@@ -72,7 +72,7 @@ def largest_of(p: float, count: float) -> float:
 
 
 def drawn_signs(units: int) -> NDArray[np.float64]:
-    """Signs of units drawn at random, shape (draws, units); no draws for few units.
+    """Signs of units sampled at random, shape (draws, units); no draws for few units.
 
     What noise gives a unit it might have given with the other sign; what they share is lost.
     """
@@ -81,10 +81,10 @@ def drawn_signs(units: int) -> NDArray[np.float64]:
 
 
 def made_even(p: float, drawn: Sequence[float]) -> float:
-    """A p value of a search, even under noise, by those of the same search with signs drawn.
+    """A p value of a search, even under noise, by those of the same search with signs sampled.
 
     Trials depend on each other: the smallest of them has ``x = - ln(1 - p)`` exponentially
-    distributed with a rate that B draws tell, so that the chance of less is
+    distributed with a rate that B draws show, so that the probability of less is
 
     ::
 

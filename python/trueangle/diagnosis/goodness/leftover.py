@@ -1,4 +1,4 @@
-"""What is left of the readings once everything known is taken off, as plain arrays."""
+"""The residual of the readings once everything known is subtracted, as plain arrays."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Leftover:
         return max(float(np.ptp(self.theta[a:b])) for a, b in self.bounds) / (2.0 * np.pi)
 
     def units(self) -> list[tuple[int, int]]:
-        """Stretches that noise makes independent of each other: runs, or pieces of few runs."""
+        """Segments that noise makes independent of each other: runs, or pieces of few runs."""
         bounds = self.bounds
         if len(bounds) >= ENOUGH_RUNS:
             return bounds
@@ -82,7 +82,7 @@ class Leftover:
         return found
 
     def centred(self, bounds: list[tuple[int, int]]) -> Array:
-        """The residual less its mean in every one of some stretches."""
+        """The residual less its mean in every one of some segments."""
         out = self.residual.copy()
         for start, stop in bounds:
             out[start:stop] -= out[start:stop].mean()

@@ -1,13 +1,13 @@
-"""The noise of one reading and its correlation, beside whatever pattern there may be.
+"""The noise of one reading and its correlation, together with whatever pattern there may be.
 
-Residuals of a fitted account tell too little of the correlation: what repeats at a place looks
+Residuals of a fitted account show too little of the correlation: what repeats at a place looks
 like it, and what the fit takes away lowers it. Here the readings of each run are
 
 ::
 
     y = Xβ + n,    corr(n_i, n_j) = ρ^(|i - j|),
 
-with X a mean per run and a flexible pattern of the angle, alike and by direction, and rho
+with X a mean per run and a flexible pattern of the angle, common and by direction, and rho
 maximises the restricted likelihood (Patterson and Thompson 1971), in which the coefficients
 cost nothing:
 
@@ -44,7 +44,7 @@ BELOW = 0.3
 #: Share of the power of the strongest combination of columns from which another one counts.
 DISTINCT = 1e-6
 
-#: Half the deviance that a correlation must bring to be told from none: 4 standard errors.
+#: Half the deviance that a correlation must bring to be distinguished from none: 4 standard errors.
 TOLD = 16.0
 
 
@@ -57,7 +57,7 @@ class Noise:
     sigma : float
         Standard deviation of one reading.
     correlation : float
-        Between neighbours in a run; 0 where it is not told from none.
+        Between neighbours in a run; 0 where it is not distinguished from none.
     std : float
         Standard error of the correlation.
     deviance : float
@@ -83,7 +83,7 @@ def estimate_noise(left: Leftover) -> Noise:
     Parameters
     ----------
     left : Leftover
-        What is left of the readings; a pattern may still be in it.
+        The residual of the readings; a pattern may still be in it.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def estimate_noise(left: Leftover) -> Noise:
     bounds = _some(left.bounds)
     stop = bounds[-1][1]
     e = left.residual[:stop]
-    # Wild readings would hide a correlation; what is slow keeps its size.
+    # Outliers would hide a correlation; what is slow keeps its size.
     e = _without_spikes(e, bounds)
     columns = left.kept.get("pattern")
     if columns is None:
@@ -153,7 +153,7 @@ def _without_spikes(e: Array, bounds: list[tuple[int, int]]) -> Array:
         for ends, shift in zip(zip(*bounds, strict=True), (0, 1), strict=True)
     )
     before, after = np.roll(e, 1), np.roll(e, -1)
-    # At either end of a run the one neighbour: another run has a zero of its own.
+    # At either end of a run the one neighbour: another run has a separate zero.
     before[first] = e[np.minimum(first + 1, last)]
     after[last] = e[np.maximum(last - 1, first)]
     beside = 0.5 * (before + after)
@@ -212,7 +212,7 @@ class _Sums:
         self.runs, self.n = columns.runs, e.size
         inner = e.copy()
         inner[ends] = 0.0
-        # What stands beside a reading in its run.
+        # What is together with a reading in its run.
         beside = np.zeros_like(e)
         beside[1:] = e[:-1]
         beside[:-1] += e[1:]
@@ -251,7 +251,7 @@ class _Sums:
 
 
 def _bordered(gram: Array, x: Array, mapped: Array, e: Array) -> Array:
-    """Products of columns with one more column beside them, as the noise ``mapped`` it."""
+    """Products of columns with one more column with them, as the noise ``mapped`` it."""
     whole = np.empty((gram.shape[0] + 1, gram.shape[1] + 1))
     whole[:-1, :-1] = gram
     whole[-1, :-1] = whole[:-1, -1] = mapped @ x
@@ -262,7 +262,7 @@ def _bordered(gram: Array, x: Array, mapped: Array, e: Array) -> Array:
 def _independent(x: Array) -> Array:
     """Columns of length 1 at right angles that span the same; without those that hardly differ.
 
-    Over a part of a turn orders are nearly alike, and what is left of their difference would
+    Over a part of a turn orders are nearly collinear, and the residual of their difference would
     be the rounding of the determinant.
     """
     if not x.shape[1]:

@@ -11,7 +11,8 @@ without asking for phases. Noise that neighbouring readings share comes back at 
 of the rate of readings, whatever the axis: it is taken out reading by reading first, and beyond
 half of the rate of evenly taken readings the level is that of the frequency which they fold it
 to. The false-alarm probability counts the independent frequencies
-(Baluev 2008 bounds it alike). A line that is not quite steady is looked for in bands as well.
+(Baluev 2008 bounds it in the same way). A line that is not quite steady is looked for in bands as
+well.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ CELLS = 4.0
 #: Resolution cells that make the level, to each side; lowest frequency, in cells.
 LEVEL_CELLS, LOWEST = 48, 5
 
-#: Cells of a block that its level is worth: a median tells half of what a mean does, three
+#: Cells of a block that its level is worth: a median shows half of what a mean does, three
 #: neighbours share.
 SHARED = 1.2
 
@@ -70,9 +71,9 @@ class _Periodogram:
     power : ndarray
         Mean over runs: 1 on average for noise.
     peak : float
-        The frequency that stands out most.
+        The frequency that is significant most.
     width : int
-        Resolution cells that it takes up.
+        Resolution cells that it explains.
     statistic : float
         Power there.
     amplitude : float
@@ -100,7 +101,7 @@ def periodogram(
     top: float | None = None,
     correlation: float = 0.0,
 ) -> _Periodogram | None:
-    """Periodogram of ``values`` along ``axis``, phases of the runs left out.
+    """Periodogram of ``values`` along ``axis``, phases of the runs held out.
 
     Parameters
     ----------
@@ -143,7 +144,8 @@ def periodogram(
     total = np.zeros((len(WIDTHS), last))
     known = np.zeros(last)
     freedom = np.zeros(len(WIDTHS))
-    # The amplitude of a line beside the highest frequency is told by those beyond it, too.
+    # The amplitude of a line together with the highest frequency is reported by those beyond it,
+    # too.
     raw = np.zeros(min(last + boxes[-1], frequency.size))
     for (a, b), span, fold in zip(kept, spans, folds, strict=True):
         place = ((axis[a:b] - axis[a:b].min()) / cell + 0.5).astype(np.int64)
@@ -206,7 +208,7 @@ def _power(place: NDArray[np.int64], values: Array, size: int) -> Array:
 
 
 def _whitened(e: Array, correlation: float) -> Array:
-    """Readings of a run less what the one before tells of each."""
+    """Readings of a run less what the one before shows of each."""
     if not correlation:
         return e
     out = e * np.sqrt(1.0 - correlation**2)
@@ -231,13 +233,13 @@ def _beyond(
 ) -> Array:
     """Means of relative power over ``boxes``, the level that of the folded frequency.
 
-    Where that lies below the lowest frequency that is looked at the mean of noise stands.
+    Where that lies below the lowest frequency that is looked at the mean of noise is.
     """
     told = power[: cuts[-1]].copy()
     _core.add_relative_power(told, cuts, [(1, 1.0)], np.zeros((1, 1)))
     level = power[: cuts[-1]] / np.where(told > 0.0, told, 1.0)
     level = level[np.minimum(place, cuts[-1] - 1)]
-    # Where no level can be told (readings without noise) there is nothing to stand out of it.
+    # Where no level can be determined (readings without noise) there is nothing to be significant.
     relative = np.divide(power, level, out=np.ones_like(power), where=level > 1e-300 * power)
     relative[place < first] = 1.0
     total = np.concatenate([[0.0], np.cumsum(relative)])
@@ -291,7 +293,7 @@ def order_test(left: Leftover, top: float, correlation: float = 0.0) -> Evidence
 
 
 def _sampling(axis: Array, bounds: list[tuple[int, int]]) -> tuple[bool, float, list[float]]:
-    """Whether all steps are alike, readings per unit, and the rate of each even run (or 0)."""
+    """Whether all steps are equal, readings per unit, and the rate of each even run (or 0)."""
     steps = [np.abs(np.diff(axis[a:b])) for a, b in bounds]
     joined = np.concatenate(steps)
     middle = float(np.median(joined))
@@ -307,7 +309,7 @@ def _are_alike(steps: Array, middle: float) -> bool:
 
 
 def _blocks(size: int, over: float) -> tuple[NDArray[np.int64], Array]:
-    """Edges of the blocks whose medians are a spectrum's level, and the cells that it is worth.
+    """Edges of the blocks whose medians are a spectrum's level, and its equivalent number of cells.
 
     Blocks are as wide as a third of their frequency at most, so that slopes stay slopes.
     """
@@ -322,7 +324,7 @@ def _blocks(size: int, over: float) -> tuple[NDArray[np.int64], Array]:
 
 
 def _likeliest(total: Array, freedom: float, cells: Array) -> tuple[float, int]:
-    """Smallest p value of a bin, each against a level known from so many cells; and its bin."""
+    """Smallest p value of a bin, each against a level known from this many cells; and its bin."""
     best = (1.0, 0)
     cuts = np.flatnonzero(np.diff(cells)) + 1
     edges = np.concatenate([[0], cuts, [total.size]])

@@ -17,7 +17,7 @@ from .zeros import run_test
 
 @dataclass(frozen=True, eq=False)
 class TestedResidual:
-    """What the tests are asked about.
+    """What the tests test.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class TestedResidual:
     top: float
 
 
-#: Every test, in the order in which equally sure ones are told.
+#: Every test, in the order in which equally sure ones are reported.
 DECIDING: tuple[Callable[[TestedResidual], Iterable[Evidence | None]], ...] = (
     lambda asked: place_tests(asked.left, asked.top),
     lambda asked: [order_test(asked.left, asked.top, asked.noise.correlation)],

@@ -8,7 +8,7 @@ changes over between them has few large ones: their kurtosis
 
     b₂ = mean(d⁴) / (mean(d²)²)
 
-is above three, which is judged as Anscombe and Glynn (1983) do, with so many increments as are
+is above three, which is judged as Anscombe and Glynn (1983) do, with this many increments as are
 independent. Every run is taken in units of its own scatter, which lowers the kurtosis of m
 increments by ``m/(m + 2)``.
 """
@@ -23,7 +23,7 @@ from .evidence import Evidence
 from .leftover import Leftover
 from .scatter import normal_kurtosis
 
-#: What the test says that something looks like.
+#: What the test states that something looks like.
 STEPS = "steps between levels"
 
 #: Readings of a block, and blocks that a run must have.
@@ -36,7 +36,7 @@ LEAST_INCREMENTS, SHARED = 40, 1.125
 #: 0.15 was the most in noise of which neighbours share 0 to 0.99.
 ALLOWED = 0.2
 
-#: Standard deviations of increments from which on one is a step, for what is said.
+#: Standard deviations of increments from which on one is a step, for what is reported.
 STEP = 4.0
 
 
@@ -52,7 +52,7 @@ def steps_test(left: Leftover) -> Evidence | None:
         spread = float(np.sqrt(np.mean(d**2)))
         if spread > 0.0:
             parts.append(d / spread)
-            # For what is said: beyond the noise of its own run.
+            # For what is reported: beyond the noise of its own run.
             large.append(d[np.abs(d) > STEP * 1.4826 * float(np.median(np.abs(d)))])
             shared = float(np.mean(d[1:] * d[:-1])) / spread**2
             known = d.size / (1.0 + 2.0 * shared**2)

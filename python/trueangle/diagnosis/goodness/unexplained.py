@@ -18,11 +18,11 @@ from .scatter import scatter_tests
 #: What a path in time looks like that no law prescribes.
 FREE_PATH = "a free path in time"
 
-#: Chance with which noise alone may be called unexplained, all deciding tests together.
+#: Probability with which noise alone may be called unexplained, all deciding tests together.
 LEVEL = 0.01
 
-#: Chances below this are sure alike, and those that differ by less than this share are one: sums
-#: that are put together another way give the same order of tests.
+#: Probabilities below this are sure alike, and those that differ by less than this share are one:
+#: sums that are put together another way give the same order of tests.
 SURE = 1e-9
 ROUNDING = 1e-7
 
@@ -32,7 +32,7 @@ SMALLEST = 1e-9
 
 @dataclass(frozen=True)
 class Unexplained(ShownResult):
-    """What tests that need no name say of the residual.
+    """What tests that need no name state about the residual.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Unexplained(ShownResult):
     evidence : list of Evidence
         Every test, the firing ones first.
     noise : Noise
-        Beside a flexible pattern.
+        Together with a flexible pattern.
     """
 
     found: bool
@@ -61,7 +61,7 @@ class Unexplained(ShownResult):
 
     @property
     def beside_path(self) -> float:
-        """Rms of what fires beside a free path in time, arcsec: a path is noise to other causes."""
+        """Rms of what fires with a free path in time, arcsec: a path is noise to other causes."""
         rest = [item.rms for item in self.firing if item.looks_like != FREE_PATH]
         return max(max(rest), SMALLEST) if rest else 0.0
 
@@ -135,13 +135,13 @@ def goodness_of_fit(
     describing = scatter_tests(left, noise, sigma)
     firing = _firing(deciding)
     # Sure is sure: of those far beyond doubt the narrower account comes first, and of a line
-    # in angle or in time the one that stands out more.
+    # in angle or in time the one that is significant more.
     rank = {id(item): float(k) for k, item in enumerate(deciding)}
     lines = [item for item in deciding if item.test in ("place within runs", "time periodogram")]
     if len(lines) == 2 and lines[1].statistic > lines[0].statistic * (1.0 + ROUNDING):
         rank[id(lines[1])] = rank[id(lines[0])] - 0.5
     deciding.sort(key=lambda item: (round(np.log(max(item.p, SURE)) / ROUNDING), rank[id(item)]))
-    # A free path has no name either: what it follows is a part of what is left.
+    # A free path has no name either: what it follows is a part of the residual.
     variance = float(np.var((left if loose is None else loose).residual))
     power = min(max((item.rms**2 for item in firing), default=0.0), variance)
     return Unexplained(

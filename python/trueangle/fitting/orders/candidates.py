@@ -25,7 +25,7 @@ SHAFT_HARMONICS: Final = (1, 2, 3, 4)
 #: Orders scanned beyond the low ones where the angles are free.
 HIGHEST_SCANNED: Final = 450
 
-#: Coherence from which two orders are hardly told apart: they come half a cycle apart over the
+#: Coherence from which two orders are hardly separated: they come half a cycle apart over the
 #: travel. Fitted side by side they nearly cancel, and part again where nothing was read.
 _UNRESOLVED: Final = 2.0 / math.pi
 
@@ -77,12 +77,12 @@ class Candidates:
     effective : Positions
         The positions as a grid even where small shifts of the zero blur it.
     unresolved : mapping of float to float
-        Orders of the gear that are not looked at, for over this travel they are hardly told
-        from a low order, which stands for both.
+        Orders of the gear that are not looked at, for over this travel they are hardly
+        distinguished from a low order, which represents both.
     shafts : mapping of str to float
         Further shafts that were declared, and their cycles per output turn.
     local : frozenset of float
-        Of ``reference``: orders that a short single pass does not tell from drift in time.
+        Of ``reference``: orders that a short single pass does not distinguish from drift in time.
     """
 
     orders: tuple[float, ...]
@@ -121,7 +121,7 @@ class Candidates:
     def probabilities(self) -> list[float]:
         """Of each order before any reading: one in five sets has one without a reason.
 
-        Reasons are known of 1, 2 and 4 of the output (eccentricity, tilt and the sensor's
+        Reasons are known about 1, 2 and 4 of the output (eccentricity, tilt and the sensor's
         quadrature) and of the shafts that were declared.
         """
         cycles = declared_cycles(self.gear_ratio, self.shafts)
@@ -131,7 +131,7 @@ class Candidates:
 def prior_probabilities(
     orders: Sequence[float], cycles: Iterable[float], fitted: Iterable[float] = ()
 ) -> list[float]:
-    """Of each order beside shafts of so many cycles per turn; those ``fitted`` are certain."""
+    """Of each order with shafts of this many cycles per turn; those ``fitted`` are certain."""
     chance = min(_LIKELY, _UNKNOWN / max(1, len(orders)))
     reasons = {k * f for k in _KNOWN for f in (1.0, *map(abs, cycles))}
     certain = set(fitted)
@@ -163,11 +163,11 @@ def choose_candidates(
     shafts: Mapping[str, float] | None = None,
     held_from: float = 0.0,
 ) -> Candidates:
-    """Candidates as asked for, or low orders, the gear's own and a scan.
+    """Candidates as requested, or low orders, the gear's own and a scan.
 
-    ``travelled`` are angles of the readings in turns, whole turns kept: they tell how far an
-    order that is not whole is told from its neighbours. Undeclared orders below ``held_from``
-    are fitted jointly and not kept.
+    ``travelled`` are angles of the readings in turns, whole turns kept: they show how far an
+    order that is not whole is distinguished from its neighbours. Undeclared orders below
+    ``held_from`` are fitted jointly and not kept.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def choose_candidates(
     else:
         unresolved = _unresolved(gear, min(HIGHEST_LOW_ORDER, highest), travelled)
         told = [m for m in gear if m not in unresolved]
-        # A gear none of whose orders can be told says nothing about where to look.
+        # A gear none of whose orders can be determined contains nothing about where to look.
         limit = HIGHEST_LOW_ORDER if told else HIGHEST_FREE_ORDER
         main = [float(k) for k in range(1, min(limit, highest) + 1)]
         for m in told:
@@ -224,7 +224,7 @@ def choose_candidates(
 
 
 def _unresolved(gear: Sequence[float], low: int, travelled: Array | None) -> dict[float, float]:
-    """Orders of the gear hardly told from a low order over the travel, and that order."""
+    """Orders of the gear hardly distinguished from a low order over the travel, and that order."""
     found: dict[float, float] = {}
     if travelled is None:
         return found
@@ -237,7 +237,7 @@ def _unresolved(gear: Sequence[float], low: int, travelled: Array | None) -> dic
 
 
 def _apart(positions: Positions, order: float, others: Sequence[float]) -> bool:
-    """Whether the positions tell ``order`` from the constant and from all of ``others``."""
+    """Whether the positions distinguish ``order`` from the constant and from all of ``others``."""
     return bool(position_coherence(positions, order, [0.0, *others]).max() < _SAME)
 
 

@@ -1,4 +1,4 @@
-"""Chosen orders fitted to normal equations, and what they are worth in units held out."""
+"""Chosen orders fitted to normal equations, and their gain in held-out units."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...estimation.linear import pseudo_inverse
 from ...support.arrays import Array
 from .harmonicsums import HarmonicSums
 
-#: A candidate whose columns keep less than this of their energy beside those already
+#: A candidate whose columns keep less than this of their energy together with those already
 #: chosen is an alias of them.
 COLLINEAR: Final = 1e-8
 
@@ -30,7 +30,7 @@ def fit_chosen_orders(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array,
 def held_out_gains(
     sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
 ) -> tuple[Array, Array, float]:
-    """Held-out sum of squares with and without each order, one unit left out at a time.
+    """Held-out sum of squares with and without each order, one unit held out at a time.
 
     The left-out unit keeps its own zero, the chosen orders come from the other units.
 

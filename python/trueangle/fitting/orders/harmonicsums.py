@@ -22,7 +22,7 @@ from ...support.arrays import Array
 from .unitgroups import GROUPS, MOST_UNITS, sums_of_unit_means, units_in_groups
 from .zerogroups import ZeroGroupReadings
 
-#: From so many readings on the core's piecewise moments are faster than this file's powers.
+#: From this many readings on the core's piecewise moments are faster than this file's powers.
 _LARGE: Final = 1024
 
 #: Units of fewer readings whose spectra are kept, some 40 kB each.
@@ -245,7 +245,7 @@ def _spectra(
 def _few(
     turns: bytes, weights: bytes, error: bytes, highest: int
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """`_spectra` of few readings: fits that leave each run out in turn ask for the same again."""
+    """`_spectra` of few readings: fits that leave each run out in turn need the same again."""
     weight = np.frombuffer(weights)
     both = np.stack([weight, weight * np.frombuffer(error)], axis=1)
     found = power_sums(np.frombuffer(turns), both, 2 * highest + 1)

@@ -1,8 +1,8 @@
-"""Orders that the readings themselves cannot tell from those retained.
+"""Orders that the readings themselves cannot distinguish from those retained.
 
 On one grid an alias explains exactly as much. Where the zeros of the runs differ a
 little, an order m turns by ``m`` times the shift: given noise and amplitude, that may
-or may not decide. The likelihood says which.
+or may not decide. The likelihood states which.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .chosen import fit_chosen_orders
 from .harmonicsums import harmonic_sums
 from .zerogroups import ZeroGroupReadings
 
-#: Two orders are told apart when one explains better by this many noise variances: a
+#: Two orders are separated when one explains better by this many noise variances: a
 #: likelihood ratio of e^5, about 150 to 1.
 DECISIVE: Final = 10.0
 

@@ -2,7 +2,7 @@
 
 "An Angle Error Compensation Method Based on Harmonic Analysis for Integrated Joint
 Modules", Sensors 2020: Eq. 1 fitted to each run, amplitude and phase by Eq. 2, orders
-kept by eye from both (Figs. 6 and 7), averaged, and verified on a run left out (Fig. 9).
+kept by eye from both (Figs. 6 and 7), averaged, and verified on a held-out run (Fig. 9).
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def select_by_paper(
     free = max(1, sum(u.turns.size for u in training) - len(training) * (2 * len(orders) + 1))
     noise = ReadingVariance(float(left.sum()) / free, free, "residual")
     if free < len(training) * 3:
-        # A run of 36 positions holds 35 unknowns: only the scatter of runs tells noise.
+        # A run of 36 positions holds 35 unknowns: only the scatter of runs shows noise.
         per_run = float(np.mean([u.weights.sum() for u in training]))
         variance = 0.5 * per_run * float(median(scatter)) * len(training)
         noise = ReadingVariance(variance, dof * len(orders), "repeats")
@@ -201,7 +201,7 @@ def _gains(
     mean: NDArray[np.complex128],
     kept: NDArray[np.bool_],
 ) -> Array:
-    """Part by which each order lowers the held-out mean square beside the kept ones."""
+    """Part by which each order lowers the held-out mean square together with the kept ones."""
     gains = np.empty(len(orders))
     for n in range(len(orders)):
         with_, without = kept.copy(), kept.copy()

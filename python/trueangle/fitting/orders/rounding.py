@@ -20,7 +20,7 @@ def orders_beyond_rounding(
     limit: float,
     forced: int = 0,
 ) -> list[int]:
-    """Places of those orders, the strongest first, that the steps of the readings tell of.
+    """Places of those orders, the strongest first, that the steps of the readings show of.
 
     Parameters
     ----------
@@ -28,9 +28,9 @@ def orders_beyond_rounding(
     step : float
         Of the sensor, in the unit of the errors.
     orders : sequence of float
-        Strongest first; the first ``forced`` of them are always in the model and not told of.
+        Strongest first; the first ``forced`` of them are always in the model and not reported of.
     limit : float
-        Log of the chance below which an order is one: of the likelihood ratio with both of its
+        Log of the probability below which an order is one: of the likelihood ratio with both of its
         coefficients, which is of χ² with two degrees of freedom without it.
     """
     error = np.concatenate([unit.error for unit in units])

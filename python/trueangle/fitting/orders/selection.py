@@ -30,10 +30,10 @@ from .zerogroups import folds_of_run, some_angles, some_readings, zero_groups
 if TYPE_CHECKING:
     from ..summed import SummedReadings
 
-#: Chance, over the whole search, that the rounding of a coarse sensor alone makes an order.
+#: Probability, over the whole search, that the rounding of a coarse sensor alone makes an order.
 FALSE_ALARM: Final = 0.005
 
-#: An order is left out as negligible when its amplitude is below this share of the whole
+#: An order is omitted as negligible when its amplitude is below this share of the whole
 #: error (root sum of squares of the amplitudes) ...
 NEGLIGIBLE_SHARE: Final = 0.01
 #: ... and at the same time below this share of one reading's scatter: correcting it would
@@ -41,7 +41,7 @@ NEGLIGIBLE_SHARE: Final = 0.01
 NEGLIGIBLE_NOISE: Final = 0.1
 
 #: Bound of the error's slope that the retained orders must keep: from 1 on an indicated
-#: angle stands for several true ones, as ill-determined orders on a short arc make it.
+#: angle represents several true ones, as ill-determined orders on a short arc make it.
 STEEPEST: Final = 0.95
 
 #: Amplitudes below this part of a turn are rounding of angles.
@@ -68,7 +68,7 @@ class EvidenceSelection:
             sum(unit.turns.size for unit in units) if summed is None else summed.moments.count
         )
         self.step = rounding_step(runs, self.positions)
-        #: Angles of the readings in radians, as many as tell the travel.
+        #: Angles of the readings in radians, as many as show the travel.
         self.travel = some_angles([unit.turns for unit in units], 1.0)
         self.units = some_readings(units)
         self.orders = list(candidates.orders)
@@ -116,10 +116,10 @@ class EvidenceSelection:
         return self.forced + [i for i in kept if i not in steep], dropped
 
     def _too_steep(self, estimate: EvidenceEstimate, places: Sequence[int]) -> list[int]:
-        """Orders to leave out so that the error can be corrected: the steepest weak ones.
+        """Orders to omit so that the error can be corrected: the steepest weak ones.
 
         One by one that order goes which adds most slope for the energy that it explains,
-        its order over its amplitude, until the greatest slope of the rest is below `STEEPEST`.
+        its order over its amplitude, until the greatest slope of the remainder is below `STEEPEST`.
         """
         gone = list[int]()
         orders = np.array([self.orders[i] for i in places], dtype=float)
@@ -270,5 +270,5 @@ class EvidenceSelection:
         return np.asarray(np.sqrt(2.0 * half))
 
     def _false_alarm(self, statistic: float) -> float:
-        """Log10 of the chance that noise alone makes any order stand out as much."""
+        """Log10 of the probability that noise alone makes any order are significant as much."""
         return min(0.0, math.log10(len(self.orders)) - 0.5 * statistic / math.log(10.0))

@@ -9,14 +9,14 @@ from typing import Any, Final
 from ...estimation.evidence import CORRELATION_TIMES
 from ...support.angles import arcsec
 from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, rounded_phase, sine_of_rms
-from ...support.layout import laid_out, wrapped_lines
+from ...support.layout import counted, laid_out, wrapped_lines
 from ...support.plainresult import finite_or_none
 from .table import OrderRow, OrderTable
 
-#: Parts of the noise that are told: of its standard deviation at least.
+#: Parts of the noise that are reported: of its standard deviation at least.
 _SHOWN: Final = 0.2
 
-#: Rejected orders listed beside the retained ones, the strongest first.
+#: Rejected orders listed together with the retained ones, the strongest first.
 _REJECTED = 8
 
 
@@ -28,15 +28,15 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
     unit = selection_error_unit(selection, errors_in)
     noise_std = noise / math.sqrt(2.0 * max(1.0, selection.noise.degrees_of_freedom))
     runs = f"{selection.runs} run{'s' if selection.runs != 1 else ''}"
+    retained = [row for row in selection.table if row.retained]
     lines = [
+        f"{counted(retained, 'order')} retained: held-out error {unit.number(before)} -> "
+        f"{unit.text(after)} rms ({selection.holdout}).",
         f"Orders of the angle error ({selection.method})",
         f"  {selection.samples} readings in {runs}, {selection.positions.describe()}",
         f"  noise of one reading  {unit.number(noise, noise_std)} {unit.name}"
         f"{_source(selection, unit)}",
-        f"  held-out rms          {unit.number(before)} -> {unit.number(after)} {unit.name} "
-        f"({selection.holdout})",
     ]
-    retained = [row for row in selection.table if row.retained]
     others = [row for row in selection.table if not row.retained and row.verdict != "alias"]
     others.sort(key=lambda row: row.log10_false_alarm)
     shown = sorted([*retained, *others[:_REJECTED]], key=lambda row: row.order)
@@ -59,7 +59,7 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
 
 
 def selection_error_unit(selection: OrderTable, errors_in: ErrorsIn = "auto") -> ErrorUnit:
-    """One unit for all that is told and drawn of a selection, by the rms before it."""
+    """One unit for all that is reported and sampled of a selection, by the rms before it."""
     before = arcsec(selection.holdout_rms[0], selection.period)
     return error_unit(errors_in, sine_of_rms(before), selection.period)
 
@@ -87,7 +87,7 @@ def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
 
 
 def _explanations(rows: Sequence[OrderRow]) -> list[str]:
-    """What each retained order may be by itself; aliases are told with what they hinder."""
+    """What each retained order may be by itself; aliases are reported with what they hinder."""
     lines = []
     for row in rows:
         names = [e.name for e in row.explanations if e.order == row.order and not e.assumed]
@@ -98,7 +98,7 @@ def _explanations(rows: Sequence[OrderRow]) -> list[str]:
 
 
 def _source(selection: OrderTable, unit: ErrorUnit) -> str:
-    """Where the noise is known from, or the parts of it that a reading shows."""
+    """Where the noise is known from, or the parts that a reading shows."""
     noise = selection.noise
     if selection.estimate is not None:
         white, *drifts = (arcsec(math.sqrt(v), selection.period) for v in selection.estimate.noise)

@@ -1,4 +1,4 @@
-"""What is known of every order that was looked at: one row of evidence each."""
+"""What is known about every order that was looked at: one row of evidence each."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ LEFT_OUT: Final = ("reference", "too long", "negligible", "too steep", "rounding
 
 @dataclass(frozen=True)
 class OrderRow:
-    """What the data say about one order.
+    """What the data state about one order.
 
-    Angles are in the unit of the runs unless the name says otherwise.
+    Angles are in the unit of the runs unless the name states otherwise.
 
     Attributes
     ----------
@@ -38,21 +38,21 @@ class OrderRow:
         ``"reference"``, ``"rounding"``, ``"shared"``, ``"too long"``; with method
         ``"paper"`` also ``"small"`` and ``"phase varies"``.
     cosine, sine : float
-        Coefficients A and B beside all retained orders.
+        Coefficients A and B together with all retained orders.
     standard_error : float
         Of each of A and B, and of the amplitude where it is well above zero; of a retained
         order that of the fit (`FitResult.amplitude_std`).
     statistic : float
         Reduction of the sum of squares over the noise variance; about 2 for noise.
     log10_false_alarm : float
-        Logarithm of the chance that noise alone does as well in the whole search.
+        Logarithm of the probability that noise alone does as well in the whole search.
     holdout_gain : float
         Part by which the held-out mean square falls when this order joins the other
         retained ones (negative: it makes new data worse).
     phase_spread_deg : float
         Circular range of the phase over the runs, NaN with a single run.
     aliases : tuple of int
-        Orders that these readings cannot tell from this one.
+        Orders that these readings cannot distinguish from this one.
     explanations : tuple of Explanation
         Known lines of the joint that the order or an alias of it may be.
     reason : str
@@ -60,10 +60,10 @@ class OrderRow:
         True when an alias of a retained order is a known line of the joint or was a
         candidate too.
     phase_std : float
-        Standard error of the phase in radians where a fit tells it, else NaN.
+        Standard error of the phase in radians where a fit shows it, else NaN.
     needed : float
         Amplitude from which it would be significant in the whole search, at the phase that it has;
-        NaN where the readings do not tell it.
+        NaN where the readings do not show it.
     probability : float
         That the order is in the error, given the readings; NaN where sums alone are known.
     """
@@ -168,7 +168,7 @@ class OrderTable(PlainResult):
         """The same with coefficients and standard errors of retained orders as a fit has them.
 
         One order has one amplitude and one standard error, wherever they are shown; ``errors``
-        are those of amplitudes and phases, where a fit tells them.
+        are those of amplitudes and phases, where a fit shows them.
         """
         lines = {
             order * shaft.cycles_per_turn: (shaft.cosine[i], shaft.sine[i])

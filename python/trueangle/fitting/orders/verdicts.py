@@ -31,10 +31,10 @@ from .candidates import Candidates, choose_candidates
 from .result import OrderSelection
 from .table import OrderRow
 
-#: Share of the energy in the upper half of the orders from which under-sampling is said.
+#: Share of the energy in the upper half of the orders from which under-sampling is reported.
 _UNDER_SAMPLED: Final = 0.25
 
-#: Largest noise factor with which mounts count as telling orders apart.
+#: Largest noise factor with which mounts count as separating orders.
 _TELLING_FACTOR: Final = 5.0
 
 _VERDICTS: Final = {
@@ -55,7 +55,7 @@ _VERDICTS: Final = {
 
 
 def verdict_reason(verdict: str) -> str:
-    """Why an order of this verdict is not retained, as the rest of a sentence."""
+    """Why an order of this verdict is not retained, as the remainder of a sentence."""
     return _VERDICTS[verdict]
 
 
@@ -113,7 +113,7 @@ def _reference_reason(order: float, carriers: Sequence[float]) -> str:
 
 
 def _measure(positions: Positions, ratio: float | None, member: str) -> str:
-    """What to measure to tell aliases apart."""
+    """What to measure to separate aliases."""
     if positions.divisions is None:
         return "over more of the turn, or at more positions"
     offset = _separating_offset(positions.divisions, ratio, member)
@@ -222,7 +222,7 @@ def verified_positions(
     """At which positions the readings can verify a model, and whether also in between.
 
     In between is verified where the positions are no grid, or a grid (or union of grids)
-    that tells the low orders and all orders of the gear from each other; without a
+    that separates the low orders and all orders of the gear; without a
     declared gear the orders of the common ratios are taken.
 
     Examples
@@ -240,7 +240,7 @@ def verified_positions(
 
 
 def _between(positions: Positions, candidates: Candidates) -> bool:
-    """Whether the readings tell the low orders from those of the gear."""
+    """Whether the readings distinguish the low orders from those of the gear."""
     if len(positions.offsets) != 1 and not positions.has_alias(candidates.highest_alias):
         return True
     grid = candidates.effective

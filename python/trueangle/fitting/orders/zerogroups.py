@@ -1,4 +1,4 @@
-"""Groups of readings with a zero of their own, and folds of a single run."""
+"""Groups of readings with a separate zero, and folds of a single run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _GOLDEN: Final = 0.5 * (math.sqrt(5.0) - 1.0)
 #: Readings from which orders are chosen; of more, some blocks are taken.
 MOST_READINGS: Final = 8000
 
-#: Angles that tell the travel.
+#: Angles that show the travel.
 _TOLD: Final = 2000
 
 #: Readings a run up to which the call of a function costs more than what it computes.
@@ -56,7 +56,7 @@ class ZeroGroupReadings(NamedTuple):
     time: Array | None = None
 
     def given(self) -> RunReadings:
-        """The same as the evidence takes it: angles in radians, nothing where all are alike."""
+        """The same as the evidence takes it: angles in radians, nothing where all are equal."""
         return RunReadings(
             2.0 * math.pi * self.turns,
             self.error,
@@ -75,7 +75,7 @@ class ZeroGroupReadings(NamedTuple):
 def zero_groups(
     runs: Sequence[CalibrationRun], whole: bool
 ) -> tuple[list[ZeroGroupReadings], NDArray[np.intp]]:
-    """Units with a zero of their own: runs, split where the mount changes within one.
+    """Units with a separate zero: runs, split where the mount changes within one.
 
     Returns the units and the place of each of their readings among all readings of the
     runs. Angles are taken over turns unless ``whole`` (all orders are whole).
@@ -108,7 +108,7 @@ def some_angles(angles: Sequence[Array], period: float) -> Array:
 def some_readings(
     units: Sequence[ZeroGroupReadings], most: int = MOST_READINGS
 ) -> list[ZeroGroupReadings]:
-    """About so many of the readings, in blocks that follow each other in time and lie anywhere."""
+    """About n of the readings, in blocks that follow each other in time and lie anywhere."""
     total = sum(unit.turns.size for unit in units)
     if total <= most:
         return list(units)

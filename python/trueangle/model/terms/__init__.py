@@ -6,10 +6,10 @@ A `HarmonicModel` with ``terms`` corrects, with ``φ = θ - vτ``,
 
     indicated = φ + ε_h(φ) + Σ_i ε_i(φ, signals)
 
-A term says which forms of the compiled core it takes; which effect it takes off, and what cannot
-be taken off while the joint runs, say the effects (`trueangle.effects`). Missing orders, sidebands
-and the argument of the pattern need no term: they are harmonics and the argument of the model
-itself.
+A term states which forms of the compiled core it takes; which effect it subtracts, and what cannot
+be subtracted while the joint runs, state the effects (`trueangle.effects`). Missing orders,
+sidebands and the argument of the pattern need no term: they are harmonics and the argument of the
+model itself.
 """
 
 from __future__ import annotations

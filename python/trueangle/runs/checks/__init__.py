@@ -1,4 +1,4 @@
-"""Are data fit to be used? Tests before anything is fitted, and what such data can tell."""
+"""Are data fit to be used? Tests before anything is fitted, and what such data can show."""
 
 from __future__ import annotations
 

@@ -156,7 +156,7 @@ def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
 
 
 def mixed_units(records: list[Record]) -> Iterator[DataFault]:
-    """Runs, or parts of one, whose angles stand in another unit than the others."""
+    """Runs, or parts of one, whose angles are in another unit than the others."""
     sizes = np.array([float(np.abs(record.reference).max(initial=0.0)) for record in records])
     travel = np.array([float(np.ptp(record.reference)) for record in records])
     whole, largest = float(travel.max(initial=0.0)), float(sizes.max(initial=0.0))
@@ -221,7 +221,7 @@ def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:
         spread = 1.4826 * float(median(np.abs(slip - median(slip))))
         typical = float(median(np.abs(ahead)))
         jumps = np.flatnonzero(np.abs(slip) > max(20.0 * spread, 10.0 * typical, LEAST_JUMP))
-        # One wild reading is no wrap: readings follow each.
+        # One outlier is no wrap: readings follow each.
         alone = np.diff([0, *jumps + 1, len(record)]) < 2
         jumps = jumps[~(alone[:-1] | alone[1:])]
         if jumps.size == 0:
@@ -246,7 +246,7 @@ def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:
 
 
 def _stays(record: Record, jumps: NDArray[np.intp], slip: Array) -> bool:
-    """Whether the two angles stay apart by each jump: what follows a command closes up again."""
+    """Whether the two angles stay apart by each jump: what follows a command catches up again."""
     apart = record.reference - record.indicated
     bounds = [0, *(jumps + 1).tolist(), len(record)]
     levels = []
@@ -274,7 +274,7 @@ def swapped_channels(records: list[Record]) -> Iterator[DataFault]:
         steps = np.abs(np.diff(indicated))
         typical = float(median(steps))
         least = EXACT * typical
-        # Readings taken at even counts of the joint say nothing of its noise.
+        # Readings taken at even counts of the joint state nothing of its noise.
         even = float(np.mean(np.abs(steps - typical) <= EVEN * typical)) > 0.5
         if own > least and not even:
             ratios.append(own / max(other, least, 1e-300))
@@ -306,7 +306,7 @@ def _roughness(x: Array, time: Array | None) -> float:
 def _straight(record: Record) -> float | None:
     """Slope of a line that all but few readings lie on; None where the error is no such line.
 
-    An error of the joint bends: over part of a turn it has a slope of its own, but a line, which is
+    An error of the joint curves: over part of a turn it has a separate slope, but a line, which is
     that of least absolute deviations, leaves more than 3 % of its size.
     """
     slope = _slope(record)
@@ -330,7 +330,7 @@ def _turns(record: Record) -> float:
 
 
 def bending(turns: float) -> float:
-    """How far from 1 an error of the joint may bring the slope over so many turns."""
+    """How far from 1 an error of the joint may bring the slope over this many turns."""
     return max(AGREES / max(turns, 1.0) ** 2, DRIFTS)
 
 
@@ -341,6 +341,6 @@ def _slope(record: Record) -> float | None:
         return None
     steps = np.abs(np.diff(reference))
     if float(quantile(steps, 0.9)) > COARSE:
-        return None  # too coarse to say which way it went
+        return None  # too coarse to state which way it went
     x = reference - reference.mean()
     return float(x @ (indicated - indicated.mean()) / (x @ x))

@@ -31,7 +31,7 @@ UNSURE = ("mixed_units", "wrapped_reference", "unsorted_time")
 
 @told_kinds
 def check(data: Any, **reading: Unpack[ReadingOptions]) -> Check:
-    """Say whether data are fit to be used before anything is fitted.
+    """Check data for faults before a fit.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def unsorted_time(records: list[Record]) -> Iterator[DataFault]:
             )
 
 
-#: Every test of the data, in the order in which they are told.
+#: Every test of the data, in the order in which they are reported.
 TESTS = (
     unsorted_time,
     *UNUSABLE_ANGLES,
@@ -133,7 +133,7 @@ TESTS = (
 
 
 def data_faults(records: list[Record]) -> list[DataFault]:
-    """Faults of the data; where units are mixed, what follows from that is not told twice."""
+    """Faults of the data; where units are mixed, what follows from that is not reported twice."""
     found: list[DataFault] = []
     for test in TESTS:
         mixed = {label for fault in found if fault.fault in UNSURE for label in fault.runs}

@@ -1,4 +1,4 @@
-"""What a log with columns of unknown roles seems to hold, as their names tell."""
+"""What a log with columns of unknown roles seems to hold, as their names show."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...support.layout import counted, laid_out
 from ...support.plainresult import PlainResult
 from ...support.roles import unit_in_name
 
-#: Words of a name that tell its role.
+#: Words of a name that show its role.
 _WORDS: Final = {
     "reference": "reference ref laser tracker true truth polygon interferometer external",
     "indicated": "indicated position pos encoder enc angle actual act measured q theta",
@@ -25,7 +25,7 @@ _WORDS: Final = {
     "time": "time t stamp timestamp",
 }
 _ROLES: Final = {word: role for role, words in _WORDS.items() for word in words.split()}
-#: Words that tell neither a role nor which joint.
+#: Words that show neither a role nor which joint.
 _IDLE: Final = frozenset(
     [
         "joint",
@@ -57,7 +57,7 @@ class LikelyColumn(NamedTuple):
 
 @dataclass(frozen=True)
 class LogColumns(PlainResult):
-    """What a log holds, as the names of its columns tell: likely, not known.
+    """What a log holds, as the names of its columns show: likely, not known.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class LogColumns(PlainResult):
 
     @property
     def signals(self) -> list[str]:
-        """Values of ``--signal`` for these joints; UNIT where a name does not tell it."""
+        """Values of ``--signal`` for these joints; UNIT where a name does not show it."""
         found = []
         for column in self.columns:
             if column.joint in self.joints:
@@ -112,7 +112,7 @@ class LogColumns(PlainResult):
         return f"{self.file}, {counted(len(self.joints), 'joint')}: {', '.join(self.joints)}"
 
     def summary(self) -> str:
-        """What the log seems to hold, and the options that say so."""
+        """What the log seems to hold, and the options that report it."""
         lines = [
             f"{self.file} has {counted(len(self.header), 'column')}; by their names they are of "
             f"{counted(len(self.joints), 'joint')}:"
@@ -131,9 +131,9 @@ class LogColumns(PlainResult):
 
 
 def columns_of_log(path: str | Path, topic: str | None = None) -> LogColumns | None:
-    """What the names of a log's columns make likely; None where they tell of no joint.
+    """What the names of a log's columns make likely; None where they show of no joint.
 
-    A word of the name tells the role (``laser``, ``pos``, ``tau`` ...), the rest which joint:
+    A word of the name shows the role (``laser``, ``pos``, ``tau`` ...), the remainder which joint:
     ``elbow_laser`` and ``elbow_pos`` belong together, as ``laser3 [deg]`` and ``q3`` do. A name
     without such a word is an indicated angle where its joint has no other.
 
@@ -162,7 +162,7 @@ def _likely(header: Sequence[str], unit: str | None) -> list[LikelyColumn]:
         if not roles:
             unnamed.append((joint, name))
             continue
-        # The reference tells itself apart: a laser's angle is no encoder's.
+        # The reference separates itself: a laser's angle is no encoder's.
         role = "reference" if "reference" in roles else roles[-1]
         columns.append(LikelyColumn(joint, role, name, unit_in_name(name, role) or unit))
     taken = {(column.joint, column.role) for column in columns}
@@ -178,7 +178,7 @@ def _likely(header: Sequence[str], unit: str | None) -> list[LikelyColumn]:
 
 
 def _words(name: str) -> list[str]:
-    """Words and numbers of a name, what stands in brackets left out."""
+    """Words and numbers of a name, what is in brackets omitted."""
     bare = re.sub(r"[\[(][^\])]*[\])]", " ", name)
     parted = re.sub(r"([a-z])([A-Z])", r"\1 \2", bare)
     return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", parted)]

@@ -1,4 +1,4 @@
-"""One fault of the data, told with what to do about it."""
+"""One fault of the data, reported with what to do about it."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def extent_of(records: list[Record]) -> Extent:
 
 
 def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
-    """What can be known from such data; what cannot, why, and which measurement tells it."""
+    """What can be known from such data; what cannot, why, and which measurement shows it."""
     can = ["the periodic error at the places visited"]
     cannot: list[dict[str, str]] = []
 
@@ -254,14 +254,13 @@ class Check(PlainResult):
     def summary(self) -> str:
         """The check as readable text: faults first."""
         e = self.extent
-        lines = []
+        found = counted(self.data_faults, "fault")
+        lines = [f"{found}; the data {'can' if self.usable else 'must not'} be used as they are."]
+        if not self.data_faults:
+            lines = ["No fault found in the data."]
         for fault in self.data_faults:
             lines += wrapped_lines(f"{fault.fault}: {fault.says}.", 2)
             lines += wrapped_lines(f"Remedy: {fault.mend}.", 4, 2)
-        if not self.data_faults:
-            lines.append("No fault found in the data.")
-        elif not self.usable:
-            lines.append("The data must not be used as they are.")
         if self.columns:
             told = [
                 f"{role} is '{name}'" + (f" in {unit}" if unit else "") + _reversed(role, name)

@@ -1,4 +1,4 @@
-"""Rows that are no readings of the rest: repeated ones, isolated outliers, steps that stay."""
+"""Rows that are no readings of the remainder: repeated ones, isolated outliers, steps that stay."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _lost(
     then = ends[nearest]
     gone = lost[new] - lost[then]
     near = np.abs(ring[nearest] - place[new]) <= _USUAL * _pace(np.diff(reference))
-    # Jumps that are made up for at the same place tell nothing.
+    # Jumps that are made up for at the same place show nothing.
     again = near & (np.abs(gone) > 0.5 * abs(size))
     if again.sum() < _BESIDE and abs(size) <= travel:
         return None

@@ -1,4 +1,4 @@
-"""Two logs with two clocks made into calibration runs, and a simulator's log taken off runs."""
+"""Two logs with two clocks joined to calibration runs; a simulator's log subtracted."""
 
 from __future__ import annotations
 

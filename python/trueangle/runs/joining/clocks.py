@@ -19,7 +19,7 @@ _OVERLAP = 0.25
 #: Parts of the motion that differ and are alike: times the least, and more by so much.
 _AS_WELL = 1.5
 _TIE = 1e-3
-#: Variation of the velocity, as a share of its root mean square, below which one speed is seen.
+#: Variation of the velocity, as a share of its root mean square, below which one speed is found.
 _ONE_SPEED = 0.02
 #: Orders of the joint that may not pass for a motion of the clock.
 _ORDERS = (1, 2, 3, 4)
@@ -39,7 +39,7 @@ class Clocks:
         t_B = t_A + offset + 10⁻⁶ rate · (t_A - t₀)
 
     with ``t₀`` the first reading of A; standard errors in ``offset_std``, ``rate_std``
-    (None where it was declared or the motion does not tell), that of a time on the other
+    (None where it was declared or the motion does not show), that of a time on the other
     clock, root mean square over the log, in ``timing_std``, and the covariance of offset and rate
     in ``shared``.
     """
@@ -66,7 +66,7 @@ def estimated_clocks(
     Raises
     ------
     ArgumentError
-        The streams share no time and the motion does not tell the offset.
+        The streams share no time and the motion does not show the offset.
     """
     start = float(indicated.time[0])
     notes = []
@@ -105,7 +105,7 @@ def estimated_clocks(
 def _coarse(indicated: Stream, reference: Stream) -> tuple[float, list[float] | None]:
     """The offset at which the velocities agree best, and others at which they do as well.
 
-    None instead of others where the motion does not tell an offset.
+    None instead of others where the motion does not show an offset.
     """
     step = max(indicated.step, reference.step)
     longest = max(np.ptp(indicated.time), np.ptp(reference.time))
@@ -144,19 +144,19 @@ def _coarse(indicated: Stream, reference: Stream) -> tuple[float, list[float] | 
     limit = _AS_WELL * float(shift.min()) + _TIE
     alike = least[shift[least] <= limit]
     best = int(alike[np.argmax(np.roll(count, n // 2)[alike])])
-    # Sample i of A stands at sample i + lag of B.
+    # Sample i of A is at sample i + lag of B.
     start = float(reference.time[0] - indicated.time[0])
     offsets = [start + (int(place) - n // 2) * step for place in alike if place != best]
     return start + (best - n // 2) * step, offsets
 
 
 def _refined(indicated: Stream, reference: Stream, clocks: Clocks, wanted: list[str]) -> Clocks:
-    """Least squares over the readings of A, beside a zero, a ramp and the lowest orders."""
+    """Least squares over the readings of A, next to a zero, a ramp and the lowest orders."""
     if "rate" in wanted:
         found = _solved(indicated, reference, clocks, wanted)
         if found is not None and found.rate_std is not None:
             time = indicated.time - clocks.start
-            # Of a rate that stands out nothing is assumed.
+            # Of a rate that is significant nothing is assumed.
             is_sure = abs(found.rate) > _SIGNIFICANT * found.rate_std
             return found if is_sure else _as_quartzes(found, time)
     if "offset" not in wanted:
@@ -174,7 +174,7 @@ def _as_quartzes(found: Clocks, time: Array) -> Clocks:
 
         c - C_r rate / (C_rr + T),    C - C_r C_r' / (C_rr + T)
 
-    An offset of clocks that were taken as equal would be told better than it is known.
+    An offset of clocks that were taken as equal would be reported better than it is known.
     """
     std = found.rate_std
     assert std is not None
@@ -259,7 +259,7 @@ def _solved(
 
 
 def _inflation(rest: Array) -> float:
-    """Factor on the variance of neighbours that are alike (first-order correlation)."""
+    """Factor on the variance of correlated neighbours (first order)."""
     power = float(rest @ rest)
     if power <= 0.0:
         return 1.0

@@ -1,4 +1,4 @@
-"""An indicated and a reference log with clocks of their own, joined in time."""
+"""An indicated and a reference log with separate clocks, joined in time."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def join(
         θ(t_i) = ref(t_i + offset + rate · (t_i - t₀))
 
     at every indicated reading, by lines or cubics through the readings of the reference,
-    whichever foretells left-out ones better. Nothing is made up over gaps. A log that holds
-    changes only (EPICS monitors and the like) stood still in its pauses, and is held there.
+    whichever predicts left-out ones better. Nothing is made up over gaps. A log that holds
+    changes only (EPICS monitors and the like) was still in its pauses, and is held there.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def join(
         ``reference_*``, both with ``time_s`` (or another unit of time).
     offset_s, rate_ppm : float, optional
         Of the reference's clock against the indicated one, where it is known (0 and 0 for
-        one clock); else estimated from the motion, as far as that tells: a rate that is hardly
-        known is taken for one of two quartzes, 0 +- 100 ppm beforehand.
+        one clock); else estimated from the motion, as far as that shows: a rate that is hardly
+        known is read as one of two quartzes, 0 +- 100 ppm beforehand.
     max_gap_s : float, optional
         Longest pause of the reference that is interpolated over (default: five times its
         typical step, and longer where the motion in as long a time is a line).
@@ -112,7 +112,7 @@ def join(
 
 
 class _Log(NamedTuple):
-    """Readings of one log: times, angles in degrees, and what else stands in it."""
+    """Readings of one log: times, angles in degrees, and what else is in it."""
 
     table: FileReadings
     time: Array
@@ -166,7 +166,7 @@ def _assigned(
         used |= fitting.keys()
         if fitting:
             tables[i] = read_readings(paths[i], {**fitting, **own[i]}, topics[i])
-    for role in shared.keys() - used:  # says what was meant
+    for role in shared.keys() - used:  # states what was meant
         signed_name(tables[0].path, list(tables[0].columns), _name(shared[role]))
     for one, other in (tables, tables[::-1]):
         if "indicated" in one.roles and "reference" in other.roles:

@@ -13,7 +13,7 @@ from ..run import CalibrationRun
 
 
 class Gap(NamedTuple):
-    """A pause of the reference, on its own clock, and the readings left out over it."""
+    """A pause of the reference, on its own clock, and the readings omitted over it."""
 
     start_s: float
     end_s: float
@@ -32,7 +32,7 @@ class Joined(PlainResult):
     offset_s, rate_ppm : float
         ``t_reference = t_indicated + offset + rate * (t_indicated - start)``.
     offset_std_s, rate_std_ppm : float or None
-        Their standard errors; None where they are declared, or the motion does not tell.
+        Their standard errors; None where they are declared, or the motion does not show.
     std_arcsec : float
         Standard deviation that the joining adds to an error: of interpolation and clocks.
     gaps : tuple of Gap

@@ -1,4 +1,4 @@
-"""What a simulator's log says, taken off the measured runs: by time or by angle."""
+"""What a simulator's log states, subtracted from the measured runs: by time or by angle."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .travel import TravelledError
 
 #: How a log may be brought to the readings.
 BY = ("time", "angle")
-#: rms by which two motions differ, as a share of their own, from which on they are not the same.
+#: rms by which two motions differ, as a separate share, from which on they are not the same.
 SAME_MOTION = 0.05
 #: Share of a run's readings that the log must cover in time.
 COVERED = 0.5
@@ -36,25 +36,25 @@ _USUAL = 6.0 / 0.6745
 
 @dataclass(frozen=True)
 class MeasuredMinusSimulated(ShownResult):
-    """Measured runs without the error that a simulator's log says.
+    """Measured runs without the error that a simulator's log states.
 
     Attributes
     ----------
     runs : list of CalibrationRun
-        ``indicated`` is lowered by the simulated error: what is left is for a diagnosis.
+        ``indicated`` is lowered by the simulated error: the remainder is for a diagnosis.
     source : str
         The log.
     by : tuple of str
         "time" or "angle", for each run.
     left_out : int
-        Readings at which the log says nothing.
+        Readings at which the log contains nothing.
     offsets_s : tuple of float
         Seconds from the clock of every run to that of the log; 0 where it is joined by angle.
     std_arcsec : float
         Standard deviation that the joining adds to an error.
     notes : tuple of str
     logs : list of CalibrationRun
-        What the log says of the motion of every run.
+        What the log states about the motion of every run.
     """
 
     runs: list[CalibrationRun]
@@ -106,7 +106,7 @@ class MeasuredMinusSimulated(ShownResult):
 
 
 class _Expected(NamedTuple):
-    """The simulated error at the readings of a run, degrees, where the log says one."""
+    """The simulated error at the readings of a run, degrees, where the log states one."""
 
     by: str
     error: Array
@@ -123,7 +123,7 @@ def minus_simulated(
     by: str | None = None,
     **reading: Any,
 ) -> MeasuredMinusSimulated:
-    """Measured runs without what a simulator's log says of the same joint.
+    """Measured runs without what a simulator's log states about the same joint.
 
     ::
 
@@ -134,7 +134,7 @@ def minus_simulated(
     runs : CalibrationRun or iterable of CalibrationRun
     simulated : path, table or iterable of CalibrationRun
         The log, as `trueangle.runs.files.runs_of` takes it: ``reference`` is the simulator's
-        true output angle, ``indicated`` what the simulated encoder (or command) says. One run
+        true output angle, ``indicated`` what the simulated encoder (or command) states. One run
         for all measured runs, or runs of the same labels.
     by : {"time", "angle"}, optional
         By default by time where both have one and the motions are the same, else by angle.
@@ -155,7 +155,7 @@ def minus_simulated(
     Notes
     -----
     In time by lines or cubics through the log's own readings, exact at equal times; an offset
-    of the clocks is found where the motion tells one. By angle over the log's whole travel if
+    of the clocks is found where the motion shows one. By angle over the log's whole travel if
     that holds the measured one, else modulo a turn, for each direction that the log has; there
     the log must count its angle from the same place. Cost: a sort of each run.
 
@@ -216,7 +216,7 @@ def _counterparts(
 
 
 def _lowered(run: CalibrationRun, expected: _Expected) -> CalibrationRun:
-    """The run's readings at which the log says an error, lowered by it."""
+    """The run's readings at which the log states an error, lowered by it."""
     rows = expected.known
     lowered = run.indicated[rows] - expected.error[rows] * (run.period / 360.0)
     fields = {

@@ -21,13 +21,13 @@ MODEL_BYTES: Final = 256 << 20
 SIMULATION_BYTES: Final = 16 << 20
 RUNS_BYTES: Final = 1 << 30
 
-#: Bytes asked for at a time where the size is not known before.
+#: Bytes requested at a time where the size is not known before.
 _CHUNK: Final = 1 << 20
 
 #: Milliseconds between two looks for Ctrl-C while a pipe is waited for.
 _LOOK_MS: Final = 100
 
-#: What stands for no value.
+#: What represents no value.
 _NOTHING: Final = "__HIVE_DEFAULT_PARTITION__"
 
 
@@ -184,7 +184,7 @@ def partition_keys(path: str | PathLike[str]) -> dict[str, str]:
 
 
 def partition_name(path: str | PathLike[str]) -> str:
-    """The name of a file, with the folders that tell it from others of this name.
+    """The name of a file, with the folders that distinguish it from others of this name.
 
     Examples
     --------
@@ -227,7 +227,7 @@ def named_again(
 ) -> str | None:
     """The input that ``output`` is, or None.
 
-    A folder among the inputs stands for the files in and below it that have one of the
+    A folder among the inputs represents the files in and below it that have one of the
     ``endings``.
     """
     known = tuple(endings)
@@ -247,7 +247,7 @@ def _files(folder: str | PathLike[str]) -> Iterator[str]:
 
 
 def irregular_file_kind(mode: int) -> str:
-    """What a thing that is no regular file is, as a message says it."""
+    """What a thing that is no regular file is, as a message states it."""
     names = (
         (stat.S_ISDIR, "a folder"),
         (stat.S_ISFIFO, "a pipe"),

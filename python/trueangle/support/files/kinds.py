@@ -52,7 +52,7 @@ def declare_endings(promises: Mapping[str, tuple[str, ...]]) -> None:
 
 
 def log_endings() -> tuple[str, ...]:
-    """Endings of the files that a folder among the inputs stands for."""
+    """Endings of the files that a folder among the inputs represents."""
     return tuple(ending for endings in _LOGS.values() for ending in endings)
 
 

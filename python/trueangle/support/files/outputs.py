@@ -33,7 +33,7 @@ __all__ = [
     "written_atomically",
 ]
 
-#: What the system says of writing only.
+#: What the system states about writing only.
 _OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 #: Bytes that a file must take for its disk not to be full.
@@ -57,7 +57,7 @@ def check_output(
     kind : Kind, optional
         What is written; its endings are checked.
     inputs : iterable of paths
-        What was read: none of it is overwritten.
+        What was read: nothing is overwritten.
     hashes : iterable of str
         sha256 of what was read, where its place is not known.
     regular : bool
@@ -134,10 +134,10 @@ def written_atomically(
 ) -> Iterator[IO[str]]:
     """Text file that takes the name ``path`` only once it is complete and synced.
 
-    It is written beside the file that ``path`` leads to (links are followed and stay) under
+    It is written next to the file that ``path`` leads to (links are followed and stay) under
     a hidden name and renamed at the end; an exception inside the block, or a full disk,
     leaves ``path`` as it was. The null device takes everything and keeps its place. What
-    may be written is said by `check_output`, which takes the other arguments.
+    may be written is reported by `check_output`, which takes the other arguments.
     """
     target = check_output(path, kind, inputs, hashes)
     if target.exists() and not target.is_file():  # the null device
@@ -155,7 +155,7 @@ def written_atomically(
 def external_output(target: Path) -> Iterator[Path]:
     """Path of a file to be made by another program, which has the name ``target`` at the end.
 
-    It is alone in a folder of its own beside it. Of the null device that is elsewhere.
+    It is alone in a separate folder with it. Of the null device that is elsewhere.
     """
     if target.exists() and not target.is_file():  # the null device
         import tempfile
@@ -170,7 +170,7 @@ def external_output(target: Path) -> Iterator[Path]:
 
 
 def _file_beside(target: Path) -> contextlib.AbstractContextManager[Path]:
-    """A new empty file beside ``target``; see `made_beside`."""
+    """A new empty file next to ``target``; see `made_beside`."""
 
     def make(beside: Path) -> int:
         handle = os.open(beside, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
@@ -185,7 +185,7 @@ def _file_beside(target: Path) -> contextlib.AbstractContextManager[Path]:
 def publish(aside: str | PathLike[str], target: str | PathLike[str]) -> None:
     """Sync the finished file or folder ``aside`` to the disk and rename it ``target``.
 
-    A symbolic link stays; what it leads to is replaced, a folder as `renamed` says. A
+    A symbolic link stays; what it leads to is replaced, a folder as `renamed` states. A
     file that is replaced hands on its permissions; the null device takes the file and stays.
     Where the disk does not take the new name, the old state comes back.
     """
@@ -241,10 +241,10 @@ def named_output(
     making: contextlib.AbstractContextManager[Path],
     read: str | PathLike[str] | None = None,
 ) -> Iterator[Path]:
-    """What ``making`` makes, in which ``path`` is written; errors of the system are told by name.
+    """Write ``path`` in what ``making`` makes; name errors of the system.
 
-    Libraries tell of a full disk in words of their own, or as damage of what they read: whether
-    that is the cause is asked of the disk. An error without a name, and not of writing alone, is
+    Libraries report a full disk in other words, or as damage of what they read: whether that
+    is the cause is tested on the disk. An error without a name, and not of writing alone, is
     one of reading ``read`` (default: of ``path``).
     """
     try:
@@ -283,7 +283,7 @@ def _check_room(place: Path) -> None:
 
 @contextlib.contextmanager
 def _named_by(path: str | PathLike[str]) -> Iterator[None]:
-    """Errors of the system without a name, or with another, told by this one."""
+    """Errors of the system without a name, or with another, reported by this one."""
     try:
         yield
     except OSError as error:

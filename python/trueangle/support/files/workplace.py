@@ -1,4 +1,4 @@
-"""Hidden places beside an output in which it is made, locks, and leftovers of killed processes.
+"""Hidden places next to an output in which it is made, locks, and leftovers of killed processes.
 
 A place is locked as long as its process lives, and the system takes the lock from one that
 dies: whoever writes to the same name next removes what is locked by nobody.
@@ -19,7 +19,7 @@ try:
 except ImportError:  # pragma: no cover - Windows has no flock
     fcntl = None  # type: ignore[assignment]
 
-#: Ending of what is being written beside its name.
+#: Ending of what is being written next to its name.
 PARTIAL: Final = ".trueangle-partial"
 #: Ending of a folder that is being replaced, in the place where the new one was made.
 _REPLACED: Final = ".replaced"
@@ -33,7 +33,7 @@ _EXCHANGE: Final = 2
 
 
 def hidden_beside(target: Path) -> Path:
-    """A new name beside ``target``: no other file has it, for nobody draws 64 bits twice."""
+    """A new name next to ``target``: no other file has it, because nobody draws 64 bits twice."""
     return target.with_name(f"{hidden_name(target)}.{os.urandom(8).hex()}{PARTIAL}")
 
 
@@ -44,7 +44,7 @@ def hidden_name(target: Path) -> str:
 
 @contextmanager
 def made_beside(target: Path, make: Callable[[Path], int]) -> Iterator[Path]:
-    """A new hidden file or folder beside ``target``, locked until the end.
+    """A new hidden file or folder next to ``target``, locked until the end.
 
     ``make`` makes it and opens it (-1 where that cannot be); its handle is closed at the end.
     What is still there then is removed, and a folder that was moved into it and not replaced
@@ -88,9 +88,9 @@ def _lock(handle: int) -> None:
 
 @contextmanager
 def workplace(target: Path) -> Iterator[Path]:
-    """Path of the same name in a new hidden folder beside ``target``, removed at the end.
+    """Path of the same name in a new hidden folder next to ``target``, removed at the end.
 
-    Of a symbolic link that is the file it leads to: `publish` renames beside it.
+    Of a symbolic link that is the file it leads to: `publish` renames with it.
     """
     target = Path(os.path.realpath(target))
 
