@@ -1,4 +1,4 @@
-"""What is known of a joint while it is recorded: its travel, and the orders of its error."""
+"""What is known about a joint while it is recorded: its travel, and the orders of its error."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..support.angles import arcsec, wrap
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_quantile
 
-#: Cells of a turn, orders that are looked at, and the chance that one of them is there by noise.
+#: Cells of a turn, orders that are looked at, and the probability that one of them is noise.
 CELLS: Final = 72
 _HIGHEST: Final = 32
 _ORDERS: Final = [list(range(1, _HIGHEST + 1))]
@@ -119,7 +119,7 @@ class Estimate:
                 sums.update(reference[own], error[own])
             self._seen[cells[rows]] = True
             if turns[rows[-1]] > self._ended and self._seen.all():
-                with suppress(RankError):  # it goes on until its places tell the orders apart
+                with suppress(RankError):  # it goes on until its places separate the orders
                     self._end_turn(self._solved(self._turn)[0], int(turns[rows[-1]]))
 
     def _travel(self, path: Array, time: Array) -> NDArray[np.intp]:

@@ -43,7 +43,7 @@ class SourceOptions(NamedTuple):
     dbc : str, optional
         Description of the messages of a CAN bus.
     fields : tuple of str
-        Columns that are asked for: a CAN bus takes its signals from them.
+        Columns that are requested: a CAN bus takes its signals from them.
     pattern : str, optional
         Columns of a line as named groups; else the layout is found by the first lines.
     send : str, optional
@@ -97,7 +97,7 @@ def kind_of(address: str) -> str:
 
 
 def open_source(address: str, options: SourceOptions) -> Source:
-    """Open a source by its address, a port exclusively, and send what is asked for.
+    """Open a source by its address, a port exclusively, and send what is requested.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def _library(name: str, what: str) -> Any:
 def _can_bus(address: str, options: SourceOptions) -> Source:
     """``can:CHANNEL`` or ``can:INTERFACE:CHANNEL``; rows come as lines of CSV.
 
-    A row is complete with one frame of each identifier that is asked for, whatever their order:
+    A row is complete with one frame of each identifier that is requested, whatever their order:
     rows come as often as the rarest of them, with the newest of each. Frames without a value of
     each column become a line that is no row: it is rejected and counted as any other.
     """
@@ -272,7 +272,7 @@ def _can_bus(address: str, options: SourceOptions) -> Source:
 
 
 def _can_signals(options: SourceOptions) -> dict[str, tuple[int, Callable[[bytes], float]]]:
-    """Identifier and value of each column: of fields, and of a DBC those asked for or all.
+    """Identifier and value of each column: of fields, and of a DBC those requested or all.
 
     A value is NaN in a frame that is too short for it.
     """
