@@ -34,7 +34,7 @@ SPEED = 20.0  # deg/s, of the target
 
 
 def indicated(true: float) -> float:
-    """What the joint's own encoder says at a true angle, degrees."""
+    """The reading of the joint's encoder at a true angle, degrees."""
     return true + float(JOINT.pattern.value(np.array([np.radians(true)]))[0]) / 3600.0
 
 

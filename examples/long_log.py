@@ -1,9 +1,9 @@
-"""Correct a long log in memory and say how fast: 1e8 rows with ``--rows 1e8``.
+"""Correct a long log in memory and print the speed: 1e8 rows with ``--rows 1e8``.
 
     python examples/long_log.py [--rows 1e6] [--float32]
 
-The log is a joint turning back and forth; its error is known, so that what is left can be
-told. Files of any size go through ``trueangle correct`` in constant memory instead.
+The log is a joint turning back and forth; its error is known, so that the residual can be
+computed. Files of any size go through ``trueangle correct`` in constant memory instead.
 """
 
 from __future__ import annotations

@@ -2,11 +2,11 @@
 
 The model is a position servo: a command, a joint that follows it late. The real joint (here made
 by the same servo) has 0.1 arcmin of play to either side and an encoder whose magnet is tilted:
-40 arcsec twice a turn, beside 2 arcsec of noise. Both logs hold the same motion.
+40 arcsec twice a turn, and 2 arcsec of noise. Both logs hold the same motion.
 
     python examples/mujoco_joint.py [FOLDER]
 
-writes model.csv and real.csv and says what the model lacks. Needs mujoco.
+writes model.csv and real.csv and prints what the model lacks. Needs mujoco.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def motion(speed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def write_logs(folder: Path) -> tuple[Path, Path]:
-    """What the model says, and what was measured."""
+    """The model's log, and the measured one."""
     rng = np.random.default_rng(7)
     logs = {"model": ["run,time_s,reference_rad,indicated_rad"]}
     logs["real"] = list(logs["model"])

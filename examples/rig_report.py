@@ -4,7 +4,7 @@
 
 Without a file it takes ``rm44_repeat.csv`` from ``../shared/data`` (or ``$TRUEANGLE_DATA``):
 an RLS RM44 against a TONiC reference, twelve repeats of one turn. Where that is not
-present either, a simulated encoder of the same kind stands in for it.
+present either, a simulated encoder of the same kind replaces it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ DATA = Path(os.environ.get("TRUEANGLE_DATA", ROOT.parent / "shared" / "data"))
 
 
 def simulated() -> list[ta.CalibrationRun]:
-    """Orders 1, 2 and 4 of a magnet beside its axis, in degrees, with an arbitrary zero."""
+    """Orders 1, 2 and 4 of a magnet off its axis, in degrees, with an arbitrary zero."""
     rng = np.random.default_rng(0)
     theta = np.linspace(0.0, 360.0, 500, endpoint=False)
     x = np.radians(theta)

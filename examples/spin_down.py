@@ -1,6 +1,6 @@
 """From a coasting shaft to a corrected loop, without a reference.
 
-``python examples/spin_down.py [--samples 20000]``: a simulated rotor with cogging and imbalance
+``python examples/spin_down.py [--samples 20000]``: a simulated rotor with cogging
 coasts from 10 to 2 turns per second; its encoder is calibrated from the time stamps alone; a
 position loop then runs on the corrected reading of the same joint.
 """
@@ -32,8 +32,7 @@ def joint(samples: int) -> Simulation:
         samples=samples,
         spacing="clock",
         cogging_deg_s2=30.0,
-        cogging_order=4.0,
-        imbalance_deg_s2=40.0,
+        cogging_order=6.0,
     )
     return Simulation(harmonics=LINES, sigma_arcsec=20.0, runs=(coast,))
 

@@ -1,4 +1,4 @@
-"""The paper's Figures 4 to 9, each beside what its 36 positions hide.
+"""The paper's Figures 4 to 9, each next to what its 36 positions hide.
 
 Run with ``python examples/paper/figures.py FOLDER``; writes one picture a figure. Joint a of
 Equation 8; the right half shows a joint that reads the same at the 36 positions and whose
@@ -23,7 +23,7 @@ from trueangle.plots.palette import AFTER, BEFORE, MARKERS, MUTED, run_colour
 
 Array = NDArray[np.float64]
 
-#: Orders that 36 positions can show, and a stretch of the turn in which gear orders are seen.
+#: Orders that 36 positions can show, and a segment of the turn in which gear orders are visible.
 ORDERS = np.arange(1, 18)
 STRETCH = np.linspace(40.0, 80.0, 4001)
 TURN = np.linspace(0.0, 360.0, 14401)[:-1]
@@ -83,7 +83,7 @@ def figure4() -> Figure:
 
 
 def stretch(ax: Axes) -> None:
-    """Both joints over a stretch, and the positions at which they are one."""
+    """Both joints over a segment, and the positions at which they agree."""
     ax.plot(STRETCH, GEAR.error(STRETCH), color=BEFORE, linewidth=0.8, label="gear orders")
     ax.plot(STRETCH, JOINT_A.error(STRETCH), color=AFTER, linewidth=1.4, label="as published")
     inside = (STRETCH[0] <= AT) & (STRETCH[-1] >= AT)

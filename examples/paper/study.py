@@ -27,7 +27,7 @@ PUBLISHED_MEAN = 82.03
 
 
 def study_table(study: Study) -> str:
-    """The paper's figures beside those of the simulated groups."""
+    """The paper's figures next to those of the simulated groups."""
     lines = [
         "joint   peak-to-peak, arcsec             paper                       orders retained",
     ]
@@ -47,7 +47,7 @@ def study_table(study: Study) -> str:
 
 
 def repeated_studies() -> str:
-    """Mean and standard deviation of many such studies, beside the paper's single one."""
+    """Mean and standard deviation of many such studies, next to the paper's single one."""
     lines = ["joint   before, arcsec     after, arcsec      reduction            paper"]
     for joint in (JOINT_A, JOINT_B):
         found = [

@@ -212,7 +212,7 @@ def _valued(fit: FitResult, angles: NDArray[np.float64], who: Identity) -> dict[
     """Values with their uncertainty, the widest budget, and what is stated of them."""
     if fit.model.covariance is None or not math.isfinite(fit.residual_std):
         raise ArgumentError(
-            "as many unknowns as readings leave nothing to take an uncertainty from: "
+            "there are as many unknowns as readings, so no uncertainty can be estimated: "
             "read more positions, or fit fewer orders"
         )
     values = values_at(fit, angles)

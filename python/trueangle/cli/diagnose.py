@@ -212,8 +212,8 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     single = (args.simulated, args.extend, args.extend_into, args.model, args.plan)
     if any(given is not None for given in single):
         raise ArgumentError(
-            "--simulated, --extend, --extend-into, --plan and --model are of one joint: leave "
-            "--robot out and name its columns with --signal ROLE=NAME"
+            "--simulated, --extend, --extend-into, --plan and --model are of one joint: omit "
+            "--robot and name its columns with --signal ROLE=NAME"
         )
 
     def work(joint: JointAsked) -> Diagnosis:

@@ -94,7 +94,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
 
     if args.certificate is not None or args.pdf is not None or args.model is not None:
         raise ArgumentError(
-            "--certificate, --pdf and --model are of one joint: leave --robot out and name its "
+            "--certificate, --pdf and --model are of one joint: omit --robot and name its "
             "columns with --signal ROLE=NAME"
         )
 

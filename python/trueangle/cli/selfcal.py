@@ -120,7 +120,7 @@ def _calibrated(args: argparse.Namespace) -> SelfCalibration:
 def _whole(text: str, option: str) -> tuple[float, ...]:
     orders = parse_orders(text, option)
     if any(k != int(k) for k in orders):
-        raise ArgumentError(f"{option}: orders of a self-calibration are whole, got {text!r}")
+        raise ArgumentError(f"{option}: orders must be whole numbers, got {text!r}")
     return orders
 
 

@@ -210,7 +210,7 @@ def _refuse_beyond_limit(found: ChannelEstimate, named: str) -> None:
     if std > _LINEAR * abs(found.channels.fundamental):
         raise NoModelError(
             f"{named}: {found.coverage:.0f} deg of the channels' period with this noise do not "
-            "settle the middle of the channels: turn the shaft further, 120 deg or more"
+            "determine the offsets of the channels: turn the shaft further, 120 deg or more"
         )
     if found.takes > (1.0 + normal_quantile(_CONFIDENCE)) * found.limit:
         return

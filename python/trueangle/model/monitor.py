@@ -268,8 +268,8 @@ def _lines(model: HarmonicModel) -> tuple[list[int], list[float], list[float]]:
     odd = [order for order in found if order != round(order)]
     if odd:
         raise ArgumentError(
-            f"model: order {odd[0]:g} does not come back after a turn of the output and cannot be "
-            "watched turn by turn; watch a model without it"
+            f"model: order {odd[0]:g} is not periodic in one output turn and cannot be watched "
+            "turn by turn; watch a model without it"
         )
     highest = max(found)
     if highest > HIGHEST:

@@ -279,8 +279,8 @@ def clampings_of(recordings: Sequence[Recording]) -> Clampings:
         shift = gap
         if follows > math.radians(2.0):
             notes.append(
-                f"the readings' differences are off shift_deg by up to "
-                f"{math.degrees(follows):.3g} deg: the differences are taken"
+                f"the readings' differences deviate from shift_deg by up to "
+                f"{math.degrees(follows):.3g} deg: the differences are used"
             )
     return Clampings(joint, other, shift, _facets(other), tuple(notes))
 

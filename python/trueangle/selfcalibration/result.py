@@ -287,7 +287,7 @@ def _constants(result: SelfCalibration, unit: ErrorUnit) -> list[str]:
     if result.limit_arcsec is not None and result.coverage_deg is not None:
         lines.append(
             f"the phase {sense} with the angle; {result.coverage_deg:.0f} deg of the period are "
-            f"covered; the constants settle the angle to {unit.text(result.limit_arcsec)}"
+            f"covered; the constants determine the angle to {unit.text(result.limit_arcsec)}"
         )
     if result.diagnosis is not None:
         lines += result.diagnosis.lines()

@@ -134,8 +134,8 @@ def error_unit(
     if asked == "count":
         if period is None or period in UNIT_PERIODS.values():
             raise ArgumentError(
-                "errors in counts need the counts of a turn: give "
-                "`counts_per_turn=N`, of a summary `errors_in=N`"
+                "errors in counts need the counts of a turn: give `counts_per_turn=N`, "
+                "or `errors_in=N` for a summary"
             )
         return ErrorUnit("count", period / ARCSEC_PER_TURN)
     turns = {"arcsec": ARCSEC_PER_TURN, "deg": 360.0, "mrad": 2000.0 * math.pi}

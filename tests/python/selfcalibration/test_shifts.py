@@ -176,7 +176,7 @@ def test_shifts_that_readings_contradict_are_told_by_how_much(sense: float) -> N
         sense * (np.array(SHIFTS) + np.array([0.0, -2.5, 5.0]))[log["run"].astype(int)]
     )
     found = selfcal(log)
-    (note,) = [n for n in found.notes if "are off shift_deg" in n]
+    (note,) = [n for n in found.notes if "deviate from shift_deg" in n]
     assert float(note.split("by up to ")[1].split()[0]) == pytest.approx(5.0, abs=0.02)
     assert found.beside["shifts_deg"] == pytest.approx(SHIFTS, abs=0.1)
     log["shift_deg"] = sense * np.array(SHIFTS)[log["run"].astype(int)]

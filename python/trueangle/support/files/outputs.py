@@ -115,7 +115,7 @@ def check_output(
         raise FileError(path, f"is also read{also}: it would be overwritten; name another file")
     if found is not None:
         if _is_printed_into(found):
-            raise FileError(path, "is where this program's printed text goes; name another file")
+            raise FileError(path, "is the file of this program's own output; name another file")
         known = {digest for digest in hashes if digest}
         if known and sha256_of(target) in known:
             raise FileError(
