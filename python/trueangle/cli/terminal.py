@@ -129,7 +129,7 @@ def silence_output() -> None:
         pass
 
 
-#: What is significant in a text, and how: bold, red, yellow, green. Words state all that colours
+#: What is emphasised in a text: bold, red, yellow, green. Words state all that colours
 #: do.
 _RULES: Final = tuple(
     (re.compile(pattern, re.MULTILINE), code)
@@ -153,7 +153,7 @@ def has_colours(stream: Any) -> bool:
 
 
 def coloured_text(text: str) -> str:
-    r"""``text`` with what is significant in colour; JSON stays as it is.
+    r"""``text`` with emphasis in colour; JSON stays as it is.
 
     Examples
     --------

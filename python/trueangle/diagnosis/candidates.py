@@ -1,4 +1,4 @@
-"""What causes propose together with those found, and which of it is the best."""
+"""Proposals of further causes, and the best of them."""
 
 from __future__ import annotations
 

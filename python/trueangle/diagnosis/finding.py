@@ -49,7 +49,7 @@ _SIZED: dict[str, tuple[float, str]] = {
     "gear_ratio": (1.0, "is the ratio"),
 }
 
-#: Where or of what a finding is, by the parameters that report it.
+#: Place or object of a finding, by its parameters.
 _PLACES = {
     "order": "order {:g}",
     "carrier": "of order {:g}",

@@ -58,7 +58,7 @@ def held_out_residuals(
 
 @dataclass(frozen=True)
 class HoldOutModel:
-    """What a fit states about readings that it was not fitted to.
+    """Prediction of readings that were not fitted.
 
     Attributes
     ----------

@@ -53,7 +53,7 @@ def open_origins(
     """What else may make an error of this form, in the order of `DOUBTS`."""
     cause = extension.cause
     shared = (spot for spot in spots if spot.common == cause and cause in spot.causes)
-    # What is supported already is reported of another finding.
+    # What is supported already is listed with another finding.
     found = [spot for spot in shared if not spot.supported]
     for doubt in _doubts(extension, regression, spots):
         if doubt.common == cause and doubt not in found:

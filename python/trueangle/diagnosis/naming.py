@@ -1,4 +1,4 @@
-"""What the causes chosen are called, together with what the error follows whatever its name."""
+"""Names of the chosen causes, jointly with the factors that the error follows."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ def deviance_of_form_errors(deviance: float, readings: int) -> float:
 
 def penalty_of(terms: Sequence[Extension], left: float) -> float:
     """Of causes beyond that of their parameters; their forms may leave ``left``."""
-    # A line of a declared shaft is expected, and is where it was reported to be.
+    # A line of a declared shaft is expected, and is at its declared place.
     declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
     effects = [effect_or_unnamed(term.cause) for term in terms]
     separate = [effect for effect in effects if effect.is_separate]

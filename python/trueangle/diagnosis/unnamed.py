@@ -144,7 +144,7 @@ class UnnamedLine(Effect):
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
-        """Low orders of the angle of each run's own, or the line in time that is significant."""
+        """Low orders of the angle in single runs, or a significant line in time."""
         if regression.signals.runs < 2:
             return None
         trials = [cls._own_orders(regression, top) for top in OWN_ORDERS]
@@ -164,7 +164,7 @@ class UnnamedLine(Effect):
 
     @staticmethod
     def _line_in_time(regression: Regression) -> Extension | None:
-        """The line that is significant, unless one with a name is hardly distinguished from it."""
+        """A significant line, unless one with a name is close to it."""
         signals = regression.signals
         left = regression.left_within_runs
         left = left * ~regression.outlying

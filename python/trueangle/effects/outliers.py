@@ -50,7 +50,7 @@ GATHERED = 1e-3
 #: wide normal supplies and no reading shows. It counts as the fraction's uncertainty.
 HIDDEN = 3.0
 
-#: Standard deviations from which on a reading that is significant alone is not its neighbours'.
+#: Standard deviations from which on a reading that is far off alone is not its neighbours'.
 WILD = 6.0
 
 #: Scale below which no normal is narrow: readings that are all alike have none.

@@ -14,7 +14,7 @@ from ..support.distributions import f_tail
 #: Probability that two calibrations of one pattern are reported to differ.
 FALSE_ALARMS: Final = 0.01
 
-#: Orders of which one is significant at random: those that a selection looks at in two models.
+#: Orders tested at once: those that a selection looks at in two models.
 _LOOKED_AT: Final = 220
 
 #: Degrees of freedom of a scatter at least: fewer show nothing.

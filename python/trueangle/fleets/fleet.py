@@ -41,7 +41,7 @@ def fleet(
     shafts: Mapping[str, float] | None = None,
     **reading: Any,
 ) -> Fleet:
-    """Units of one design: who is significant, what all share, what moved since the last time.
+    """Units of one design: outliers, the shared pattern, changes since the last time.
 
     ::
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from .variance import robust_variance
 
-#: Probability that a fleet without an outlier is reported of one.
+#: Probability that a fleet without an outlier is reported with one.
 LEVEL: Final = 0.01
 
 #: Shares of that probability: of a unit by one of its orders, the remainder by all together; and of

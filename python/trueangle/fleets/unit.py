@@ -34,7 +34,7 @@ class FleetUnit:
     unit : str
     verdict : {"fine", "outlier", "recalibrate", "changed", "zero_moved"}
     because : str
-        What is significant, and what it is likely to be; empty where nothing does.
+        What deviates, and its likely cause; empty where nothing does.
     orders : tuple of UnitOrder
         Of the last calibration.
     peak_to_peak : float

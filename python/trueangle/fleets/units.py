@@ -17,7 +17,7 @@ from .calibration import Calibration, order_columns, output_orders
 from .outliers import Deviates, deviates, level_by_order
 from .variance import BetweenUnits, held_out_score, reml
 
-#: Units below which none is reported to be an outlier: the others are what it is reported by.
+#: Fewest units for finding outliers: each is compared with the others.
 FEWEST: Final = 5
 
 #: Share of the units that are rejected as outliers, at most (one may always be).

@@ -327,7 +327,7 @@ _OUT_OF_ORDER = (
     "follow the direction of travel. {} does not keep the order: {}"
 )
 
-#: Library -> what corrects its data, or states NotImplemented to that of others.
+#: Library -> what corrects its data, or returns NotImplemented for other data.
 _KINDS: Sequence[tuple[str, Callable[[Any, Any, LogSettings], Any]]] = (
     ("dask.dataframe", _from_dask_frame),
     ("dask.array", _from_dask_array),

@@ -18,7 +18,7 @@ from .further import run_steps
 
 @dataclass(frozen=True)
 class RivalEvidence:
-    """What the next runs are expected to state about causes.
+    """Expected evidence of the next runs for causes.
 
     Attributes
     ----------

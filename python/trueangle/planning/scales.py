@@ -172,7 +172,7 @@ class DesignScales:
         return worth
 
     def answers(self, designs: Sequence[RunDesign], start: Signals | None) -> Iterator[Answer]:
-        """What designs state about each question."""
+        """Evidence of designs for each question."""
         regression, spots = self._at(designs, start)
         for question in self.questions:
             evidence = self._evidence(question, regression)

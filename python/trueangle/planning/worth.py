@@ -186,7 +186,7 @@ def barely(reached: tuple[int, int, bool, int]) -> Worth:
 
 @dataclass(frozen=True)
 class Answer:
-    """What runs state about one question: whether it is decided, and by which evidence."""
+    """Evidence of runs for one question, and whether it decides."""
 
     told: bool
     bic: float | None

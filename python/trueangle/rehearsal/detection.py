@@ -61,7 +61,7 @@ class Threshold:
 
 
 class Chance:
-    """What trials state about the probability that a cause is named.
+    """Estimate the probability that a cause is named, from trials.
 
     Parameters
     ----------

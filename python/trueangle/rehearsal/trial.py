@@ -14,7 +14,7 @@ from ..joint.pattern import JointPattern
 from ..joint.signals import Signals, join_runs
 from ..simulation.simulation import Simulation, simulate
 
-#: What a diagnosis may state about a hidden cause: it is confirmed; it is listed and not confirmed;
+#: Answers of a diagnosis for a hidden cause: it is confirmed; it is listed and not confirmed;
 #: it is one of several that are not separated; another cause is in its place; something is
 #: unexplained; nothing is detected. A diagnosis that failed is a defect; one that was ended no
 #: answer.

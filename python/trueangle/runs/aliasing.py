@@ -23,7 +23,7 @@ from ..support.quantiles import median
 from .run import CalibrationRun, as_runs
 
 #: Positions closer than this (turns) count as one: 0.01 degree, which turns the phase
-#: of order 202 by 2 degrees, so that no order of interest is reported by the difference.
+#: of order 202 by 2 degrees, so that no order of interest depends on the difference.
 POSITION_TOLERANCE: Final = 1.0 / 36_000.0
 
 #: Highest order that is named as an alias where no gear is declared, and the phase (radians)

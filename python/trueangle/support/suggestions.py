@@ -35,7 +35,7 @@ def did_you_mean(got: str, known: Iterable[str]) -> str:
     """
     import difflib  # needed only where something is wrong
 
-    # A wide log has thousands: more are looked through only to be reported nothing.
+    # A wide log has thousands: more are searched in vain.
     words = {word.lower(): word for word in reversed(list(islice(known, _LOOKED_AT)))}
     near = difflib.get_close_matches(got.lower(), words, n=3, cutoff=0.6)
     # Words are begun right more often than ended right.

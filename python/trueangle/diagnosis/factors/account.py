@@ -131,7 +131,7 @@ class FactorAccount:
     def best_beside(
         self, given: Sequence[float], allowed: Iterable[int], start: Sequence[float] | None = None
     ) -> tuple[float, list[float]]:
-        """Score and model of the best of some groups together with those given."""
+        """Score and model of the best of some groups, added to those given."""
         probabilities = [0.0] * len(self.groups)
         for k in allowed:
             if given[k] == 0.0:

@@ -36,7 +36,7 @@ FAMILIES: Final = (
     {"run", "run_time", "temperature"},
 )
 
-#: The factor of how an error settles after a reversal, which is reported of any: no name is by it.
+#: Factor of settling after a reversal: reported, but no cause is named by it.
 TRANSITION: Final = "reversal_time"
 
 #: Bumps of one place from which on they are one function of it; and how near, in their widths,

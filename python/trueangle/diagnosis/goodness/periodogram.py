@@ -71,7 +71,7 @@ class _Periodogram:
     power : ndarray
         Mean over runs: 1 on average for noise.
     peak : float
-        The frequency that is significant most.
+        The most significant frequency.
     width : int
         Resolution cells that it explains.
     statistic : float
@@ -144,7 +144,7 @@ def periodogram(
     total = np.zeros((len(WIDTHS), last))
     known = np.zeros(last)
     freedom = np.zeros(len(WIDTHS))
-    # The amplitude of a line together with the highest frequency is reported by those beyond it,
+    # The amplitude of a line near the highest frequency needs those beyond it,
     # too.
     raw = np.zeros(min(last + boxes[-1], frequency.size))
     for (a, b), span, fold in zip(kept, spans, folds, strict=True):

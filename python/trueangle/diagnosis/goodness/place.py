@@ -193,7 +193,7 @@ def _smallest(
     """Smallest p value of orders, bands of them and the modulator alone, and what has it.
 
     The p value, its statistic, the band (0 for one order, -1 for none), the order that is
-    significant most, and the evidence of every order.
+    most significant, and the evidence of every order.
     """
     count, n_units = w.shape
     coherent = np.abs(w @ signs) ** 2

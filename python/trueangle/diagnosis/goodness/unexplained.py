@@ -32,7 +32,7 @@ SMALLEST = 1e-9
 
 @dataclass(frozen=True)
 class Unexplained(ShownResult):
-    """What tests that need no name state about the residual.
+    """Tests of the residual that need no name.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ def goodness_of_fit(
     describing = scatter_tests(left, noise, sigma)
     firing = _firing(deciding)
     # Sure is sure: of those far beyond doubt the narrower account comes first, and of a line
-    # in angle or in time the one that is significant more.
+    # in angle or in time the more significant one.
     rank = {id(item): float(k) for k, item in enumerate(deciding)}
     lines = [item for item in deciding if item.test in ("place within runs", "time periodogram")]
     if len(lines) == 2 and lines[1].statistic > lines[0].statistic * (1.0 + ROUNDING):

@@ -24,7 +24,7 @@ LEFT_OUT: Final = ("reference", "too long", "negligible", "too steep", "rounding
 
 @dataclass(frozen=True)
 class OrderRow:
-    """What the data state about one order.
+    """Evidence of the data for one order.
 
     Angles are in the unit of the runs unless the name states otherwise.
 

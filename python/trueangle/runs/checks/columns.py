@@ -162,7 +162,7 @@ def _likely(header: Sequence[str], unit: str | None) -> list[LikelyColumn]:
         if not roles:
             unnamed.append((joint, name))
             continue
-        # The reference separates itself: a laser's angle is no encoder's.
+        # The reference is recognised by itself: a laser's angle is no encoder's.
         role = "reference" if "reference" in roles else roles[-1]
         columns.append(LikelyColumn(joint, role, name, unit_in_name(name, role) or unit))
     taken = {(column.joint, column.role) for column in columns}

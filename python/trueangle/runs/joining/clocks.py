@@ -156,7 +156,7 @@ def _refined(indicated: Stream, reference: Stream, clocks: Clocks, wanted: list[
         found = _solved(indicated, reference, clocks, wanted)
         if found is not None and found.rate_std is not None:
             time = indicated.time - clocks.start
-            # Of a rate that is significant nothing is assumed.
+            # No rate is assumed to be exceptional.
             is_sure = abs(found.rate) > _SIGNIFICANT * found.rate_std
             return found if is_sure else _as_quartzes(found, time)
     if "offset" not in wanted:

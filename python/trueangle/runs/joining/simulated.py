@@ -54,7 +54,7 @@ class MeasuredMinusSimulated(ShownResult):
         Standard deviation that the joining adds to an error.
     notes : tuple of str
     logs : list of CalibrationRun
-        What the log states about the motion of every run.
+        Motion of every run, from the log.
     """
 
     runs: list[CalibrationRun]
@@ -123,7 +123,7 @@ def minus_simulated(
     by: str | None = None,
     **reading: Any,
 ) -> MeasuredMinusSimulated:
-    """Measured runs without what a simulator's log states about the same joint.
+    """Measured runs minus a simulator's log of the same joint.
 
     ::
 

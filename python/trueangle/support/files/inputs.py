@@ -27,7 +27,7 @@ _CHUNK: Final = 1 << 20
 #: Milliseconds between two looks for Ctrl-C while a pipe is waited for.
 _LOOK_MS: Final = 100
 
-#: What represents no value.
+#: Marks of a missing value.
 _NOTHING: Final = "__HIVE_DEFAULT_PARTITION__"
 
 

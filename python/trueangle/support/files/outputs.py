@@ -33,7 +33,7 @@ __all__ = [
     "written_atomically",
 ]
 
-#: What the system states about writing only.
+#: Errors of the system for writing only.
 _OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 #: Bytes that a file must take for its disk not to be full.
