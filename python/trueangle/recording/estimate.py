@@ -33,16 +33,12 @@ _SPEED: Final = 0.5
 
 
 class LiveOrder(NamedTuple):
-    """One order: its cosine and sine, and their standard error, in the unit of the angles."""
+    """One order: its amplitude, the phase of its sine, and their standard error."""
 
     order: int
-    value: complex
-    std: float
-
-    @property
-    def phase_deg(self) -> float:
-        """Phase of its sine, degrees."""
-        return math.degrees(math.atan2(self.value.real, self.value.imag)) % 360.0
+    amplitude_arcsec: float
+    phase_deg: float
+    std_arcsec: float
 
 
 class Estimate:
@@ -170,10 +166,12 @@ class Estimate:
         limit = chi_squared_quantile(1.0 - _CHANCE / _HIGHEST, 2.0 * more) / (2.0 * more)
         std = np.sqrt(np.where((own > limit * white) & (self.turns > 1), own, white))
         least = math.sqrt(-2.0 * math.log(_CHANCE / _HIGHEST)) * std
-        sizes, known = np.abs(self._values), {order.order for order in self.orders}
+        known, scale = {order.order for order in self.orders}, arcsec(1.0, self.period)
+        sizes = np.abs(self._values)
+        phases = np.degrees(np.arctan2(self._values.real, self._values.imag)) % 360.0
         self.orders = [
-            LiveOrder(int(i) + 1, complex(self._values[i]), float(std[i]))
-            for i in np.argsort(-sizes)
+            LiveOrder(i + 1, scale * sizes[i], phases[i], scale * std[i])
+            for i in np.argsort(-sizes).tolist()
             if sizes[i] > least[i]
         ]
         watched = [k - 1 for k in known | {order.order for order in self.orders}]
@@ -186,9 +184,9 @@ class Estimate:
         return np.asarray((self.cells > 0).mean(axis=1))
 
     @property
-    def is_covered(self) -> bool:
-        """Every part of the turn was read, in one direction or the other."""
-        return bool(self.cells.any(axis=0).all())
+    def share(self) -> float:
+        """Part of the turn that was read, in one direction or the other."""
+        return float(self.cells.any(axis=0).mean())
 
     @property
     def curve(self) -> tuple[Array, Array]:
@@ -208,13 +206,5 @@ class Estimate:
             "turns_travelled": round(self.travelled, 3),
             "turns": self.turns,
             "peak_to_peak_arcsec": scale * float(np.ptp(error)) if error.any() else None,
-            "orders": [
-                {
-                    "order": order.order,
-                    "amplitude_arcsec": scale * abs(order.value),
-                    "phase_deg": order.phase_deg,
-                    "std_arcsec": scale * order.std,
-                }
-                for order in self.orders
-            ],
+            "orders": [order._asdict() for order in self.orders],
         }

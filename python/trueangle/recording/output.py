@@ -175,10 +175,8 @@ class RunsFile:
 
     def close(self) -> None:
         """End both files."""
-        try:
+        with contextlib.closing(self.rejected):
             self.rows.close()
-        finally:
-            self.rejected.close()
 
 
 def _continued(path: Path) -> tuple[list[str], set[str]]:

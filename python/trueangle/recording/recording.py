@@ -115,9 +115,8 @@ class LiveRecording:
     @property
     def is_enough(self) -> bool:
         """What it was to go on until is there."""
-        if self._choices.until == "orders":
-            return self.estimate.is_settled
-        return self._choices.until == "coverage" and self.estimate.is_covered
+        enough = {"orders": self.estimate.is_settled, "coverage": self.estimate.share == 1.0}
+        return enough.get(self._choices.until or "", False)
 
     def take(self, now: float) -> None:
         """Take what has arrived by ``now``, seconds from the start of the recording."""
@@ -236,8 +235,7 @@ class LiveRecording:
     @property
     def missing(self) -> str:
         """What the recording still lacks, in one line; empty where it lacks nothing."""
-        forwards, backwards = self.estimate.covered.tolist()
-        share = float(self.estimate.cells.any(axis=0).mean())
+        share, (forwards, backwards) = self.estimate.share, self.estimate.covered.tolist()
         if self._angles is None or not self.rows:
             return self.note
         if not share:

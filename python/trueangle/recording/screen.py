@@ -103,8 +103,8 @@ class Screen:
         if recording.jitter >= 0.0:
             lines.append(f"times are those of arrival, jitter {1e3 * recording.jitter:.2g} ms")
         for order in estimate.orders[:_SHOWN]:
-            size, std = (arcsec(x, estimate.period) for x in (abs(order.value), order.std))
-            shown = error_unit(self._errors_in, size).text(size, std)
+            size = order.amplitude_arcsec
+            shown = error_unit(self._errors_in, size).text(size, order.std_arcsec)
             lines.append(f"order {order.order:3d}  {shown} at {order.phase_deg:.0f} deg")
         if estimate.turns > 1 and not (estimate.orders or recording.note):
             lines.append("no order above the noise")

@@ -73,7 +73,9 @@ def test_standard_errors_hold_what_turns_differ_by():
             for rows in np.array_split(np.arange(angle.size), 240):
                 estimate.add(angle[rows], angle[rows] + error[rows], rows * 1e-3)
             order = next(order for order in estimate.orders if order.order == 1)
-            pulls += [(order.value - 1.0).real / order.std, order.value.imag / order.std]
+            phase, std = np.radians(order.phase_deg), order.std_arcsec / 3600.0
+            size = order.amplitude_arcsec / 3600.0
+            pulls += [(size * np.sin(phase) - 1.0) / std, size * np.cos(phase) / std]
         # By their steps 11 turns have 15 degrees: Student's t has 1.07, and 48 of them tell it to
         # 11 %: within three of these.
         assert 0.72 < np.sqrt(np.mean(np.square(pulls))) < 1.42, (moved, pulls)
@@ -100,7 +102,7 @@ def test_travel_knows_where_it_was_and_which_way(sign):
     one_way, other = travel.covered[:: int(sign)]
     assert one_way == 1.0
     assert other == pytest.approx(0.25, abs=2.0 / CELLS)
-    assert travel.is_covered
+    assert travel.share == 1.0
     assert travel.travelled == pytest.approx(1.75, abs=0.02)
     assert travel.speeds == pytest.approx([0.2, 0.2], rel=0.2)
 
@@ -111,4 +113,4 @@ def test_few_positions_leave_the_orders_that_they_tell_apart():
         angle = np.arange(72) * 5.0 + 360.0 * turn
         estimate.add(angle, angle + np.sin(3.0 * np.radians(angle)), angle / 30.0)
     assert [order.order for order in estimate.orders] == [3]
-    assert abs(estimate.orders[0].value) == pytest.approx(1.0, rel=1e-6)
+    assert estimate.orders[0].amplitude_arcsec == pytest.approx(3600.0, rel=1e-6)

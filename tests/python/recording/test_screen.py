@@ -87,7 +87,7 @@ def test_a_shaft_without_a_reference_is_recorded_for_selfcal(tmp_path):
     lines = [f"{i % 4096}" for i in range(0, 20_000, 37)]
     signals = {"indicated": ("column1", "count")}
     recording = recorded(tmp_path / "a.csv", lines, signals, (4096.0, None))
-    assert recording.estimate.is_covered
+    assert recording.estimate.share == 1.0
     assert (tmp_path / "a.csv").read_text().startswith("run,time_s,indicated_deg\n")
     assert "reference_deg" in recording.missing
     assert recording.estimate.orders == []
