@@ -4,7 +4,8 @@ Noise may follow the speed as ``exp(a + b |v|)`` (friction, which has no law) or
 ``a + b v²`` (time stamps that scatter), together with what follows the angle and the load, which
 may represent either. Neither form holds the other. So every account, with and without what is not
 the speed, with either form or none, has its likelihood and its penalty; and each part of the best
-account is compared with the best account in which another cause is in its place.
+account is compared with the best account in which another cause is in its place. Runs at two
+speeds determine one number of either form: readings between the two speeds do not select one.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from ..effects.noiselaw import NoiseLaw, noise_law
 from ..effects.scatter import standardised_residuals
 from ..effects.timestamp_jitter import TimestampJitter, shares_of_speed
 from ..estimation.regression import Regression
+from .levels import levels_of_runs
 from .penalty import NEW_CAUSE
 
 UNEVEN, JITTER = HeteroscedasticNoise.kind, TimestampJitter.kind
@@ -104,6 +106,9 @@ def _parts(
         return bool(best.form) or one.blocks != best.blocks
 
     gap, rival = gain_over(is_instead)
+    levels = levels_of_runs(regression.signals, "velocity")
+    if best.form and rival.form and rival.blocks == best.blocks and levels and len(levels[1]) == 2:
+        gap = 0.0
     other = UNEVEN if is_jitter else JITTER
     instead = _jitter(regression, rival) if rival.form == JITTER else _uneven(rival)
     assert instead is not None
