@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import MissingExtraError
 from ..plots import palette
-from ..plots.canvas import described, new_axes, new_figure, turn_axis
+from ..plots.canvas import described, new_axes, new_figure, page_pictures, turn_axis
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.display_units import ErrorsIn, error_unit, significant_digits, sine_of_rms
 from ..support.files import CERTIFICATE, check_output, external_output, read_whole
@@ -100,7 +100,8 @@ def _picture(content: dict[str, Any], said: dict[str, Any], small: bool) -> byte
     if left is None and small:
         parts.append([row | {"error_arcsec": 0.0} for row in rows])
     # One below the other, each at a separate scale.
-    figure, axes = new_figure(len(parts), 1, 7.5, (2.8, 4.6)[len(parts) - 1], sharey=False)
+    with page_pictures(1.0):
+        figure, axes = new_figure(len(parts), 1, 7.5, (2.8, 4.6)[len(parts) - 1], sharey=False)
     result = said["result"]
     names = [result["axis_error"], "U / #unit" if left is None else result["axis_left"]]
     for ax, some, name in zip(axes, parts, names, strict=False):
@@ -111,9 +112,6 @@ def _picture(content: dict[str, Any], said: dict[str, Any], small: bool) -> byte
     figure.align_ylabels()
     buffer = io.BytesIO()
     figure.savefig(buffer, format="svg")
-    from matplotlib import pyplot
-
-    pyplot.close(figure)
     return buffer.getvalue()
 
 

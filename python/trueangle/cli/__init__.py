@@ -84,16 +84,13 @@ def build_parser(words: Container[str] = COMMANDS, commands: Iterable[str] = COM
     )
     for name in commands:
         command: Command = importlib.import_module(f".{name}{'_' * iskeyword(name)}", __name__)
-        subparser = subparsers.add_parser(
-            name,
-            help=command.HELP,
-            description="\n".join(wrapped_lines(command.HELP)),
-            epilog=f"example:\n  {command.EXAMPLE}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
+        is_called = name in words
+        subparser = subparsers.add_parser(name, help=command.HELP, add_help=is_called)
         parser.commands[name] = subparser
-        if name not in words:
+        if not is_called:
             continue
+        subparser.description = "\n".join(wrapped_lines(command.HELP))
+        subparser.epilog = f"example:\n  {command.EXAMPLE}"
         command.add_arguments(subparser)
         subparser.add_argument(
             "--debug", action="store_true", help="print the traceback of an error too"

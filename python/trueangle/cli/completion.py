@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import shlex
 from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
@@ -84,6 +83,8 @@ def _first_part(text: str) -> str:
 
 
 def _bash(parser: Parser) -> Iterator[str]:
+    import shlex  # a help needs none of it
+
     yield "# bash completion of trueangle"
     yield "_trueangle() {"
     yield "  local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]}"

@@ -6,7 +6,6 @@ import argparse
 import sys
 from collections.abc import Iterator
 from functools import partial
-from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError, FileError, NoModelError, TrueAngleError
@@ -184,6 +183,8 @@ def _minus_simulated(
         told = of_joint(error.problem, "simulated")
         missing = [entry for entry in args.signal if entry[1] not in (columns or {})]
         if told != error.problem and missing:
+            from shlex import quote
+
             again = " ".join(f"--signal {quote(f'simulated.{entry.text}')}" for entry in missing)
             told += f"; --signal ROLE=NAME is of the runs only, for the same names add {again}"
         raise FileError(error.path, told, line=error.line, column=error.column) from None

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any, Final, NoReturn, TypeAlias
 
+from ..support.layout import text_columns
 from ..support.suggestions import did_you_mean
 from .paths import Input
 
@@ -35,6 +36,13 @@ _OUTPUT: Final = (
 Kind: TypeAlias = type[bool] | tuple[str, ...] | Callable[[str], Any]
 
 
+class HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """As wide as other texts are; argparse asks `shutil` for that, whose import takes long."""
+
+    def __init__(self, prog: str, **how: Any) -> None:
+        super().__init__(prog, width=text_columns() - 2, **how)
+
+
 class Parser(argparse.ArgumentParser):
     """`argparse.ArgumentParser` with grouped help whose errors suggest what was meant.
 
@@ -45,7 +53,7 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         self._headed: dict[str, argparse._ArgumentGroup] = {}
         self._words: list[str] = []
-        super().__init__(*args, **kwargs)
+        super().__init__(*args, **{"formatter_class": HelpFormatter, **kwargs})
         #: Parsers of the commands, by name; those of a command have none.
         self.commands: dict[str, Parser] = {}
 

@@ -129,16 +129,12 @@ def silence_output() -> None:
         pass
 
 
-#: What is emphasised in a text: bold, red, yellow, green. Words state all that colours
-#: do.
-_RULES: Final = tuple(
-    (re.compile(pattern, re.MULTILINE), code)
-    for pattern, code in (
-        (r"\berror:|\bNOT UNDERSTOOD\b|\bNO ORDER RETAINED\b|\bDISAGREE\b", "1;31"),
-        (r"\bwarning:|^ *! |\bNOT CONFIRMED\b|^Listed and not confirmed:", "33"),
-        (r"^Confirmed:|\bretained$|^Nothing beyond the simulation:|^No fault found", "32"),
-        (r"^\d+\. .*|^[A-Z][^\n]*:$|did you mean [^\n?]+\?", "1"),
-    )
+#: What is emphasised in a text: bold, red, yellow, green. Words state all that colours do.
+_RULES: Final = (
+    (r"\berror:|\bNOT UNDERSTOOD\b|\bNO ORDER RETAINED\b|\bDISAGREE\b", "1;31"),
+    (r"\bwarning:|^ *! |\bNOT CONFIRMED\b|^Listed and not confirmed:", "33"),
+    (r"^Confirmed:|\bretained$|^Nothing beyond the simulation:|^No fault found", "32"),
+    (r"^\d+\. .*|^[A-Z][^\n]*:$|did you mean [^\n?]+\?", "1"),
 )
 
 
@@ -165,5 +161,5 @@ def coloured_text(text: str) -> str:
     if text[:1] in ("{", "["):
         return text
     for pattern, code in _RULES:
-        text = pattern.sub(f"\x1b[{code}m\\g<0>\x1b[0m", text)
+        text = re.sub(pattern, f"\x1b[{code}m\\g<0>\x1b[0m", text, flags=re.MULTILINE)
     return text

@@ -16,7 +16,7 @@ SHAFTS = ("output", "motor", "wave_generator")
 #: Seconds of a unit.
 _SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "m": 60.0, "h": 3600.0}
 
-_DURATION = re.compile(r"(?P<number>[0-9.]+(?:e[+-]?[0-9]+)?) *(?P<unit>[a-z]*)", re.IGNORECASE)
+_DURATION = r"(?P<number>[0-9.]+(?:[eE][+-]?[0-9]+)?) *(?P<unit>[a-zA-Z]*)"
 
 #: Arcsec of a unit, the longer names first.
 _ARCSEC = {"arcsec": 1.0, "arcmin": 60.0, "mrad": 648.0 / math.pi, "deg": 3600.0}
@@ -30,7 +30,7 @@ def seconds(text: str) -> float:
     >>> seconds("2min"), seconds("10")
     (120.0, 10.0)
     """
-    found = _DURATION.fullmatch(text.strip())
+    found = re.fullmatch(_DURATION, text.strip())
     try:
         value = float(found["number"]) * _SECONDS[found["unit"].lower()] if found else math.nan
     except (ValueError, KeyError):

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _Block: TypeAlias = "QuotedBlock | PlainBlock"
 
 #: Bytes of a file that the standard library reads in less time than pyarrow takes to start.
-SMALL = 1 << 18
+SMALL = 1 << 19
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import TrueAngleError
 from ..support.suggestions import check_choice
 from .amplitudespectrum import amplitude_spectrum
-from .canvas import as_image, small_pictures, text_alternative
+from .canvas import as_image, page_pictures, text_alternative
 from .controlcharts import fleet_history, watched_windows
 from .diagnosispictures import error_left, factors, gains
 from .drawnreadings import (
@@ -94,7 +94,7 @@ def thumbnail(result: object) -> str:
     """A small picture of a result as an element of a page; empty where there is none to draw."""
     draw = _RESULTS.get(type(result).__name__)
     try:
-        with small_pictures():
+        with page_pictures():
             return "" if draw is None else as_image(draw(result))
     except TrueAngleError:  # of no matplotlib too
         return ""

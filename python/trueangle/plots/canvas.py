@@ -26,7 +26,7 @@ _DOTS_PER_INCH: float = 120.0
 _ON_PAGE: float = 80.0
 #: Dots per inch of a page that draws vectors: those of CSS.
 ON_PAGE: float = 96.0
-_SMALLER: ContextVar[bool] = ContextVar("smaller", default=False)
+_SCALE: ContextVar[float | None] = ContextVar("scale", default=None)
 
 #: Entries of a legend beyond which it is next to the picture, not inside.
 _MANY: int = 5
@@ -82,13 +82,13 @@ def new_figure(
 
 
 @contextmanager
-def small_pictures() -> Iterator[None]:
-    """Within it new figures are small, and no window and no notebook knows them."""
-    before = _SMALLER.set(True)
+def page_pictures(scale: float = _SMALL) -> Iterator[None]:
+    """Within it new figures have another size, and no window and no notebook knows them."""
+    before = _SCALE.set(scale)
     try:
         yield
     finally:
-        _SMALLER.reset(before)
+        _SCALE.reset(before)
 
 
 def as_image(drawn: Axes | Figure) -> str:
@@ -106,16 +106,16 @@ def as_image(drawn: Axes | Figure) -> str:
 
 def _subplots(rows: int, columns: int, width: float, height: float, **how: Any) -> Any:
     """A figure of this many inches and an array of its axes."""
+    scale = _SCALE.get()
     try:
-        from matplotlib import pyplot
-        from matplotlib.figure import Figure
+        if scale is None:
+            from matplotlib import pyplot
+        from matplotlib import figure as figures
     except ModuleNotFoundError:
         raise MissingExtraError("pictures need matplotlib: pip install 'trueangle[plot]'") from None
-    if not _SMALLER.get():
-        return pyplot.subplots(
-            rows, columns, figsize=(width, height), layout="constrained", squeeze=False, **how
-        )
-    figure = Figure(figsize=(_SMALL * width, _SMALL * height), layout="constrained")
+    new = pyplot.figure if scale is None else figures.Figure
+    size = (scale or 1.0) * width, (scale or 1.0) * height
+    figure = new(figsize=size, layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False, **how)
 
 

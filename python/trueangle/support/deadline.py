@@ -8,11 +8,9 @@ it; who requested the work enters one with `with_deadline`, and may let Ctrl-C e
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
@@ -165,6 +163,8 @@ class Deadline:
         if self._style == "json":
             state = {"stage": stage, "done": done, "total": total}
             times = {"seconds": now - self._begun, "seconds_left": left}
+            import json  # a help needs none of it
+
             self._write(json.dumps(state | {k: v and round(v, 1) for k, v in times.items()}) + "\n")
             return
         text = f"{stage}: {done} of {total}"
@@ -243,6 +243,8 @@ def ending_early() -> Iterator[_Interruption]:
     """
     found = _Interruption()
     ignored = signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None)
+    import threading
+
     if ignored or threading.current_thread() is not threading.main_thread():
         yield found
         return

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections.abc import Iterator, Mapping
@@ -95,7 +94,13 @@ def json_text(value: Any, indent: int | None = None) -> str:
             return {name: plain(one) for name, one in entry.items()}
         return [plain(one) for one in entry] if isinstance(entry, (list, tuple)) else entry
 
-    return json.dumps(plain(value), indent=indent, allow_nan=False)
+    return _dumps(plain(value), indent=indent, allow_nan=False)
+
+
+def _dumps(value: Any, **how: Any) -> str:
+    import json  # a help needs none of it
+
+    return json.dumps(value, **how)
 
 
 def result_picture(result: object, *args: Any, **options: Any) -> Any:
@@ -112,11 +117,9 @@ def pretty_json(value: Any, indent: int = 0) -> str:
     pad = "  " * (indent + 1)
     end = "\n" + "  " * indent
     if isinstance(value, Mapping) and value:
-        items = [
-            f"{pad}{json.dumps(key)}: {pretty_json(v, indent + 1)}" for key, v in value.items()
-        ]
+        items = [f"{pad}{_dumps(key)}: {pretty_json(v, indent + 1)}" for key, v in value.items()]
         return "{\n" + ",\n".join(items) + end + "}"
     nested = isinstance(value, (list, tuple)) and any(isinstance(v, (Mapping, list)) for v in value)
     if nested:
         return "[\n" + ",\n".join(pad + pretty_json(v, indent + 1) for v in value) + end + "]"
-    return json.dumps(value, allow_nan=False)
+    return _dumps(value, allow_nan=False)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...support.angles import wrap
-from ...support.arrays import Array
+from ...support.arrays import Array, distinct
 from ...support.display_units import brief_number
 from ...support.quantiles import median, quantile
 from ..outliers import WILD, robust_scale, spikes
@@ -209,7 +209,7 @@ def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
         timed = record.time is not None
         columns = [record.indicated, record.reference, *([record.time] if timed else [])]
         table = np.stack([column for column in columns if column is not None])
-        if np.unique(table[-1]).size == len(record):
+        if distinct(table[-1]).size == len(record):
             continue
         order = np.lexsort(table)
         same = np.diff(table[:, order]) == 0.0

@@ -129,7 +129,8 @@ def kind_of_log(path: str | PathLike[str]) -> FileKind:
     ending = ending_of(path)
     for name, endings in _LOGS.items():
         if ending in endings and name:
-            return FileKind(f"{name}, as the log is", (ending, *endings))
+            own_first = dict.fromkeys((ending, *endings))
+            return FileKind(f"{name}, as the log is", tuple(own_first))
     texts = [entry for entry in log_endings() if entry.startswith((".csv", ".tsv", ".tab", ".txt"))]
     own = [ending] if promised_format(path) is None else []
     return FileKind("text, as the log is", (*own, *texts))
@@ -162,7 +163,7 @@ _OWN: Final = {
     b"robot": "the correction models of a robot",
     b"fleet": "a fleet",
 }
-_STATED: Final = re.compile(rb'\A\s*\{\s*"format":\s*"trueangle-(model|robot|fleet)"')
+_STATED: Final = rb'\A\s*\{\s*"format":\s*"trueangle-(model|robot|fleet)"'
 
 
 def refuse_own(path: str | PathLike[str], head: bytes, wanted: str) -> None:
@@ -172,7 +173,7 @@ def refuse_own(path: str | PathLike[str], head: bytes, wanted: str) -> None:
     ------
     FileError
     """
-    found = _STATED.match(head)
+    found = re.match(_STATED, head)
     if found:
         remedy = (
             f'`ta.fit("RUNS", prior="{path}")`'
