@@ -9,7 +9,7 @@ from typing import Final, TextIO
 
 from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, error_unit
-from ..support.layout import counted
+from ..support.layout import counted, laid_out
 from ..support.letterchart import letter_chart
 from .recording import LiveRecording
 
@@ -63,8 +63,10 @@ class Screen:
             # What redraws itself steers the terminal, which printed text must not.
             steering = getattr(self._stream, "steering", self._stream)
             steering.write(f"\x1b[{self._lines}F\x1b[J")
-        self._lines = len(lines)
-        self._stream.write("".join(f"{line}\n" for line in lines))
+        # Lines that a terminal breaks by itself would be too few to draw over.
+        text = laid_out(lines) if self._redraws else "\n".join(lines)
+        self._lines = text.count("\n") + 1
+        self._stream.write(f"{text}\n" if lines else "")
         self._stream.flush()
 
     def lines(self, recording: LiveRecording, now: float, rate: float) -> list[str]:
@@ -74,7 +76,7 @@ class Screen:
         estimate = recording.estimate
         if estimate.cells.any():
             for mark, read, share in zip(_MARKS, estimate.cells, estimate.covered, strict=True):
-                cells = "".join("#" if count else "." for count in read)
+                cells = "".join("#" if two.all() else "." for two in read.reshape(-1, 2))
                 lines.append(f"{mark} [{cells}] {360.0 * share:.0f} deg")
             slow, fast = (360.0 * speed for speed in estimate.speeds)
             speeds = f"{slow:.3g} to {fast:.3g} deg/s" if fast else "none yet"
@@ -83,7 +85,7 @@ class Screen:
         if error.any():
             size = arcsec(1.0, estimate.period) * error
             lines += letter_chart(360.0 * places, {"o": size}, "arcsec")
-        return [line[:200] for line in (*lines, *told)]
+        return [*lines, *told]
 
     def summary(self, recording: LiveRecording) -> list[str]:
         """What was recorded, and what it shows."""

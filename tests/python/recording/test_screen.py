@@ -26,7 +26,7 @@ def test_the_screen_is_drawn_anew_and_holds_everything(tmp_path):
     for part in (
         "1600 readings in run 1, 1 line rejected", "0.3 s  ",
         "given: CSV, columns reference_deg, indicated_deg",
-        "forwards  [" + 72 * "#" + "] 360 deg", "backwards [" + 72 * "." + "] 0 deg",
+        "forwards  [" + 36 * "#" + "] 360 deg", "backwards [" + 36 * "." + "] 0 deg",
         "order   1  0.50", "order   2  0.20", "  arcsec", "missing: turn it backwards as well",
     ):  # fmt: skip
         assert part in first
@@ -34,6 +34,16 @@ def test_the_screen_is_drawn_anew_and_holds_everything(tmp_path):
     screen.show(recording, 0.6)
     again = stream.getvalue()[len(first) :]
     assert again.startswith(f"\x1b[{first.count(chr(10))}F\x1b[J")
+
+
+def test_no_line_of_the_screen_is_broken_by_the_terminal(tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    for name, lines in (("long" * 9, ["a:1 b:2"] * 4), ("b", joint_lines(1.2)), ("c", ["1"] * 9)):
+        recording = recorded(tmp_path / name, lines)
+        stream = Terminal()
+        Screen("auto", "deg", stream).show(recording, 3.0)
+        drawn = stream.getvalue().splitlines()
+        assert [line for line in drawn if len(line) > 80 and str(tmp_path) not in line] == []
 
 
 def test_what_is_missing_ends_with_nothing(tmp_path):
