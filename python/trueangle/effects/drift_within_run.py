@@ -61,7 +61,7 @@ FORMS = (
     "walk",
     "flicker",
     "centred ramp",
-    "centred curvature",
+    "centred bend",
     "centred walk",
     "centred flicker",
 )
