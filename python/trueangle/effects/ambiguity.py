@@ -22,7 +22,7 @@ OWN_POWER = 0.02
 #: Kelvin of change below which temperature counts as constant.
 LEAST_KELVIN = 2.0
 
-#: Runs per level that a level of a whole run needs to be significant from their own zeros.
+#: Runs per level that separate the effect of a level, constant in a run, from zeros of runs.
 RUNS_PER_LEVEL = 3
 
 
@@ -40,7 +40,7 @@ class Ambiguity(ShownResult):
     evidence : float or None
         By how much BIC is better with it.
     estimates : dict of str to Parameters
-        What each of the causes would be if it alone were the one; where something is detected.
+        Estimate of each cause as the only one; where something is detected.
     hypotheses : dict of str to tuple of Effect
         The same as effects of a simulation, lines too: what a plan of further runs assumes.
     factor : str
@@ -48,8 +48,8 @@ class Ambiguity(ShownResult):
         "temperature", "direction", "run", "time".
     common : str
         The cause whose form is what all of them share, where there is one: naming it claims
-        at most is detected. Another one is named where the readings show what the design does
-        not promise to (`Effect.told`).
+        only what the readings show. Another one is named where the readings show what the
+        design does not promise to (`Effect.told`).
     """
 
     causes: tuple[str, ...]
@@ -86,7 +86,7 @@ class Ambiguity(ShownResult):
 
 
 def share_left(regression: Regression, columns: Array, *others: Array) -> float:
-    """Largest share of power that columns keep together with the simulation's lines and others."""
+    """Largest share of power that columns have outside the span of the lines and ``others``."""
     q = orthonormal_basis(np.hstack([regression.base, *others]))
     rest = columns - q @ (q.T @ columns)
     before = np.einsum("ij,ij->j", columns, columns)

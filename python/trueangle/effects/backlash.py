@@ -96,7 +96,7 @@ class Backlash(Effect):
         best = sharp
         for start_state in (1.0, 0.0) if first == "reference" else (1.0,):
             width = abs(mean)
-            # The play itself states over which travel it is crossed: no further parameter.
+            # The size of the play is the travel that crosses it: no further parameter.
             for _ in range(SETTLING if first == "reference" else 1):
                 shape = {
                     "turns_first": first,
@@ -157,7 +157,7 @@ class Backlash(Effect):
 
 
 def _shows_crossing(signals: Signals, first: str, width: float) -> bool:
-    """Readings lie where one side has turned and the other still rests."""
+    """Whether readings lie where one side has turned and the other is still at rest."""
     if first == "indicated":
         return bool((_crossing_at_rest(signals) != signals.direction).any())
     play = signals.play(abs(float(width)) / ARCSEC_PER_DEG)
@@ -165,7 +165,7 @@ def _shows_crossing(signals: Signals, first: str, width: float) -> bool:
 
 
 def _crossing_at_rest(signals: Signals) -> Array:
-    """The direction, going evenly from one to the other where the reference is between them."""
+    """The direction, changing linearly while the reference is at rest between two movements."""
     crossing = signals.direction.copy()
     for start, stop in signals.run_bounds():
         moved = np.abs(np.diff(signals.theta[start:stop])) > STANDS
@@ -175,7 +175,7 @@ def _crossing_at_rest(signals: Signals) -> Array:
         clock, direction = signals.clock[start:stop], signals.direction[start:stop]
         apart = np.flatnonzero(np.diff(moving) > 1)
         for last, following in zip(moving[apart], moving[apart + 1], strict=True):
-            # The last reading before, and the first one after, still are where they turn.
+            # The last reading before, and the first one after, are still at the reversal.
             ends = direction[[max(last - 1, 0), min(following + 1, stop - start - 1)]]
             if ends[0] != ends[1]:
                 inside = slice(start + last, start + following + 1)

@@ -1,4 +1,4 @@
-"""`blind_spots`: which causes a design of runs can separate, the readings not looked at."""
+"""`blind_spots`: which causes a design of runs can separate, whatever the readings are."""
 
 from __future__ import annotations
 
@@ -31,5 +31,5 @@ def blind_spots(regression: Regression) -> list[Ambiguity]:
 
 
 def blind_spot_place(factors: tuple[str, ...], spot: Ambiguity) -> int:
-    """Where the factor of a blind spot is among others; behind all where it is not."""
+    """Index of a blind spot's factor among others; their number where it is not among them."""
     return factors.index(spot.factor) if spot.factor in factors else len(factors)

@@ -47,7 +47,7 @@ class ChannelSkew(Effect):
     order : float
         m.
     phase_deg : float
-        Where the sensor's periods are on the joint.
+        Phase of the sensor's periods on the joint.
     """
 
     delay_s: float
@@ -101,8 +101,8 @@ class ChannelSkew(Effect):
         def gain(turned: float) -> float:
             return regression.gain(cls.columns(signals, around, {"phase": turned}))[0]
 
-        # The constant part is as large as the line: which of the two signs, the data state. And it
-        # leaves its mark in the phase of a line that is fitted without it.
+        # The constant part is as large as the line; the data decide which of the two signs it has.
+        # It also shifts the phase of a line that is fitted without it.
         tried = []
         for start in (phase, phase + np.pi):
             settled, _ = golden_maximum(gain, start - REACH, start + REACH)

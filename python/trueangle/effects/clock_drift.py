@@ -99,5 +99,5 @@ class ClockDrift(Effect):
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
-        """Whether the speeds of the runs, in contrast to a ramp in angle, are significant."""
+        """Whether the error depends on the speeds of the runs, which a ramp in angle does not."""
         return cls.beats(ScaleError, regression, TOLD)

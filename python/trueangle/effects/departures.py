@@ -13,7 +13,7 @@ LENGTHS = (0.1, 0.5, 2.0, 8.0, 30.0)
 #: Share of a run over which an error may lag behind what it follows.
 LAG = 0.03
 
-#: Share from which on the residual of an earlier reading is rounding.
+#: Remaining weight of an earlier reading that is only rounding.
 FORGOTTEN = 1e-18
 
 
@@ -25,7 +25,7 @@ def departure_columns(signals: Signals, factor: str, signal: Array) -> Array:
         s x,    s |x|,    s x²,    <s>_late - s,    |s| sign(ṡ)
 
     curvature, saturation, lag and a loop; for an error of reversal transitions of other
-    lengths. None where the factor was not recorded or curves nothing.
+    lengths. None where the factor was not recorded or has no such form.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def departure_columns(signals: Signals, factor: str, signal: Array) -> Array:
     late = _late(signals, signal)
     loop = np.abs(signal) * np.sign(signal - late)
     curved = signal[:, None] * np.column_stack([x, np.abs(x), x**2, np.abs(x) ** 3])
-    # What has a part along the error itself is that much more of it, and no curve.
+    # A part along the error itself is more of that error, not a departure from its form.
     return np.column_stack([departure_beyond(curved, signal[:, None]), late - signal, loop])
 
 
@@ -58,7 +58,7 @@ def spring_transitions(signals: Signals) -> Array:
 
 
 def departure_beyond(columns: Array, own: Array) -> Array:
-    """What ``columns`` have together with the columns ``own``."""
+    """The part of ``columns`` outside the span of the columns ``own``."""
     return np.asarray(columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0])
 
 

@@ -26,7 +26,8 @@ from .presliding_hysteresis import PreslidingHysteresis
 from .search import Array, Fitted, line_parameters
 from .shapes import best_shape
 
-#: Orders that play has where a gear is eccentric or worn on one side: half of the prior.
+#: Orders that play has where a gear is eccentric or worn on one side: half of the prior
+#: probability.
 LIKELY = 3
 
 #: Lines at most.

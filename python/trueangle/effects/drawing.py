@@ -7,7 +7,7 @@ import numpy as np
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 
-#: Low orders of the output that are sampled together with those of its gear.
+#: Low orders of the output that are sampled in addition to those of its gear.
 LOW_ORDERS = tuple(("output", k) for k in range(1, 9))
 
 

@@ -42,14 +42,14 @@ DRIFT_TERMS, MOST_TERMS = 24, 96
 #: Power of the last of them, in variances of one reading, from which on more are needed.
 SEEN = 0.5
 
-#: Evidence of a drift together with a ramp from which on it is more than one: "very strong" on the
-#: scale of Kass and Raftery.
+#: Evidence, with a ramp in the model, from which on a drift is more than a ramp: "very strong" on
+#: the scale of Kass and Raftery.
 TOLD = 10.0
 
 #: Time constants of settling, in shares of the mean run.
 SETTLING = {"early settling": 0.12, "settling": 0.4}
 
-#: Half periods over a run of a curve.
+#: Half periods over a run that a slow curve has.
 BENT = 3
 
 #: Forms of a drift: from the start of the run, or about its mean.
@@ -69,7 +69,7 @@ FORMS = (
 #: Forms of which every path is one: they describe the noise (Kennedy and O'Hagan 2001).
 FREE = ("walk", "flicker", "centred walk", "centred flicker")
 
-#: Of these as many differ: a slope, a relaxation, a curve, a free path.
+#: Number of them that differ in form: a slope, a relaxation, a curve, a free path.
 UNLIKE_FORMS = 4.0
 
 
@@ -157,8 +157,8 @@ class DriftWithinRun(Effect):
     def _finer(cls, regression: Regression, best: Extension) -> Extension:
         """With as many half periods as are above the noise: where they end, an edge is left.
 
-        Tested under white noise, as correlated noise includes what is finer; of one run under
-        the noise found, for there a drift that is taken too fine takes the lines of the place.
+        Tested under white noise, since correlated noise explains finer parts. A single run is
+        tested under the noise found: there a drift that is too fine explains lines in angle.
         """
         form, terms = best.shape["form"], int(best.shape["terms"])
         if best.bic_gain <= 0.0 or form not in FREE:
@@ -199,7 +199,7 @@ class DriftWithinRun(Effect):
         """Columns of a drift, scaled so that it ends at variance 1 or about that.
 
         A ramp and a relaxation have one rate and one time constant in runs of any span, where
-        times show it; a curve and a free path end where the run does.
+        the time is recorded; a curve and a free path end where the run does.
         """
         timed, mean = regression.signals.time is not None, cls._mean_span(regression)
         u, passed = np.zeros(regression.n), np.zeros(regression.n)
@@ -265,7 +265,7 @@ class DriftWithinRun(Effect):
 
     @classmethod
     def told(cls, extension: Extension, regression: Regression) -> bool:
-        """Whether it drifts: together with a ramp in angle, which a ramp in time is, too."""
+        """Whether it is more than a ramp in angle, from which a ramp in time may not differ."""
         assert extension.run_effect is not None
         others = [term for term in regression.terms if term.cause != cls.kind]
         rest = regression.with_terms(others, regression.whiten.rho)

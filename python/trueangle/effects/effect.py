@@ -35,7 +35,7 @@ ALWAYS = math.inf
 class Effect(TabledParameters):
     """Base of the effects; each is a frozen dataclass whose fields are its parameters.
 
-    A class with a ``kind`` joins the vocabulary by being defined. What it must state is its
+    A class with a ``kind`` joins the vocabulary by being defined. It must define its
     `signal`; with `propose`, `columns` and `report` a diagnosis looks for it, with a
     ``term`` (or lines) it is corrected, otherwise ``not_at_run_time`` states why not.
 
@@ -72,9 +72,9 @@ class Effect(TabledParameters):
         Turns of travel up to which it can imitate specific causes, which are then tried
         first: `ALWAYS` for one that always can.
     is_separate : bool
-        Its every term is a separate finding.
+        Each of its terms is a separate finding.
     draws_zeros : bool
-        It leaves each run with a separate zero, which held-out runs then get too.
+        It gives each run its own zero; held-out runs then get one too.
     has_exact_form : bool
         Its form leaves nothing of it, however large it is: steps of a zero, ratios of teeth.
     changes_lines : bool
@@ -92,7 +92,7 @@ class Effect(TabledParameters):
     not_at_run_time : str
         Why no corrector can subtract it while the joint runs; empty where one can.
     size_name : str
-        The parameter that states how large it is, for a rehearsal; the first where not given.
+        The parameter that is its size in a rehearsal; the first where not given.
     size_grows : bool
         It shows the more the larger that is; False where the less.
     size_most : float
@@ -175,14 +175,14 @@ class Effect(TabledParameters):
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:
-        """The best extension of this cause with what is known; None where it cannot act."""
+        """The best extension by this cause beyond the fitted terms; None where it cannot act."""
         return None
 
     @classmethod
     def imitate(cls, regression: Regression) -> Extension | None:
         """What it would explain in the place of another cause, where it is not named itself.
 
-        None where `propose` has everything.
+        None where `propose` covers all of it.
         """
         return None
 
@@ -217,7 +217,7 @@ class Effect(TabledParameters):
 
     @classmethod
     def form_limits(cls, regression: Regression, terms: Sequence[Fitted]) -> Parameters:
-        """How far its error may depart from its form, by what the readings show of that."""
+        """How far its error may depart from its form, as far as the readings show."""
         return {}
 
     @classmethod
@@ -237,7 +237,7 @@ class Effect(TabledParameters):
 
     @classmethod
     def describes_noise(cls, extension: Extension) -> bool:
-        """Whether a term in this form only states how the noise behaves, and is no cause."""
+        """Whether a term in this form only describes the noise, and is no cause."""
         return False
 
     @classmethod
@@ -300,7 +300,7 @@ class Effect(TabledParameters):
         return self
 
     def to_lines(self) -> Sequence[tuple[str, float]]:
-        """(shaft, order) of the lines that a correction has to explain."""
+        """(shaft, order) of the lines that a correction must include."""
         return ()
 
     @property

@@ -37,7 +37,7 @@ class FactorEffect(Effect):
     def alternatives(
         cls, regression: Regression, shape: dict[str, Any], shapes: list[dict[str, Any]]
     ) -> int:
-        """Shapes as likely as this one; half of the assumed model goes to the likeliest."""
+        """Shapes as likely as this one; half of the prior probability goes to the likeliest."""
         return 1 if shape["what"] == "zero" else len(shapes)
 
     @classmethod

@@ -289,7 +289,7 @@ def _settled(
         column = _lagged(waves, frequency, **shape)[:, None]
         extension = regression.propose(kind, shape, column)
         full = regression.with_terms([*regression.terms, extension])
-        # With the coefficient 1: a free one represents the cutoff far below it.
+        # With the coefficient 1: far below the cutoff a free one is collinear with it.
         left = regression.whiten(full.target - column[:, 0])
         left -= regression.q @ (regression.q.T @ left)
         rest = float(left @ left)

@@ -137,7 +137,7 @@ class NoiseBlock:
 def noise_blocks(regression: Regression) -> dict[str, NoiseBlock]:
     """Every block that may be chosen: low orders, those of the shafts, speed and load."""
     signals = regression.signals
-    # A reading has half the information of the logarithm of a variance as of a mean.
+    # A reading has half as much information about the logarithm of a variance as about a mean.
     log_n = regression.log_n - float(np.log(2.0))
     turns = [c for c in regression.around.joint.shafts.values() if c != 1.0]
     fast = sorted({k * cycles for cycles in turns for k in (1, 2)})
@@ -161,8 +161,8 @@ def noise_blocks(regression: Regression) -> dict[str, NoiseBlock]:
 
 def speed_penalty(regression: Regression) -> float:
     """What noise that follows the speed (or the load) must bring, whatever its form."""
-    # One parameter, of which a reading has half the information about a mean, and one of four
-    # factors.
+    # One parameter, about which a reading has half as much information as about a mean, and one
+    # of four factors.
     return regression.log_n - float(np.log(2.0)) + 2.0 * float(np.log(4.0))
 
 

@@ -199,8 +199,8 @@ class LocalDefect(Effect):
     def _settled(cls, regression: Regression, shape: dict[str, Any]) -> dict[str, Any]:
         """Refined again with a tall bump in the model, until that saves nothing more.
 
-        Without it its top is clipped at this many standard deviations and looks flat and wide, and
-        the noise seems to be correlated over the bump. The readings on it are taken as they are,
+        Without it the clipping of outliers makes the bump look flat and wide, and
+        the noise seems to be correlated over it. The readings on it are taken as they are,
         once; from then on outliers among them are distinguished from the bump.
         """
         best, least = shape, np.inf

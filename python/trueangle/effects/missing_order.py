@@ -91,7 +91,7 @@ class MissingOrder(Effect):
         penalties = 2.0 * np.log(np.where(lines.plausible, 2 * expected, 2 * gains.size))
         gains = np.where(shows_line(regression.signals, lines.orders), gains, 0.0)
         # At equal steps higher orders are the same numbers as low ones, but for the error by
-        # which the angles miss the steps: what separates them  there is the noise.
+        # which the angles miss the steps: only the noise separates them there.
         grid = regression.signals.grid
         if grid is not None:
             gains = np.where(2.0 * lines.orders > grid.positions, 0.0, gains)

@@ -13,7 +13,7 @@ from .search import Array
 #: standard deviation is more than noise of one kind does.
 WIDEST = 2.0 * float(np.log(1e3))
 
-#: Scoring steps at most, the change of a logarithm below which there are no further, and the
+#: Largest number of scoring steps, the change of a logarithm below which they end, and the
 #: largest change in one step.
 STEPS, SETTLED, LARGEST_STEP = 30, 1e-8, 2.0
 
@@ -39,8 +39,8 @@ class NoiseLaw:
         Of γ, and of ln g behind it where there is one.
     log_variance : ndarray, shape (n,)
     log_likelihood : float
-        Normal up to `SQUARE_CLIP`, beyond with the tail of which clipped squares are the slope: so
-        laws of different form are compared by what the same readings weigh in the fit of either.
+        Normal up to `SQUARE_CLIP`; beyond it the tail has clipped squares as its slope. So laws
+        of different form are compared with the weights that the readings have in the fits.
     """
 
     coefficients: Array

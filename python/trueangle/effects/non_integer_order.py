@@ -34,7 +34,7 @@ from .search import (
 #: Trial orders per resolution cell (one order over the turns of a run).
 OVERSAMPLING = 3
 
-#: Lowest order searched, and cycles that a run must show: fewer are a curve, not a line.
+#: Lowest order searched, and cycles that a run must show: fewer are a slow curve, not a line.
 LOWEST, LEAST_CYCLES = 0.3, 2.0
 
 #: Trial orders at most; beyond, the grid stops at a lower order.
@@ -139,7 +139,7 @@ class NonIntegerOrder(Effect):
         """The searched orders about it, where the travel does not resolve them, explain as much.
 
         Phases that are new in each of R runs leave a share of 1/R to one phase for all; half way
-        between that and everything is the limit.
+        between that and 1 is the limit.
         """
         away = regression.lines.orders - found.shape["order"]
         sides = (away[away <= 0.0].max(initial=-np.inf), away[away > 0.0].min(initial=np.inf))
@@ -186,7 +186,7 @@ class NonIntegerOrder(Effect):
         hides = grid is not None and 2.0 * known > grid.positions
         top = min(top, 0.5 * rate) if rate and not hides else top
         low = max(LOWEST, LEAST_CYCLES / usual)
-        # Half the mean rate of readings is as far as a run can show.
+        # A run shows orders up to half its mean rate of readings.
         step = 1.0 / (OVERSAMPLING * usual)
         count = int(min((top - low) / step, MOST_TRIALS))
         if count < 3:

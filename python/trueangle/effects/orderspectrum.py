@@ -27,7 +27,7 @@ class OrderSpectrum:
 
         F_k = Σ_j y_j e^(-i (m₀ + k Δ) θ_j),    0 ≤ k < K
 
-    Of y only a transform depends: what the angles need is kept.
+    Only one transform depends on y: all that depends on the angles alone is computed once.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class OrderSpectrum:
 
 
 def _kernel(away: Array) -> Array:
-    """What a reading gives a place of the grid this many places away."""
+    """Weight of a reading at grid points ``away`` steps from it."""
     share = np.clip(1.0 - (away / (0.5 * WIDTH)) ** 2, 0.0, None)
     return np.asarray(np.exp(SHAPE * (np.sqrt(share) - 1.0)))
 

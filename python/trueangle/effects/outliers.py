@@ -27,12 +27,12 @@ from .search import Array
 TAILS = (2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0)
 SIZES = (3.0, 10.0, 100.0)
 
-#: What is near outliers is smaller by this factor; of the segments of
-#: outliers at least this share must be such short ones.
+#: Readings next to outliers are smaller by this factor; at least this share of the segments
+#: of outliers must be isolated like that.
 BESIDE = 0.5
 ISOLATED = 0.5
 
-#: Pairs of outliers in a row, beyond three times those at random, that distinguish a burst from a
+#: Pairs of outliers in a row, beyond three times those expected, that distinguish a burst from a
 #: manoeuvre, and the share of them that must change sides: half do so at random.
 LEAST_PAIRS = 8
 TURNING = 0.3
@@ -50,7 +50,7 @@ GATHERED = 1e-3
 #: wide normal supplies and no reading shows. It counts as the fraction's uncertainty.
 HIDDEN = 3.0
 
-#: Standard deviations from which on a reading that is far off alone is not its neighbours'.
+#: Standard deviations from which on an isolated deviation is not used to predict neighbours.
 WILD = 6.0
 
 #: Scale below which no normal is narrow: readings that are all alike have none.
@@ -69,13 +69,13 @@ BEYOND_TAILS = 2.0
 #: probability of ``8^(-nu)``: 0.2 % for nu = 3, 3e-5 for nu = 5. Such a reading is of another kind.
 APART = 8.0
 
-#: Share of the readings that may be apart so.
+#: Largest share of the readings that may be of that kind.
 MOST_APART = 0.01
 
 
 @dataclass(frozen=True)
 class Outliers(Effect):
-    """Isolated outliers and bursts: a share of the readings gets a separate normal error.
+    """Isolated outliers and bursts: a share of the readings gets an additional normal error.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ class Outliers(Effect):
             "fraction": quantity(
                 float(share), max(std, float(share) * float(np.clip(HIDDEN / size, 0.2, 1.0)))
             ),
-            # A deviation of this many readings.
+            # The standard error of a standard deviation of that many readings.
             "size_arcsec": quantity(float(spread), float(spread / np.sqrt(2.0 * rows.size))),
             **({"bursts": quantity(bursts)} if bursts else {}),
             "rows": quantity(
@@ -191,7 +191,7 @@ def _apart(e: Array) -> NDArray[np.int64]:
 
 
 def _beside_neighbours(regression: Regression) -> tuple[Array, float]:
-    """Residuals less what both neighbours show of them, in a robust standard deviation; and that.
+    """Residuals less their prediction by both neighbours, in robust standard deviations; and that.
 
     ::
 
@@ -199,7 +199,7 @@ def _beside_neighbours(regression: Regression) -> tuple[Array, float]:
 
     is what a correlation leaves of one reading. Whitened residuals show an outlier twice,
     and what lasts over many readings as large as it is. White noise stays as it is.
-    Outliers are compared with the level about them, and show nothing of their neighbours.
+    Outliers are compared with the level about them, and do not predict their neighbours.
     """
     left = _unfiltered(regression)
     away = less_local_level(left, regression.bounds)
@@ -224,9 +224,9 @@ def _unfiltered(regression: Regression) -> Array:
 
 
 def _interpolated(left: Array, rho: float, bounds: list[tuple[int, int]]) -> Array:
-    """The residual of every reading together with its neighbours in the run, all of one deviation.
+    """Residuals less their prediction by the neighbours in the run, scaled to one deviation.
 
-    The first and the last one have one neighbour only, and scatter more about it.
+    The first and the last reading have only one neighbour, and scatter more about it.
     """
     out = left.copy()
     share, wider = rho / (1.0 + rho**2), float(np.sqrt(1.0 + rho**2))

@@ -18,7 +18,7 @@ class RandomPhaseLine:
     regression : Regression
         With the line among its terms.
     cause : str
-        Its cause; what others explain is subtracted.
+        Its cause; the run effects of others are subtracted.
     waves : ndarray, shape (n, 2)
         Cosine and sine of the line.
     """
@@ -41,9 +41,9 @@ class RandomPhaseLine:
 
             σ_f⁻² = |P M x (b_r cos f x - a_r sin f x) |² / σ²
 
-        M makes the noise and the sampled phases white, and P takes out what is fitted: the bound
+        M makes the noise and the random phases white, and P takes out what is fitted: the bound
         of Cramer and Rao with the phases unknown, ``√6 σ/(π A T √n)`` for
-        places evenly over a span T of one run. None where the readings do not show f.
+        places evenly over a span T of one run. None where the readings do not determine f.
         """
         slope = np.empty_like(along)
         for (start, stop), (a, b) in zip(self._regression.bounds, self._drawn, strict=True):

@@ -25,7 +25,7 @@ HALF = 0.5
 #: Correlations of the noise that are one.
 SAME_CORRELATION = 0.02
 
-#: Share of the largest derivative below which one is rounding, and the variance of what that shows.
+#: Share of the largest derivative below which one is rounding, and the variance then reported.
 ROUNDED, UNKNOWN = 1e-12, 1e24
 
 _GOLDEN = (5.0**0.5 - 1.0) / 2.0
@@ -90,7 +90,7 @@ def known_orders(around: JointPattern) -> list[float]:
 def shows_line(signals: Signals, orders: Array) -> NDArray[np.bool_]:
     """Orders of which a run travels enough for a line.
 
-    Less than half a period is a curve, and anything slow curves.
+    Less than half a period is like any slow curve.
     """
     return np.asarray(orders * signals.run_turns().max() >= HALF)
 
@@ -109,10 +109,10 @@ def grid_ambiguity(regression: Regression, spots: Sequence[Ambiguity]) -> Ambigu
 
 
 def seen_beside(regression: Regression, extension: Extension) -> Regression | None:
-    """The regression under the noise, and of the readings, that there are with an extension.
+    """The regression with the noise and the outliers found when an extension is fitted.
 
-    Without a large one its form is confused with correlated noise and its ends for outliers: what
-    it looks like there is not what it is. None where the noise is the same.
+    Without a large one its form is confused with correlated noise and its ends with outliers, so
+    that its shape is estimated wrongly. None where the noise is the same.
     """
     full = regression.with_terms([*regression.terms, extension])
     if abs(full.whiten.rho - regression.whiten.rho) < SAME_CORRELATION:
@@ -132,7 +132,7 @@ def tangent_covariance(regression: Regression, terms: Sequence[Fitted], tangents
     others = [term for term in regression.terms if all(term is not one for one in chosen)]
     # Under the noise together with these terms: without them what they explain looks correlated.
     x, _ = regression.with_terms(others, regression.whiten.rho).projected(tangents)
-    # Each of length 1: what the readings hardly show has a large variance, and not none.
+    # Each of length 1: what the readings hardly determine has a large variance, and not none.
     sizes = np.sqrt(np.einsum("ij,ij->j", x, x))
     seen = sizes > ROUNDED * sizes.max(initial=0.0)
     x = np.where(seen, x / np.where(seen, sizes, 1.0), 0.0)

@@ -28,8 +28,8 @@ from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 #: Knees searched, in shares of the largest torque.
 KNEES = (0.2, 0.35, 0.5, 0.65, 0.8)
 
-#: A knee and the slopes on both sides of it pass through as many loads wherever they are: more
-#: are needed to state that it is there.
+#: A knee and the slopes on both sides of it fit this many loads exactly, wherever they are: more
+#: are needed to detect it.
 KNEE_PARAMETERS = 3
 
 
@@ -100,7 +100,7 @@ class StiffeningCompliance(Effect):
     def drawn(
         cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
     ) -> Self | None:
-        # What is subtracted at the largest load is a quarter of the linear part there.
+        # At the largest load the cubic part is a quarter of the linear part.
         largest = float(np.abs(torque_of(signals)).max())
         return cls(4.0 * size * largest**2, -size)
 

@@ -35,7 +35,7 @@ MOST_TRIALS = 2**17
 #: Bins of time per period of the highest frequency: the quick search then loses 2 % there.
 BINS = 8
 
-#: Cycles that a run must show: fewer are a curve, not a line.
+#: Cycles that a run must show: fewer are a slow curve, not a line.
 LEAST_CYCLES = 3.0
 
 #: Share of its frequency by which a line may differ from run to run (a converter's clock).
@@ -275,7 +275,7 @@ def _drifting(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, f
     padded = np.vstack([p, np.full((1, p.shape[1]), -np.inf)])
     deviances = np.maximum.reduceat(padded, np.column_stack([low, high]).ravel())[::2].sum(axis=1)
     cells = (high - low) / OVERSAMPLING
-    # A band of this many cells has one more independent point.
+    # A band of n cells has n + 1 points of independent power.
     log_grids = np.log(2.0 * bands) + p.shape[1] * np.log(cells + 1.0)
     k = int(np.argmax(deviances - 2.0 * log_grids))
     places = low[k] + p[low[k] : high[k]].argmax(axis=0)
@@ -285,7 +285,7 @@ def _drifting(frequencies: Array, p: Array) -> tuple[NDArray[np.int64], float, f
 def _refined(regression: Regression, frequencies: list[float], step: float) -> list[float]:
     """Frequencies between the trial ones: one for all runs, or one a run.
 
-    That of all runs by what it saves jointly with what is fitted, which has explained a part.
+    One frequency for all runs is the best jointly with the fitted terms, which explain a part.
     """
     if len({*frequencies}) == 1:
         f, turn = frequencies[0], 2.0 * np.pi * regression.signals.clock

@@ -22,7 +22,7 @@ from .search import Array
 
 @dataclass(frozen=True)
 class TimestampJitter(Effect):
-    """The moment of a reading scatters: noise of ``|v| σ_t`` together with its own.
+    """The moment of a reading scatters: noise of ``|v| σ_t`` in addition to its own.
 
     Parameters
     ----------
@@ -53,9 +53,9 @@ class TimestampJitter(Effect):
 
     @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:
-        """Noise with a part that grows with the square of the speed.
+        """Noise whose variance is a constant plus a part proportional to the square of the speed.
 
-        Whether the speed itself shows the noise as well is tested for all causes of the scatter
+        Whether the speed itself describes the noise as well is tested for all causes of the scatter
         together (`trueangle.diagnosis.unevennoise`).
         """
         speed = shares_of_speed(regression)

@@ -39,7 +39,7 @@ TURNED = 0.06
 
 @dataclass(frozen=True)
 class TorqueHysteresis(Effect):
-    """Friction in the teeth together with the compliance: ``ε = h z(τ)``.
+    """Friction in the teeth in addition to the compliance: ``ε = h z(τ)``.
 
     ::
 

@@ -112,7 +112,7 @@ class TorsionalCompliance(FactorEffect):
         low = np.hstack([line_columns(regression.signals.theta, k) for k in (1, 2, 3)])
         cube = (share**3)[:, None]
         if share_left(regression, cube, low, share[:, None]) < OWN_POWER:
-            return {}  # too few loads to show
+            return {}  # too few loads to determine it
         column, _ = regression.projected(cube)
         power = float(column[:, 0] @ column[:, 0])
         cubic = float(column[:, 0] @ regression.r) / power

@@ -25,7 +25,7 @@ from .load_dependent_gear_error import LoadDependentGearError
 from .search import Array, Fitted, grid_ambiguity, is_gear_order, line_parameters
 from .shapes import best_shape
 
-#: Lines at most, and the price of a broad cause: one of this many together with every narrow one.
+#: Lines at most, and the number of broad causes that the prior counts for every narrow one.
 MOST_LINES = 2
 BROAD = 8.0
 
@@ -118,7 +118,7 @@ class VaryingLine(Effect):
             return None
         if best.bic_gain < regression.least:
             return best
-        # What varies is judged by what it leaves of the constant line, which comes first.
+        # The variation is judged by what it saves beyond the constant line, which comes first.
         steady = regression.jointly_with(line_columns(signals.theta, best.shape["order"]))
         beyond = steady.gain(best.columns)[0]
         return replace(best, deviance=min(best.deviance, beyond))

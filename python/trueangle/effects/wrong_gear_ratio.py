@@ -117,7 +117,7 @@ class WrongGearRatio(Effect):
 
     @staticmethod
     def _are_there(regression: Regression) -> bool:
-        """The assumed lines are where they are assumed to be."""
+        """Whether the assumed lines are at their assumed orders."""
         pattern = regression.belief.pattern
         geared = _geared(regression.belief.joint, pattern)
         # Measured less simulated, so a line that is not there leaves its negative.

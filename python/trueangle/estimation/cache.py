@@ -12,12 +12,12 @@ T = TypeVar("T")
 #: Numbers of the fits that are kept: 32 MiB, some twenty fits of 5000 readings, one of many.
 MOST_KEPT = 2**22
 
-#: A cause, and the terms that it was asked together with.
+#: A cause, and the terms in addition to which it was proposed.
 ProposalKey: TypeAlias = "tuple[str, tuple[tuple[str, str], ...]]"
 
 
 class CachedProposal(NamedTuple):
-    """What a cause proposed with some terms, searched no further than ``least`` requested."""
+    """What a cause proposed in addition to some terms, searched as far as ``least`` required."""
 
     extension: Extension | None
     least: float
@@ -26,8 +26,8 @@ class CachedProposal(NamedTuple):
 class Cache:
     """Results by what they depend on: the motion, the readings, or one fit of them.
 
-    Regressions of the same readings share one for the motion, the proposals and the fits requested
-    last; each has separate answers.
+    Regressions of the same readings share one for the motion, the proposals and the latest fits;
+    each has its own results.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Cache:
         return answer
 
     def fit(self, key: object, build: Callable[[], tuple[T, int]]) -> T:
-        """A fit of the same readings and its size; of those requested last some are kept.
+        """A fit of the same readings and its size; some of the latest are kept.
 
         It must not hold this cache: what holds itself is not let go of.
         """
@@ -72,7 +72,7 @@ class Cache:
         return found
 
     def proposed(self, key: ProposalKey, least: float) -> CachedProposal | None:
-        """A proposal that was searched at least as far as ``least`` needs."""
+        """A proposal that was searched at least as far as ``least`` requires."""
         kept = self._proposals.get(key)
         return kept if kept is not None and kept.least <= least else None
 

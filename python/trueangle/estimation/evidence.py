@@ -15,7 +15,7 @@ from ..support.arrays import Array
 #: Correlation times of the noise's exponential terms, in median steps of a run's time.
 CORRELATION_TIMES = tuple(Evidence.CORRELATION_TIMES)
 
-#: Part of the variance of the curve that orders omitted of a model may take from its mean.
+#: Part of the variance of the curve that orders omitted from a model may take from its mean.
 _LEFT_OUT: Final = 0.25
 
 #: Singular values of columns, over the largest, below which they are one column at the angles.
@@ -32,7 +32,7 @@ class RunReadings(NamedTuple):
 
 
 class RunZero(NamedTuple):
-    """What the readings show of the zero of a run."""
+    """Information in the readings about the zero of a run."""
 
     information: float  #: Inverse variance, where the coefficients are known.
     columns: Array  #: Weighted mean of each column, as that of ``level``.
@@ -48,7 +48,7 @@ class WeightedModel(NamedTuple):
 
 
 class Alone(NamedTuple):
-    """One order by itself, together with those of the most probable model."""
+    """One order by itself, in addition to those of the most probable model."""
 
     cosine: float
     sine: float
@@ -152,8 +152,8 @@ class EvidenceEstimate:
         """The fewest orders that hold the curve at these angles.
 
         These are the orders that are there with more than half of the probability, and, where
-        orders represent each other, the likeliest of the others, until what they omit of
-        the mean curve has less than a quarter of the curve's variance.
+        orders are nearly collinear, the likeliest of the others. Orders are added until what they
+        omit of the mean curve has less than a quarter of the curve's variance.
 
         Parameters
         ----------
@@ -235,7 +235,7 @@ class EvidenceEstimate:
             1 / ν = p² / 2 (R - 1) + (1 - p)² / f,    p = ω / R var b
 
         with the part p of a variance that comes from what differs between R runs, two
-        coefficients of which show ω, and f degrees of freedom of the readings.
+        coefficients of which estimate ω, and f degrees of freedom of the readings.
         """
         runs = len(self.runs)
         mean = np.sum([m.weight * m.omega for m in self.models], axis=0)

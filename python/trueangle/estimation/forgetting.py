@@ -58,12 +58,12 @@ class Forgetting:
         return Forgetting(self.factor, self._weights)
 
     def faded(self, count: int, weights: Array | None) -> Array:
-        """Weights of this many readings in a row as the last of them sees them."""
+        """Weights of ``count`` successive readings at the time of the last of them."""
         faded = self.factor ** np.arange(count - 1.0, -1.0, -1.0)
         return faded if weights is None else faded * weights
 
     def follow(self, run: Hashable, weights: Array) -> float:
-        """Count readings of these weights, and state by which factor all before them fade."""
+        """Count readings of these weights; return the factor by which all before them fade."""
         factor = self.factor**weights.size
         first, second = self._weights.get(run, (0.0, 0.0))
         self._weights[run] = (
@@ -73,7 +73,7 @@ class Forgetting:
         return float(factor)
 
     def widened(self, found: MomentsFit, count: int) -> MomentsFit:
-        """A fit of this many readings with the uncertainties of their effective number."""
+        """A fit of ``count`` readings with the uncertainties of their effective number."""
         freedom = found.degrees_of_freedom
         first, second = np.sum([self._weights[run] for run in found.offsets], axis=0)
         unknowns = count - freedom

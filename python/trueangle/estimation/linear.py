@@ -2,7 +2,7 @@
 
 Columns are scaled to unit length. Directions of which less is left than rounding makes are
 omitted, ``32 n ε`` of the greatest singular value (of rows) or eigenvalue (of sums) of
-n columns: every other limit here is a statement about the readings, and states which.
+n columns: every other limit here is a stated condition on the readings.
 """
 
 from __future__ import annotations

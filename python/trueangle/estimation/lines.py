@@ -35,7 +35,7 @@ class LineBasis:
     plausible : ndarray of bool, shape (k,)
         Orders that physics expects; they pay a lower penalty for the search.
     columns : callable
-        Gives `values` when they are first requested.
+        Gives `values` when they are first used.
     """
 
     orders: NDArray[np.float64]

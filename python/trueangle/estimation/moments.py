@@ -42,7 +42,7 @@ class Moments(ShownResult):
     Parameters
     ----------
     orders : iterable of int, or mapping of shaft name to such
-        All orders that may ever be requested.
+        All orders that may ever be fitted.
     period : float
         One turn of ``theta`` and ``error``.
     forgetting : float, optional
@@ -189,7 +189,7 @@ class Moments(ShownResult):
     def subtract(self, other: Moments) -> Moments:
         """Take away the readings of another accumulator that were added to this one before.
 
-        The residual is that of the others to the rounding of the sums: a window that moves along
+        The sums of the other readings remain, to within rounding: a window that moves along
         a log is the sum of its parts less the oldest.
 
         Parameters

@@ -28,7 +28,7 @@ EXCITED = 1e-4
 class Projection:
     """A target y fitted by columns X under a noise that M makes white.
 
-    What candidates would save is computed for their columns projected together with the fitted ones
+    What candidates would save is computed for their columns with the fitted ones projected out
     (Frisch and Waugh), all of a search at once.
 
     Attributes
@@ -41,7 +41,7 @@ class Projection:
         Its sum of squares.
     coefficients : ndarray, shape (p,)
     further : ndarray or None
-        Columns that are taken out together with those of the factor, at right angles to them.
+        Columns that are projected out in addition to those of the factor, orthogonal to them.
     """
 
     factor: _core.Factor
@@ -57,7 +57,7 @@ class Projection:
 
     @cached_property
     def q(self) -> Array:
-        """Orthonormal columns that span M X, and those taken out with them."""
+        """Orthonormal columns that span M X, and those projected out in addition."""
         q = self.factor.q
         return q if self.further is None else np.hstack([q, self.further])
 
@@ -68,7 +68,7 @@ class Projection:
 
     @property
     def rank(self) -> int:
-        """Columns that are taken out and separated."""
+        """Number of independent columns that are projected out."""
         return self.factor.rank + (0 if self.further is None else self.further.shape[1])
 
     # -- the residual ------------------------------------------------------------
@@ -131,8 +131,8 @@ class Projection:
     def jointly_with(self, columns: Array, spread: float = np.inf) -> Self:
         """The same with ``columns`` fitted too, for scores of others.
 
-        With a finite ``spread`` their coefficients are sampled from a normal distribution of that
-        standard deviation about zero: a column that the readings show worse than that is fitted
+        With a finite ``spread`` their coefficients have a normal prior of that standard deviation
+        about zero: a column that the readings determine less well than that is fitted
         in part. Scores stay those of generalised least squares: with the covariance
         ``I + U S² Uᵀ`` of columns and noise, ``U S²/(1 + S²) Uᵀ`` is taken out.
         """
@@ -210,14 +210,14 @@ class Projection:
         return np.where(excited, self.as_deviances(np.maximum(saved, 0.0)), 0.0)
 
     def ratio_of(self, columns: Array) -> tuple[float, float]:
-        """Best ratio of variances of a run effect with what is fitted, and what it saves."""
+        """Best ratio of variances of a run effect beyond what is fitted, and what it saves."""
         current_deadline().spend(columns.size)
         return self.beside.ratio(columns)
 
     def drawn_line(self, angles: Array, low: float, high: float, steps: int) -> tuple[float, float]:
         """Order in a span of the line with a new phase in every run that saves most, and what.
 
-        That of `ratio_of` the line's columns, by this many golden sections.
+        It maximises what `ratio_of` reports for the line's columns, by ``steps`` golden sections.
         """
         return self.beside.line(angles, low, high, steps, VANISHES)
 

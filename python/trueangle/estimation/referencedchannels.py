@@ -25,7 +25,7 @@ _WHOLE: Final = 0.9
 def referenced_channels(
     signals: Sequence[tuple[Array, Array, Array]], channels: Channels, named: str
 ) -> Channels:
-    """Constants of channels whose phase a reference shows, of runs with a zero each.
+    """Constants of channels whose phase a reference determines, of runs with a zero each.
 
     ``signals`` are sine, cosine and reference of every run; ``channels`` state the sense, periods
     and unit.

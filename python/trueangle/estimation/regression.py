@@ -29,13 +29,13 @@ T = TypeVar("T")
 BEYOND_SHOWN = 3.0
 
 #: Times what a coarse search finds that the refined one may. Where the noise is correlated a
-#: search that does not whiten has its peaks elsewhere: three times was detected.
+#: search that does not whiten has its peaks elsewhere: a factor of three was observed.
 REFINED = 4.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Regression(Solution):
-    """A fit of readings, and proposals of causes together with its terms.
+    """A fit of readings, and proposals of causes in addition to its terms.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Regression(Solution):
         """The readings without terms under other weights.
 
         What terms explain is counted from the likeliest noise without any, even or uneven: where
-        what they explain is still in the readings, a correlation may describe it at random.
+        what they explain is still in the readings, a spurious correlation may describe it.
         """
         readings = replace(self.readings, weights=weights)
         found = self.of_readings(readings, cache=self.cache.for_other_errors())

@@ -26,7 +26,7 @@ def repeated_part(residual: Array, signals: Signals, by_direction: bool = False)
         F = Σ_ij ē_i² / (I - 1) / (Σ_ij (e_ij - ē_i)² / (IJ - I - J)) > 4
 
     Noise that is correlated in time differs from pass to pass; an error that is a
-    function of angle does not, and its neighbours in time are equal for that reason.
+    function of angle does not, and its neighbours in time are similar for that reason.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Errors of readings that were rounded: a reading shows in which step the angle was, no further.
+"""Errors of readings that were rounded: a reading shows only in which step the angle was.
 
 A reading rounded to whole steps q holds its own error to an interval,
 
@@ -6,12 +6,12 @@ A reading rounded to whole steps q holds its own error to an interval,
 
     ε_i ∈ [e_i - q/2, e_i + q/2],    e_i = y_i - x_i β,
 
-and is fitted by the probability of that interval under ``ε ~ N(0, σ²)``. What it shows of β is the
-expected error within it, whose mean is zero at every angle. That of ``e_i`` is not, unless noise
-moves readings by half a step and more: on the same positions the rounding is the same in every
-run, and looks like a property of the joint. Source: Gourieroux, Monfort, Renault and Trognon
-(1987), J. Econometrics 34; residuals sampled within the intervals: Dunn and Smyth (1996), J. Comp.
-Graph. Stat. 5.
+and is fitted by the probability of that interval under ``ε ~ N(0, σ²)``. It enters the
+estimate of β by the expected error within it, whose mean is zero at every angle. That of ``e_i``
+is not, unless noise moves readings by half a step and more: on the same positions the rounding is
+the same in every run, and looks like a property of the joint. Source: Gourieroux, Monfort, Renault
+and Trognon (1987), J. Econometrics 34; residuals sampled within the intervals: Dunn and Smyth
+(1996), J. Comp. Graph. Stat. 5.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ LEAST_SHARE = 0.2
 #: errs by other numbers than on all, but on none that does not scatter.
 MOST_SHARE = 2.0
 
-#: Standard deviation of the noise, in steps, below which readings show of none: only one in a
-#: dozen is then within two of them of the border of its step.
+#: Standard deviation of the noise, in steps, below which readings do not determine it: only one in
+#: a dozen is then within two of them of the border of its step.
 LEAST_NOISE = 0.03
 
 #: Standard deviations of it by which a reading may be outside of its step.
@@ -93,7 +93,7 @@ def fit_rounded(
         The readings less what they are expected to be.
     step : float
     aside : ndarray of bool, shape (n,), optional
-        Readings that state nothing: outliers.
+        Readings without information: outliers.
 
     Returns
     -------
@@ -129,5 +129,5 @@ def fit_rounded(
 
 
 def is_rounding_visible(rounding: float, left: float, scatter: float) -> bool:
-    """A variance of rounding is a good part of that left, and at most the readings' may be."""
+    """Whether rounding is a large part of the residual variance and agrees with the scatter."""
     return LEAST_SHARE * left < rounding < MOST_SHARE * scatter

@@ -24,7 +24,7 @@ class _Exclusive:
     """One thread at a time; the others wait, unless nobody can ever be done.
 
     A process that is forked while another of its threads is at it inherits sums that are
-    half added: there it is reported so.
+    half added: there an error is raised.
     """
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class RunSums:
     ----------
     period : float
     shafts : sequence of ShaftOrders
-        All orders that may be requested.
+        All orders that may be fitted.
 
     Raises
     ------

@@ -64,7 +64,7 @@ def within_segments(
 
 
 def less_local_level(values: Array, bounds: list[tuple[int, int]]) -> Array:
-    """Readings less the median of those about each: a glitch remains, what is slow does not.
+    """Readings less the median of those about each: a glitch remains, slow changes do not.
 
     About 5 ms for 10 000 readings.
     """

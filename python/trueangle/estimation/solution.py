@@ -177,7 +177,7 @@ class Solution(Projection):
 
     @cached_property
     def left_within_runs(self) -> Array:
-        """The residual less what is assumed to be random in every run, arcsec."""
+        """The residual less the estimated run effects, random in every run, arcsec."""
         return np.asarray(self.left - self.whiten.run_part(self.left))
 
     @property
@@ -200,7 +200,7 @@ class Solution(Projection):
 
     @property
     def size(self) -> int:
-        """Numbers that it holds together with the readings, about."""
+        """About how many numbers it holds in addition to the readings."""
         return self.design.size + self.n * sum(factor.rank for factor in self.factors)
 
     def has(self, cause: str) -> bool:
@@ -240,7 +240,7 @@ class Solution(Projection):
 
             V_s = (R / (R - 1))Σ_j s_j s_jᵀ,    s_j = X⁺_j r_j
 
-        with the residuals r of run j: no form is exact, and what it leaves is equal within a
+        with the residuals r of run j: no form is exact, and what it leaves is correlated within a
         run. Coefficients whose variance is larger by this than by the noise alone are
         widened to it; from `ENOUGH_RUNS` runs on. `form_errors`, where known, come on top.
         """
@@ -269,8 +269,8 @@ class Solution(Projection):
 
             β - C_{·g} C_gg⁻¹ β_g,    C = (Xᵀ Mᵀ M X)⁻¹
 
-        under the noise of this fit, which may have a fixed correlation and none of the terms
-        ``group`` a separate run effect; outliers are clipped as in the fit of the others.
+        under the noise of this fit. It may have a fixed correlation, and no term of
+        ``group`` may have a run effect. Outliers are clipped as in the fit of the others.
         """
         readings = self.readings
         return self.factor.without(
@@ -285,7 +285,7 @@ class Solution(Projection):
         """The joint, with the assumed pattern and the missing orders among the terms.
 
         Not with the fitted corrections: an effect on the pattern (a filter) would be
-        confused with one in part, and then act on a pattern that it has already changed.
+        partly fitted as one, and then act on a pattern that it has already changed.
         """
         belief = self.belief.pattern
         orders = [*belief.orders]
@@ -300,7 +300,7 @@ class Solution(Projection):
 
 
 def fields_of_solution(solution: Projection, of: type[Projection]) -> dict[str, Any]:
-    """Fields of a class of results, as they are in one."""
+    """Fields of a class of results, with the values that ``solution`` has."""
     return {field.name: getattr(solution, field.name) for field in fields(of)}
 
 
