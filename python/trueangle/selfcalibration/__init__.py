@@ -1,1 +1,1 @@
-"""Calibration without a reference: patterns together with what the log does not know."""
+"""Calibration without a reference: patterns jointly with the unknowns of the log."""

@@ -55,7 +55,7 @@ def selfcal(
     method : {"auto", "spin-down", "heads", "shifts", "dual", "channels"}
         ``"auto"`` looks at the columns.
     orders : "auto" or sequence of int
-        By default those above the noise.
+        By default those that are significant.
     loop : {"open", "closed", "unknown"}
         Whether the speed was held by a loop closed on this encoder.
     loop_bandwidth : float, optional
@@ -92,8 +92,8 @@ def selfcal(
     Notes
     -----
     Reaches the Cramer-Rao limit of white noise where motion is smooth; standard errors
-    include what the drift of the motion, fitted jointly, takes away. Never identifiable: the zero;
-    see `SelfCalibration.blind` for the remainder. A million readings, 30 orders: about a second.
+    include the loss by the drift of the motion, which is fitted jointly. Never identifiable: the
+    zero; `SelfCalibration.blind` lists the others. A million readings, 30 orders: about a second.
 
     References
     ----------

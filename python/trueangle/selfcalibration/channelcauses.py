@@ -287,7 +287,7 @@ def _causes(
         off = _off(offset / (9.0 * sensor), p)
         words = f"the channels have an offset, or {disc} is off centre{off}"
         rivals = ("magnet_eccentricity",)
-        # A magnet's error is a third of what the curve shows, an offset's everything.
+        # A magnet's error is a third of what the curve shows, an offset's is all of it.
         add("channel_offset", 1, offset, 0.5 * offset, words, at=std_offset, rivals=rivals)
     gain = abs(channels.image.real) >= abs(channels.image.imag)
     ratio = max(channels.gain_ratio, 1.0 / channels.gain_ratio)
@@ -402,7 +402,7 @@ def _between_periods(
         return {}
     own = (std**2).mean(axis=0)
     spread = np.sqrt(np.maximum(values.var(axis=0, ddof=1) - own, 0.0))
-    # The standard error of a standard deviation of this many draws of the errors alone.
+    # The standard error of the standard deviation of n samples of the errors alone.
     return _significant(spread, np.sqrt(own) / (2.0 * (len(kept) - 1)) ** 0.25)
 
 

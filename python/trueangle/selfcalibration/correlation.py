@@ -30,12 +30,12 @@ _ROUNDS: Final = 4
 #: Points of frequency over which a spectrum is averaged.
 _GRID: Final = 8192
 
-#: Frequency below which fitted motion may take all, at most; and cycles of a series over which the
-#: power with it is averaged, at least.
+#: Highest frequency below which fitted motion may remove everything; and the fewest cycles of a
+#: series over which the power just above it is averaged.
 _HIGHEST_CUT: Final = 0.15
 _LEAST_BAND: Final = 10.0
 
-#: A series is continued by this many readings of nothing: beyond, noise no longer correlates.
+#: Zeros that are appended to a series: noise further apart is uncorrelated.
 _BEYOND: Final = 1024
 
 
@@ -66,7 +66,7 @@ class Correlation:
 
     @cached_property
     def level(self) -> float:
-        """Variance over that of what no reading before predicts: 1 of white noise."""
+        """Variance relative to that of the one-step prediction error: 1 for white noise."""
         return float(self._shape((np.arange(_GRID) + 0.5) / (2.0 * _GRID)).mean())
 
     def over_lags(self, count: int) -> Array:
@@ -84,7 +84,7 @@ class Correlation:
         return np.asarray(found[: len(rows)])
 
     def whitened(self, rows: Array) -> Array:
-        """What rows of one series hold beyond what those before predict."""
+        """The part of each row of one series that earlier rows do not predict."""
         p = self.terms.size
         found = rows[p:].copy()
         for lag, term in enumerate(self.terms, 1):
@@ -112,7 +112,7 @@ def lag_pairs(lengths: Sequence[int], most: int) -> Array:
 
 
 def _most_terms(lengths: Sequence[int]) -> int:
-    """Terms that series of this many readings show, at most."""
+    """Most terms that series of these lengths can determine."""
     return min(_MOST, sum(lengths) // _PER_TERM, max(lengths, default=1) - 1)
 
 
@@ -156,10 +156,11 @@ def correlation_of(
 
 
 def correlation_above(series: Sequence[Array], cut: float) -> tuple[Correlation, float]:
-    """As `correlation_of`, where slow motion was fitted that took all below a frequency.
+    """As `correlation_of`, where a fitted slow motion removed everything below a frequency.
 
-    There the power is confused with what it is above, up to twice of it; white where that is most
-    of the frequencies. With the variance of a reading, what was taken included.
+    The power there is assumed to equal that between this frequency and twice it; the noise is
+    taken as white where that covers most frequencies. Returns also the variance of a reading,
+    including what the motion removed.
 
     Parameters
     ----------
@@ -188,7 +189,7 @@ def correlation_above(series: Sequence[Array], cut: float) -> tuple[Correlation,
 
 
 def _autoregression(lags: Array, count: int) -> Correlation:
-    """Levinson's recursion on correlations of neighbours, as far as BIC needs terms."""
+    """Levinson's recursion on correlations of neighbours, with as many terms as BIC selects."""
     terms, best = np.zeros(0), np.zeros(0)
     share, least = 1.0, 0.0
     for p in range(1, lags.size):

@@ -1,4 +1,4 @@
-"""Patterns with plain nuisances: zeros of runs, ratios, couplings that change with clamping."""
+"""Patterns jointly with nuisances: zeros of runs, ratios, couplings that change with clamping."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from .densetriangle import (
 )
 from .projected import NOT_SEEN, Projected, Unknown, combinations
 
-#: Readings from which residuals show their correlation, and blocks whose means are looked at.
+#: Readings from which the correlation of residuals is estimated, and blocks that are averaged.
 _TOLD: Final = 60
 _BLOCKS: Final = 40
 
-#: Fits of which each is made at the places that the one before corrects, at most, and the standard
-#: errors within which coefficients no longer move; and those at places that are wrong.
+#: Most fits, each at the angles corrected by the one before; fits whose angles are not corrected
+#: yet; and the change, in standard errors, below which coefficients have converged.
 _ROUNDS: Final = 8
 _AT_FIRST: Final = 2
 _STILL: Final = 0.02
@@ -43,7 +43,7 @@ class DenseFit:
     """Variance of a random term relative to the noise."""
     residuals: Array
     covariance: Array
-    """Of the patterns; holds what is known about the correlation and of the random term."""
+    """Of the patterns; includes the correlation of the noise and the random term."""
     correlation: Correlation
     triangle: Array
     """Of nuisances, patterns and target: all that fits of fewer columns need."""
@@ -69,11 +69,11 @@ def fit_dense(
 ) -> DenseFit:
     """Least squares by orthogonal triangles, the nuisances eliminated first.
 
-    ``random`` nuisances are sampled anew in every run, with one variance: coefficients are averages
-    over what the evidence states about it, and their covariance holds how little few runs state.
-    Where neighbouring residuals correlate it is estimated from what no earlier reading predicts.
-    ``freedom_lost`` counts rows that contain no information (differences to a mean);
-    combinations of patterns of which less than ``floor`` is left count as not detected, whatever
+    ``random`` nuisances differ at random from run to run, with one variance. Coefficients are
+    averaged over the evidence of this variance; their covariance includes its uncertainty.
+    Where neighbouring residuals are correlated it is estimated from whitened rows.
+    ``freedom_lost`` counts rows without information of their own (differences to a mean).
+    Combinations of patterns that retain less than ``floor`` count as not identifiable, whatever
     the random nuisances hide of the others.
     """
     p, m = parts[0].nuisances.shape[1], len(columns)
@@ -110,7 +110,7 @@ def fit_dense(
                 asked = triangle_of(rows)
                 independent = sum(part.target.size for part in rows) - freedom_lost
             possible = possible_variances(asked, p, seen, random, independent)
-            # The unit is the noise of a reading, of which neighbours predict a share.
+            # The unit is the whole noise of a reading, including what neighbours predict.
             possible = [(v / correlation.level, chance) for v, chance in possible]
             variance = max(possible, key=lambda pair: pair[1])[0]
             solved = solved_triangle(triangle, p, m, random, variance)
@@ -128,7 +128,7 @@ def fit_dense(
             if not correlation.is_white:
                 spread, own = series.with_correlation(correlation, freedom)
                 projected = replace(projected, variance=noise * freedom / own)
-        # Where readings correlate, the variance was estimated as for white ones.
+        # Where readings are correlated, the first variance was estimated as if they were white.
         if correlation.is_white or not before.is_white or not len(random):
             break
     covariance = projected.variance * spread[p:, p:]
@@ -167,15 +167,15 @@ def _bread(solved: SolvedTriangle, projected: Projected) -> Array:
 
 
 def dense_fixed_point(fit_at: Callable[[Array, bool], DenseFit], size: int) -> DenseFit:
-    """The fit at the places that its own patterns correct, from no correction on.
+    """The fit at the angles that its own patterns correct, starting without a correction.
 
-    ``fit_at`` is reported whether the places are those of a pattern: until then the residual is not
-    noise, and shows of no random nuisance.
+    The second argument of ``fit_at`` is whether the angles are corrected: until then the residual
+    is not noise, and random nuisances cannot be estimated from it.
     """
     coefficients = np.zeros(size)
     for number in range(_ROUNDS):
         fit = fit_at(coefficients, number >= _AT_FIRST)
-        # What is hardly observed is noise of any size: it moves no place.
+        # A hardly identifiable combination is noise of any size: it corrects no angle.
         found = np.where(fit.projected.told, fit.patterns, 0.0)
         std = np.sqrt(np.maximum(np.diagonal(fit.covariance), 1e-300))
         still = np.abs((found - coefficients) / std).max(initial=0.0) < _STILL
@@ -215,8 +215,8 @@ def patterns_apart(
 def low_frequency_inflation(fit: DenseFit) -> float:
     """Variance of slow patterns relative to independent residuals; 1 at least.
 
-    By the greater of two: what neighbours state, and means over blocks, less what slow patterns
-    explain of them, for the residual that outlasts any of its neighbours.
+    The greater of two estimates: from the correlation of neighbours, and from means over blocks
+    (less what slow patterns explain of them), for correlation over longer times.
     """
     if not fit.correlated:
         return 1.0

@@ -16,13 +16,13 @@ from .correlation import Correlation
 #: readings do not show on, two a decade.
 _SIZES: Final = np.logspace(-1.0, 12.0, 27)
 
-#: Variances of less probability than this share of the most probable one's are omitted.
+#: Variances less probable than this share of the most probable one are omitted.
 _IMPROBABLE: Final = 1e-2
 
 #: No variance at all: a prior so tight that the term is nothing.
 _NO_VARIANCE: Final = 1e-24
 
-#: Singular values of patterns below this share of the largest are not detected.
+#: Singular values of patterns below this share of the largest count as zero.
 _RANK: Final = 1e-9
 
 
@@ -40,13 +40,13 @@ class DenseRows:
 
     @property
     def squares(self) -> Array:
-        """Of each pattern with nothing with it."""
+        """Sum of squares of each pattern by itself."""
         if self.alone is not None:
             return self.alone
         return np.asarray(np.einsum("ij,ij->j", self.patterns, self.patterns))
 
     def whitened(self, correlation: Correlation) -> DenseRows:
-        """What rows hold beyond what those before them in a series predict."""
+        """The part of each row that earlier rows of its series do not predict."""
         whole = np.column_stack([self.patterns, self.nuisances, self.target])
         rows = np.concatenate([correlation.whitened(one) for one in np.split(whole, self.series)])
         m = self.patterns.shape[1]
@@ -67,7 +67,7 @@ def triangle_of(parts: Iterable[DenseRows]) -> Array:
 
 @dataclass(frozen=True)
 class SolvedTriangle:
-    """Nuisances eliminated: the residual for the patterns, and the noise."""
+    """Nuisances eliminated: what remains for the patterns, and the noise."""
 
     inverse: Array  # of the nuisances' triangle
     beside: Array  # nuisances against patterns
@@ -78,13 +78,13 @@ class SolvedTriangle:
 
     @property
     def information(self) -> Array:
-        """Of the patterns together with the nuisances."""
+        """Of the patterns, estimated jointly with the nuisances."""
         return np.asarray(self.root.T @ self.root)
 
     def squares(self, seen: Array) -> float:
         """Sum of squares left by a fit of these combinations of the patterns, columns of ``seen``.
 
-        Others may be there by the noise of places alone, and would be made of the residual.
+        Others may come from the noise of the angles alone, and would be fitted to the residual.
         """
         basis = np.linalg.qr(self.root @ seen)[0]
         lost = self.right - basis @ (basis.T @ self.right)
@@ -117,7 +117,7 @@ def solved_triangle(
 
 
 def _split(root: Array, right: Array) -> tuple[Array, Array]:
-    """Singular values that are detected, and what is together with the directions of the others."""
+    """The singular values that are not zero, and ``right`` along the directions of the others."""
     if root.size == 0:
         return np.zeros(0), right
     u, values, _ = np.linalg.svd(root)
@@ -130,10 +130,10 @@ def possible_variances(
 ) -> list[tuple[float, float]]:
     """Variances of the random nuisances with their probabilities, the improbable ones omitted.
 
-    Of the patterns take part the combinations that are detected, columns of ``seen``.
+    Only identifiable combinations of the patterns take part, the columns of ``seen``.
 
-    Before the readings there is none with probability one half, else any that they would show, as
-    probable in each octave.
+    The prior: zero with probability one half, else any variance that the readings would show,
+    equally probable in each octave.
     """
     shown = float((triangle[:, list(random)] ** 2).sum()) / len(random)
     tried = np.concatenate([[0.0], _SIZES / max(shown, 1e-300)])

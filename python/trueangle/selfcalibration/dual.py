@@ -1,9 +1,9 @@
 """``dual``: motor and output encoder of a geared joint.
 
 ``o - m/i = error_o(theta) - error_m(i theta)/i + gear + play + c``: at every order only the sum
-is detected, and its number is under all its names. Patterns are functions of the motor's
-angle: harmonics of the reading that is explained would explain it by itself. A ratio that is
-given is a count of teeth: it is not estimated unless that is requested.
+is identifiable, and it is reported under all its names. Patterns are functions of the motor's
+angle: harmonics of the output's own reading would explain that reading by itself. A ratio that
+is given is a count of teeth: it is not estimated unless that is requested.
 
 What it can never see: which of output encoder, gear and motor encoder an order belongs to;
 where the ratio is whole, output order k i and motor order k are one; the zero; orders that
@@ -57,15 +57,16 @@ from .result import (
 )
 from .verification import chance_of_parts
 
-#: A ratio is accepted as different from the given or a whole one beyond this many standard errors:
-#: a probability of 6e-5.
+#: Standard errors beyond which a ratio differs from the given or a whole one: a probability of
+#: 6e-5.
 _FAR: Final = 4.0
 
-#: Over less than a turn no ratio is taken that needs orders 1 and 2 of more than this, a
-#: degree: a ratio that needs none is likelier than an encoder so eccentric.
+#: Over less than a turn no ratio is used that needs orders 1 and 2 of more than a degree: a
+#: ratio that needs neither is likelier than so eccentric an encoder.
 _ECCENTRIC: Final = math.radians(1.0)
 
-#: Where nobody requested the ratio, it is questioned beyond this many, and by such a share.
+#: Where no estimate of the ratio was requested, a given one is reported as doubtful beyond this
+#: many standard errors if it also differs by this share.
 _DOUBTED: Final = 6.0
 _SHARE: Final = 1e-4
 

@@ -1,8 +1,8 @@
-"""Both encoders of a geared joint by least squares: lines together with zero, direction and speed.
+"""Both encoders of a geared joint by least squares: lines jointly with zero, direction and speed.
 
 Over an arc the output's low orders, its zero and the slope of one reading over the other are
-nearly one another. So a ratio is estimated together with orders 1 and 2 whatever they bring, and of
-the output's orders no further are taken than the readings need, the lowest first.
+nearly collinear. So a ratio is always estimated jointly with orders 1 and 2, significant or not.
+Of the output's orders only as many are fitted as the readings need, the lowest first.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from .gearlines import (
 )
 from .projected import Unknown, harmonic_unknowns
 
-#: Probability of taking up any line that is not there.
+#: Probability of selecting any line that is not there.
 _CHANCE: Final = 0.01
 
-#: Orders of the output together with which a ratio is estimated: eccentricity and ellipse.
+#: Orders of the output that are estimated jointly with a ratio: eccentricity and ellipse.
 BESIDE_RATIO: Final = (1, 2)
 
-#: Fits in which a ratio settles, and in which the zeros settle, together with the patterns.
+#: Fits within which a ratio converges, and those for the zeros, jointly with the patterns.
 _RATIOS: Final = 3
 _ZEROS: Final = 2
 
@@ -44,7 +44,7 @@ _CHUNK: Final = 8192
 
 
 class DualSample(NamedTuple):
-    """Readings that take part: even or odd ones of this many blocks of a run; all where 1."""
+    """Readings that take part: those of every other of ``blocks`` blocks of a run; all where 1."""
 
     blocks: int = 1
     first: int = 0
@@ -65,7 +65,7 @@ class DualFit(NamedTuple):
 
 
 class RatioEstimate(NamedTuple):
-    """Motor turns per output turn, and its standard error; infinite where not detected."""
+    """Motor turns per output turn, and its standard error; infinite where not identifiable."""
 
     value: float
     std: float
@@ -156,14 +156,14 @@ def choose_dual_lines(
     slope: bool = False,
     held: Sequence[int] = (),
 ) -> tuple[list[SharedLine], list[SharedLine]]:
-    """Lines that are significant, and those of which the travel holds too little to state.
+    """Lines that are significant, and those that the travel is too short to determine.
 
-    ``held`` are orders of the output that are kept whatever they bring.
+    ``held`` are orders of the output that are always kept.
 
-    Of the output's own orders the first few are taken beyond which no higher one is missed;
-    of these, and of the motor's, those are omitted that are not significant. Together with a ratio
-    (``slope``) and ``held`` none is omitted, and one more is taken: over an arc orders that the
-    readings do not need may make it another.
+    The output's own orders are kept up to the lowest beyond which no higher one is significant;
+    of these, and of the motor's, insignificant ones are omitted. Jointly with a ratio (``slope``)
+    and ``held`` none is omitted, and one more is kept: over an arc an order that is not
+    significant may still change the ratio.
     """
     fit = fit_dual_lines(channels, ratio, lines, slope=slope, settled=False).dense
     scale = fit.projected.variance * low_frequency_inflation(fit)
@@ -205,7 +205,7 @@ def choose_dual_lines(
     return told, [lines[i] for i in lost]
 
 
-#: An order of which less remains with the others is not reported.
+#: An order that retains less than this share, jointly with the others, is not determined.
 _LEAST: Final = 0.02
 
 
@@ -223,8 +223,8 @@ def estimate_dual_ratio(
 ) -> RatioEstimate:
     """The ratio jointly with orders 1 and 2 of the output, and with what else there may be.
 
-    Of ``orders="auto"`` one more than the readings need is held with it: over an arc the
-    lowest orders and the slope are nearly one another, and one that is not detected would move it.
+    With ``orders="auto"`` one order more than the readings need is fitted: over an arc the lowest
+    orders and the slope are nearly collinear, and an undetected order would bias the ratio.
 
     Examples
     --------

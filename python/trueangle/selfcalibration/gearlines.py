@@ -19,10 +19,10 @@ _HIGHEST: Final = 8
 #: Turns by which two orders must part over the travel to be two numbers.
 SLIP: Final = 0.05
 
-#: Steps whose mean states the direction.
+#: Steps whose mean gives the direction.
 _WIDTH: Final = 5
 
-#: Readings to either side that show the speed.
+#: Readings to either side from which the speed is estimated.
 _SPREAD: Final = 10
 
 #: Speed is a separate regressor where it varies by this share of the highest.
@@ -100,7 +100,7 @@ def slope_ratio(channels: GearedChannels) -> float:
 
 
 def lines_of_gear(orders: str | Sequence[float], ratio: float, turns: float) -> list[SharedLine]:
-    """Orders of both shafts; those that the travel cannot separate are once."""
+    """Orders of both shafts; those that the travel cannot separate are listed once."""
     size = abs(ratio)
     numbers = range(1, _HIGHEST + 1) if isinstance(orders, str) else [int(k) for k in orders]
     lines = {float(k): SharedLine(float(k), k, 0) for k in numbers}

@@ -143,7 +143,7 @@ def _fit(readings: Sequence[Array], orders: Sequence[float]) -> DenseFit:
 
 
 def _common(readings: Sequence[Array]) -> float:
-    """Rows without information: one of each place, for the mean of the heads."""
+    """Rows without information of their own: one per angle, for the mean of the heads."""
     return float(sum(h.shape[1] for h in readings))
 
 
@@ -204,7 +204,7 @@ def _blind(
     return [
         Blind(
             lost,
-            f"with heads at {where} deg all heads read these orders equally (order {lost[0]:g} at "
+            f"with heads at {where} deg these orders are equal at all heads (order {lost[0]:g} at "
             f"head {numbers[0]} is the same at every head): differences hold nothing of them",
             "move one head, or add one, off the equal spacing "
             '(`trueangle.planning.plan_self("heads")`)',

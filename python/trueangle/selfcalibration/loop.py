@@ -12,7 +12,7 @@ from ..support.suggestions import check_choice
 from .methods import LOOPS
 from .result import Blind, OrderEstimate
 
-#: Below this many bandwidths a velocity loop follows more than a tenth of what it sees.
+#: Below this multiple of its bandwidth a velocity loop follows more than a tenth of an error.
 FOLLOWS_BELOW: Final = 2.0
 
 
@@ -78,7 +78,7 @@ def followed_share(hertz: float, loop: str, bandwidth: float | None) -> float:
 
 
 def widened_by_loop(estimate: OrderEstimate, share: float) -> OrderEstimate:
-    """The estimate where any part up to ``share`` may be the loop's doing.
+    """The estimate where a share of up to ``share`` may come from the loop.
 
     In any phase: the standard deviation of a disc of that radius, along one direction.
     """

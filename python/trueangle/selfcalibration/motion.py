@@ -1,9 +1,9 @@
-"""Patterns together with a smooth motion, and the motion's stiffness.
+"""Patterns jointly with a smooth motion, and the motion's stiffness.
 
-The motion of each segment is a cubic spline in time under a prior: smooth trends are free,
-with them the acceleration drifts, with a memory. The stiffness (the ratio of noise to that
-drift), the memory and the knot spacing maximise the evidence, that is the likelihood with
-motion and patterns integrated out.
+The motion of each segment is a cubic spline in time under a prior: smooth trends are free, and
+the acceleration drifts about them with a correlation time. The stiffness (the ratio of noise to
+that drift), the correlation time and the knot spacing maximise the evidence, that is the
+likelihood with motion and patterns integrated out.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ from .splines import (
 #: Stiffness looked at, as a power of ten relative to the readings per knot.
 _STIFFEST, _SOFTEST = 7.0, -5.0
 
-#: Grids that bring no further evidence than this in a row end the search (log likelihood).
+#: The search ends after a few grids in a row that raise the evidence by less (log likelihood).
 _WORTH = 1.0
 _BEHIND = 2
 
 #: A combination of common columns of which motion leaves less is the motion's own.
 _GONE = 1e-13
 
-#: Close knots may show a rougher drift than distant ones allow by this factor (drift that
-#: has a memory), not by more: what coloured noise would need is no motion.
+#: Close knots may show a rougher drift than distant ones by this factor at most (drift with a
+#: correlation time): coloured noise would need more, and is not motion.
 _ROUGHER = 100.0
 
-#: Memories of the acceleration that are tried, as shares of the longest segment.
+#: Correlation times of the acceleration that are tried, as shares of the longest segment.
 _MEMORIES = (0.1, 0.01)
 
 #: Stiffnesses of evidence within this of the best are still possible (log likelihood).
@@ -97,7 +97,7 @@ class MotionFit:
 class _Grid:
     """The sums on one grid, with the motion so far in terms of it.
 
-    Smooth trends of each segment (coasting down, state) are taken out of the prior: columns
+    Smooth trends of each segment, such as coasting down, are not penalised by the prior: columns
     whose third differences are Legendre polynomials join the common ones.
     """
 

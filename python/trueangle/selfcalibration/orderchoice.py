@@ -30,7 +30,7 @@ _ROUNDS: Final = 5
 #: Distances from an order at which its neighbourhood is looked at.
 _BESIDE: Final = (-0.5, -0.41, -0.32, -0.23, 0.23, 0.32, 0.41, 0.5)
 
-#: A louder neighbourhood is assumed where probability would make it once in this many orders.
+#: P-value below which noise next to an order counts as stronger than at the order.
 _COLOURED: Final = 1e-3
 
 #: Turns from which it is looked at, and readings over which a spectrum in time is averaged.
@@ -51,7 +51,7 @@ def highest_order(readings: SegmentReadings) -> int:
 
 
 def choose_selfcal_orders(readings: SegmentReadings) -> tuple[float, ...]:
-    """Orders that are significant of the noise with them.
+    """Orders that are significant against the noise near them.
 
     The lowest eight are fitted first, then those at which the residual peaks, until none
     does; at last those that are not significant are dropped.
@@ -114,7 +114,7 @@ def significant_orders(
     source: str | None = None,
     tried: int | None = None,
 ) -> tuple[float, ...]:
-    """Orders of ``among`` whose cosine and sine together are significant, of this many tried."""
+    """Orders of ``among`` whose cosine and sine are jointly significant, of ``tried`` orders."""
     limit = _limit(len(among) if tried is None else tried)
     kept = []
     for order in among:
@@ -135,7 +135,7 @@ def spectrum_at(theta: Array, values: Array, orders: Array) -> Array:
     total = float(values @ values)
     if total == 0.0:
         return np.zeros(orders.size)
-    # Harmonics of the whole part of an order times those of the remainder, which few share.
+    # Harmonics of the integer part of an order times those of the fraction: few are distinct.
     whole = np.unique(np.floor(orders))
     rests, which = np.unique(np.round(orders - np.floor(orders), 9), return_inverse=True)
     place = np.searchsorted(whole, np.floor(orders))
@@ -157,9 +157,9 @@ def noise_spectrum_at(
 ) -> Array:
     """Noise power at each order relative to white noise.
 
-    An order passes at a frequency that follows the speed: there what the residuals' correlation in
-    time states, on average. Where there are turns enough to look between orders, and noise together
-    with an order is louder than that, as loud as it is there.
+    An order appears at a frequency proportional to the speed: the power there follows, on average,
+    from the residuals' correlation in time. Where there are enough turns to resolve the spectrum
+    between orders, and the noise next to an order is stronger than that, its power is used.
 
     Returns
     -------
@@ -179,7 +179,7 @@ def noise_spectrum_at(
     passing = readings.speed[part] * steps[part]
     power = correlation.spectrum(np.multiply.outer(np.asarray(orders, dtype=np.float64), passing))
     if not correlation.is_white:
-        # What motion took of the noise is no less where the noise is slow, but more.
+        # Motion removes more of the noise, not less, where the noise is slow.
         power *= variance / fit.projected.variance
     factors = louder = np.asarray(power.mean(axis=1))
     if sum(stretch.turns for stretch in readings.stretches) >= _TURNS:
@@ -192,7 +192,7 @@ def noise_spectrum_at(
 
 
 def louder_beside(theta: Array, residuals: Array, orders: Sequence[float], factors: Array) -> Array:
-    """``factors``, and of orders with which noise is louder than these, its value there."""
+    """``factors``; where the noise next to an order is stronger, its power instead."""
     found = factors.copy()
     near = np.add.outer(np.asarray(orders, dtype=np.float64), _BESIDE)
     power = spectrum_at(theta, residuals, near.ravel()).reshape(near.shape)

@@ -1,4 +1,4 @@
-"""The one estimator: harmonics unknown together with nuisances, their covariance, null vectors."""
+"""The one estimator: unknown harmonics jointly with nuisances, their covariance, null vectors."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ import trueangle._core as _core
 
 from ..support.arrays import Array
 
-#: A column is not detected where nuisances and other columns leave less of its square.
+#: A column is not identifiable where nuisances and other columns leave less of its square.
 #: Below this share rounding in the sums (1e-16 of a column, times its condition) decides.
 NOT_SEEN = 1e-9
 
 
-#: A column of which less is left is not reported: its standard error is 30 times that of it alone.
+#: A column that retains less is not determined: its standard error is 30 times that of it alone.
 TOLD = 1e-3
 
-#: A column that has more of its square in combinations that are not detected is not detected.
+#: A column with more of its square in unidentifiable combinations is not identifiable.
 _SHARE = 0.01
 
 
@@ -80,7 +80,7 @@ def harmonic_sum(
 def combinations(
     information: Array, alone: Array, floor: float
 ) -> tuple[Array, Array, Array, Array]:
-    """Columns' scale; the residual of combinations of them that show, these; and the others."""
+    """Columns' scale; shares retained by identifiable combinations, these; and the others."""
     scale = _scale(alone)
     values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
     kept = values >= floor
@@ -103,7 +103,7 @@ class Projected:
     right : ndarray, shape (m,)
         ``Xᵀ (I - Π) y``.
     alone : ndarray, shape (m,)
-        ``x_jᵀ x_j``: what each column would have with nothing with it.
+        ``x_jᵀ x_j``: the information on each column without the others.
     variance : float
         Of one reading, about the fit.
     freedom : float
@@ -117,13 +117,13 @@ class Projected:
     variance: float
     freedom: float
     floor: float = NOT_SEEN
-    """Combinations of which less is left count as not detected."""
+    """Combinations that retain less count as not identifiable."""
     design: Projected | None = None
-    """What decides which combinations show, where noise of these columns' own hides them."""
+    """Decides which combinations are identifiable, where noise of these columns hides it."""
 
     @cached_property
     def _eigen(self) -> tuple[Array, Array, Array, Array]:
-        """Columns' scale; the residual of combinations that are detected, these; and the others."""
+        """Columns' scale; shares retained by identifiable combinations, these; and the others."""
         if self.design is None:
             return combinations(self.information, self.alone, self.floor)
         scale = _scale(self.alone)
@@ -134,20 +134,20 @@ class Projected:
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
-        """Columns that take part in no combination that is not detected."""
+        """Columns that take part in identifiable combinations only."""
         lost = (self._eigen[3] ** 2).sum(axis=1)
         return np.asarray(lost < _SHARE)
 
     @cached_property
     def inverse(self) -> Array:
-        """Pseudo-inverse of the information over the combinations that are detected."""
+        """Pseudo-inverse of the information over the identifiable combinations."""
         scale, values, vectors, _ = self._eigen
         half = (scale[:, None] * vectors) / np.sqrt(values)
         return np.asarray(half @ half.T)
 
     @property
     def solution(self) -> Array:
-        """The unknowns; of least norm along what is not detected."""
+        """The unknowns; of least norm along combinations that are not identifiable."""
         return np.asarray(self.inverse @ self.right)
 
     @property
@@ -158,7 +158,7 @@ class Projected:
     def retained(self, among: Sequence[int] | None = None) -> Array:
         """Share of each column's square that nothing else explains.
 
-        ``1 / (A⁻¹_jj x_jᵀ x_j)``: 1 where it is alone, 0 where it is not detected.
+        ``1 / (A⁻¹_jj x_jᵀ x_j)``: 1 where it is alone, 0 where it is not identifiable.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 1.0 / (np.diagonal(self.inverse) * self.alone)
@@ -167,12 +167,12 @@ class Projected:
 
     @cached_property
     def told(self) -> NDArray[np.bool_]:
-        """Columns of which the design leaves a thousandth and more."""
+        """Columns that retain at least a thousandth in the design."""
         return np.asarray((self.design or self).retained() >= TOLD)
 
     @property
     def rank(self) -> int:
-        """Combinations that are detected."""
+        """Number of identifiable combinations."""
         return int(self._eigen[1].size)
 
     def index(self, source: str, order: float) -> tuple[int, int]:

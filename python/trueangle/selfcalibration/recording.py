@@ -39,7 +39,7 @@ _CHANNELS = (
 #: Shifts that differ by less (radians) are one shift.
 _APART: Final = math.radians(0.5)
 
-#: Readings of a polygon are within this share of the pitch of its facets.
+#: Readings of a polygon lie on its facets within this share of their pitch.
 _ON_FACET: Final = 0.1
 _MOST_FACETS: Final = 720
 
@@ -286,7 +286,7 @@ def clampings_of(recordings: Sequence[Recording]) -> Clampings:
 
 
 def _facets(other: Sequence[Array]) -> int:
-    """Facets of a polygon: readings that are at a few equal steps of the turn; else 0."""
+    """Facets of a polygon, if the readings lie at a few equal steps of the turn; else 0."""
     places = np.mod(np.concatenate(list(other)), 2.0 * math.pi)
     offset = float(np.angle(np.exp(1j * places[:1]).mean()))
     x = np.mod(places - offset, 2.0 * math.pi) / (2.0 * math.pi)

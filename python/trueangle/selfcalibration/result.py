@@ -36,7 +36,7 @@ class OrderEstimate:
     std_factor: float
     """Standard error over the limit of white noise with the true angle known."""
     of: str = "the encoder"
-    """What the number is a number of: one thing, or several that cannot be separated."""
+    """Where the error comes from: one source, or several that cannot be separated."""
 
     @property
     def amplitude(self) -> float:
@@ -130,7 +130,7 @@ class SelfCalibration(PlainResult):
     readings : int
     turns : float
     beside : dict
-        What was fitted jointly with: ripple, reversal error, head angles, facets...
+        What was fitted jointly: ripple, reversal error, head angles, facets and others.
     coverage_deg : float, optional
         Of channels: how much of their period the readings cover.
     limit_arcsec : float, optional

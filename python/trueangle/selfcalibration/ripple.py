@@ -1,10 +1,10 @@
-"""Speed ripple and the encoder's pattern, weighed by the readings.
+"""Speed ripple jointly with the encoder's pattern, both weighted by their evidence.
 
 A torque ``T_k cos kθ`` moves a free shaft by ``T_k / (J k² ω²)``. Where the
 speed changes, the ripple is distinguished from the pattern, at the cost of a greater standard
 error. Where it is not there, that cost is not due. So its size is given a distribution: nothing
 with probability one half, else any size, equally probable per octave; the standard error and the
-estimate are averages over it (empirical evidence of each order on its own).
+estimate are averages over it (empirical evidence of each order separately).
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ LARGEST_COST: Final = 10.0
 #: Sizes looked at: from a tenth of the standard error to ten thousand of it.
 _SIZES: Final = np.logspace(-1.0, 4.0, 61)
 
-#: Probability that there is none, before the readings are detected.
+#: Prior probability that there is no ripple.
 _NONE: Final = 0.5
 
 
 def cost_of_ripple(ripple: Array) -> float:
-    """Factor of the standard error when ripple columns ``ρ H`` are together with ``H``.
+    """Factor of the standard error when ripple columns ``ρ H`` are fitted jointly with ``H``.
 
     ::
 
@@ -48,8 +48,8 @@ def averaged_over_ripple(
 ) -> tuple[Array, Array, Array]:
     """Pattern and covariance averaged over the size of the ripple at each order.
 
-    ``unknowns`` and ``covariance`` hold pattern, then ripple, as if nothing were known about the
-    ripple's size, and so does what comes back, with the probability that each order ripples.
+    ``unknowns`` and ``covariance`` hold pattern, then ripple, without a prior of the ripple's
+    size. Returns both, averaged, and the probability that there is ripple at each order.
     """
     m = 2 * len(orders)
     precision = np.zeros(2 * len(ripple))

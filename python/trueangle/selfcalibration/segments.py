@@ -19,23 +19,22 @@ from .splines import Knots
 #: Motion slower than this share of the median speed is omitted, as are reversals.
 SLOWEST: Final = 0.2
 
-#: Steps between readings beyond this part of a turn cannot be distinguished from the other way
-#: round.
+#: Steps between readings beyond this part of a turn may as well go the other way round.
 _LARGEST_STEP: Final = 0.4
 
-#: A segment shorter than this shows no pattern of its own (turns, readings).
+#: A segment shorter than this does not show a pattern (turns, readings).
 _SHORTEST: Final = (0.8, 48)
 
 #: Turns in all without which motion and pattern cannot be separated.
 TURNS_NEEDED: Final = 2.0
 
-_BLOCKS: Final = 400  # a log is looked at in about this many pieces
+_BLOCKS: Final = 400  # pieces into which a log is divided, about
 
 #: Readings per knot of the finest grid, at least.
 PER_KNOT: Final = 6
 
-#: Smooth trends of a segment at most: of polynomials of degree 2 to 8 a coasting shaft needs
-#: no further; and the turns that each needs, so that none comes near an order.
+#: Most smooth trends of a segment: polynomials of degree 2 to 8 suffice for a coasting shaft;
+#: and the turns that each needs, so that none comes near an order.
 _TRENDS: Final = 7
 _TURNS_PER_TREND: Final = 5.0
 
@@ -76,7 +75,7 @@ class Segment:
         if last <= 1.25 * turn:
             return np.full(t.size, self.speed)
         at = np.linspace(0.0, last - turn, min(4000, max(8, int(16 * last / turn))))
-        # Where readings are still, the mean of their times is as good as any.
+        # Where readings do not change, the mean of their times is as good as any.
         left, right = np.interp(at, x, t), np.interp(at + turn, x, t)
         if not (right > left).all():  # of angles so large that rounding takes a turn
             raise _fault(
@@ -261,7 +260,7 @@ class SegmentReadings:
         self.extra_names: tuple[str, ...] = ()
 
     def knots(self, intervals: int) -> Knots:
-        """A grid of about this many intervals in all, each segment a power of two times some."""
+        """A grid of about ``intervals``; those of each segment are a multiple of a power of 2."""
         spans = [float(s.time[-1] - s.time[0]) for s in self.stretches]
         fewest = min(self.size // PER_KNOT, intervals)
         levels = max(0, math.floor(math.log2(max(fewest / (4 * len(spans)), 1.0))))
@@ -272,7 +271,7 @@ class SegmentReadings:
         count = tuple(max(unit, unit * math.ceil(span / (spacing * unit))) for span in spans)
         spacing = max(span / n for span, n in zip(spans, count, strict=True))
         starts = tuple(
-            # Shorter segments are in the middle of their knots.
+            # Knots that are longer than their segment are centred on it.
             0.5 * (float(s.time[0]) + float(s.time[-1]) - n * spacing)
             for s, n in zip(self.stretches, count, strict=True)
         )

@@ -40,7 +40,7 @@ FACETS: Final = "the polygon's facets"
 
 _HIGHEST: Final = 32
 
-#: Share of an order that is left together with the other pattern, below which it is refused.
+#: An order that retains less, jointly with the other pattern, is refused.
 _LEAST: Final = 1e-3
 
 #: Directions of columns below this share of the greatest are none.
@@ -97,7 +97,7 @@ def shift_patterns(
     limit = noise * math.sqrt(2.0 / count)
     at = [i for k in kept for i in fit.projected.index(ENCODER, k)]
     retained = fit.projected.retained()
-    # Cosine alone is detected of the order at half the number of facets.
+    # Of the order at half the number of facets only the cosine is identifiable.
     for first in at[::2]:
         if fit.projected.alone[first + 1] == 0.0:
             retained[first + 1] = retained[first]
@@ -269,7 +269,7 @@ def _held_out(
     for j in range(runs):
         fit = _fit(design, orders, [i for i in range(runs) if i != j])
         rows = _rows(design, j, 0, 1, orders, whole.patterns, False)
-        # What the others cannot show is fitted here: it is not theirs to predict.
+        # What the others cannot determine, and so not predict, is fitted here.
         seen = fit.projected.told
         here = np.concatenate([rows.patterns[:, ~seen], rows.nuisances], axis=1)
         basis = np.linalg.svd(here, full_matrices=False)
@@ -289,7 +289,7 @@ def _held_out(
     return {
         "clampings": HeldOutPattern(
             "all clampings but one",
-            "the one left out",
+            "the one held out",
             math.sqrt(before / count) * ARCSEC,
             math.sqrt(after / count) * ARCSEC,
             p,
@@ -302,11 +302,11 @@ def _chance_of_one_pattern(
 ) -> float | None:
     """Fisher's test of one pattern for all clampings against one for each.
 
-    Together with both are the other's pattern and the couplings, of the variance that was found;
-    the rows are those of white noise. None where a pattern for each leaves nothing.
+    Both models contain the other's pattern and the couplings with their estimated variance; the
+    rows are whitened. None where a pattern for each leaves no degrees of freedom.
     """
     runs, m = len(design.joint), 2 * len(orders)
-    # The noise of whitened rows is what no reading before predicts.
+    # The noise of whitened rows is what earlier readings do not predict.
     scale = math.sqrt(whole.random_variance * whole.correlation.level)
     common, apart = [], []
     for j in range(runs):
@@ -331,7 +331,7 @@ def _chance_of_one_pattern(
     extra = np.vstack([more, np.zeros((4 * runs, more.shape[1]))])
     size = np.sqrt((extra**2).sum(axis=0))
     extra = extra / np.where(size > 0.0, size, 1.0)
-    # What the other's pattern and the coupling leave of them at random of the places is none.
+    # A small remainder next to the other's pattern and couplings is scatter of the angles: dropped.
     own = _basis(extra - basis @ (basis.T @ extra), math.sqrt(_LEAST), 1.0)
     between = float(((own.T @ left) ** 2).sum())
     few, freedom = float(own.shape[1]), float(len(one) - basis.shape[1] - own.shape[1])

@@ -32,7 +32,7 @@ from .segments import SegmentReadings, cut_stretches
 from .steady import SteadyFit, fit_steady
 from .verification import held_out_patterns
 
-#: An order of which motion leaves less is not the encoder's to state.
+#: An order that retains less, jointly with the motion, is not attributed to the encoder.
 LEAST_RETAINED: Final = 0.02
 
 #: Below this many turns per knot's own wave a warning is due.
@@ -247,10 +247,10 @@ def _renamed(o: OrderEstimate, of: str) -> OrderEstimate:
 
 
 def _may_be_ripple(o: OrderEstimate, first: OrderEstimate | None) -> bool:
-    """Whether torque at this order, no greater than at order 1, could explain everything.
+    """Whether torque at this order, no greater than at order 1, could explain all of the error.
 
-    The same torque moves the shaft by 1/k^2 of what it does at order 1, and order 1 is all
-    that is detected there.
+    The same torque moves the shaft by 1/k^2 of what it does at order 1, where at most the whole
+    measured order is ripple.
     """
     if o.order <= 1.0 or first is None:
         return True

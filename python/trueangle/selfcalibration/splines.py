@@ -64,7 +64,7 @@ class Knots:
     def parents(self) -> NDArray[np.int64]:
         """Finer coefficients behind each coarser one, shape (coarser size, 5).
 
-        ``size`` represents those beyond the ends, which have no readings.
+        ``size`` marks those beyond the ends, which have no readings.
         """
         rows = []
         for first, n in zip(self.first[:-1], self.intervals, strict=True):
@@ -97,13 +97,14 @@ def spline_basis(place: Array) -> Array:
 
 
 class DriftPenalty:
-    """Prior of the motion: the acceleration is noise of one roughness with a memory.
+    """Prior of the motion: the acceleration is noise of one roughness with a correlation time.
 
     ::
 
         λ Σ (Δ³ c)² + μ Σ (Δ² c)²,    μ = λ (h/τ)²
 
-    The residual free is constant speed; ``tau`` is the memory in seconds, ``h`` the spacing.
+    Only constant speed is not penalised; ``tau`` is the correlation time in seconds, ``h`` the
+    spacing.
     """
 
     def __init__(self, knots: Knots) -> None:

@@ -20,7 +20,7 @@ from .splines import Knots, ordered_motion_sums, spline_basis, spline_values
 #: Readings that the first iterations look at: enough to come close.
 _FIRST_LOOK: Final = 40_000
 
-#: Intervals of the first grid; a finer one is laid where the evidence needs it.
+#: Intervals of the first grid; a finer one is used where the evidence needs it.
 _INTERVALS: Final = 512
 
 #: Steps of the pattern below this share of its standard error end the iteration.
@@ -86,7 +86,7 @@ def fit_steady(
     start : SteadyFit, optional
         Where to begin.
     groups : ndarray of int, optional
-        0 or 1 for each reading: one pattern for each group, together with one motion.
+        0 or 1 for each reading: one pattern for each group, jointly with one motion.
     thorough : bool
         Look at all readings in the last iteration; else at some 40 000.
     smooth : bool
@@ -133,7 +133,7 @@ def fit_steady(
         left = work.residuals(knots, spline, unknowns)
         return SteadyFit(orders, ripple, unknowns, fit, readings, left, valid)
     # Knots so far apart that no order fits between them, until the true angles are known:
-    # at wrong ones, the residual repeats every turn and would pass for motion.
+    # at wrong ones, the residual repeats every turn and would be fitted as motion.
     stiff = _TURNS_PER_KNOT / readings.mean_speed
     while True:
         knots = readings.knots(intervals)
@@ -221,7 +221,7 @@ class GaussNewtonSteps:
     def state(
         self, knots: Knots, spline: Array, unknowns: Array, rows: slice
     ) -> tuple[NDArray[np.int64], Array, Array, Array, Array]:
-        """Place on the knots, true angle, weight of motion and the residual."""
+        """Place on the knots, true angle, weight of motion and residual."""
         data = self.readings
         time, stretch = data.time[rows], data.stretch[rows]
         index, place = np.empty(time.size, dtype=np.int64), np.empty(time.size)

@@ -1,4 +1,4 @@
-"""Tests of a pattern: one part of the readings predicts another."""
+"""Tests of a pattern: how well one part of the readings predicts another, with a p-value."""
 
 from __future__ import annotations
 
