@@ -56,7 +56,7 @@ def unread(path: Path) -> list[str]:
 
 
 class BatchRange(NamedTuple):
-    """Neighbouring record batches, or one of this many parts of a single large one."""
+    """Neighbouring record batches, or one of ``parts`` parts of a single large one."""
 
     batches: range
     part: int = 0
@@ -86,7 +86,7 @@ def stretches(path: Path) -> list[BatchRange | None]:
         size = path.stat().st_size
         each = max(1, batches * _STRETCH // size)
         parts = 1
-        # A part of a packed batch needs everything unpacked.
+        # A part of a packed batch needs the whole batch unpacked.
         if batches * _STRETCH < size and _compression(path, True) is None:
             parts = min(-(-size // (max(batches, 1) * _STRETCH)), _MOST_PARTS)
     return [
@@ -238,7 +238,7 @@ def _check_batches(path: Path, is_file: bool) -> None:
 
 
 def _compression(path: Path, is_file: bool) -> str | None:
-    """Codec of the first record batch, which only the message's own header shows."""
+    """Codec of the first record batch, which only the message's own header contains."""
     return next((batch.codec for batch in _packed(path, is_file) if batch.rows >= 0), None)
 
 
@@ -317,7 +317,7 @@ class PlacedBatch(NamedTuple):
     places: dict[str, ColumnBuffers]
 
     def read(self, file: FileIO, part: int, parts: int) -> Iterator[dict[str, NDArray[Any]]]:
-        """One of this many parts of the rows, in blocks."""
+        """One of ``parts`` parts of the rows, in blocks."""
         first, last = (self.rows * k // parts for k in (part, part + 1))
         for start in range(first, last, ROWS):
             stop = min(start + ROWS, last)
@@ -337,7 +337,7 @@ def placed_batch(
     base = mapped.read_buffer(1).address  # of more, the system would look at every page
 
     def place(part: pa.Buffer | None, least: int) -> int | None:
-        """The byte of the file that a part of this many bytes starts at."""
+        """The byte of the file at which a part of at least ``least`` bytes starts."""
         if part is None or part.size < least:
             return None
         start = part.address - base

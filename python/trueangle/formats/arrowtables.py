@@ -34,7 +34,7 @@ _MOST = 256
 def element_names(schema: pa.Schema, first: Callable[[str], int]) -> list[str]:
     """Columns of numbers and texts, elements of columns of lists as ``state[3]``.
 
-    ``first`` shows the length of the first list of a column whose lists may differ in length.
+    ``first`` returns the length of the first list of a column whose lists may differ in length.
     """
     found: list[str] = []
     for field in schema:
@@ -198,7 +198,7 @@ class ArrowDigest:
 
 
 def column_batches(path: object, batches: Iterable[Any], wanted: Selection) -> Iterator[Batch]:
-    """What is wanted of record batches: numbers as arrays, texts and times requested as labels."""
+    """The selected columns of record batches: numbers as arrays, selected texts as labels."""
     for batch in batches:
         yield {
             name: _values(path, name, _taken_column(batch, name), name in wanted.texts)

@@ -1,7 +1,7 @@
 """What a file holds before it is read and decoded: extents, sizes, one budget of memory for all.
 
-A packed file contains nothing of what it unpacks to: kilobytes represent gigabytes. It is checked
-before memory is taken, from what the file states about itself, and again while it is read.
+The size of a packed file does not show what it unpacks to: kilobytes may become gigabytes. It is
+checked before memory is allocated, from what the file declares, and again while it is read.
 """
 
 from __future__ import annotations

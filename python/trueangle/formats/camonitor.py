@@ -1,7 +1,7 @@
 """EPICS logs as ``camonitor`` prints them: a process variable, its time stamp and its value a line.
 
 A row is one line: the time, the value of the variable that changed, and nothing of the others.
-Variables of texts (states, names) may be between; waveforms and enumerations begin with their
+Text variables (states, names) may appear between them; waveforms and enumerations begin with their
 number.
 """
 

@@ -1,4 +1,4 @@
-"""Checksums that show whether what was read back is what was written."""
+"""Checksums that verify that what is read back is what was written."""
 
 from __future__ import annotations
 

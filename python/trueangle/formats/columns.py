@@ -30,7 +30,7 @@ def matching_column(path: object, header: Sequence[str], name: str) -> str:
     Raises
     ------
     FileError
-        None, or several; states which ones are near.
+        No column matches, or several do; the message names similar ones.
     """
     if name in header:
         return name
@@ -63,7 +63,7 @@ def signed_name(path: object, header: Sequence[str], name: str) -> tuple[str, bo
 
 
 def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[str, RoleColumn]:
-    """The columns of every role that a table has: those requested, the others by their names.
+    """The column of every role that a table has: as requested, else by its name.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[st
     taken = {column.name for column in found.values()}
     heads = {name.partition("_")[0].lower() for name in header if _HEAD.match(name.lower())}
     for role in ("reference", "indicated", "error", *LABELS, *SIGNALS, *sorted(heads)):
-        # An error represents one of the two angles.
+        # An error replaces one of the two angles.
         if role in found or (role == "error" and ("reference" in found) == ("indicated" in found)):
             continue
         candidates = [c for c in _by_name(header, role) if c.name not in taken]
@@ -113,7 +113,7 @@ _HEAD = re.compile(r"head[1-9][0-9]?(_| *[\[(])")
 
 
 def _by_name(header: Sequence[str], role: str) -> list[RoleColumn]:
-    """Columns whose own name states that they have a role."""
+    """Columns whose own name states the role."""
     if role in LABELS:
         return [RoleColumn(role, name, None) for name in header if name == role]
     names = dict(_standard(role))

@@ -56,7 +56,7 @@ def _lines(data: bytes) -> int:
 
 
 def _without_blanks(data: bytes) -> bytes:
-    """Columns that are apart by blanks with one blank between them, exponents written with e."""
+    """Columns that blanks separate, with one blank between them and exponents written with e."""
     data = re.sub(rb"[ \t]+", b" ", data)
     data = data.replace(b"\n ", b"\n").replace(b" \n", b"\n").replace(b" \r\n", b"\r\n").strip(b" ")
     return re.sub(rb"(?<=[\d.])[dD](?=[+-]\d)", b"e", data) if b"D" in data else data
@@ -116,7 +116,7 @@ class PlainBlock:
             if strict and not all(_is_finite(self._table[name]) for name in names):
                 raise pa.ArrowInvalid("words instead of numbers")
         except pa.ArrowInvalid:
-            # The standard library reads a little more (+1.5) and states what is wrong where.
+            # The standard library reads a little more (+1.5) and reports what is wrong where.
             self._quoted = QuotedBlock.whole(self.data, self.header, self.line)
             return self._quoted.numbers(names, texts, strict)
         return {name: arrow_numbers(self.header.path, name, self._table[name]) for name in names}

@@ -74,9 +74,9 @@ def _split(data: bytes) -> list[bytes]:
 
 
 def western_text(text: str) -> str:
-    """Text whose bytes that are no UTF-8 are in it as surrogates, of Western Europe's code page.
+    """Decode text with surrogates for bytes that are not UTF-8 by Western Europe's code page.
 
-    It is that where every byte beyond ASCII is a letter or sign: °, µ, ± or a letter with an
+    It is decoded where every byte beyond ASCII is a letter or sign: °, µ, ± or a letter with an
     accent, in a preamble, a unit or a label. Other text stays as it is.
     """
     if _is_utf8(text):
@@ -125,7 +125,7 @@ def not_cut(path: Path, cause: csv.Error, line: int) -> FileError:
 
 
 def delimiter_of(text: str) -> str:
-    """What is between the names of a line: the most frequent sign, else blanks."""
+    """The delimiter between the names of a line: the most frequent sign, else blanks."""
     found = max(",;\t", key=text.count)
     return found if found in text or len(text.split()) < 2 else " "
 

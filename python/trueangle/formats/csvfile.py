@@ -153,7 +153,7 @@ def _plain_block() -> Callable[[bytes, Header, int], PlainBlock | None] | None:
 
 
 def _blocks(file: IO[bytes], header: Header, small: bool = False) -> Iterator[_Block]:
-    """The remainder of the file in blocks of whole rows, of a ``small`` one as csv cuts them."""
+    """The remainder of the file in blocks of whole rows; of a ``small`` file, rows cut by csv."""
     line, held = header.line, b""
     plain_block = None if small else _plain_block()
     while data := held + file.read(BLOCK):

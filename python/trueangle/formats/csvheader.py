@@ -1,4 +1,4 @@
-"""What is before the readings of a text file: preamble, names, units."""
+"""What comes before the readings of a text file: preamble, names, units."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class Header:
 
     The line of names is the last one before the readings that has as many cells; without
     one the columns are called ``column1``, ``column2`` and so on. A line of units may
-    be between, notes that begin with # anywhere. A file whose first line has the names
-    of this package's columns is taken at its word.
+    follow the names; notes that begin with # may be anywhere. Where the first line has names
+    of this package's columns, it is the line of names.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class Header:
                     if i != before[-1]:
                         continue
                 cells = self._cells(text)
-                off = abs(len(cells) - width)  # blanks state nothing of an end of the line
+                off = abs(len(cells) - width)  # blanks do not show an empty cell at the end
                 if off > (delimiter != " ") or self._is_talk(cells, lines[begin]):
                     continue
                 if _units_of(cells, width) is None:
@@ -226,7 +226,7 @@ class Header:
         decimal = decimal_of(delimiter)
 
         def is_words(cells: list[str], width: int) -> bool:
-            blanks = delimiter == " "  # which show nothing of how many cells were meant
+            blanks = delimiter == " "  # which do not show how many cells were meant
             return (blanks or len(cells) != width) and not any(
                 cell_number(cell, decimal) is not None for cell in cells
             )
@@ -276,7 +276,7 @@ _STANDARD = re.compile(r"(reference|indicated|corrected)_(deg|rad|turn|count)\b|
 
 
 def _units_of(cells: Sequence[str], width: int) -> list[str] | None:
-    """Units of a line of units under this many names, or None for another line."""
+    """Units of a line of units under ``width`` names, or None for another line."""
     if abs(len(cells) - width) > 1 or not any(
         re.fullmatch(_KNOWN_UNITS, cell, re.IGNORECASE) for cell in cells
     ):

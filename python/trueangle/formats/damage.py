@@ -14,9 +14,9 @@ from ..errors import FileError, TrueAngleError
 def damage_told(path: object, name: str, hint: str = "") -> Iterator[None]:
     """Errors of a library that reads ``path`` as a file of the format ``name``.
 
-    Libraries raise almost anything over damaged bytes, so everything is read as damage
-    but errors of this package and of the operating system; the cause stays attached. A
-    length that was damaged needs memory that no file of this size can need.
+    Libraries raise almost anything over damaged bytes, so all errors are reported as damage
+    except those of this package and of the operating system; the cause stays attached. With a
+    damaged length a library requests more memory than a file of this size can need.
     """
     try:
         yield
@@ -24,7 +24,7 @@ def damage_told(path: object, name: str, hint: str = "") -> Iterator[None]:
         raise
     except MemoryError:
         raise FileError(
-            path, "needs more memory than available: it is damaged, or its parts are too large"
+            path, "needs more memory than there is: it is damaged, or its parts are too large"
         ) from None
     except OSError as cause:
         _raise_if_of_machine(cause)
@@ -37,7 +37,7 @@ def damage_told(path: object, name: str, hint: str = "") -> Iterator[None]:
         raise FileError(path, f"is damaged or not {name}: {_told(cause)}{hint}") from cause
 
 
-#: What libraries state about a full disk, or of too little memory, in errors of their own kinds.
+#: What libraries report of a full disk, or of too little memory, in errors of their own types.
 _DISK_FULL = ("disk is full", "no space left", "errno = 28")
 _NO_MEMORY = ("out of memory", "cannot allocate memory", "malloc of size", "can't start new thread")
 

@@ -1,4 +1,4 @@
-"""What a format is: how its files are given, selected and read, copied with columns and a note."""
+"""What a format is: how files are recognised, selected, read, copied with columns and a note."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..errors import FileError, MissingExtraError
 from .budget import FileExtent
 from .textfile import text_extent
 
-#: Columns that are texts whatever they look like, in formats that do not state.
+#: Columns that are texts whatever they look like, in formats that do not state types.
 TEXTS = ("run", "unit")
 
 #: Called after every batch with the rows done and the part of the file done, 0 to 1.
@@ -82,7 +82,7 @@ def note(additions: Sequence[Addition]) -> str:
 def refuse_corrected(
     path: Path, columns: Mapping[str, NDArray[Any]], addition: Addition, corrected: NDArray[Any]
 ) -> None:
-    """Refuse a table whose columns have no separate names and hold what is to be added.
+    """Refuse a table whose columns have no names of their own and hold what is to be added.
 
     Raises
     ------
@@ -138,13 +138,13 @@ class CopyTask(NamedTuple):
 class FormatModule(Protocol):
     """What the module of a format defines.
 
-    Next to these a module may define ``stretches(path)``, parts of a file that `read` takes one
-    of: then the batches of that part only, and parts may be read side by side; ``line_of(path,
-    row)`` and ``header_line(path)``, formats of text, the line that a row or the names come
-    from; and ``together(path, needed, others)``, formats whose columns need not be equally
-    long, those of ``others`` that are; and ``unread(path)``, formats of further types, the names
-    of the columns that hold neither numbers nor labels. Formats of text that know no further of
-    their length than their first lines show need no ``extent``.
+    In addition a module may define ``stretches(path)``: parts of a file, of which `read` takes
+    one and yields its batches only; parts may be read in parallel. Formats of text may define
+    ``line_of(path, row)`` and ``header_line(path)``: the line that a row or the names come from.
+    Formats whose columns may differ in length define ``together(path, needed, others)``: those of
+    ``others`` that are as long as the needed ones. Formats with further types define
+    ``unread(path)``: names of columns that hold neither numbers nor labels. Formats of text whose
+    length is estimated from their first lines need no ``extent``.
     """
 
     def columns(self, path: Path, topic: str | None) -> list[str]:
@@ -168,7 +168,7 @@ class FormatModule(Protocol):
 
 @dataclass(frozen=True)
 class Format:
-    """A format: its module, how its files are reported and the extra that it needs.
+    """A format: its module, how its files are recognised and the extra that it needs.
 
     ``promises`` holds its endings by what each is called; those of "" promise nothing.
     ``magics`` are first bytes of its files, ``pattern`` matches them; ``unit`` is that of all
@@ -229,7 +229,7 @@ class Format:
 
     @contextmanager
     def at_header(self, path: Path) -> Iterator[None]:
-        """Let errors of the header, reported of line 1, name the line where the names are."""
+        """Let errors of the header, reported for line 1, name the line where the names are."""
         try:
             yield
         except FileError as error:

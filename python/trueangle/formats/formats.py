@@ -81,7 +81,7 @@ _HEAD = 1 << 12
 
 
 def find_format(path: Path) -> Format:
-    """Format of ``path`` by its first bytes, else by its ending; text where nothing shows.
+    """Format of ``path`` by its first bytes, else by its ending; text where neither shows it.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def known_format(path: Path) -> Format | None:
     if path.is_dir():
         ending = ".db3" if (path / "metadata.yaml").is_file() else "/"
     found = [entry for entry in FORMATS if ending in entry.endings]
-    if len(found) > 1 and path.is_file():  # MATLAB's ending represents several formats
+    if len(found) > 1 and path.is_file():  # several formats share MATLAB's ending
         head = head_of_text(path, _HEAD)
         found.sort(key=lambda entry: not _begins(entry, head))
     return found[0] if found else None

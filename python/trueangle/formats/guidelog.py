@@ -36,7 +36,7 @@ SIDEREAL: Final = 360.0 / 86164.0905
 _COLUMNS = ("run", "when", "time_s", "indicated_deg", "error_arcsec", "declination_arcsec", "snr")
 _LABELS = ("run", "when")
 _BEGINS = re.compile(r"Guiding Begins at (\d{4}-\d\d-\d\d \d\d:\d\d:\d\d)")
-#: Of this many digits at most: no angle, scale or rate has more.
+#: A number with at most 9 digits before the point: no angle, scale or rate has more.
 _NUMBER = r"(-?\d{1,9}(?:\.\d+)?)\b"
 _SCALE = re.compile(rf"Pixel scale = {_NUMBER} arc-sec/px")
 _DECLINATION = re.compile(rf"\bDec = {_NUMBER} deg")
@@ -49,7 +49,7 @@ _LONGEST = 1 << 14
 
 @dataclass
 class _Section:
-    """A segment of guiding and what is before its frames."""
+    """A segment of guiding, and what its header states."""
 
     label: str
     begins: datetime
@@ -163,7 +163,7 @@ def _frames(path: Path) -> tuple[list[_Frame], int, int]:
 
 
 def _take_header(path: Path, section: _Section, text: str, line: int) -> None:
-    """What a line before the frames states."""
+    """Store what a line before the frames states."""
     scale, declination, rate, lock = (
         pattern.search(text) for pattern in (_SCALE, _DECLINATION, _RATE, _LOCK)
     )

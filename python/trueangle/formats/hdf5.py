@@ -33,14 +33,14 @@ from .stored import ROWS
 _BLOCK = 1 << 17
 #: Rows of a part that is read on its own, and parts at most: each opens the file.
 _PART, _MOST_PARTS = 1 << 20, 64
-#: A multiple of this many parts, where there are as many: two or four threads end together.
+#: The number of parts is a multiple of this, if it is that large: 2 or 4 threads end together.
 _EVEN = 4
-#: Attribute of a corrected data set that states how it was made.
+#: Attribute of a corrected data set that records how it was made.
 _ATTRIBUTE = "trueangle"
 
 
 class RowRange(NamedTuple):
-    """One of this many parts of every data set, in their order."""
+    """One of ``parts`` parts of every data set, in their order."""
 
     number: int
     parts: int
@@ -227,7 +227,7 @@ def _names(
     found: list[str] = []
 
     def visit(name: str | bytes, item: Any) -> None:
-        if isinstance(name, bytes):  # it is no text, and nobody can need it
+        if isinstance(name, bytes):  # it is not a text, and cannot be requested
             return
         if isinstance(item, h5py.Dataset) and item.ndim and is_wanted(item):
             found.append(name)
@@ -264,7 +264,7 @@ def _create_like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) ->
 
 
 def _text(data: h5py.Dataset, attribute: str) -> Any | None:
-    """What an attribute states, one or more texts; None where it is something else.
+    """The value of an attribute, one or more texts; None where it is something else.
 
     Of values that are no text the library may end the process where the file is damaged.
     """

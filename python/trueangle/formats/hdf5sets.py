@@ -57,8 +57,8 @@ def _data_set(path: Path, file: h5py.File, name: str) -> h5py.Dataset:
 def is_elsewhere(data: h5py.Dataset) -> bool:
     """Whether its values are those of other data sets or files.
 
-    The library follows such a chain without an end where it leads back to itself, until the
-    process ends; its values are not read before this.
+    Where such a chain leads back to itself the library follows it until the process ends. So
+    this is tested before anything is read from the values.
     """
     return bool(data.is_virtual or data.external)
 

@@ -83,7 +83,7 @@ def copy(task: CopyTask) -> Contents:
 
 
 def _variable(name: str) -> str:
-    """A name that MATLAB takes: it begins with a letter, and what does not is omitted unsaid."""
+    """A name that MATLAB accepts: it begins with a letter; others are omitted without a message."""
     name = name.replace("/", "_")
     return name if name[:1].isalpha() else f"x{name}"
 

@@ -22,7 +22,7 @@ from .format import Batch, Contents, CopyTask, Selection, check_lengths, note
 #: Kinds of numbers by the tens of the type.
 _KINDS = ("f8", "f4", "i4", "i2", "u2", "u1")
 _HEAD = struct.Struct("<5i")
-#: Matrix of a copy that shows how its corrected ones were made.
+#: Matrix of a copy that records how its corrected ones were made.
 NOTE = "trueangle_note"
 
 

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 
 from . import budget
 
-#: Bytes of the header of a file, whose last two show the order of bytes.
+#: Bytes of the header of a file, whose last two give the byte order.
 HEADER: Final = 128
 #: Bytes of a value by the type of an element.
 _SIZES: Final = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
@@ -160,7 +160,7 @@ def _check_members(
     where: str,
     depth: int,
 ) -> None:
-    """Cells, or the fields of every structure: separate arrays."""
+    """Check cells, or the fields of every structure, which are arrays themselves."""
     if which == _FUNCTION:
         count = 1
     if which == _OBJECT:

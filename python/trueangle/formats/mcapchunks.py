@@ -216,7 +216,7 @@ class _ChunkWriter(McapWriter):  # type: ignore[misc]
                 self.close_chunk()
 
     def close_chunk(self) -> None:
-        """Write the messages that wait, and where they are."""
+        """Write the waiting messages, and an index of where they are."""
         chunk = self.chunk
         if not chunk.bio.tell():
             return

@@ -67,7 +67,7 @@ class RecordRows:
 
     @classmethod
     def of_chunk(cls, data: bytes, mixed: bool = False) -> list[RecordRows] | None:
-        """The records of a chunk, some thousands at a time; None where they are not all equal.
+        """The records of a chunk, some thousands at a time; None where kind or length differ.
 
         Of several channels where ``mixed``, one channel after the other.
         """
@@ -94,7 +94,7 @@ class RecordRows:
 
 
 def interleaved_rows(parts: Sequence[tuple[int, RecordRows]]) -> RecordRows:
-    """Row 0 of every part, row 1 of every part..., each on the channel that is before it.
+    """Row 0 of every part, row 1 of every part and so on, each on the channel of its part.
 
     Numbers are 0 and times of publishing those of logging, as for messages written one by one.
     """

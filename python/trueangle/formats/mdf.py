@@ -79,7 +79,7 @@ def copy(task: CopyTask) -> Contents:
 
 
 def _history(mdf: MDF, comment: str) -> FileHistory:
-    """What is reported of the copy; of the time of the last entry, so that a log gives one copy."""
+    """The entry about the copy, with the time of the last one: equal logs give equal copies."""
     known = mdf.file_history
     made = FileHistory()
     made.comment = f"<FHcomment><TX>{escape(comment)}</TX><tool_id>trueangle</tool_id></FHcomment>"
@@ -152,7 +152,7 @@ def _parts(path: Path, mdf: MDF, places: Sequence[tuple[int, int]]) -> Iterator[
             raise FileError(path, "numbers are needed, one to a record", column=channel.name)
     head = group.channel_group
     record = int(head.samples_byte_nr) + int(head.invalidation_bytes_nr)
-    # Its own reading of a segment of records goes through all of them.
+    # The library's own reading of a range of records goes through all of them.
     mdf.configure(read_fragment_size=_BLOCK * max(record, 1))
     said, found = _cycles(mdf, places[0][0]), 0
     for records in mdf._mdf._load_data(group):
@@ -181,8 +181,8 @@ def _part(path: Path, mdf: MDF, place: tuple[int, int], records: Any) -> Signal:
             column=part.name,
         )
     if part.invalidation_bits is None and mdf.groups[group].channels[index].flags & HAS_MARKS:
-        # Of records without a mark none are given, which a group that has them cannot be
-        # determined.
+        # The library returns no marks where no record is marked, but a group with marks cannot
+        # be extended without them.
         part.invalidation_bits = np.zeros(part.samples.size, dtype=bool)
     if part.invalidation_bits is not None and part.invalidation_bits.any():
         kind = np.float32 if part.samples.dtype == np.float32 else np.float64

@@ -21,7 +21,7 @@ from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, check_lengths, note, row_labels
 from .npy import BLOCK, read_header, write_header
 
-#: Member of a copy that shows how its arrays were made.
+#: Member of a copy that records how its arrays were made.
 _NOTE = "trueangle.json"
 
 

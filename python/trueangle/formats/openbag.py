@@ -1,4 +1,4 @@
-"""An open bag of ROS 1 or ROS 2: where its joint states are, what it states about its correction.
+"""An open bag of ROS 1 or ROS 2: where its joint states are, how it was corrected before.
 
 Bags of ROS 2 hold the note of a correction among the custom data of their metadata, which are in
 ``metadata.yaml`` and once more inside every storage file; bags of ROS 1 in the headers of the
@@ -211,7 +211,7 @@ class _Bag1(Reader1):  # type: ignore[misc]
 
 
 class MessageGroup(NamedTuple):
-    """Messages of a connection with equal length."""
+    """Messages of one connection and one length."""
 
     connection: Any
     rows: RecordRows
@@ -232,7 +232,7 @@ class OpenBag:
             if not isinstance(connection.topic, str) or not isinstance(connection.msgtype, str):
                 told = f"{connection.topic!r:.40} of the type {connection.msgtype!r:.40}"
                 raise FileError(path, f"is damaged: a topic is called {told}")
-        #: What the writer of a bag of ROS 2 noted next to the messages.
+        #: What the writer of a bag of ROS 2 recorded in addition to the messages.
         self.custom = {} if self.is_ros1 else _bag_custom_data(reader)
         self.types = get_typestore(Stores.ROS1_NOETIC if self.is_ros1 else Stores.LATEST)
         self.chunked = [] if self.is_ros1 else list(_chunked(reader))
@@ -268,7 +268,7 @@ class OpenBag:
         return [] if first is None else self.states(first).joints
 
     def blocks(self, connections: Sequence[Any] = ()) -> Iterator[list[Any] | MessageGroup]:
-        """Messages of these connections, or of all: some thousands, or equal ones."""
+        """Messages of these connections, or of all: some thousands, or a group of one length."""
         block: list[Any] = []
         for message in self.reader.messages(connections):
             rows = message[2]

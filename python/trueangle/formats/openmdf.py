@@ -17,16 +17,16 @@ from ..errors import FileError
 from ..support.layout import counted
 from .damage import damage_told
 
-#: Bytes that one byte of a file can represent: deflate reaches 1032.
+#: Bytes to which one byte of a file can unpack: deflate reaches 1032.
 _MOST_COMPRESSED = 2000
-#: Bytes of a data block read at once: asammdf reads a block whole for each part.
+#: Bytes of a data block read at once: for each part of a block asammdf reads the whole block.
 _PIECE = 1 << 22
 #: Types of channels that have no place in a record: virtual master and data.
 _VIRTUAL = (3, 6)
 #: Flag of a channel whose readings may be marked invalid.
 HAS_MARKS = 2
 #: Flag of a group of records of any length: texts of a channel of another group, no channels. The
-#: library writes them next to that channel, and no such group.
+#: library writes the texts with that channel, and no such group.
 OF_TEXTS = 1
 #: First bytes of a file, also of one that was not finished.
 _MAGIC = (b"MDF     ", b"UnFinMF ")
@@ -79,7 +79,7 @@ def opened_mdf(path: Path, **options: Any) -> Iterator[MDF]:
 
 @contextmanager
 def _told_once() -> Iterator[None]:
-    """Without what the library prints of damage next to the error that it raises."""
+    """Suppress what the library prints about damage in addition to the error that it raises."""
 
     def nothing(record: logging.LogRecord) -> bool:
         return False
@@ -93,7 +93,7 @@ def _told_once() -> Iterator[None]:
 
 
 def _check_sizes(path: Path, mdf: MDF) -> None:
-    """Refuse groups that state they hold more than the file can: reading them would not end."""
+    """Refuse groups that declare more than the file can hold: reading them would not end."""
     size = path.stat().st_size
     for group in mdf.groups:
         record = group.channel_group.samples_byte_nr + group.channel_group.invalidation_bytes_nr
@@ -104,9 +104,9 @@ def _check_sizes(path: Path, mdf: MDF) -> None:
                 f"is damaged: a group of texts declares {counted(group.channels, 'channel')}",
             )
         if said > _MOST_COMPRESSED * size:
-            raise FileError(path, f"is damaged: it has {size} bytes and declares {said}")
+            raise FileError(path, f"is damaged: {size} bytes, but it declares {said}")
         if record > _MOST_COMPRESSED * size:
-            raise FileError(path, f"is damaged: {size} bytes and declares records of {record}")
+            raise FileError(path, f"is damaged: {size} bytes, but it declares records of {record}")
         marks = 8 * int(group.channel_group.invalidation_bytes_nr)
         for channel in group.channels:
             if channel.channel_type not in _VIRTUAL:
@@ -136,7 +136,7 @@ def _take_in_pieces(mdf: MDF) -> None:
 
 def _pieces(block: DataBlockInfo) -> list[DataBlockInfo]:
     size = block.original_size or 0
-    # What is compressed, has marks with it or is cut short is taken as it is.
+    # A block that is compressed, has invalidation marks or is cut short stays whole.
     whole = block.block_type or block.invalidation_block or block.block_limit is not None
     if whole or size <= _PIECE:
         return [block]
@@ -194,7 +194,7 @@ def _leads(path: Path, file: BinaryIO, block: int, size: int) -> list[int]:
     file.seek(min(block, size))
     kind, length, count = struct.unpack("<4s4xQQ", file.read(_HEAD).ljust(_HEAD, b"\0"))
     leads = _LEADS.get(kind, {})
-    # The library reads the links of most kinds where they must be, whatever number is reported.
+    # The library reads the links of most kinds where they must be, whatever the declared number.
     room = 8 * (max(leads, default=-1) + 1)
     if kind == b"##CC":
         room = min(8 * count, max(length, _HEAD) - _HEAD, size)

@@ -40,7 +40,7 @@ _BATCH = 1 << 15
 
 
 class RowGroupRange(NamedTuple):
-    """Neighbouring row groups, and the footer that shows where they are."""
+    """Neighbouring row groups, and the footer that states where they are."""
 
     groups: list[int]
     footer: pq.FileMetaData
@@ -164,8 +164,8 @@ def _whole(path: Path) -> Iterator[tuple[pq.ParquetFile, Iterator[pa.Table]]]:
 def _tables(file: pq.ParquetFile, schema: pa.Schema, rows: int) -> Iterator[pa.Table]:
     """The rows in tables of a bounded size in memory, none across a border of row groups.
 
-    Texts come as dictionaries, which take no further memory than the file, and are decoded
-    for as many rows as fit: pages of a few bytes can represent gigabytes.
+    Texts come as dictionaries, which take no more memory than the file, and are decoded
+    for as many rows as fit: pages of a few bytes can decode to gigabytes.
     """
     for group in range(file.metadata.num_row_groups):
         for batch in file.iter_batches(batch_size=rows, row_groups=[group], use_threads=False):
@@ -183,7 +183,7 @@ def _decoded(column: pa.Array, kind: pa.DataType) -> pa.Array:
 
 
 def _cuts(batch: pa.RecordBatch, schema: pa.Schema) -> Iterator[tuple[int, int]]:
-    """Segments of rows whose texts take a bounded size once they are decoded."""
+    """Ranges of rows whose texts take a bounded size once they are decoded."""
     size = np.zeros(batch.num_rows, dtype=np.int64)
     for column, field in zip(batch.columns, schema, strict=True):
         if column.type != field.type:
@@ -229,10 +229,10 @@ def _encoded(file: pq.ParquetFile, name: str) -> int:
 def _chunks(
     file: pq.ParquetFile, group: int, name: str | None = None
 ) -> list[pq.ColumnChunkMetaData]:
-    """What the footer states about a row group's columns.
+    """The footer's entries of a row group's columns, or of one; the first row is read before.
 
-    Damage there (a codec that is none, statistics of another length) ends the process where
-    it is requested, and raises where it is read.
+    Damage there (an unknown codec, statistics of another length) ends the process when an entry
+    is accessed, but raises an error when a row is read.
     """
     columns = None if name is None else [name]
     next(file.iter_batches(1, row_groups=[group], columns=columns, use_threads=False), None)
@@ -290,8 +290,8 @@ def _codec(name: str) -> str:
 def _overflowed(chunk: Any) -> bool:
     """A dictionary that grew too large is followed by pages without it.
 
-    The dictionary's own page is PLAIN in files of today, so encodings alone do not show:
-    a chunk that stays well below its plain size was kept in its dictionary.
+    The dictionary's own page is PLAIN in files of today, so encodings alone do not show this.
+    A chunk well below its plain size was kept in its dictionary.
     """
     width = {"DOUBLE": 8, "INT64": 8, "FLOAT": 4, "INT32": 4}.get(chunk.physical_type)
     if width is None:

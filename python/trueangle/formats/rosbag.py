@@ -218,13 +218,13 @@ class BagWriter:
     def add(self, connection: Any, topic: str, is_corrected: bool) -> Any:
         """A connection like one that was read, perhaps of another topic.
 
-        In bags of ROS 1, which hold notes nowhere else, the header of one whose positions are
-        corrected reports it: its caller is the note, in which the caller is that it had.
+        Bags of ROS 1 hold notes only in the headers of connections. The caller of a corrected
+        connection is therefore the note, which contains the original caller.
 
         Raises
         ------
         FileError
-            An old bag holds no definition of a separate type.
+            An old bag does not define a type that is not a standard one.
         """
         if self._bag.is_ros1:
             caller = connection.ext.callerid

@@ -1,4 +1,4 @@
-"""Serial logs of named values, ``angle:1.25,target:1.5``: rows among whatever a firmware states.
+"""Serial logs of named values, ``angle:1.25,target:1.5``: rows among other output of a firmware.
 
 A row is a line of pairs of a name and a number, with ``:`` or ``=`` between them; the clock that
 a terminal writes before it (``12:34:56.789 ->``) becomes ``time_s``. Other lines are words.
@@ -148,7 +148,7 @@ def _clocked(names: Sequence[str]) -> Callable[[list[_Row]], Batch]:
 
 
 def _style(raw: bytes) -> tuple[bytes, bytes]:
-    """What is between the pairs of a line, and within one."""
+    """The separators between the pairs of a line, and within a pair."""
     pairs = list(PAIR.finditer(raw))
     between = raw[pairs[0].end() : pairs[1].start()] if len(pairs) > 1 else b","
     return between, raw[pairs[0].end(1) : pairs[0].start(2)]

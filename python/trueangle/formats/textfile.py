@@ -29,7 +29,7 @@ _ARCHIVE = b"PK\x03\x04"
 _NAME = 30
 #: Bytes unpacked at a time.
 _BUFFER = 1 << 16
-#: Bytes of a text that show how long its lines are; of a packed one more, for it is read in parts.
+#: Bytes of a text from which its length of lines is estimated; more of a packed one, read in parts.
 _HEAD, _HEAD_PACKED = 1 << 16, 1 << 22
 
 #: Characters of a message that are shown.
@@ -137,7 +137,7 @@ def open_text(path: Path) -> TextFile:
 
 
 def create_text(path: Path) -> Any:
-    """A new file for the bytes of a text, packed as its ending states.
+    """A new file for the bytes of a text, packed according to its ending.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def head_of_text(path: Path, size: int) -> bytes:
 
 
 def text_extent(path: Path) -> FileExtent:
-    """Rows of a text, as its first lines show; their numbers are counted while it is read."""
+    """Rows of a text, estimated from its first lines; numbers are counted while it is read."""
     with open_text(path) as file:
         head = file.read(_HEAD_PACKED if file.unpack else _HEAD)
         return FileExtent(int((head.count(b"\n") + 1) / file.part), 0)
@@ -200,14 +200,13 @@ def _opener(kind: str) -> Callable[..., Any]:
 
 
 def warn_of_messages(path: Path, messages: Sequence[tuple[int, str]]) -> None:
-    """State how many lines hold no readings, and the first of them, by its number and words."""
+    """Warn how many lines hold no readings, and show the first, with its number and words."""
     if messages:
         line, text = min(messages)
         one = len(messages) == 1
         warnings.warn(
-            f"{path}: {len(messages)} line{'' if one else 's'} of words "
-            f"{'is' if one else 'are'} no reading{'' if one else 's'} and omitted, the first at "
-            f"line {line}: {text[:_SHOWN]!r}",
+            f"{path}: {len(messages)} line{'' if one else 's'} of words without readings "
+            f"{'is' if one else 'are'} omitted, the first at line {line}: {text[:_SHOWN]!r}",
             MessageLinesWarning,
             stacklevel=9,
         )

@@ -1,4 +1,4 @@
-"""Packed parts and files of bags, unpacked up to a limit, whatever their headers state about them.
+"""Packed parts and files of bags, unpacked up to a limit, whatever their headers declare.
 
 A file that is packed as a whole is read at places all over, so it is unpacked to a temporary
 folder before; a few kilobytes can fill a disk there.
@@ -30,7 +30,7 @@ else:
 
 #: Bytes on the disk that the files of a bag may unpack to: hours of a robot's sensors with images.
 UNPACKED_BYTES: Final = 1 << 36
-#: The variable of the environment that states another limit.
+#: The environment variable that sets another limit.
 LIMIT: Final = "TRUEANGLE_UNPACKED_BYTES"
 
 _METADATA = "metadata.yaml"
@@ -125,7 +125,7 @@ def _limit() -> int:
     Raises
     ------
     ArgumentError
-        The environment states something else than a number.
+        The environment variable is not a number.
     """
     said = os.environ.get(LIMIT, "")
     if not said:

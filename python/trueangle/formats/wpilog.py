@@ -121,7 +121,7 @@ def _opened(path: Path) -> _Records:
     Raises
     ------
     FileError
-        Damage, reported by the byte of the record; a file without entries of numbers.
+        Damage, reported with the byte of the record; a file without entries of numbers.
     """
     check_part(path, path.stat().st_size, "file")
     data = path.read_bytes()

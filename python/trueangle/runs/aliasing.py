@@ -28,7 +28,7 @@ POSITION_TOLERANCE: Final = 1.0 / 36_000.0
 
 #: Highest order that is named as an alias where no gear is declared, and the phase (radians)
 #: by which it may turn within a place that was visited again and not met exactly: no order
-#: looked for shows the two by more than a tenth of itself from their middle.
+#: that is searched for differs there by more than a tenth of itself from the middle.
 _HIGHEST_ALIAS: Final = 404
 _SAME_PHASE: Final = 0.2
 
@@ -113,9 +113,9 @@ class Positions:
         return max(0, (count - 1) // 2)
 
     def has_alias(self, highest: int) -> bool:
-        """Whether orders up to ``highest`` that are not neighbours look identical here.
+        """Whether orders up to ``highest`` that are not neighbours are identical at the positions.
 
-        Over part of a turn neighbours do anyway: those are distinguished from aliases by the width
+        Over part of a turn neighbours always are: they are distinguished from aliases by the width
         of their coherence.
 
         Examples
@@ -158,7 +158,7 @@ def distinct_positions(
     tolerance : float, optional
         Angles closer than this count as one, in the unit of the runs; a cluster is never wider
         than it. Default: 0.01 degree (`POSITION_TOLERANCE`), and up to 0.028 degree, where
-        order 404 turns by 0.2 radians, between places that are clear of each other.
+        order 404 turns by 0.2 radians, between clearly separate places.
 
     Returns
     -------
@@ -206,10 +206,10 @@ def distinct_positions(
 def closure_errors(
     runs: CalibrationRun | Iterable[CalibrationRun], tolerance: float | None = None
 ) -> Array:
-    """The difference of the last reading of each run that closes a turn at its first position.
+    """Closure error of each run that ends at its first position after whole turns.
 
-    Drift, slip or a lost count within a run show here; a closed turn is no proof
-    against them at other places. Runs that do not end where they began have no entry.
+    Drift, slip or a lost count within a run show here. A small closure error does not exclude
+    them at other places. Runs that do not end where they began have no entry.
 
     Returns
     -------
@@ -237,7 +237,7 @@ def closure_errors(
 
 
 def _places(ascending: Array) -> NDArray[np.intp] | None:
-    """Clusters that are clear of each other, none wider than what an order shows; or None."""
+    """Clearly separate clusters, none so wide that an order varies within it; or None."""
     width = _SAME_PHASE / (2.0 * math.pi * _HIGHEST_ALIAS)
     gaps = np.diff(ascending)
     starts = gaps > width

@@ -1,4 +1,4 @@
-"""The two angles of a run: their columns and units, what is added to them, separate rows."""
+"""The two angles of a run: their columns and units, what is added to them, those in other rows."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def find_run_angles(
 ) -> RunAngles:
     """What the angles of a table are made of, and their period.
 
-    ``unit`` is that of angles whose columns state none, ``path`` is in messages.
+    ``unit`` is that of angles whose columns state none; messages name ``path``.
 
     Raises
     ------

@@ -64,8 +64,8 @@ class Facets(NamedTuple):
 def read_facets(path: str | PathLike[str]) -> Facets:
     """Facets of a file with the columns ``reference_deg`` and ``deviation_arcsec``.
 
-    Other units of angles may be at the ends of the names. The true angle of a facet is its
-    nominal one and the deviation.
+    The names may end with other units of angles. The true angle of a facet is its nominal angle
+    plus the deviation.
 
     Raises
     ------

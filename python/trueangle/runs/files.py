@@ -51,11 +51,11 @@ def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationR
         ``reference_deg`` and ``indicated_deg`` (or ``_rad``, ``_turn``, ``_count``, or a unit in
         brackets), and optionally ``run``,
         ``unit``, ``when`` (ISO 8601) and those of `trueangle.support.signals.SIGNALS`; an
-        ``error_arcsec`` (or another unit) may be next to one of the two angles. Others are
+        ``error_arcsec`` (or another unit) may replace one of the two angles. Others are
         kept in `CalibrationRun.columns`.
     **reading
         ``counts_per_turn``, ``counts_per_turn_reference``: counts in one turn of the output,
-        of an indicated angle or reference in counts or without a separate unit.
+        of an indicated angle or reference in counts or without a stated unit.
         ``signals``: columns with other names,
         ``{"torque": "tau", "reference": ("pos act", "rad")}``; ``"-pos"`` is a reversed sensor
         (`CalibrationRun.indicated_sign`), and ``"reference_offset"`` (a list for several) is

@@ -56,7 +56,8 @@ _RESOLVED = 2.0**30
 #: How far beyond the spread of the errors a line may go that half of them are near.
 _LINE = 1.0 + 2.0 * STRAIGHT
 
-#: Highest order, and the share of the error's power left by it, by which degrees are reported.
+#: Orders that are fitted in degrees and in radians; degrees are reported where they leave less
+#: than this share of the power that radians leave.
 _HIGHEST, _LEFT = 3, 0.25
 
 _TURNS = {"degrees": 360.0, "radians": 2.0 * math.pi, "turns": 1.0}

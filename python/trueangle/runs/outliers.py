@@ -56,7 +56,7 @@ def spikes(error: Array, angle: Array, period: float) -> tuple[NDArray[np.bool_]
     # they are off the line between the next two, 3/2 of the variance.
     middle = _NEIGHBOURS // 2
     between = around[:, middle] - 0.5 * (around[:, middle - 1] + around[:, middle + 1])
-    # Readings in counts: most deviations may be exactly 0, the remainder one count.
+    # Readings in counts: most deviations may be exactly 0, the others one count.
     scales = robust_scale(deviation), robust_scale(between) / math.sqrt(1.5)
     limit = WILD * max(*scales, float(quantile(distance, 0.8)))
     far = distance > limit
@@ -70,7 +70,7 @@ def spikes(error: Array, angle: Array, period: float) -> tuple[NDArray[np.bool_]
         line = before + share * (after - before)
         distance[order] = np.minimum(distance[order], np.abs(error[order] - line))
         far &= distance > limit
-        # On a slope an outlier moves the median of those with it, which do without it.
+        # On a slope an outlier moves the median of its neighbours, so it is replaced for them.
         wilder = _windows(np.where(far, distance, 0.0)[order]) > 2.0 * distance[order, None]
         around = np.where(wilder, _windows((error - deviation)[order]), around)
         far[order] &= np.abs(error[order] - median(around, axis=1)) > limit

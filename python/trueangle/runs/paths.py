@@ -26,8 +26,8 @@ def find_logs(
 
     In a folder every file of a known format counts, also in folders below, hidden files
     excepted; a folder that is a ROS 2 bag is one log. A pattern (``*``, ``?``, ``[0-9]``,
-    ``**``) that is no file's name represents what it matches. Without ``whole`` pipes, and
-    names of no file, are given back as they are.
+    ``**``) that is no file's name is expanded to what it matches. Without ``whole`` pipes, and
+    names of no file, are returned as they are.
 
     Raises
     ------

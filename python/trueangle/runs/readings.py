@@ -36,7 +36,7 @@ from ..support.times import elapsed_seconds, parsed_time
 
 T = TypeVar("T")
 
-#: Columns that are kept although nothing is known about them, at most: a wide log has thousands.
+#: Most columns of unknown role that are kept: a wide log has thousands.
 _KEPT = 256
 
 
@@ -47,9 +47,9 @@ _ONCE: ContextVar[_Kept | None] = ContextVar("columns of files", default=None)
 
 @contextmanager
 def reading_files_once() -> Iterator[None]:
-    """Files that are requested their readings again, of another joint, are not read again.
+    """Read files once, even if readings of another joint are requested from them later.
 
-    The columns of as many as a table of runs may hold are kept meanwhile.
+    Meanwhile all columns are kept that a table of runs may hold.
     """
     token = _ONCE.set({})
     try:
@@ -79,7 +79,7 @@ class FileReadings(NamedTuple):
     source: InputFile
 
     def error(self, problem: str, column: str | None = None, row: int | None = None) -> FileError:
-        """The error that states ``problem`` of a column, at the line of a row."""
+        """The error that reports ``problem`` of a column, at the line of a row."""
         line = 1 if row is None else self.format.line_of(self.path, row)
         return FileError(self.path, problem, line=line, column=column)
 
@@ -187,7 +187,7 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Fil
     others = [name for name in header if name not in known][:_KEPT]
     together = getattr(kind.module, "together", None)
     if together is not None:  # formats whose columns need not be equally long
-        if not needed and len(header) > 1:  # which belong together nobody stated
+        if not needed and len(header) > 1:  # which columns belong together is unknown
             empty = dict.fromkeys(header, np.empty(0))
             return FileReadings(path, kind, roles, empty, _source(path))
         others = together(path, needed, others)
@@ -195,7 +195,7 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Fil
     try:
         columns = _whole(kind, path, needed, others, labels, topic)
     except FileError:
-        # A date is no number, and no number a date: only what is not read is looked at for one.
+        # A column is searched for dates only if it was not read as numbers.
         if "time" not in roles or not _is_dated(kind, path, roles["time"].name, topic):
             raise
         labels.add(roles["time"].name)
@@ -216,7 +216,7 @@ def _whole(
     """`_columns`, those kept of an earlier read, or without the others where they are too large."""
     kept, key = _ONCE.get(), (str(path), topic, frozenset(labels))
     found = {} if kept is None else kept.get(key, {})
-    # What was text then may be needed as numbers now: reading states what is wrong.
+    # What was text then may be needed as numbers now: reading it reports what is wrong.
     if needed and all(n in found and (found[n].dtype != object or n in labels) for n in needed):
         return {name: found[name] for name in (*needed, *others) if name in found}
     try:
@@ -315,7 +315,7 @@ def _joined(
 
 
 def _is_no_number(value: Any) -> bool:
-    """What is in the way of a column of numbers, some of which may be texts of one."""
+    """Whether a value is not a number, nor a text of a number, nor missing."""
     if value is None:
         return False
     try:
@@ -326,7 +326,7 @@ def _is_no_number(value: Any) -> bool:
 
 
 def _undecoded(values: Any) -> int | None:
-    """The first row of a text that no output could hold; None without."""
+    """The first row with a text that cannot be encoded; None without one."""
     if not isinstance(values, Labels) or _is_text("".join(map(str, values.names))):
         return None
     code = next(i for i, text in enumerate(values.names) if not _is_text(str(text)))
@@ -336,7 +336,7 @@ def _undecoded(values: Any) -> int | None:
 def _is_text(text: str) -> bool:
     try:
         text.encode()
-    except UnicodeEncodeError:  # bytes that were no UTF-8 are in it as halves of characters
+    except UnicodeEncodeError:  # bytes that were not UTF-8 are in it as surrogates
         return False
     return True
 

@@ -167,7 +167,7 @@ class CalibrationRun:
         return f" ({self.label})" if self.label else ""
 
     def signal(self, name: str) -> Array | None:
-        """Values of the signal ``name``, whether a separate field or not; None without.
+        """Values of the signal ``name``, a field or one of ``signals``; None without.
 
         Examples
         --------
@@ -299,12 +299,12 @@ def runs_or_data(data: Any) -> tuple[list[CalibrationRun] | None, Any]:
 
 
 def _resolved(angle: Array, other: Array, period: float) -> Array:
-    """Angles, of which those that a double does not resolve within a turn are half of one off.
+    """Angles, with those that a double does not resolve within a turn moved half a turn off.
 
-    Such a number (1e300) is no angle: whatever it wraps to is rounding, which could pass for a
+    Such a number (1e300) is no angle: whatever it wraps to is rounding, which could look like a
     good reading. Half a period off the ``other`` angle it is an outlier to every test.
     """
-    most = 2.0**40 * period  # of this many turns a double resolves a 4096th
+    most = 2.0**40 * period  # at which a double resolves 1/4096 of a turn
     wild = np.abs(angle) > most
     if not wild.any():
         return angle

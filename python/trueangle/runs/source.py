@@ -39,7 +39,7 @@ class OtherReadingOptions(TypedDict, total=False):
         Column whose values separate the runs, in place of ``run``.
     counts_per_turn, counts_per_turn_reference
         Counts in one turn of the output, of an indicated angle or reference in counts or without
-        a separate unit.
+        a stated unit.
     topic
         JointState topic of a ROS bag (default: the only one).
     unit_from
@@ -188,7 +188,7 @@ def each_table(
 
 
 def _of_joint(table: FileReadings, unit: str | None) -> FileReadings:
-    """All rows of one unit, that the name of the file shows."""
+    """The table with all rows assigned to one unit, found in the name of the file."""
     if unit is None:
         return table
     if "unit" in table.roles:
@@ -204,7 +204,7 @@ def _of_joint(table: FileReadings, unit: str | None) -> FileReadings:
 
 
 def _with_unit(table: FileReadings, period: float | None) -> FileReadings:
-    """Angles without a separate unit are in that of ``period``."""
+    """The table with angles without a stated unit in that of ``period``."""
     if period is None:
         return table
     unit = unit_name(period)
@@ -239,7 +239,7 @@ def _table_readings(data: Any, name: str, wanted: Wanted) -> FileReadings | None
     ArgumentError, KindError
         Columns that are no vectors of one length, or have other names than texts.
     FileError
-        A column that was requested is missing; ``name`` is in place of a file.
+        A requested column is missing; the message has ``name`` in place of a file.
     """
     held = _columns(data)
     if held is None:

@@ -1,8 +1,8 @@
 """Partial travel: the span that is covered on the circle, the orders it holds, drift in a pass.
 
 A joint with hard stops shows its harmonics on an arc only. There they nearly cancel
-each other, and plain least squares buys a last hundredth of a degree with amplitudes of
-a hundred degrees that run outlying outside the arc.
+each other: plain least squares removes a last hundredth of a degree by amplitudes of a
+hundred degrees, with errors as large outside the arc.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ CONDITION = 30.0
 _JUMPS = 0.1
 
 
-#: Ends of a span nearer to zero than this share of it are reported as zero.
+#: An end of a span nearer to zero than this share of the span is reported as zero.
 _TOLD = 1e-4
 
 
@@ -51,14 +51,14 @@ _COMPARED = 20_000
 
 
 class Span(NamedTuple):
-    """Segment of the turn that was travelled, in the unit of the angles."""
+    """Part of the turn that was travelled, in the unit of the angles."""
 
     start: float
     stop: float
     full: bool
 
     def describe(self, period: float) -> str:
-        """The segment with its unit, a turn off where it ends beyond the first.
+        """The span with its unit, less a turn where it ends beyond the first turn.
 
         Examples
         --------
@@ -75,8 +75,8 @@ class Span(NamedTuple):
 def covered_span(angles: Sequence[Array], period: float) -> Span:
     """The turn without its widest gap, or the whole turn where no gap is missing travel.
 
-    A gap is missing travel when it is wider than 20 deg and than probability leaves between as
-    many random positions (2 %). Of more than 65 536 readings every n-th is looked at.
+    A gap is missing travel when it is wider than 20 deg and wider than as many random positions
+    leave with a probability of 2 %. Of more than 65 536 readings every n-th is used.
 
     ``start`` lies in ``[0, period)``; partial travel is narrower than ``period``, a full turn ``(0,
     period, True)``.
@@ -112,8 +112,7 @@ def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> fl
     On an arc that one run passed once, drift in time is a function of the angle as well, and a
     low order that is fitted to it makes the next run worse. So over less than a quarter of a
     turn, where neighbouring readings agree or lines were declared that the travel holds, only
-    orders count that come back within the travel. 0 where every order counts; and whether
-    neighbouring readings agree next to the declared lines.
+    orders count that come back within the travel. 0 where every order counts.
 
     Examples
     --------

@@ -19,13 +19,13 @@ from ..support.files import RUNS, written_atomically
 from ..support.signals import find_signal
 from .run import CalibrationRun, as_runs
 
-#: Signals that are first, in the order that these files have always had.
+#: Signals that come first, in the order that these files have always had.
 _ORDER = ("time", "velocity", "torque", "temperature", "mount")
 
 
 @told_kinds
 def write_runs(runs: CalibrationRun | Iterable[CalibrationRun], path: str | Path) -> int:
-    """Write ``runs`` in degrees, next to and then renamed; floats round-trip exactly.
+    """Write ``runs`` in degrees, to a temporary file that is renamed; floats round-trip exactly.
 
     Columns: run, reference_deg, indicated_deg and those of the signals of
     `trueangle.support.signals.SIGNALS` that every run has, such as time_s and current_A; ``unit``

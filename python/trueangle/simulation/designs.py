@@ -76,12 +76,12 @@ class RunDesign:
     friction_deg_s2, friction_memory_s : float
         Standard deviation and correlation time of a friction that drifts.
     deg_s2_per_A : float, optional
-        Acceleration per ampere; the current that the loop needs joins ``current_A``.
+        Acceleration per ampere; the current that the loop commands is added to ``current_A``.
     motor_sigma_arcsec : float, optional
         The motor's own angle is recorded too, not reduced, with this noise.
     coupled : mapping of str to list of float
         Other joints of a robot: the angles (degrees) that each passes in straight lines, evenly
-        spaced over the travel of the run; one angle where it is still.
+        spaced over the travel of the run; one angle where it does not move.
     """
 
     label: str | None = None
@@ -145,7 +145,7 @@ class RunDesign:
         object.__setattr__(self, "coupled", coupled)
 
     def _check_rotor(self, refuse: Callable[[str, str], ArgumentError]) -> None:
-        """What moves the shaft together with the commanded speed needs one, in one direction."""
+        """What disturbs the commanded speed needs a speed, in one direction."""
         for name in ("loop_bandwidth_hz", "cogging_order", "friction_memory_s", "deg_s2_per_A"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < math.inf:

@@ -48,7 +48,7 @@ def design_of(run: CalibrationRun) -> RunDesign:
     """
     signals = join_runs([run])
     direction, lengths = _ways(signals)
-    # The last reading of a design is a step before its end.
+    # The last reading of a design is one step before its end.
     lengths[-1] += lengths.sum() / max(len(run) - 1, 1)
     whole = max(float(lengths.sum()), 1e-9)
     speed = None if signals.velocity is None else np.abs(signals.velocity)
@@ -84,7 +84,7 @@ def design_of(run: CalibrationRun) -> RunDesign:
 
 
 def _ways(signals: Signals) -> tuple[int, Array]:
-    """Direction of the first segment, and the length of every one, degrees."""
+    """Direction of the first segment, and the length of each segment, degrees."""
     kept: list[tuple[float, float]] = []
     ways = zip(signals.segment_direction.tolist(), signals.segment_length.tolist(), strict=True)
     for direction, length in ways:

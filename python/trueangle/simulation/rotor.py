@@ -1,11 +1,11 @@
-"""The rotor as an inertia: what moves it together with the speed that a run needs.
+"""The rotor as an inertia: what moves it in addition to the commanded speed of a run.
 
 ::
 
     θ̈ = -γθ̇ + c sin(mθ + φ) + u sin(θ + ψ) + f(t) + a
 
 with viscous friction ``γ`` (none at constant speed), cogging, imbalance and a friction
-that drifts, all as accelerations, and ``a`` the acceleration by a velocity loop. The
+that drifts, all as accelerations, and ``a`` the acceleration that a velocity loop commands. The
 loop is closed on the encoder under test: with what the encoder reads, r, and its speed,
 
 ::
@@ -162,7 +162,7 @@ def rotor_angle(
 
 
 def _drift(drive: RotorDrive, time: Array, rng: np.random.Generator) -> Array:
-    """A friction's acceleration at every reading, that decorrelates in ``memory_s``."""
+    """A friction's acceleration at every reading, with the correlation time ``memory_s``."""
     size = drive.friction_deg_s2
     if size == 0.0:
         return np.zeros(time.size)

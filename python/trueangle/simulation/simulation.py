@@ -92,7 +92,7 @@ class Simulation(ShownResult):
 
     @property
     def surroundings(self) -> JointPattern:
-        """What effects are given beyond the readings, of the assumed model."""
+        """What effects are given of the assumed model, in addition to the readings."""
         return JointPattern(self.joint, self.pattern)
 
     @property
@@ -168,7 +168,7 @@ def simulate(
     -------
     list of CalibrationRun
         In degrees, with time, velocity, torque, temperature and mount; with the signals
-        that joint and runs have together with: ``head1`` ..., ``motor``, ``shift``, ``current``.
+        that joint and runs have in addition: ``head1`` ..., ``motor``, ``shift``, ``current``.
 
     Raises
     ------
@@ -288,12 +288,12 @@ def simulate_along(
 
 
 def _effects(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """The effects, checked: terms of a correction model have like names, and other units."""
+    """The effects, checked: terms of a correction model have similar names, and other units."""
     return all_of_type("effects", effects, Effect, EFFECT, _meant)
 
 
 def _meant(value: object) -> str:
-    """The effect that represents what was given."""
+    """Which effect to use instead of what was given."""
     effect = KINDS.get(getattr(value, "kind", ""))
     if effect is None:
         return ""
@@ -322,7 +322,7 @@ def _refuse_endless(sim: Simulation, what: str) -> NoReturn:
 
 
 def _written(sim: Simulation, degrees: Array) -> Array:
-    """What is recorded of readings: rounded, where an effect reports it."""
+    """Readings as they are recorded: rounded, where an effect rounds them."""
     for effect in sim.effects:
         degrees = effect.written(degrees)
     return degrees
@@ -338,8 +338,8 @@ def _beside(
 ) -> dict[str, Array]:
     """What heads and the motor's own encoder read, degrees; not a number where not recorded.
 
-    ``own`` is what the joint's own head reads. A further head sees lines and effects where
-    it is, random effects by their mean.
+    ``own`` is what the joint's own head reads. A further head reads lines and effects at its own
+    place, and of random effects the mean.
     """
     found = {}
     for i, head in enumerate(sim.joint.heads, 1):

@@ -19,7 +19,7 @@ def load_simulation(path: str | Path) -> Simulation:
         TOML with ``[joint]``, ``[[harmonic]]``, ``[[effect]]``, ``[noise]``, ``[[run]]``,
         each optional; keys are the parameters of `Joint`, `Harmonic`, the effects and
         `RunDesign`. With a ``gear_ratio`` the ``fixed_member`` is the circular spline and
-        the encoder on the motor where the file does not state.
+        the encoder on the motor where the file does not state otherwise.
 
     Returns
     -------

@@ -235,7 +235,7 @@ def guarded_build(path: str | Path, where: str, build: Callable[[], T]) -> T:
 
 
 def simulation_table(sim: StatedSimulation) -> dict[str, Any]:
-    """The tables of a simulation file; keys at their defaults are omitted of ``run``."""
+    """The tables of a simulation file; ``run`` omits keys at their defaults."""
     runs = []
     for design in sim.runs:
         values = {field.name: getattr(design, field.name) for field in fields(design)}
@@ -264,7 +264,7 @@ def _given(entry: Any) -> dict[str, Any]:
 
 
 def write_simulation(sim: StatedSimulation, path: str | Path) -> None:
-    """Write a simulation file, together with and then renamed; floats round-trip exactly.
+    """Write a simulation file under a temporary name, then rename it; floats round-trip exactly.
 
     Where the simulation was read from a file, that file's text is kept and only what
     is new is appended, so comments and layout stay. Otherwise the whole is written.

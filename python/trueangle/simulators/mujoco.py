@@ -27,7 +27,7 @@ _STEPS = 100
 
 
 class SensorLayer:
-    """What the encoders of joints would state: true angles of MuJoCo with their errors.
+    """What the encoders of joints would read: true angles of MuJoCo with their errors.
 
     ::
 
@@ -63,7 +63,7 @@ class SensorLayer:
     Notes
     -----
     Each call of `read` is one reading: what follows travel takes them in their order. A layer
-    belongs to as many environments as the first `read` shows; `reset` clears them. All
+    has as many environments as the first `read` has; `reset` clears their travel. All
     environments are read at once, also by models with a state. Angles that turn further than
     half a turn from one reading to the next are counted wrongly by models with a state. A joint
     that is coupled to another one takes its reading, where that is in the layer; else its angle.

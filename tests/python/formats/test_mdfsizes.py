@@ -46,8 +46,8 @@ TAKEN = [
     group(pos_invalidation_bit=99),  # without marks the bit means nothing
 ]
 REFUSED = [
-    (group(MOST // 8 + 1), "100 bytes and declares 200008"),
-    (group(MOST // 10 + 1, marks=2), "100 bytes and declares 200010"),
+    (group(MOST // 8 + 1), "100 bytes, but it declares 200008"),
+    (group(MOST // 10 + 1, marks=2), "100 bytes, but it declares 200010"),
     (group(MOST + 1, 0), "declares 200001"),
     (group(0, MOST + 1), "declares records of 200001"),
     (group(byte_offset=4, bit_offset=7, bit_count=26), "behind its record of 8 bytes"),

@@ -70,7 +70,7 @@ def test_damage_is_told_by_line_and_an_end_within_a_row_is_not(tmp_path):
     path = tmp_path / "serial.txt"
     lines = rows(STYLES["plotter"])
     path.write_text("\n".join([*lines, "ref:1.2,en"]))
-    with pytest.warns(MessageLinesWarning, match="1 line of words is no reading and left out"):
+    with pytest.warns(MessageLinesWarning, match="1 line of words without readings is omitted"):
         (run,) = ta.read_runs(path, signals=SIGNALS)
     assert len(run) == ROWS
     for bad in ("ref:1.2,enc:1.2.5", "ref:1.2,enc:", "ref:x,enc:1"):

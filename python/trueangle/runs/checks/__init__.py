@@ -1,4 +1,4 @@
-"""Are data fit to be used? Tests before anything is fitted, and what such data can show."""
+"""Are data fit to be used? Tests before a fit, and what can be determined from such data."""
 
 from __future__ import annotations
 

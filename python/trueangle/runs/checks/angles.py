@@ -246,7 +246,7 @@ def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:
 
 
 def _stays(record: Record, jumps: NDArray[np.intp], slip: Array) -> bool:
-    """Whether the two angles stay apart by each jump: what follows a command catches up again."""
+    """Whether the angles stay apart by each jump; a joint that follows a command catches up."""
     apart = record.reference - record.indicated
     bounds = [0, *(jumps + 1).tolist(), len(record)]
     levels = []
@@ -263,10 +263,10 @@ UNUSABLE_ANGLES = (mixed_units, wrapped_reference, wrong_ratio)
 
 
 def swapped_channels(records: list[Record]) -> Iterator[DataFault]:
-    """A reference that is much noisier than the joint it is to judge."""
+    """A reference that is much noisier than the joint under test."""
     ratios = []
     for record in records:
-        # One angle and an error are no two columns that could be exchanged.
+        # An angle and an error cannot be exchanged.
         if len(record) < 30 or "error" in record.columns:
             continue
         reference, indicated = record.unwrapped
@@ -274,7 +274,7 @@ def swapped_channels(records: list[Record]) -> Iterator[DataFault]:
         steps = np.abs(np.diff(indicated))
         typical = float(median(steps))
         least = EXACT * typical
-        # Readings taken at even counts of the joint state nothing of its noise.
+        # Readings taken at even counts of the joint do not show its noise.
         even = float(np.mean(np.abs(steps - typical) <= EVEN * typical)) > 0.5
         if own > least and not even:
             ratios.append(own / max(other, least, 1e-300))
@@ -306,8 +306,8 @@ def _roughness(x: Array, time: Array | None) -> float:
 def _straight(record: Record) -> float | None:
     """Slope of a line that all but few readings lie on; None where the error is no such line.
 
-    An error of the joint curves: over part of a turn it has a separate slope, but a line, which is
-    that of least absolute deviations, leaves more than 3 % of its size.
+    An error of the joint is curved. Over part of a turn it has a mean slope too, but a line of
+    least absolute deviations leaves more than 3 % of its size.
     """
     slope = _slope(record)
     if slope is None:
@@ -341,6 +341,6 @@ def _slope(record: Record) -> float | None:
         return None
     steps = np.abs(np.diff(reference))
     if float(quantile(steps, 0.9)) > COARSE:
-        return None  # too coarse to state which way it went
+        return None  # too coarse to determine the direction
     x = reference - reference.mean()
     return float(x @ (indicated - indicated.mean()) / (x @ x))

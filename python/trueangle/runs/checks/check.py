@@ -133,7 +133,7 @@ TESTS = (
 
 
 def data_faults(records: list[Record]) -> list[DataFault]:
-    """Faults of the data; where units are mixed, what follows from that is not reported twice."""
+    """Faults of the data; where units are mixed, consequences of that are not reported."""
     found: list[DataFault] = []
     for test in TESTS:
         mixed = {label for fault in found if fault.fault in UNSURE for label in fault.runs}

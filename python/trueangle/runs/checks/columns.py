@@ -1,4 +1,4 @@
-"""What a log with columns of unknown roles seems to hold, as their names show."""
+"""What a log with columns of unknown roles seems to hold, judged by their names."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class LikelyColumn(NamedTuple):
 
 @dataclass(frozen=True)
 class LogColumns(PlainResult):
-    """What a log holds, as the names of its columns show: likely, not known.
+    """What a log is likely to hold, judged by the names of its columns.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class LogColumns(PlainResult):
         return f"{self.file}, {counted(len(self.joints), 'joint')}: {', '.join(self.joints)}"
 
     def summary(self) -> str:
-        """What the log seems to hold, and the options that report it."""
+        """What the log seems to hold, and the options that declare it."""
         lines = [
             f"{self.file} has {counted(len(self.header), 'column')}; by their names they are of "
             f"{counted(len(self.joints), 'joint')}:"
@@ -131,9 +131,9 @@ class LogColumns(PlainResult):
 
 
 def columns_of_log(path: str | Path, topic: str | None = None) -> LogColumns | None:
-    """What the names of a log's columns make likely; None where they show of no joint.
+    """The likely columns of a log by their names; None where they indicate no joint.
 
-    A word of the name shows the role (``laser``, ``pos``, ``tau`` ...), the remainder which joint:
+    A word of the name shows the role (``laser``, ``pos``, ``tau`` ...), its other words the joint:
     ``elbow_laser`` and ``elbow_pos`` belong together, as ``laser3 [deg]`` and ``q3`` do. A name
     without such a word is an indicated angle where its joint has no other.
 
@@ -162,7 +162,7 @@ def _likely(header: Sequence[str], unit: str | None) -> list[LikelyColumn]:
         if not roles:
             unnamed.append((joint, name))
             continue
-        # The reference is recognised by itself: a laser's angle is no encoder's.
+        # A word for a reference decides: the angle of a laser is not that of an encoder.
         role = "reference" if "reference" in roles else roles[-1]
         columns.append(LikelyColumn(joint, role, name, unit_in_name(name, role) or unit))
     taken = {(column.joint, column.role) for column in columns}
@@ -178,7 +178,7 @@ def _likely(header: Sequence[str], unit: str | None) -> list[LikelyColumn]:
 
 
 def _words(name: str) -> list[str]:
-    """Words and numbers of a name, what is in brackets omitted."""
+    """Words and numbers of a name, without what is in brackets."""
     bare = re.sub(r"[\[(][^\])]*[\])]", " ", name)
     parted = re.sub(r"([a-z])([A-Z])", r"\1 \2", bare)
     return [word.lower() for word in re.findall(r"[^\W\d_]+|\d+", parted)]

@@ -1,4 +1,4 @@
-"""Readings of one run as they are in a file, read without the trust that runs deserve."""
+"""Readings of one run as they are in a file, before the checks that a run has passed."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
 
 
 def _deviations(table: FileReadings) -> tuple[str, ...]:
-    """Columns of numbers in small units of angles, or called so, that are not used."""
+    """Unused columns of numbers whose names suggest small angular deviations."""
     if offsets_of(table.roles):
         return ()
     used = {column.name for column in table.roles.values()}

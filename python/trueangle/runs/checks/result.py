@@ -91,7 +91,7 @@ def extent_of(records: list[Record]) -> Extent:
 
 
 def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
-    """What can be known from such data; what cannot, why, and which measurement shows it."""
+    """What such data can determine; what they cannot, why, and which measurement would."""
     can = ["the periodic error at the places visited"]
     cannot: list[dict[str, str]] = []
 

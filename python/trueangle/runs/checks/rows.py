@@ -1,4 +1,4 @@
-"""Rows that are no readings of the remainder: repeated ones, isolated outliers, steps that stay."""
+"""Rows that do not fit the other readings: repeated ones, isolated outliers, steps that stay."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .record import LEAST_READINGS, Record
 #: Readings on either side of a step that show whether it stays.
 _BESIDE: Final = 7
 
-#: Jumps of a run that are events; more are a property of it.
+#: Most jumps of a run that count as events; more are a property of the run.
 _FEW: Final = 4
 
 #: Steps of the reference, in usual ones, up to which a change of the error is no gap.
@@ -133,7 +133,7 @@ def _lost(
     then = ends[nearest]
     gone = lost[new] - lost[then]
     near = np.abs(ring[nearest] - place[new]) <= _USUAL * _pace(np.diff(reference))
-    # Jumps that are made up for at the same place show nothing.
+    # Jumps that are reversed at the same place do not count.
     again = near & (np.abs(gone) > 0.5 * abs(size))
     if again.sum() < _BESIDE and abs(size) <= travel:
         return None
@@ -202,8 +202,8 @@ def duplicate_runs(records: list[Record]) -> Iterator[DataFault]:
 def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
     """Rows with one time stamp and the same readings; without times, readings that repeat others.
 
-    A reference that repeats with another indicated angle is measured anew, and readings that
-    agree there may be those of a coarse scale.
+    A reference that repeats with another indicated angle was measured again; readings that also
+    agree there may come from a coarse resolution.
     """
     for record in records:
         timed = record.time is not None

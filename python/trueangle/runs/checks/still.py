@@ -1,10 +1,10 @@
-"""Readings that are still while the other channel moves: at a limit, or repeated.
+"""Readings that do not change while the other channel moves: at a limit, or repeated.
 
-A column also is still when the joint rests, when a command waits for the joint to follow,
-and between two counts. So it is no fault that it is, but what it does when it goes on:
+A column is also constant when the joint rests, when a command waits for the joint to follow,
+and between two counts. So a constant column is a fault only by what it does when it goes on:
 
-- a *repeated* reading is made up for: the next new one has moved as far as the other column did
-  since the last new one, while the joint was moving throughout;
+- after *repeated* readings the next new one has moved as far as the other column did since the
+  last new one, while the joint was moving throughout;
 - a column at a *limit* is at one end of its range, the joint passes by in the same motion
   before and after, and the column leaves the limit where it met it.
 """
@@ -22,8 +22,8 @@ from ...support.quantiles import median, quantile
 from .fault import DataFault
 from .record import Record
 
-#: What the other channel must have passed by: in noise (a probability of 1e-9), in counts of a
-#: column that has a lattice, and of one whose steps only look like it (no count is so long).
+#: How far the other channel must have moved: in standard deviations of noise (a probability of
+#: 1e-9), in counts of a column with a lattice, and in steps that only look like counts.
 _FAR: Final = 6.0
 _COUNTS: Final = 1.5
 _STEPS: Final = 2.5
@@ -52,15 +52,15 @@ _ONWARD: Final = 0.7
 #: Readings on both sides whose speeds are compared.
 _BESIDE: Final = 5
 
-#: A column has a lattice where its steps take so few values, each this many times.
+#: A column has a lattice where its steps take this few values, each this many times.
 _VALUES: Final = 12
 _TIMES: Final = 5
 
 #: Steps are even to this part of one.
 _EVEN: Final = 1e-3
 
-#: Repeats are the exception below this share of readings, and a rule where this many of them
-#: last equally long.
+#: Repeats are the exception below this share of readings, and the rule where this share of them
+#: is equally long.
 _RARE: Final = 0.2
 _RULE: Final = 0.9
 
@@ -72,13 +72,13 @@ class _AnglePair(NamedTuple):
     other: Array
     speed: Array
     least: float
-    """What the other must pass by."""
+    """How far the other must move."""
     apart: tuple[float, float]
-    """How far the two are apart where ``own`` does not rest for long."""
+    """Smallest and largest difference of the two where ``own`` is not constant for long."""
 
 
 def stuck_readings(records: list[Record]) -> Iterator[DataFault]:
-    """Readings that are still while the other channel moves: at a limit, or stale."""
+    """Readings that do not change while the other channel moves: at a limit, or stale."""
     for record in records:
         reference, indicated = record.unwrapped
         for name, own, other in (
@@ -200,7 +200,7 @@ def _is_stale(c: _AnglePair, a: int, b: int) -> bool:
     made_up = float(c.own[b + 1] - c.own[b]) - float(c.other[b + 1] - c.other[b])
     if abs(_turned(made_up - missed)) > near:
         return False
-    if b - a >= _LEAST_STUCK:  # else a joint that was when the column went on
+    if b - a >= _LEAST_STUCK:  # excludes a joint that was at rest when the column went on
         passes = a == 0 or _passes(c, a, b - a, 1)
         if not (passes and _passes(c, b, b - a, -1)):
             return False
@@ -230,10 +230,10 @@ def _is_limit(c: _AnglePair, a: int, b: int) -> bool:
 
 
 def _moves_on(c: _AnglePair, a: int, b: int) -> bool:
-    """Whether the joint moves on while ``own`` is to the last reading, or from the first.
+    """Whether the joint moves while ``own`` is constant to the last reading, or from the first.
 
-    What catches up with a command that stopped comes to rest, and no farther from it than it
-    has been before.
+    A joint that catches up with a stopped command comes to rest, no farther from it than it has
+    been before.
     """
     passed = abs(float(c.other[b] - c.other[a]))
     if passed < c.least or (a == 0 and b + 1 == c.own.size):
@@ -250,7 +250,7 @@ def _moves_on(c: _AnglePair, a: int, b: int) -> bool:
 
 
 def _passes(c: _AnglePair, at: int, length: int, end: int) -> bool:
-    """Whether the joint keeps its speed where ``own``, which went with it, begins to be.
+    """Whether the joint keeps its speed where ``own``, which moved with it, stops changing.
 
     ``end`` is 1 there and -1 where ``own`` goes on.
     """

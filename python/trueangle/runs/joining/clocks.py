@@ -16,16 +16,16 @@ from .stream import Stream
 _GRID = 1 << 20
 #: Share of the shorter stream that must overlap.
 _OVERLAP = 0.25
-#: Parts of the motion that differ and are alike: times the least, and more by so much.
+#: Offsets fit equally well up to this multiple of the least misfit, and this much more.
 _AS_WELL = 1.5
 _TIE = 1e-3
-#: Variation of the velocity, as a share of its root mean square, below which one speed is found.
+#: Variation of the velocity, as a share of its rms, below which it counts as one speed.
 _ONE_SPEED = 0.02
-#: Orders of the joint that may not pass for a motion of the clock.
+#: Orders of the joint that are fitted, so that they are not confounded with the clock.
 _ORDERS = (1, 2, 3, 4)
-#: Rounds of refining, each of which is linear, and the change of a time (s) that is none.
+#: Linear rounds of refinement, and the change of a time (s) below which they have converged.
 _ROUNDS, _SETTLED = 8, 1e-9
-#: Standard errors from which a rate is taken as it is, and what two quartzes may differ by, in ppm.
+#: Standard errors above which a rate is used without a prior; the prior of two quartzes, in ppm.
 _SIGNIFICANT = 5.0
 _QUARTZ = 100.0
 
@@ -39,7 +39,7 @@ class Clocks:
         t_B = t_A + offset + 10⁻⁶ rate · (t_A - t₀)
 
     with ``t₀`` the first reading of A; standard errors in ``offset_std``, ``rate_std``
-    (None where it was declared or the motion does not show), that of a time on the other
+    (None where it was declared or the motion does not determine it), that of a time on the other
     clock, root mean square over the log, in ``timing_std``, and the covariance of offset and rate
     in ``shared``.
     """
@@ -61,12 +61,12 @@ class Clocks:
 def estimated_clocks(
     indicated: Stream, reference: Stream, offset: float | None, rate: float | None
 ) -> Clocks:
-    """Offset and rate from the motion, but those that are declared.
+    """Offset and rate from the motion, except those that are declared.
 
     Raises
     ------
     ArgumentError
-        The streams share no time and the motion does not show the offset.
+        The streams share no time and the motion does not determine the offset.
     """
     start = float(indicated.time[0])
     notes = []
@@ -105,7 +105,7 @@ def estimated_clocks(
 def _coarse(indicated: Stream, reference: Stream) -> tuple[float, list[float] | None]:
     """The offset at which the velocities agree best, and others at which they do as well.
 
-    None instead of others where the motion does not show an offset.
+    None instead of others where the motion does not determine an offset.
     """
     step = max(indicated.step, reference.step)
     longest = max(np.ptp(indicated.time), np.ptp(reference.time))
@@ -151,12 +151,12 @@ def _coarse(indicated: Stream, reference: Stream) -> tuple[float, list[float] | 
 
 
 def _refined(indicated: Stream, reference: Stream, clocks: Clocks, wanted: list[str]) -> Clocks:
-    """Least squares over the readings of A, next to a zero, a ramp and the lowest orders."""
+    """Least squares over the readings of A, jointly with a zero, a ramp and the lowest orders."""
     if "rate" in wanted:
         found = _solved(indicated, reference, clocks, wanted)
         if found is not None and found.rate_std is not None:
             time = indicated.time - clocks.start
-            # No rate is assumed to be exceptional.
+            # No prior is applied to a rate that is highly significant.
             is_sure = abs(found.rate) > _SIGNIFICANT * found.rate_std
             return found if is_sure else _as_quartzes(found, time)
     if "offset" not in wanted:
@@ -174,7 +174,7 @@ def _as_quartzes(found: Clocks, time: Array) -> Clocks:
 
         c - C_r rate / (C_rr + T),    C - C_r C_r' / (C_rr + T)
 
-    An offset of clocks that were taken as equal would be reported better than it is known.
+    If the rates were assumed equal, the standard error of the offset would be too small.
     """
     std = found.rate_std
     assert std is not None
@@ -259,7 +259,7 @@ def _solved(
 
 
 def _inflation(rest: Array) -> float:
-    """Factor on the variance of correlated neighbours (first order)."""
+    """Factor on the variance for correlated neighbours (first-order autoregression)."""
     power = float(rest @ rest)
     if power <= 0.0:
         return 1.0

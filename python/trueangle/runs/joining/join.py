@@ -44,8 +44,8 @@ def join(
         θ(t_i) = ref(t_i + offset + rate · (t_i - t₀))
 
     at every indicated reading, by lines or cubics through the readings of the reference,
-    whichever predicts left-out ones better. Nothing is made up over gaps. A log that holds
-    changes only (EPICS monitors and the like) was still in its pauses, and is held there.
+    whichever predicts held-out ones better. Gaps are not interpolated. In a log of changes only
+    (EPICS monitors and the like) the value is constant over a pause.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def join(
         ``reference_*``, both with ``time_s`` (or another unit of time).
     offset_s, rate_ppm : float, optional
         Of the reference's clock against the indicated one, where it is known (0 and 0 for
-        one clock); else estimated from the motion, as far as that shows: a rate that is hardly
-        known is read as one of two quartzes, 0 +- 100 ppm beforehand.
+        one clock); else estimated from the motion, if it determines them. A rate that is not
+        clearly significant gets the prior of two quartzes, 0 +- 100 ppm.
     max_gap_s : float, optional
         Longest pause of the reference that is interpolated over (default: five times its
         typical step, and longer where the motion in as long a time is a line).
@@ -166,7 +166,7 @@ def _assigned(
         used |= fitting.keys()
         if fitting:
             tables[i] = read_readings(paths[i], {**fitting, **own[i]}, topics[i])
-    for role in shared.keys() - used:  # states what was meant
+    for role in shared.keys() - used:  # raises, and suggests similar names
         signed_name(tables[0].path, list(tables[0].columns), _name(shared[role]))
     for one, other in (tables, tables[::-1]):
         if "indicated" in one.roles and "reference" in other.roles:

@@ -32,7 +32,7 @@ class Joined(PlainResult):
     offset_s, rate_ppm : float
         ``t_reference = t_indicated + offset + rate * (t_indicated - start)``.
     offset_std_s, rate_std_ppm : float or None
-        Their standard errors; None where they are declared, or the motion does not show.
+        Their standard errors; None where declared, or where the motion does not determine them.
     std_arcsec : float
         Standard deviation that the joining adds to an error: of interpolation and clocks.
     gaps : tuple of Gap

@@ -1,4 +1,4 @@
-"""What a simulator's log states, subtracted from the measured runs: by time or by angle."""
+"""The error in a simulator's log subtracted from measured runs, by time or by angle."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from .travel import TravelledError
 
 #: How a log may be brought to the readings.
 BY = ("time", "angle")
-#: rms by which two motions differ, as a separate share, from which on they are not the same.
+#: rms difference of two motions, relative to their rms, from which on they are not the same.
 SAME_MOTION = 0.05
 #: Share of a run's readings that the log must cover in time.
 COVERED = 0.5
-#: Times by which another offset of the clocks must bring the motions nearer to be taken.
+#: Factor by which another offset of the clocks must reduce the difference to be used.
 NEARER = 2.0
-#: Times the median of second differences, six standard deviations, beyond which they are no noise.
+#: Multiple of the median of second differences, 6 standard deviations, that noise does not reach.
 _USUAL = 6.0 / 0.6745
 
 
 @dataclass(frozen=True)
 class MeasuredMinusSimulated(ShownResult):
-    """Measured runs without the error that a simulator's log states.
+    """Measured runs minus the error in a simulator's log.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class MeasuredMinusSimulated(ShownResult):
     by : tuple of str
         "time" or "angle", for each run.
     left_out : int
-        Readings at which the log contains nothing.
+        Readings that the log does not cover.
     offsets_s : tuple of float
         Seconds from the clock of every run to that of the log; 0 where it is joined by angle.
     std_arcsec : float
@@ -106,7 +106,7 @@ class MeasuredMinusSimulated(ShownResult):
 
 
 class _Expected(NamedTuple):
-    """The simulated error at the readings of a run, degrees, where the log states one."""
+    """The simulated error at the readings of a run, degrees, where the log covers them."""
 
     by: str
     error: Array
@@ -134,8 +134,8 @@ def minus_simulated(
     runs : CalibrationRun or iterable of CalibrationRun
     simulated : path, table or iterable of CalibrationRun
         The log, as `trueangle.runs.files.runs_of` takes it: ``reference`` is the simulator's
-        true output angle, ``indicated`` what the simulated encoder (or command) states. One run
-        for all measured runs, or runs of the same labels.
+        true output angle, ``indicated`` that of the simulated encoder (or command). One run for
+        all measured runs, or runs of the same labels.
     by : {"time", "angle"}, optional
         By default by time where both have one and the motions are the same, else by angle.
     **reading
@@ -155,7 +155,7 @@ def minus_simulated(
     Notes
     -----
     In time by lines or cubics through the log's own readings, exact at equal times; an offset
-    of the clocks is found where the motion shows one. By angle over the log's whole travel if
+    of the clocks is estimated where the motion determines it. By angle over the whole travel if
     that holds the measured one, else modulo a turn, for each direction that the log has; there
     the log must count its angle from the same place. Cost: a sort of each run.
 
@@ -216,7 +216,7 @@ def _counterparts(
 
 
 def _lowered(run: CalibrationRun, expected: _Expected) -> CalibrationRun:
-    """The run's readings at which the log states an error, lowered by it."""
+    """The run's readings that the log covers, less the error there."""
     rows = expected.known
     lowered = run.indicated[rows] - expected.error[rows] * (run.period / 360.0)
     fields = {

@@ -16,8 +16,8 @@ from ...support.quantiles import quantile
 LEAST = 4
 #: Times the typical step in time from which on a pause is a gap.
 GAP = 5.0
-#: Readings off a line, in their own roughness, up to which a line is as good; times that are
-#: looked at for it, of this many windows at least.
+#: Deviation from a line, in units of the readings' roughness, up to which a line suffices; times
+#: at which it is tested, at most; and windows, at least.
 _ROUGH, _LOOKED_AT, _WINDOWS = 3.0, 4096, 16
 #: Part of a step by which a time may lie outside.
 EDGE = 1e-3
@@ -59,7 +59,7 @@ class Stream:
     def is_on_change(self) -> bool:
         """Whether a reading was logged only when it differed from the one before.
 
-        Then it was still, to one step of it, in every pause.
+        Then it did not change by more than one step in any pause.
         """
         if self.time.size < 8:
             return False
@@ -77,7 +77,7 @@ class Stream:
 
     @cached_property
     def held(self) -> Stream:
-        """The stream with its pauses filled by what was there, if it is one on change."""
+        """The stream with its pauses filled by the last value, if it is one on change."""
         if not self.is_on_change:
             return self
         long = np.flatnonzero(np.diff(self.time) > PAUSE * self.step)
@@ -109,7 +109,7 @@ class Stream:
         return longest
 
     def _off_line(self, length: float) -> float | None:
-        """How far readings are off the line between two n seconds apart; None without any."""
+        """Deviation of readings from lines between two that are ``length`` s apart, or None."""
         t = self.time
         first = np.arange(0, t.size, 1 + t.size // _LOOKED_AT)
         last = np.searchsorted(t, t[first] + length)
@@ -149,8 +149,8 @@ class Stream:
     def interpolation_std(self) -> float:
         """Standard deviation of what interpolation adds between two readings, degrees.
 
-        From readings that were omitted, at twice the distance: a line's error grows with its
-        square, a cubic's with its fourth power; the noise of readings is in it.
+        From held-out readings, at twice the distance: a line's error grows with its square, a
+        cubic's with its fourth power. The noise of readings is included.
         """
         left_out = self._left_out(self.is_cubic)
         if not left_out.size:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...support.arrays import Array
 
-#: Times the typical step in angle from which on a segment is a gap.
+#: Multiple of the typical step in angle above which a step is a gap.
 GAP = 5.0
 #: Part of a turn that may be missing in a log of a whole turn.
 CLOSED = 0.02
@@ -47,7 +47,7 @@ class TravelledError:
     angle, error : ndarray
         Degrees, the angle without jumps at a turn.
     direction : ndarray
-        -1 or 1 of every reading; 0 where it was from the start.
+        -1 or 1 of every reading; 0 before the first motion.
     """
 
     angle: Array
@@ -66,7 +66,7 @@ class TravelledError:
         return float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
 
     def at(self, angle: Array, direction: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Error at angles of a travel, and where the log states one.
+        """Error at angles of a travel, and which of them the log covers.
 
         Over the log's whole travel where that holds these angles, else modulo a turn.
         """
