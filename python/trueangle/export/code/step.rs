@@ -230,12 +230,12 @@ fn advance(state: &mut State, direction: i8, x: i64) {
     let (beyond, fresh) = ((x - state.farthest) * i64::from(direction), !state.known);
     if direction != @held@ {
         if fresh || (direction == -@held@ && beyond < 0) {
-            (state.farthest, for example.known) = (x, true);
+            (state.farthest, state.known) = (x, true);
         }
         @begin@
     }
     if fresh || beyond > 0 {
-        (state.farthest, for example.known) = (x, true);
+        (state.farthest, state.known) = (x, true);
     }
 }
 
@@ -257,7 +257,7 @@ fn seen(state: &mut State, reading: i64, goal: i64, signals: &Signals) -> i64 {
 
 //@ ahead
 let ahead = if direction == @held@ { state.stretch } else {
-    state.stretch.next(direction, for example.farthest, for example.known)
+    state.stretch.next(direction, state.farthest, state.known)
 };
 
 //@ seen by angle
