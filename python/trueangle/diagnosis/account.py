@@ -29,7 +29,7 @@ from .selection import select_causes
 from .unevennoise import uneven_noise
 from .unnamed import is_named
 
-#: Readings used at most: beyond, one of every this many in a row is sampled at random.
+#: Readings used at most: beyond, one of every n in a row is taken at random.
 MOST_READINGS = 40_000
 
 
@@ -166,7 +166,7 @@ def _better(account: Account, other: Account, price: float) -> Account:
 
 
 def _helps(seen: PreparedData, chosen: Regression) -> bool:
-    """Whether another ratio helps, alone or with what was chosen; a whole account is slower."""
+    """Whether another ratio helps, alone or with the chosen causes; a whole account is slower."""
     start = _start(seen, seen.sim)
     hopes = (start, start.with_terms(chosen.terms))
     return min(map(total_penalty, hopes)) < total_penalty(chosen)
@@ -189,9 +189,9 @@ def _believed(seen: PreparedData) -> Account:
 def _corrections(
     choice: CauseSelection, believed: Simulation, stated: Simulation
 ) -> list[Simulation]:
-    """With one refuted effect as the readings show it, together with the causes chosen or for them.
+    """With one refuted effect as the readings show it, with the chosen causes or without them.
 
-    Another size of the assumed model comes before further causes that make up for it.
+    Another size of an assumed effect is tried before further causes that compensate for it.
     """
     settled = [choice.chosen, choice.start] if choice.chosen.terms else [choice.start]
     found = (effects_as_measured(each, believed, stated, choice.spots) for each in settled)
@@ -201,7 +201,7 @@ def _corrections(
 def _start(seen: PreparedData, sim: Simulation) -> Regression:
     """The readings against a simulation, without any cause.
 
-    A delay stays free together with all else: what follows the direction, state, is judged jointly
+    A delay stays free in every fit: what follows the direction, for example, is tested jointly
     with it.
     """
     beside = None if seen.delay is None else seen.delay.columns(seen.signals)
@@ -219,7 +219,7 @@ def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:
     )
     scatter: list[ScatterFinding] = []
     if current_deadline().over:
-        return CauseSelection(start, chosen, scatter, spots)  # the residual is no scatter yet
+        return CauseSelection(start, chosen, scatter, spots)  # the residual is not yet scatter
     least = NEW_SCATTER + misfit_of_scatter(start, chosen)
     uneven = [item for item in _uneven(start, chosen) if item.bic_gain > least]
     if uneven:
@@ -269,7 +269,7 @@ def _directed(signals: Signals) -> NDArray[np.int64]:
 
 
 def _subsample(n: int) -> NDArray[np.int64]:
-    """One reading of every this many in a row, at random within each; all where they fit."""
+    """One reading of every n in a row, at random within each; all where they are few enough."""
     if n <= MOST_READINGS:
         return np.arange(n)
     edges = np.linspace(0, n, MOST_READINGS + 1).astype(np.int64)

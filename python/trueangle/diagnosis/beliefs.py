@@ -1,7 +1,7 @@
 """Verdicts on what a simulation already claims: its lines and its effects.
 
 Every assumed line is in the regression with two free coefficients, every assumed effect
-that can be predicted with a factor; what the readings state about them is
+that can be predicted with a factor; the statistic of the readings about them is
 
 ::
 
@@ -20,7 +20,7 @@ from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, normal_tail
 from ..support.plainresult import ShownResult
 
-#: Probability with which a right assumed model of many is refuted.
+#: Probability with which one of many correct assumptions is refuted.
 LEVEL = 1e-4
 
 #: Share of the assumed amplitude below which a line is absent, where it is no larger than
@@ -28,7 +28,7 @@ LEVEL = 1e-4
 ABSENT = 0.15
 
 #: Share of the amplitude by which an assumed value may be off and is still confirmed: nothing that
-#: a simulation states is exact, and good data see a thousandth.
+#: a simulation states is exact, and good data detect a thousandth.
 CLOSE = 0.03
 
 #: Degrees of phase within which only the amplitude is wrong.

@@ -22,8 +22,7 @@ from .unnamed import effect_or_unnamed
 #: An extension, what it extends, and its net BIC gain.
 Candidate: TypeAlias = tuple[Extension, Regression, float]
 
-#: Time that what is reported about chosen causes takes (gain, rivals), in shares of that of the
-#: choice.
+#: Time for the gain and the rivals of chosen causes, in shares of the time for the choice.
 AFTER_CHOICE = 0.7
 
 
@@ -43,9 +42,9 @@ def candidate_extensions(
     """What every cause proposes: the extension, what it extends, its net BIC gain.
 
     A cause that contains chosen ones as special cases takes their place. Those left when the
-    time is up are not tried (`trueangle.support.deadline`). Of candidates that stay below
-    ``least``, the gain that matters together with those found so far, only as much is searched as
-    shows that; the strongest ones ``before`` are therefore tried first.
+    time is up are not tried (`trueangle.support.deadline`). ``least`` is the gain that matters,
+    given the candidates found so far. The search of a candidate ends once it must stay below
+    ``least``; the strongest ones ``before`` are therefore tried first.
     """
     found: list[Candidate] = []
     places: list[int] = []
@@ -67,7 +66,7 @@ def candidate_extensions(
         wanted = max(least(found) + penalty, 0.0) if start.terms and least is not None else 0.0
         extension = candidates_above(start, cause, wanted)
         if at.over:
-            break  # a search that was cut short contains nothing of its cause
+            break  # a search that was cut short is no evidence about its cause
         if extension is not None:
             found.append((extension, start, extension.bic_gain - penalty))
             places.append(causes.index(cause))
@@ -76,7 +75,7 @@ def candidate_extensions(
 
 
 def candidates_above(regression: Regression, cause: str, least: float = 0.0) -> Extension | None:
-    """What a cause proposes, searched only as far as candidates above ``least`` need.
+    """What a cause proposes, searched only as far as candidates above ``least`` require.
 
     None where the time is up and it has not been searched yet.
     """
@@ -117,7 +116,7 @@ class CandidateScores:
         return gain - (after - paid)
 
     def told_score(self, candidate: Candidate) -> float:
-        """Score once what curves of the causes found explain as well is subtracted."""
+        """Score less what form errors of the causes found explain as well."""
         extension, start, _ = candidate
         if id(extension) not in self.told:
             less = extension.deviance - told_from_form_errors(start, extension).deviance
@@ -127,7 +126,7 @@ class CandidateScores:
     def best(self, candidates: Sequence[Candidate]) -> tuple[float, Candidate] | None:
         """The best candidate with its score, where one is above zero.
 
-        What is subtracted only lowers a score: those behind the best one need not be tested.
+        Form errors only lower a score: candidates that score below the best one are not tested.
         """
         best: tuple[float, Candidate] | None = None
         scored = [(self.score(candidate), candidate) for candidate in candidates]
@@ -140,7 +139,7 @@ class CandidateScores:
         return best
 
     def least(self, candidates: Sequence[Candidate]) -> float:
-        """Net gain that a further candidate needs to be the best; tested after each new one."""
+        """Net gain that a further candidate needs to be the best; updated after each new one."""
         for candidate in candidates[self.seen :]:
             if self.score(candidate) > self.leading:
                 self.leading = max(self.leading, self.told_score(candidate))

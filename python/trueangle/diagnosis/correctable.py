@@ -62,13 +62,13 @@ class Correctable(PlainResult):
         Raises
         ------
         NoModelError
-            Nothing was confirmed that a corrector can subtract; states why and what to measure.
+            No confirmed cause can be corrected; states why and what to measure.
         NotInvertibleError
             The error is too steep for a model of the true angle.
         KindError
             What is given as model is none.
         ArgumentError
-            Nothing to extend, and the diagnosis is on the log of another simulator.
+            Nothing to extend, and the diagnosis is based on the log of another simulator.
 
         Examples
         --------
@@ -98,8 +98,8 @@ class Correctable(PlainResult):
         Returns
         -------
         HarmonicModel
-            Its error is on top of the log, where the diagnosis had one; else it is all of
-            the joint's.
+            Its error is in addition to the log's, where the diagnosis had one; else it is
+            the whole error of the joint.
 
         Raises
         ------
@@ -148,7 +148,7 @@ class Correctable(PlainResult):
         )
 
     def _uncorrected(self) -> Iterator[str]:
-        """Why nothing can be subtracted, and what to measure."""
+        """Why nothing can be corrected, and what to measure."""
         sure = [f for f in self.findings if f.confirmed]
         if sure:
             why = (f"{f.cause} ({EFFECTS[f.cause].not_at_run_time or 'no term'})" for f in sure)
@@ -161,4 +161,4 @@ class Correctable(PlainResult):
         if told:
             yield from (f"to distinguish {causes}: {measure}" for measure, causes in told.items())
         else:
-            yield ("measure more runs, in both directions and at two speeds, then diagnose again")
+            yield "measure more runs, in both directions and at two speeds, then diagnose again"

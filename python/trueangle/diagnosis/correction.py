@@ -74,7 +74,7 @@ def without_terms(
     """The runs as a joint without the model's terms would have given them.
 
     With ``φ = θ - vτ`` the reference becomes ``φ`` and the
-    indicated angle loses the terms' error there: the residual is for the harmonics.
+    indicated angle loses the terms' error there: the harmonics are fitted to the residual.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def extend_model(
     NotInvertibleError
         The error is too steep for a model of the true angle.
     """
-    from ..fitting.fit import fit  # a model is requested after most of a diagnosis, if at all
+    from ..fitting.fit import fit  # slow to import, and few diagnoses need a model
 
     found = as_runs(runs)
     if argument == "auto":
@@ -205,7 +205,7 @@ def _shafts(
 ) -> tuple[dict[str, float], dict[str, set[int]]]:
     """Cycles and orders of the model's shafts, of ``lines`` and of those found.
 
-    A line that is no whole order of its shaft gets a separate shaft.
+    A line that is not a whole order of its shaft gets its own shaft.
     """
     cycles = {shaft.name: shaft.cycles_per_turn for shaft in model.shafts}
     orders = {shaft.name: set(shaft.orders) for shaft in model.shafts}

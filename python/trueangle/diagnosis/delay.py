@@ -1,14 +1,14 @@
-"""A reading that is old, jointly with the pattern that it is old of.
+"""A delay of readings, estimated jointly with the pattern that it shifts.
 
-A joint that answers ``τ`` late states
+The error of a joint that answers ``τ`` late is
 
 ::
 
     ε = θ(t - τ) - θ(t) + p(θ(t - τ))
 
-so that a delay moves the argument of the pattern itself. Together with a large pattern neither is
-known without the other: the delay is found with all low orders free (Gauss and Newton), and the
-whole account is given of the angle at which the joint was read.
+so that a delay moves the argument of the pattern itself. With a large pattern neither can be
+estimated without the other: the delay is found with all low orders free (Gauss and Newton), and
+the whole account refers to the angle at which the joint was read.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from .goodness import Unexplained
 from .penalty import NEW_CAUSE
 from .unnamed import effect_or_unnamed
 
-#: Orders of the output that are free together with the delay, where the travel resolves them.
+#: Orders of the output that are fitted jointly with the delay, where the travel resolves them.
 ORDERS = 32
 
-#: Readings used at most, every this many.
+#: Readings used at most: of more, every n-th.
 MOST_READINGS = 4_000
 
 #: Steps at most, and the share of a standard error at which a step ends the search; the last of
@@ -89,7 +89,7 @@ def error_before_delay(signals: Signals, error: Array, delay_s: float) -> tuple[
 def find_delay(signals: Signals, error: Array, sim: Simulation) -> Delay | None:
     """The delay of readings whose pattern moves with it by more than a line can follow.
 
-    None where a delay together with an unmoved pattern explains as much (it is then one cause among
+    None where a delay with an unmoved pattern explains as much (it is then one cause among
     others), or where speed was not recorded or does not change.
     """
     if signals.velocity is None or signals.time is None or np.ptp(signals.velocity) == 0.0:
@@ -166,7 +166,7 @@ def _at_the_time(regression: Regression, plain: Regression) -> Iterator[Extensio
 def delay_finding(
     delay: Delay, chosen: Regression, plain: Regression, with_gain: bool, unexplained: Unexplained
 ) -> Finding:
-    """The delay as a finding together with the ``chosen`` causes; ``plain`` is without the delay.
+    """The delay as a finding in addition to the ``chosen`` causes; ``plain`` is without it.
 
     Its change is the last of the columns that are always free in ``chosen``.
     """

@@ -83,8 +83,8 @@ def diagnose(
     or runs that inform on a parameter, and 6 for a new cause, forward and then backward;
     a further cause must also bring 0.1 % of what the others explain, as no form is exact;
     correlated noise is whitened, outliers are clipped at four standard deviations,
-    and errors sampled anew in every run enter as random effects. What the design of the
-    runs cannot separate is worked out first and not named.
+    and errors that are new in every run enter as random effects. Causes that the design of
+    the runs cannot separate are determined first and not named.
 
     Parameters
     ----------
@@ -92,11 +92,11 @@ def diagnose(
         Time, velocity, torque, temperature and mount where known; files, folders, patterns and
         tables in memory as `trueangle.read_runs` takes them.
     sim : Simulation, optional
-        The assumed model; may be held out where there is a log.
+        The assumed model; may be omitted where there is a log.
     simulated : path, table, iterable of CalibrationRun or MeasuredMinusSimulated, optional
         What any other simulator states about the same motion
         (`trueangle.runs.joining.minus_simulated`): it is subtracted from the readings, and ``sim``
-        and its extension are on top of it. Where both have the torque of the drive, that is
+        and its extension describe the difference. Where both have the torque of the drive, that is
         accounted for as well (`Diagnosis.torque`).
     gain : bool
         Measure the gain on held-out runs (about half of the time).
@@ -125,8 +125,8 @@ def diagnose(
     Notes
     -----
     Readings at a turning point, where the joint turned and has not moved, take no part: which way
-    they were reached is not known. Up to 40 000 readings are used; of more, one of every this many
-    in a row is sampled at random (seed 0), which keeps the angles free of a grid. About 0.4 to
+    they were reached is not known. Up to 40 000 readings are used; of more, one of every n in
+    a row is taken at random (seed 0), which keeps the angles free of a grid. About 0.4 to
     1.5 s for 10 000 readings, on one processor: numpy's own threads are stopped meanwhile.
     Source: Frisch-Waugh projection; Schwarz (1978) and Kass and Wasserman (1995) for the
     penalty; Koenker (1981) for the variance.
@@ -317,7 +317,7 @@ def _structure(start: Regression) -> dict[str, float]:
 
 
 def _noise(chosen: Regression, rest: Unexplained) -> float:
-    """Standard deviation of one reading: the residual, where all that is left is noise."""
+    """Standard deviation of one reading: that of the residual, where it is only noise."""
     if rest.found or int(np.count_nonzero(~chosen.outlying)) <= chosen.rank:
         return float(np.hypot(rest.noise.sigma, rounding_of(chosen)))
     return float(np.sqrt(chosen.variance_within_runs))

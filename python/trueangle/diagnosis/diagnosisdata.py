@@ -1,4 +1,4 @@
-"""What a diagnosis holds, what follows from it, and the runs that would show what is open."""
+"""What a diagnosis holds, what follows from it, and the runs that would settle what is open."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ class DiagnosisData(Correctable):
 
     @property
     def is_enough(self) -> bool:
-        """The simulation is enough: no finding, nothing unexplained, every assumed model confirmed.
+        """The simulation is enough: no finding, nothing unexplained, every assumption confirmed.
 
-        An account that was ended early does not show.
+        False where the account was ended early.
         """
         return (
             self.complete
@@ -71,8 +71,8 @@ class DiagnosisData(Correctable):
     def simulation(self) -> Simulation:
         """`extended`, with the noise of the readings and designs of their runs.
 
-        Both are where the simulation states none: `trueangle.simulate` repeats the
-        measurement then. What an extended simulation is written as.
+        Both are added where the simulation states none, so that `trueangle.simulate` repeats
+        the measurement. What an extended simulation is written as.
 
         Examples
         --------
@@ -93,7 +93,7 @@ class DiagnosisData(Correctable):
     def plan(
         self, limits: Limits | None = None, *, between: Sequence[str] | None = None
     ) -> NextRuns:
-        """The runs that would show what is open (`trueangle.planning.planner.next_runs`).
+        """The runs that would settle what is open (`trueangle.planning.planner.next_runs`).
 
         Parameters
         ----------
@@ -129,9 +129,9 @@ class DiagnosisData(Correctable):
 
     @cached_property
     def next_runs(self) -> NextRuns | None:
-        """The runs that would separate what is detected, as `plan` has them by default.
+        """The runs that separate detected causes not yet distinguished, as `plan` gives by default.
 
-        None where nothing is, or the account was ended early.
+        None where there are none, or the account was ended early.
         """
         is_open = any(spot.supported and spot.hypotheses for spot in self.not_identifiable)
         return self.plan() if is_open and self.complete and self.runs else None

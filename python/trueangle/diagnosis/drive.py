@@ -4,8 +4,8 @@
 
     τ_measured - τ_simulated = F sgn θ̇ + d θ̇ - Σ_m T_m sin(mθ + φ_m) + n
 
-It is diagnosed like an error of the angle: a line is a ripple, what follows the direction dry
-friction, what follows the velocity damping. A simulator has separate elements for them.
+It is diagnosed like an error of the angle: a line is a ripple, what follows the direction is dry
+friction, and what follows the velocity is damping. Simulators have separate elements for them.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Exchange causes of an account, one for another or for none, while that explains more.
 
-Forward and backward steps see one change at a time; the gain of a cause together with others, and
-which readings are outliers, may look otherwise once it is replaced. Of two that overlap, the first
-was chosen while it represented both: over a part of a turn orders 6 and 7 for 5.
+Forward and backward steps make one change at a time. The gain of a cause in addition to others,
+and which readings are outliers, may differ once another cause is replaced. Of two overlapping
+causes the first was chosen while it explained both: over a part of a turn orders 6 and 7 for 5.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from .unnamed import is_named
 #: are implausible together, that would take as long as the whole choice.
 MOST_EXCHANGES, LOOKED_AT = 3, 2
 
-#: Pairs that are exchanged at most, and the correlation together with all else from which on a pair
-#: is tried: half of what one explains the other could.
+#: Pairs that are exchanged at most, and the partial correlation from which on a pair is tried: the
+#: other could explain half of what one explains.
 MOST_PAIRS, OVERLAP = 6, 0.5
 
 #: Criterion by which another account must be better: nothing worth more than a bare mention.
@@ -29,7 +29,7 @@ BETTER = 2.0
 
 
 def exchanged_causes(regression: Regression) -> Regression:
-    """The account of which no cause is better held out, or replaced by another one.
+    """The account that no removal or replacement of a cause improves.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _better(regression: Regression) -> Regression | None:
         if len(groups) > LOOKED_AT:
             continue
         own = regression.terms[group[0]].cause
-        # What explains anything explains more than any law, and is none.
+        # A flexible cause explains more than any law, and is none.
         others = [
             name for name, effect in EFFECTS.items() if not (name == own or is_flexible(effect))
         ]
@@ -102,10 +102,10 @@ def _better(regression: Regression) -> Regression | None:
 
 
 def _reshaped(regression: Regression) -> Regression:
-    """With causes whose form follows what is with them in the form that they have now.
+    """With causes whose form depends on the other terms in the form that they have now.
 
-    What was chosen, or dropped, since may have represented a part of one: a delay for the constant
-    part of channels that are read one after the other, which leaves their line with another sign.
+    A cause chosen or dropped since may have explained a part of one: a delay explains the constant
+    part of channels that are read one after the other, and their line then has another sign.
     """
     for term in regression.terms:
         if current_deadline().over or not (is_named(term) and EFFECTS[term.cause].form_follows):

@@ -30,8 +30,8 @@ _SHUFFLED = {
 #: Numbers that are no errors, which `ErrorUnit.pair` rounds as well.
 _PLAIN = ErrorUnit("", 1.0)
 
-#: Parameters that state how large a finding is, the first that it has; by how much it is
-#: multiplied, and its unit where that is not the unit of errors.
+#: Parameters that give the size of a finding: the first that it has counts. With each, its factor
+#: and its unit where that is not the unit of errors.
 _SIZED: dict[str, tuple[float, str]] = {
     **{
         f"{name}_arcsec": (1.0, "")

@@ -51,7 +51,7 @@ def findings_of(
         evidence = sum(regression.terms[k].bic_gain for k in group)
         if doubt is None:
             named.append(group)
-            # What sets it apart from the common form was detected after all.
+            # What distinguishes it from the common form was detected after all.
             cause = regression.terms[group[0]].cause
             spots = [spot for spot in spots if not (spot.common and spot.hides(cause))]
             origins[group[0]] = [
@@ -202,7 +202,7 @@ def equal_scatter(item: ScatterFinding) -> Ambiguity | None:
 
 
 def scatter_doubt(item: ScatterFinding, fault: DataFault | None = None) -> Ambiguity:
-    """Scatter about a mean that is itself uncertain, or of readings that a fault made unusable."""
+    """Ambiguity of scatter about an uncertain mean, or of readings that a fault made unusable."""
     because, measure = (
         "the error that the readings show has no certain cause yet, so what scatters about it "
         "has none either",

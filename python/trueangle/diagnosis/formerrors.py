@@ -1,4 +1,4 @@
-"""Form errors: the gain of a cause jointly with what the forms of larger ones leave."""
+"""Form errors: what a cause explains beyond the errors in the forms of larger ones."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .unseenorders import unseen_order_columns
 #: Share of a cause's energy that its form may leave: one known to 3 %.
 FORM = 1e-3
 
-#: Sizes of curves that are tried, in units of those expected; deviance from which on they show.
+#: Sizes of form errors tried, in units of those expected; deviance from which on they show.
 SIZES = np.geomspace(0.03, 10.0, 26).tolist()
 SHOWN = 6.0
 
-#: Share of the strongest combination of curves from which another one counts.
+#: Share of the strongest combination of form errors from which on another one counts.
 DISTINCT = 1e-6
 
 #: Share of the noise below which what a form leaves does not matter.
@@ -28,9 +28,9 @@ SLIGHT = 0.01
 
 
 def form_error_columns(regression: Regression, exempt: Collection[str] = ()) -> Array:
-    """Columns by which the causes found may curve, each with the size that is expected of it.
+    """Form errors of the causes found as columns, each with the size that is expected of it.
 
-    Of causes ``exempt`` none: a further element of a cause is no companion of it.
+    None of the causes ``exempt``: a further element of a cause is not explained by its form error.
     """
     causes: dict[str, list[tuple[Extension, Array]]] = {}
     for term, coefficients in regression.fitted():
@@ -48,7 +48,7 @@ def form_error_columns(regression: Regression, exempt: Collection[str] = ()) -> 
 
 
 def beside_form_errors(regression: Regression, exempt: Collection[str] = ()) -> Regression:
-    """The regression with `form_error_columns`, for scores of others; itself without any."""
+    """The regression with `form_error_columns` fitted too, for scores; itself without any."""
 
     def build() -> Regression | None:
         columns = form_error_columns(regression, exempt)
@@ -60,7 +60,7 @@ def beside_form_errors(regression: Regression, exempt: Collection[str] = ()) -> 
 
 
 def told_from_form_errors(regression: Regression, extension: Extension) -> Extension:
-    """The extension with the evidence that it has together with curves of the other causes."""
+    """The extension with the evidence that it has beyond form errors of the other causes."""
     beside = beside_form_errors(regression, {extension.cause})
     if beside is regression:
         return extension
@@ -71,7 +71,7 @@ def told_from_form_errors(regression: Regression, extension: Extension) -> Exten
 def share_beside_form_errors(
     regression: Regression, beside: Regression, extensions: Sequence[Extension]
 ) -> float:
-    """Share of the deviance of ``extensions`` together that is left together with the curves."""
+    """Share of the joint deviance of ``extensions`` that remains beyond the form errors."""
     saved = []
     effects = [e.run_effect.columns for e in extensions if e.run_effect is not None]
     for each in (regression, beside):
@@ -85,7 +85,7 @@ def share_beside_form_errors(
 def with_form_errors(regression: Regression) -> Regression:
     """The regression with the errors that the forms make in its coefficients.
 
-    Curves B with coefficients ``ξ ~ N(0, κ²)`` shift what is fitted without
+    Form errors B with coefficients ``ξ ~ N(0, κ²)`` shift what is fitted without
     them by ``X⁺ Bξ``. ``κ`` is the one that makes the residual most likely (0
     where it is hardly better than none), and ``ξ`` has its mean and covariance given
     the residual.
@@ -97,7 +97,7 @@ def with_form_errors(regression: Regression) -> Regression:
 def with_unseen_orders(regression: Regression) -> Regression:
     """The same with what orders that were not found may do over an arc (κ = 1).
 
-    They are nearly those that were found, and the residual shows nothing of them.
+    They are nearly collinear with those found, and the residual does not determine them.
     """
     shifts = _shifts(regression, unseen_order_columns(regression), 1.0)
     if shifts is None:
@@ -107,7 +107,7 @@ def with_unseen_orders(regression: Regression) -> Regression:
 
 
 def _shifts(regression: Regression, bends: Array, size: float | None) -> Array | None:
-    """Covariance of what curves of a size, or of the likeliest, shift; None without any."""
+    """Covariance of the shifts by form errors of a size, or of the likeliest; None without any."""
     columns = regression.whiten(bends)
     known = regression.q.T @ columns
     rest = columns - regression.q @ known
@@ -129,8 +129,8 @@ def _shifts(regression: Regression, bends: Array, size: float | None) -> Array |
         return None
     wider = variance + (kappa * s) ** 2
     mean = vt.T @ (kappa**2 * s * moment / wider)
-    # The mean, what the residual shows of the curves, and what it does not: roots, whose products
-    # are no variances below zero.
+    # The mean, what the residual determines of the form errors, and what it does not: as roots,
+    # since their products are no variances below zero.
     told = vt.T * (kappa * np.sqrt(variance / wider))
     untold = kappa * (np.eye(count) - vt.T @ vt)
     roots = regression.back @ known @ np.column_stack([mean, told, untold])

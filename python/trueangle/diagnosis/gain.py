@@ -50,7 +50,7 @@ class Gain(ShownResult):
     interval : (float, float) or None
         95 % of its bootstrap over runs.
     control_share : float or None
-        What is gained with the factor's labels shuffled over runs, of what the finding
+        Gain with the factor's labels shuffled over runs, as a share of what the finding
         subtracts from the same readings: should be at most 0 (given as -1 where it is below).
     note : str
     by_level : LevelGain or None
@@ -87,9 +87,9 @@ class Gain(ShownResult):
 
 
 def _acts_within(regression: Regression, before: Array, after: Array) -> bool:
-    """Whether zeros of the runs make most of an error, and less of what a finding subtracts it.
+    """Whether zeros of the runs make most of an error, and little of what a finding subtracts.
 
-    A pattern is then judged about the zero of each run: no pattern can subtract that.
+    A pattern is then tested about the zero of each run, which no pattern can subtract.
     """
     clean = ~regression.outlying
     whole, taken = (
@@ -100,7 +100,7 @@ def _acts_within(regression: Regression, before: Array, after: Array) -> bool:
 
 
 def _about_zeros(regression: Regression, e: Array) -> Array:
-    """Residuals about the mean of each run, outliers held out of it."""
+    """Residuals about the mean of each run, computed without outliers."""
     found = e.copy()
     for start, stop in regression.bounds:
         used = ~regression.outlying[start:stop]
@@ -109,7 +109,7 @@ def _about_zeros(regression: Regression, e: Array) -> Array:
 
 
 def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> list[Gain] | None:
-    """Gain of every finding (its terms' indices) together with the others, by holding out runs.
+    """Gain of every finding (its terms' indices) in addition to the others, by holding out runs.
 
     In every fold the model is fitted to the other runs alone, and what was searched for
     (orders, lengths, places) is searched there again, for the first `SEARCHED` findings.
@@ -272,7 +272,7 @@ def _units(regression: Regression) -> tuple[NDArray[np.int64], str]:
 def _control(
     regression: Regression, group: Sequence[int], unit: NDArray[np.int64], rng: np.random.Generator
 ) -> float:
-    """Share of what the finding subtracts that it gains with its labels shuffled over runs."""
+    """Gain with the labels shuffled over runs, as a share of what the finding subtracts."""
     cause = regression.terms[group[0]].cause
     rest = regression.with_terms(t for k, t in enumerate(regression.terms) if k not in group)
     y = _within_runs(rest, regression.outlying)
@@ -303,7 +303,7 @@ def _control(
 
 
 def _within_runs(regression: Regression, outlying: NDArray[np.bool_]) -> Array:
-    """The residual of the readings together with the zeros of their runs."""
+    """The residual of the readings less the zeros of their runs."""
     left = regression.left_within_runs
     return np.where(outlying, 0.0, left)
 

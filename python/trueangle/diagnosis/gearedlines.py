@@ -222,7 +222,7 @@ class GearedLines:
         return self.refined(best, common=True, width=step)
 
     def left(self, ratio: float, common: bool) -> float:
-        """Sum of squares left together with the lines: one phase for all runs, or one for each."""
+        """Residual sum of squares of the lines with one phase for all runs, or one for each."""
         columns = np.hstack([line_columns(self.theta, m) for m in sorted(set(self.orders(ratio)))])
         known, error = self._centred(columns), self._error
         left = 0.0
@@ -233,7 +233,7 @@ class GearedLines:
         return left
 
     def keeps_phase(self, ratio: float) -> bool:
-        """Separate phases of each run explain at most what noise does, jointly with one for all."""
+        """Whether separate phases of each run explain no more than noise, beyond one for all."""
         apart = self.left(ratio, common=False)
         more = self.left(ratio, common=True) / max(apart, 1e-300) - 1.0
         extra = 2.0 * len(self.lines) * (len(self.bounds) - 1)

@@ -45,9 +45,9 @@ def find_ratio(geared: GearedLines) -> GearedLinesRatio | None:
     reported.
     """
     believed = geared.sim.joint.gear_ratio
-    # Each line counts alike: where one is assumed another may be, of the wave generator where
-    # the motor's is assumed if the ratio is a tooth less. Next to a large line a small one is
-    # found in any case: the large one shows.
+    # Each line counts equally: at the assumed order of one another may be, as that of the wave
+    # generator at the motor's if the ratio is a tooth less. Next to a large line a small one is
+    # found in any case: the large one decides.
     there = float(np.mean(geared.shares(believed)))
     if there > MISSING and geared.together(believed) > MISSING:
         return None
@@ -101,7 +101,7 @@ def signals_at_ratio(sim: Simulation, signals: Signals, error: Array) -> Signals
     """Signals whose runs start in the turn in which the geared lines have the assumed phase.
 
     Where the ratio is not a whole number the lines come back after several turns of the output
-    only, and a reference that was wrapped does not state in which of them a run began.
+    only, and a reference that was wrapped does not show in which of them a run began.
     """
     turns = _turns_until_back(sim.joint.gear_ratio)
     if turns == 1:

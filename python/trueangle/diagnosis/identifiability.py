@@ -37,7 +37,7 @@ def ambiguity_of_cause(
     cause = extension.cause
     if effect_or_unnamed(cause).is_doubted:
         for spot in spots:
-            # What is detected of a crossing is none of a delay.
+            # A detected crossing is not that of a delay.
             may_be_told = spot.common or "turns_first" in extension.shape
             if spot.hides(cause) and not (
                 may_be_told and effect_or_unnamed(cause).told(extension, regression)
@@ -53,7 +53,7 @@ def open_origins(
     """What else may make an error of this form, in the order of `DOUBTS`."""
     cause = extension.cause
     shared = (spot for spot in spots if spot.common == cause and cause in spot.causes)
-    # What is supported already is listed with another finding.
+    # What is supported already is reported with another finding.
     found = [spot for spot in shared if not spot.supported]
     for doubt in _doubts(extension, regression, spots):
         if doubt.common == cause and doubt not in found:

@@ -58,7 +58,7 @@ class LevelGain:
     levels : list of float
         Every level of the factor in the data.
     held_out : list of float
-        Those that were held out in turn; none where the remainder never shows the cause alone.
+        Those that were held out in turn; none where the others never show the cause alone.
     rms_before, rms_after : float or None
         Arcsec at the levels held out, together.
     reducible_share : float or None
@@ -159,7 +159,7 @@ def gains_by_level(
 ) -> dict[int, LevelGain]:
     """Gain of the findings (by their place) at levels of their factor that were held out.
 
-    Of a factor whose levels were not all tested when the time was up, nothing is reported.
+    Nothing is reported on a factor whose levels were not all tested when the time was up.
     """
     found: dict[int, LevelGain] = {}
     at = current_deadline()
@@ -184,7 +184,7 @@ def gains_by_level(
             able = [k for k in concerned if _is_tested_by(regression, groups[k], test)]
             if not able:
                 continue
-            # Two mounts do not show which way a mount counts: what all show is kept.
+            # Two mounts do not determine the sense of mounts: the sense from all of them is kept.
             after, *before = held_out_residuals(
                 regression, [groups[k] for k in able], test, own_zero, search=factor != "mount"
             )
@@ -228,10 +228,10 @@ def _reach(levels: list[float], held_out: list[float]) -> str:
 
 
 def _is_tested_by(regression: Regression, group: Sequence[int], test: Rows) -> bool:
-    """Leaving some readings out tests the law of a finding.
+    """Whether holding out some readings tests the law of a finding.
 
-    The others distinguish it from all else, and well enough to predict it in those held out; and
-    there it shows.
+    The others must distinguish it from all else, well enough to predict it in those held out, and
+    it must be significant there.
     """
     train = regression.of_rows(~test)
     terms = [rebuilt_term(term, ~test) for term in regression.terms]

@@ -1,4 +1,4 @@
-"""How far two findings of an account are one column together with all the others."""
+"""How far two findings of an account are collinear, given all the others."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..estimation.regression import Regression
 def finding_overlaps(
     regression: Regression, groups: Sequence[Sequence[int]]
 ) -> Iterator[tuple[int, int, float]]:
-    """Correlation of what two findings explain, together with the terms of neither.
+    """Partial correlation of what two findings explain, given the terms of all others.
 
     ::
 
@@ -26,7 +26,7 @@ def finding_overlaps(
     ----------
     regression : Regression
     groups : sequence of sequence of int
-        Terms of each finding. Those sampled anew in every run are held out.
+        Terms of each finding. Those that are new in every run are omitted.
 
     Yields
     ------

@@ -52,7 +52,7 @@ def _exact_terms(regression: Regression) -> list[Extension]:
 def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
     """As `form_misfit`, by how much smaller the readings' scatter has become.
 
-    Correlated noise explains a part of what is not yet explained, and hides it from a likelihood.
+    Correlated noise absorbs a part of what is not yet explained, and hides it from a likelihood.
     """
     exact = _exact_terms(chosen)
     before, after = (
@@ -75,7 +75,7 @@ def deviance_of_form_errors(deviance: float, readings: int) -> float:
 
 def penalty_of(terms: Sequence[Extension], left: float) -> float:
     """Of causes beyond that of their parameters; their forms may leave ``left``."""
-    # A line of a declared shaft is expected, and is at its declared place.
+    # A line of a declared shaft is expected, and its order is declared.
     declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
     effects = [effect_or_unnamed(term.cause) for term in terms]
     separate = [effect for effect in effects if effect.is_separate]
@@ -119,7 +119,7 @@ def net_deviance_lost(regression: Regression, group: Sequence[int]) -> float:
 
 
 def deviance_lost(regression: Regression, group: Sequence[int]) -> float:
-    """Deviance that the terms ``group`` save with all the others (Wald, or without them)."""
+    """Deviance that the terms ``group`` save beyond all others (Wald, or by a fit without them)."""
     if any(regression.terms[k].run_effect is not None for k in group):
         without: float = regression.cache.of_fit(
             ("lost", *group), lambda: regression_without(regression, group).deviance

@@ -1,4 +1,4 @@
-"""The residual of an account, for goodness of fit: the residual, free paths in time."""
+"""The residual of an account for tests of goodness of fit, and free paths in time."""
 
 from __future__ import annotations
 
@@ -92,8 +92,8 @@ def path_evidence(regression: Regression) -> Evidence | None:
 def aside_evidence(regression: Regression) -> Evidence | None:
     """That readings are put aside in rows too long for glitches: these are an error of the mean.
 
-    Of n readings of which a share q is put aside, rows of m and more are ``n q^m`` at random: none.
-    Noise that is correlated goes on for as long as its correlation time.
+    If a share q of n readings is put aside independently, ``n q^m`` rows of m and more are
+    expected: none. Rows in correlated noise last as long as its correlation time.
     """
     rho, aside = regression.whiten.rho, regression.outlying
     memory = int(np.ceil(np.log(FORGOTTEN) / np.log(rho))) if rho > 0.0 else 0
@@ -122,7 +122,7 @@ def remainder_of(
 ) -> Leftover:
     """What a regression leaves: run effects subtracted, outliers put to the level about them.
 
-    Where they last, to the limit.
+    Outliers that last are clipped to the range of the other readings.
 
     Structure without a name is left in it, and so are the terms ``without``; ``loose`` leaves free
     paths in time in it, too.
@@ -139,7 +139,7 @@ def remainder_of(
         for term, taken in zip(regression.terms, kept_in, strict=True)
         if taken and term.run_effect is not None
     ]
-    # Those kept alone: together with ones that are left in, each would take what the other gives.
+    # Only the subtracted ones: jointly with those left in, each would explain the other's part.
     noise = Whitener(regression.bounds, regression.whiten.rho, effects, regression.readings.weights)
     left = left - noise.run_part(left)
     kept = left[~regression.outlying]

@@ -1,4 +1,4 @@
-"""The `Diagnosis`: what was found, the residual, what could not be detected."""
+"""The `Diagnosis`: what was found, what is unexplained, what could not be detected."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ class Diagnosis(DiagnosisData):
     beliefs : list of Belief
         Verdicts on what the simulation already claims.
     data_faults : list of DataFault
-        As `trueangle.check` shows them.
+        As `trueangle.check` reports them.
     notes : list of str
         What else must be known about the account.
     complete : bool
         False where it was ended early: by the time given, or by Ctrl-C.
     simulated : MeasuredMinusSimulated or None
-        The log of another simulator that the simulation is on.
+        The log of another simulator that the simulation adds to.
     runs : list of CalibrationRun
         The readings, as given.
     factors : list of Factor
@@ -78,6 +78,6 @@ class Diagnosis(DiagnosisData):
             Unit of the errors; by itself arcsec, or degrees where errors are that large. A
             number is the counts of a turn.
         verbose : bool
-            Show in full what the readings could not have shown and nobody requested.
+            Also report in full the causes not in question that these readings cannot show.
         """
         return diagnosis_summary(self, errors_in, verbose)

@@ -28,7 +28,7 @@ SAME = 3e-4
 #: Columns whose causes are no ramp in angle, where they make one in these runs.
 RECORDED = {"torque", "temperature", "current", "coupled"}
 
-#: Standard errors by which the size of a cause changes with what another one is confused with.
+#: Standard errors by which the size of a cause changes if another one is exchanged.
 MOVED = 4.0
 
 
@@ -60,9 +60,9 @@ def _accounts(
 def dependence(
     regression: Regression, group: Sequence[int], doubt: Ambiguity, other: Sequence[int]
 ) -> str:
-    """Why a finding ``other`` is none where the causes of an ambiguity are exchanged, or nothing.
+    """Why a finding ``other`` is none if the causes of an ambiguity are exchanged; else empty.
 
-    Its size may be the residual, and another cause of the ambiguity may take its place.
+    It may be only what one cause leaves, and another cause of the ambiguity may explain it.
     """
     cause, own = regression.terms[other[0]].cause, regression.terms[group[0]].cause
     kept = [k for k in range(len(regression.terms)) if k not in group]
@@ -88,7 +88,7 @@ def dependence(
 
 
 def ambiguity_in_doubt(doubt: Ambiguity, regression: Regression, group: Sequence[int]) -> Ambiguity:
-    """An ambiguity of what is detected, with what each of its causes would amount to."""
+    """An ambiguity of what is detected, with the size that each of its causes would have."""
     found = cause_alternatives(regression, group, doubt.causes)
     # Not lines: one that another hides behind is no property of the joint.
     told = (c for c in found if EFFECTS[c].acts_on_runs or is_flexible(EFFECTS[c]))
@@ -152,10 +152,10 @@ def equal_causes(
     """That other causes explain as much as one, where they do; none strongly less.
 
     What contains it or is contained in it is the same cause in another form, and explains for it
-    where noise that follows a misfit makes the simpler form the better one; what explains
-    anything is no cause; a line is what is detected, whatever makes it, and so is a ramp among
-    those that share its form for the design alone (``spots``). What follows a load or a temperature
-    that was recorded is not detected to follow the angle: in motion under others it is no ramp. A
+    where noise that follows a misfit makes the simpler form the better one; a flexible
+    cause is none; a line is what is detected, whatever makes it, and so is a ramp among those that
+    share its form only by the design (``spots``). What follows a recorded load or temperature
+    is not known to follow the angle: in motion under others it is no ramp. A
     step so near an end of its run that the run's own zero explains as much is no step.
     """
     effect = EFFECTS[cause]

@@ -1,8 +1,8 @@
-"""What readings show that were rounded: causes that the rounding itself would show are none.
+"""Causes in rounded readings: those that the rounding itself would imitate are rejected.
 
-On the same positions a sensor that rounds has the same error in every run, by up to half a step,
-and that has orders, follows the direction, and has a period in time. So the causes that were chosen
-are tested again against the steps of the readings (`trueangle.estimation.rounded`), the strongest
+On the same positions a sensor that rounds has the same error in every run, by up to half a step.
+This error has orders, follows the direction, and has a period in time. So the chosen causes are
+tested again against the steps of the readings (`trueangle.estimation.rounded`), the strongest
 first; and the residual is compared with noise as it was before it was rounded.
 """
 

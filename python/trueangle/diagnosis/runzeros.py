@@ -19,7 +19,7 @@ from .goodness.zeros import ZEROS
 from .penalty import NEW_CAUSE, regression_without
 from .selection import acts_on_runs
 
-#: Probability above which what unexplained zeros scatter by may as well have made a cause.
+#: Probability above which the scatter of unexplained zeros may as well have made a cause.
 CHANCE = 0.01
 
 
@@ -29,8 +29,8 @@ def chance_between_runs(
     """Probability that the scatter of the runs' zeros makes what a finding explains between runs.
 
     0 where they do not scatter, and where readings within the runs show the cause; else that of
-    `scatter_chance` times the laws that could have been taken in its place. Where no run is left
-    over to show whether they scatter, 1.
+    `scatter_chance` times the number of laws that could have been chosen instead. 1 where no run
+    remains to show whether they scatter.
     """
     scatter = zeros_scatter(unexplained)
     if not (scatter or _has_no_run_to_spare(regression)):
@@ -63,15 +63,15 @@ def _has_no_run_to_spare(regression: Regression) -> bool:
 
 
 def scatter_chance(regression: Regression, group: Sequence[int]) -> float:
-    """Probability of what a finding explains of the means of runs, by what these scatter with it.
+    """Probability that as much of the runs' means is explained by their residual scatter alone.
 
     ::
 
         m_j = a + Σ_i b_i x̄_ij + u_j,   F = (Δ Σ n_j u_j² / k) / (Σ n_j u_j² / ν)
 
-    m_j are the means of the runs together with the lines, x̄_ij those of the terms that change from
-    run to run, ν the runs less the coefficients. To a cause that changes from run to run alone all
-    readings of a run are one: a delay takes one of four runs.
+    m_j are the means of the runs less the lines, x̄_ij those of the terms that change from
+    run to run, ν the runs less the coefficients. For a cause that changes only from run to run all
+    readings of a run count as one: a delay uses up one of four runs.
     """
     without, told, count = _between(regression, group)
     extra, freedom = told.rank - without.rank, count - told.rank

@@ -78,7 +78,7 @@ def select_causes(
     direct = min([*ahead, direct], key=total_penalty)
     noisy = _under_its_noise(direct)
     if noisy is not direct:
-        # A correlation represents all that a law would explain, once something else was taken.
+        # Once something else was chosen, a correlation absorbs what a law would explain.
         direct = _by_other_paths(regression, direct)
         noisy = _under_its_noise(direct)
         regression = regression.with_terms((), noisy.whiten.rho)
@@ -91,7 +91,7 @@ def select_causes(
     opened = _with_lines_for_bumps(_pruned(_forward(regression, [*EFFECTS, *UNNAMED])))
     if all(map(is_named, opened.terms)):
         return _priced_with_noise(_by_other_paths(regression, direct))
-    # The other paths take long: the first of them determines whether they are accidental.
+    # The other paths take long: the first of them shows whether they may be better.
     chosen = direct
     if not ahead:
         settled = _forward(regression, acts_on_runs(), total_penalty(direct))
@@ -103,14 +103,14 @@ def select_causes(
 
 
 def select_again(regression: Regression, causes: Sequence[str]) -> Regression:
-    """With the best of some causes together with the terms, without what they make superfluous."""
+    """With the best of some causes in addition to the terms, less what they make superfluous."""
     return _pruned(_forward(regression, causes))
 
 
 def _specific_first(regression: Regression) -> list[Regression]:
     """Over a part of a turn: the choice by a path that takes flexible causes last; else none.
 
-    A bump represents several lines there, and a drift, whose search takes longest, for most else.
+    There a bump can imitate several lines, and a drift, whose search takes longest, most else.
     """
     if regression.signals.run_turns().max() >= LocalDefect.flexible_below:
         return []
@@ -122,7 +122,7 @@ def _specific_first(regression: Regression) -> list[Regression]:
 
 
 def _in_form(regression: Regression) -> Regression:
-    """With the forms that causes of whole runs have together with all that was chosen since."""
+    """With the forms that causes of whole runs have given all that was chosen since."""
     for term in regression.terms:
         effect = effect_or_unnamed(term.cause)
         alone = sum(other.cause == term.cause for other in regression.terms) == 1
@@ -137,7 +137,7 @@ def _in_form(regression: Regression) -> Regression:
 
 
 def _beside_repeats(regression: Regression) -> Regression:
-    """With what acts on whole runs, as it shows together with an unknown pattern that repeats."""
+    """With what acts on whole runs, fitted jointly with an unknown pattern that repeats."""
     beyond = regression.without_repeats()
     if beyond is regression:
         return regression
@@ -155,8 +155,8 @@ def _doubtful(regression: Regression) -> bool:
 def _priced_with_noise(regression: Regression) -> Regression:
     """Causes that the noise's own correlation does not pay for are dropped.
 
-    It is estimated together with a flexible pattern; what selection took for it, with drift taken
-    out, is too low for noise that is correlated over many readings, and run means then look
+    It is estimated jointly with a flexible pattern. The correlation used in selection, with drift
+    removed, is too low for noise that is correlated over many readings, and run means then look
     significant. A drift in time competes with correlation alone.
     """
     return _without_misfits(_under_its_noise(regression))
@@ -165,8 +165,8 @@ def _priced_with_noise(regression: Regression) -> Regression:
 def _under_its_noise(regression: Regression) -> Regression:
     """Under the correlation by restricted likelihood, where that explains more; else itself.
 
-    What a path finds under too low a correlation, it finds in noise: this is tested at the end of
-    a first one, before others take long, and of an account that was ended early, too.
+    Under too low a correlation a path finds causes in noise. This is tested at the end of the
+    first path, before the slow others, and for an account that was ended early, too.
     """
     noise = estimate_noise(remainder_of(regression))
     tried = [regression]
@@ -176,7 +176,7 @@ def _under_its_noise(regression: Regression) -> Regression:
     if len(plain) < len(regression.terms):
         rest = regression.with_terms(plain)
         noise = estimate_noise(remainder_of(rest))
-        # Together with a mean of each run of its own, which show of the correlation too.
+        # Each run's own mean is fitted too, so a larger correlation is possible as well.
         trials = [noise.correlation + k * noise.std for k in range(1 + WITHIN)]
         tried += [
             _pruned(rest.with_terms(plain, rho)) for rho in trials if 0.0 < rho < MOST_CORRELATED
@@ -185,7 +185,7 @@ def _under_its_noise(regression: Regression) -> Regression:
 
 
 def _takes_up(term: Extension) -> bool:
-    """It follows what correlated noise does: sampled anew in every run, or flexible."""
+    """Whether it can follow correlated noise: random in every run, or flexible."""
     return term.run_effect is not None or is_flexible(effect_or_unnamed(term.cause))
 
 
@@ -194,17 +194,17 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
 
     Where forward selection with every candidate takes a flexible cause (which can
     imitate any effect of a run) or, over a part of a turn, a bump, further paths take
-    those only after the specific ones had their state, without and with a zero of each
-    run's own (or with what acts on whole runs together with an error that repeats at the same
+    those only after the specific ones were tried, without and with a separate zero of each
+    run (or with what acts on whole runs, fitted jointly with an error that repeats at the same
     angle, or with the lines of shafts that the joint declares). All are pruned
     backward; the best by BIC is kept.
     """
     if current_deadline().over:
         return direct
-    # What a flexible one was dropped from since was chosen with it, too.
+    # The causes chosen jointly with a flexible one that was dropped since count, too.
     grown = _forward(regression, list(EFFECTS))
     found = {term.cause for term in (*direct.terms, *grown.terms)}
-    # Over a part of a turn a bump, too, can represent several lines at once: lines first.
+    # Over a part of a turn a bump, too, can imitate several lines at once: lines first.
     travel = regression.signals.run_turns().max()
     if not any(travel < effect_or_unnamed(cause).flexible_below for cause in found):
         return direct
@@ -223,14 +223,14 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
         starts.append(declared)
     paths = [_pruned(_forward(_forward(s, specific, goal), list(EFFECTS))) for s in starts]
     if declared is not regression:
-        # Together with the declared lines what drifts is a drift, not what else curves as slowly.
+        # With the declared lines fitted, a drift does not imitate other slow curves.
         flexible = [cause for cause, effect in EFFECTS.items() if is_flexible(effect)]
         paths.append(_pruned(_forward(_forward(declared, flexible), list(EFFECTS))))
     return _made_specific(min([direct, *paths], key=total_penalty))
 
 
 def _with_lines_for_bumps(regression: Regression) -> Regression:
-    """With lines in place of bumps where these explain more: a wide bump represents several.
+    """With lines in place of bumps where lines explain more: a wide bump imitates several.
 
     One after the other each line saves less than a bump that imitates all of them at once.
     """
@@ -249,7 +249,7 @@ def _with_lines_for_bumps(regression: Regression) -> Regression:
 def _with_declared_lines(regression: Regression) -> Regression:
     """With the lines of the shafts that the joint declares, before a drift may take them.
 
-    What a random walk is fitted jointly with it leaves alone; those without evidence are pruned.
+    A random walk fitted jointly does not explain them; those without evidence are pruned.
     """
     joint = regression.around.joint
     known = {shaft.name for shaft in joint.declared}
@@ -263,7 +263,7 @@ def _made_specific(regression: Regression) -> Regression:
     """With a specific cause in place of a flexible one where that explains more.
 
     What the form of a law leaves, the flexible one explains in its place: this counts in the
-    evidence, and no allowance for it is charged together with.
+    evidence, and no additional allowance for it is charged.
     """
     for term in [t for t in regression.terms if is_flexible(effect_or_unnamed(t.cause))]:
         left = form_misfit(regression)
@@ -284,7 +284,7 @@ def _made_specific(regression: Regression) -> Regression:
 
 
 def _forward(regression: Regression, causes: Sequence[str], goal: float = np.inf) -> Regression:
-    """With the best cause after the other, as long as the evidence increases.
+    """With the best cause added, again and again, as long as the evidence increases.
 
     Where these alone cannot come down to a penalty of ``goal``, the walk ends early.
     """
@@ -316,7 +316,7 @@ def _grown(regression: Regression, causes: Sequence[str], goal: float) -> Regres
 
 
 def _without_misfits(regression: Regression) -> Regression:
-    """Without causes that curves of the others explain as well, the weakest first.
+    """Without causes that form errors of the others explain as well, the weakest first.
 
     They may have been chosen when the others were not known, or not in their form.
     """
@@ -387,7 +387,7 @@ def _plainest(regression: Regression) -> Regression:
 def _droppable(regression: Regression) -> list[list[int]]:
     """What may be dropped at once: a term, or all of a cause.
 
-    Each element of a cause may justify its own parameters, and the cause not its form.
+    Each element of a cause may justify its parameters, but the whole cause not its form.
     """
     whole = [group for group in finding_groups(regression.terms) if len(group) > 1]
     return [[k] for k in range(len(regression.terms))] + whole

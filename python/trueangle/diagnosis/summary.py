@@ -27,7 +27,7 @@ def diagnosis_summary(
 ) -> str:
     """The account of a diagnosis: what is wrong, why, the evidence, the gain, what is open.
 
-    ``verbose`` shows in full what the readings could not have shown, and nobody requested.
+    ``verbose`` also reports in full the causes not in question that these readings cannot show.
     """
     d = diagnosis.discrepancy
     unit = error_unit(errors_in, sine_of_rms(d.rms))
@@ -87,7 +87,7 @@ def _if_it_is(spot: Ambiguity, unit: ErrorUnit) -> Iterator[str]:
 
 
 def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
-    """What a reader must know first: faults, what is not understood, what is detected or wrong."""
+    """What a reader must know first: faults, what is not understood, what is found or wrong."""
     lines: list[str] = []
     for note in diagnosis.notes:
         lines += _wrapped(f"{note}.", 2)
@@ -178,11 +178,11 @@ def _chance(p: float) -> str:
 
 
 def _ambiguity_matters(spot: Ambiguity, diagnosis: DiagnosisData) -> bool:
-    """Something is detected, or one of the causes is assumed or found with it."""
+    """Whether something is detected, or one of the causes is assumed or was found."""
     asked = {effect.kind for effect in diagnosis.extended.effects}
     asked |= {belief.what for belief in diagnosis.beliefs}
     asked |= {finding.cause for finding in diagnosis.findings}
-    # A line with it is no reason to speak of all that may make one.
+    # A line alone is no reason to list all causes that may make one.
     return spot.supported or bool(set(spot.causes) & (asked - {MissingOrder.kind}))
 
 
@@ -191,7 +191,7 @@ def _ambiguity_entries(
 ) -> Iterator[Entry]:
     """Entries on what cannot be determined, what is detected first.
 
-    What was not tested, and is not detected either, is named in one line, but where ``verbose``.
+    Causes neither in question nor detected are named in one line, unless ``verbose``.
     ``sizes`` gives what each cause of a blind spot would amount to.
     """
     plan = diagnosis.next_runs

@@ -1,11 +1,11 @@
 """Forms that the noise follows: those that explain it equally well are reported together.
 
 Noise may follow the speed as ``exp(a + b |v|)`` (friction, which has no law) or as the square
-``a + b v²`` (time stamps that scatter), together with what follows the angle and the load, which
-may represent either. Neither form holds the other. So every account, with and without what is not
-the speed, with either form or none, has its likelihood and its penalty; and each part of the best
-account is compared with the best account in which another cause is in its place. Runs at two
-speeds determine one number of either form: readings between the two speeds do not select one.
+``a + b v²`` (time stamps that scatter), in addition to noise that follows the angle and the
+load, which may imitate either. Neither form contains the other. So every account, with and without
+what is not the speed, with either form or none, has its likelihood and its penalty. Each part of
+the best account is compared with the best account in which another cause is in its place. Runs at
+two speeds determine one number of either form: readings between the speeds do not select one.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def _parts(
     def is_instead(one: _NoiseAccount) -> bool:
         if one.is_even or (one.form == JITTER) == is_jitter:
             return False
-        # Together with the same angles the speed would come as well, not in the place of anything.
+        # With the same angles the speed would be added, not exchanged for anything.
         return bool(best.form) or one.blocks != best.blocks
 
     gap, rival = gain_over(is_instead)

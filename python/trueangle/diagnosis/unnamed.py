@@ -31,7 +31,7 @@ BANDS = (4, 8)
 #: Orders of a pattern that every run draws anew.
 OWN_ORDERS = (4, 10)
 
-#: Channels together with the direction.
+#: Channels in addition to the direction.
 CHANNELS = ("speed", "temperature", "torque", "load")
 
 #: False-alarm probability of a line in time from which on it is offered.
@@ -155,7 +155,7 @@ class UnnamedLine(Effect):
 
     @staticmethod
     def _own_orders(regression: Regression, top: int) -> Extension:
-        """Orders of the angle, with those that all runs have in common: these have names."""
+        """Orders of the angle in single runs, beyond those of all runs, which have names."""
         theta = regression.signals.theta
         columns = np.hstack([line_columns(theta, m) for m in range(1, top + 1)])
         return regression.jointly_with(columns).propose_run_effect(

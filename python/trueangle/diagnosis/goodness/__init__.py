@@ -1,6 +1,6 @@
 """How well an account fits, by tests that need no name.
 
-The residual of the readings is tested whether it is noise: at the same place, in either
+Tests show whether the residual of the readings is noise: at the same place, in either
 direction, from run to run, in time. Each test has a p value that holds for noise that is
 correlated, heavy-tailed or uneven, search included; none knows a cause.
 """

@@ -22,7 +22,7 @@ from .evidence import Evidence, drawn_signs, largest_of, made_even
 from .leftover import Leftover
 from .place import ModulatedSums, unit_sums
 
-#: What the tests state that something looks like.
+#: Form that the tests report.
 AFTER_REVERSALS = "relaxes after reversals"
 AFTER_START = "relaxes after the start of a run"
 
@@ -34,7 +34,7 @@ LEAST_READINGS = 12
 
 
 def reversal_test(left: Leftover) -> Evidence | None:
-    """What relaxes in time after each reversal, equally or by direction."""
+    """Test for an error that relaxes after each reversal, the same or by direction."""
     cuts = np.flatnonzero((np.diff(left.direction) != 0.0) & (np.diff(left.run) == 0)) + 1
     first = {start for start, _ in left.bounds}
     edges = sorted({*first, len(left), *cuts.tolist()})
@@ -45,7 +45,7 @@ def reversal_test(left: Leftover) -> Evidence | None:
 
 
 def start_test(left: Leftover) -> Evidence | None:
-    """What relaxes in time from the start of every run, equally in all."""
+    """Test for an error that relaxes from the start of every run, the same in all."""
     long = [(a, b) for a, b in left.bounds if b - a >= LEAST_READINGS]
     return _relaxing(left, long, "from the start of the runs", AFTER_START, both=False)
 

@@ -1,4 +1,4 @@
-"""One test of a goodness of fit; p values of the largest of many, made even, by sampled signs."""
+"""One test of goodness of fit; p values of the largest of many, made uniform by random signs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DRAWS, ENOUGH_UNITS = 32, 6
 
 @dataclass(frozen=True)
 class Evidence:
-    """What one test states.
+    """Result of one test.
 
     Attributes
     ----------
@@ -81,10 +81,10 @@ def drawn_signs(units: int) -> NDArray[np.float64]:
 
 
 def made_even(p: float, drawn: Sequence[float]) -> float:
-    """A p value of a search, even under noise, by those of the same search with signs sampled.
+    """A p value of a search, uniform under noise, by the same search with random signs.
 
     Trials depend on each other: the smallest of them has ``x = - ln(1 - p)`` exponentially
-    distributed with a rate that B draws show, so that the probability of less is
+    distributed with a rate that B draws estimate, so that the probability of less is
 
     ::
 

@@ -1,7 +1,7 @@
-"""The noise of one reading and its correlation, together with whatever pattern there may be.
+"""The noise of one reading and its correlation, whatever pattern there may be.
 
-Residuals of a fitted account show too little of the correlation: what repeats at a place looks
-like it, and what the fit takes away lowers it. Here the readings of each run are
+Residuals of a fitted account misstate the correlation: what repeats at a place looks
+like it, and what the fit removes lowers it. Here the readings of each run are
 
 ::
 
@@ -153,7 +153,7 @@ def _without_spikes(e: Array, bounds: list[tuple[int, int]]) -> Array:
         for ends, shift in zip(zip(*bounds, strict=True), (0, 1), strict=True)
     )
     before, after = np.roll(e, 1), np.roll(e, -1)
-    # At either end of a run the one neighbour: another run has a separate zero.
+    # At either end of a run its only neighbour: another run has another zero.
     before[first] = e[np.minimum(first + 1, last)]
     after[last] = e[np.maximum(last - 1, first)]
     beside = 0.5 * (before + after)
@@ -212,7 +212,7 @@ class _Sums:
         self.runs, self.n = columns.runs, e.size
         inner = e.copy()
         inner[ends] = 0.0
-        # What is together with a reading in its run.
+        # The neighbours of a reading in its run.
         beside = np.zeros_like(e)
         beside[1:] = e[:-1]
         beside[:-1] += e[1:]
@@ -251,7 +251,7 @@ class _Sums:
 
 
 def _bordered(gram: Array, x: Array, mapped: Array, e: Array) -> Array:
-    """Products of columns with one more column with them, as the noise ``mapped`` it."""
+    """Products of columns and of one more, which the noise maps to ``mapped``."""
     whole = np.empty((gram.shape[0] + 1, gram.shape[1] + 1))
     whole[:-1, :-1] = gram
     whole[-1, :-1] = whole[:-1, -1] = mapped @ x
@@ -262,8 +262,8 @@ def _bordered(gram: Array, x: Array, mapped: Array, e: Array) -> Array:
 def _independent(x: Array) -> Array:
     """Columns of length 1 at right angles that span the same; without those that hardly differ.
 
-    Over a part of a turn orders are nearly collinear, and the residual of their difference would
-    be the rounding of the determinant.
+    Over a part of a turn orders are nearly collinear, and their difference would be the
+    rounding of the determinant.
     """
     if not x.shape[1]:
         return x

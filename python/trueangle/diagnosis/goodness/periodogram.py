@@ -40,8 +40,8 @@ CELLS = 4.0
 #: Resolution cells that make the level, to each side; lowest frequency, in cells.
 LEVEL_CELLS, LOWEST = 48, 5
 
-#: Cells of a block that its level is worth: a median shows half of what a mean does, three
-#: neighbours share.
+#: Cells of information in the level of a block: a median has half that of a mean, and three
+#: neighbours share it.
 SHARED = 1.2
 
 #: Independent frequencies per resolution cell, for the maximum of a line's power.
@@ -73,7 +73,7 @@ class _Periodogram:
     peak : float
         The most significant frequency.
     width : int
-        Resolution cells that it explains.
+        Its width in resolution cells.
     statistic : float
         Power there.
     amplitude : float
@@ -101,7 +101,7 @@ def periodogram(
     top: float | None = None,
     correlation: float = 0.0,
 ) -> _Periodogram | None:
-    """Periodogram of ``values`` along ``axis``, phases of the runs held out.
+    """Periodogram of ``values`` along ``axis``, whatever the phases of the runs.
 
     Parameters
     ----------
@@ -144,8 +144,7 @@ def periodogram(
     total = np.zeros((len(WIDTHS), last))
     known = np.zeros(last)
     freedom = np.zeros(len(WIDTHS))
-    # The amplitude of a line near the highest frequency needs those beyond it,
-    # too.
+    # The amplitude of a line near the highest frequency needs those beyond it, too.
     raw = np.zeros(min(last + boxes[-1], frequency.size))
     for (a, b), span, fold in zip(kept, spans, folds, strict=True):
         place = ((axis[a:b] - axis[a:b].min()) / cell + 0.5).astype(np.int64)
@@ -208,7 +207,7 @@ def _power(place: NDArray[np.int64], values: Array, size: int) -> Array:
 
 
 def _whitened(e: Array, correlation: float) -> Array:
-    """Readings of a run less what the one before shows of each."""
+    """Readings of a run less the prediction by the one before."""
     if not correlation:
         return e
     out = e * np.sqrt(1.0 - correlation**2)
@@ -233,13 +232,13 @@ def _beyond(
 ) -> Array:
     """Means of relative power over ``boxes``, the level that of the folded frequency.
 
-    Where that lies below the lowest frequency that is looked at the mean of noise is.
+    Where that is below the lowest frequency searched, the mean of noise is used.
     """
     told = power[: cuts[-1]].copy()
     _core.add_relative_power(told, cuts, [(1, 1.0)], np.zeros((1, 1)))
     level = power[: cuts[-1]] / np.where(told > 0.0, told, 1.0)
     level = level[np.minimum(place, cuts[-1] - 1)]
-    # Where no level can be determined (readings without noise) there is nothing to be significant.
+    # Without a level (readings without noise) nothing can be significant.
     relative = np.divide(power, level, out=np.ones_like(power), where=level > 1e-300 * power)
     relative[place < first] = 1.0
     total = np.concatenate([[0.0], np.cumsum(relative)])

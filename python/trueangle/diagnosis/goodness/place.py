@@ -1,4 +1,4 @@
-"""What comes back at the same place: constant, or modulated by direction, speed or load; unit sums.
+"""Errors that return at the same place, constant or modulated by direction, speed or load.
 
 Each unit u (a run, or a piece of one of few runs) gives one complex sum per order m,
 
@@ -6,7 +6,7 @@ Each unit u (a run, or a piece of one of few runs) gives one complex sum per ord
 
     z_um = Σ_{t in u} g_t e_t exp(-i m θ_t),    w_um = z_um / s_um,
 
-with a modulator g (1, direction, speed...) and s the level of the unit's own spectrum about
+with a modulator g (1, direction, speed and others) and s the level of the unit's own spectrum about
 m, so that neither correlation nor unequal noise matters. What is bound to place adds up over
 units, noise does not:
 
@@ -15,9 +15,9 @@ units, noise does not:
     T_m = |Σ_u w_um|² / U ~ Exp(1),
     |Σ_u w_um|² / (U Σ_u |w_um|²) ~ Beta(1, U - 1).
 
-The second holds whatever the spectrum's shape, the first where a few units are equal at
-random; the larger p of the two counts. Orders one by one and the lowest 4, 8, 16... together
-are tried, which the p value includes.
+The second holds whatever the spectrum's shape, the first where a few units agree by
+accident; the larger p of the two counts. Orders are tried one by one, and the lowest 4, 8, 16
+and so on together, which the p value includes.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ Complex = NDArray[np.complex128]
 #: Orders tested unless more are requested.
 LEAST_ORDERS = 64
 
-#: Orders to each side that make the level of a unit's spectrum; times units at least this many.
+#: Orders to each side that make the level of a unit's spectrum; least number over all units.
 HALF_WINDOW, POOLED = 4, 40
 
 #: Widths of bands of the lowest orders.
@@ -52,7 +52,7 @@ ROUNDED = 1e-9
 #: Share of a modulator's power from which on it changes within runs.
 MOVES = 1e-3
 
-#: Factors that are not requested by direction too.
+#: Factors that are not tested by direction too.
 ALONE = ("time in the run", "sign of the torque")
 
 #: Spread of a factor, in shares of its size, from which on it counts as changing.
@@ -161,14 +161,14 @@ def _judged(
     count, n_units = z.shape
     half = max(HALF_WINDOW, -(-POOLED // (2 * n_units)))
     level = np.sqrt(np.maximum(_level(np.abs(z) ** 2, half), 1e-300))
-    level = np.maximum(level, ROUNDED * level.max())  # a unit of rounding alone shows nothing
+    level = np.maximum(level, ROUNDED * level.max())  # a unit of rounding alone has no information
     w = np.sqrt(sizes / sizes.mean()) * z / level
     alone = None if modulator.name == "place" else unit_sums(modulator.values, left, units)
     p, statistic, band, k, logs = _smallest(w, alone, np.ones(n_units))
-    # Trials depend on each other: how much, the same search with signs at random shows.
+    # Trials depend on each other: the same search with random signs shows how much.
     p = made_even(p, [_smallest(w, alone, signs)[0] for signs in drawn_signs(n_units)])
     size = 0.0 if alone is None else alone.size
-    # Power of a line beyond what its units add up to at random.
+    # Power of a line beyond the expected sum of its units with random phases.
     whole = max(float((modulator.values**2).sum()), 1e-300)
     excess = np.abs(z.sum(axis=1)) ** 2 - (np.abs(z) ** 2).sum(axis=1)
     power = 2.0 * np.maximum(excess, 0.0) / whole**2

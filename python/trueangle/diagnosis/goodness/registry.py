@@ -17,7 +17,7 @@ from .zeros import run_test
 
 @dataclass(frozen=True, eq=False)
 class TestedResidual:
-    """What the tests test.
+    """The residual that is tested.
 
     Attributes
     ----------

@@ -8,8 +8,8 @@ changes over between them has few large ones: their kurtosis
 
     b₂ = mean(d⁴) / (mean(d²)²)
 
-is above three, which is judged as Anscombe and Glynn (1983) do, with this many increments as are
-independent. Every run is taken in units of its own scatter, which lowers the kurtosis of m
+is above three, which is tested as Anscombe and Glynn (1983) do, with the number of independent
+increments. Every run is taken in units of its own scatter, which lowers the kurtosis of m
 increments by ``m/(m + 2)``.
 """
 
@@ -23,7 +23,7 @@ from .evidence import Evidence
 from .leftover import Leftover
 from .scatter import normal_kurtosis
 
-#: What the test states that something looks like.
+#: Form that the test reports.
 STEPS = "steps between levels"
 
 #: Readings of a block, and blocks that a run must have.
@@ -36,7 +36,7 @@ LEAST_INCREMENTS, SHARED = 40, 1.125
 #: 0.15 was the most in noise of which neighbours share 0 to 0.99.
 ALLOWED = 0.2
 
-#: Standard deviations of increments from which on one is a step, for what is reported.
+#: Standard deviations of increments from which on one is reported as a step.
 STEP = 4.0
 
 
@@ -52,7 +52,7 @@ def steps_test(left: Leftover) -> Evidence | None:
         spread = float(np.sqrt(np.mean(d**2)))
         if spread > 0.0:
             parts.append(d / spread)
-            # For what is reported: beyond the noise of its own run.
+            # Reported as steps: those beyond the noise of their own run.
             large.append(d[np.abs(d) > STEP * 1.4826 * float(np.median(np.abs(d)))])
             shared = float(np.mean(d[1:] * d[:-1])) / spread**2
             known = d.size / (1.0 + 2.0 * shared**2)

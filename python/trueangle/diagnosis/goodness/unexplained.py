@@ -21,8 +21,8 @@ FREE_PATH = "a free path in time"
 #: Probability with which noise alone may be called unexplained, all deciding tests together.
 LEVEL = 0.01
 
-#: Probabilities below this are sure alike, and those that differ by less than this share are one:
-#: sums that are put together another way give the same order of tests.
+#: Probabilities below this count as equal, and so do those that differ by less than this share:
+#: sums in another sequence of operations give the same order of tests.
 SURE = 1e-9
 ROUNDING = 1e-7
 
@@ -45,7 +45,7 @@ class Unexplained(ShownResult):
     evidence : list of Evidence
         Every test, the firing ones first.
     noise : Noise
-        Together with a flexible pattern.
+        Estimated jointly with a flexible pattern.
     """
 
     found: bool
@@ -134,14 +134,14 @@ def goodness_of_fit(
     deciding += [item for item in (path, aside) if item is not None]
     describing = scatter_tests(left, noise, sigma)
     firing = _firing(deciding)
-    # Sure is sure: of those far beyond doubt the narrower account comes first, and of a line
+    # Of tests that are all certain the narrower account comes first, and of a line
     # in angle or in time the more significant one.
     rank = {id(item): float(k) for k, item in enumerate(deciding)}
     lines = [item for item in deciding if item.test in ("place within runs", "time periodogram")]
     if len(lines) == 2 and lines[1].statistic > lines[0].statistic * (1.0 + ROUNDING):
         rank[id(lines[1])] = rank[id(lines[0])] - 0.5
     deciding.sort(key=lambda item: (round(np.log(max(item.p, SURE)) / ROUNDING), rank[id(item)]))
-    # A free path has no name either: what it follows is a part of the residual.
+    # A free path has no name either: what it explains counts as residual.
     variance = float(np.var((left if loose is None else loose).residual))
     power = min(max((item.rms**2 for item in firing), default=0.0), variance)
     return Unexplained(

@@ -59,7 +59,7 @@ def run_test(left: Leftover, noise: Noise) -> Evidence | None:
     between = float(weights @ m**2)
     runs = len(bounds)
     rho = noise.correlation
-    # Squares of correlated readings show the variance by this many independent ones.
+    # Number of independent readings with as much information about the variance.
     freedom = max(noise.freedom * (1.0 - rho) / (1.0 + rho) / 2.0, 1.0)
     statistic = between / (runs - 1)
     p = f_tail(statistic, runs - 1, freedom)
