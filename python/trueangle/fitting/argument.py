@@ -19,7 +19,7 @@ from .problem import Problem
 AnyArgument: TypeAlias = Literal["auto", "reference", "indicated"]
 ARGUMENTS: tuple[AnyArgument, ...] = ("auto", "reference", "indicated")
 
-#: Zeros of the runs closer than this part of a turn (0.2 deg) move no order worth asking.
+#: Zeros of the runs closer than this part of a turn (0.2 deg) shift no order enough to matter.
 _MOVED: Final = 1.0 / 1800.0
 
 #: Readings and runs looked at, and orders where none are named.
@@ -27,8 +27,8 @@ _LOOKED_AT: Final = 32_768
 _MOST_RUNS: Final = 256
 _LOW_ORDERS: Final = tuple(range(1, 9))
 
-#: The indicated angle is taken where a common pattern explains this many times the energy
-#: there, and this many noise variances more: far beyond what probability does with 8 orders.
+#: The indicated angle is taken where a common pattern explains `_MORE` times the energy
+#: there, and `_DECISIVE` noise variances more: far beyond what noise does with 8 orders.
 _MORE: Final = 1.05
 _DECISIVE: Final = 60.0
 
@@ -48,7 +48,7 @@ def choose_argument(
     argument: AnyArgument,
     shafts: Sequence[ShaftOrders] | None = None,
 ) -> ArgumentChoice:
-    """The angle requested; of ``"auto"`` the true one, unless its zero is new in every run.
+    """The angle requested; for ``"auto"`` the true one, unless its zero is new in every run.
 
     Where a rig homes its reference anew for every run, the same place of the joint has
     another reference angle each time, and no order repeats in it. The joint's own reading

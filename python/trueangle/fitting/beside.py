@@ -26,7 +26,7 @@ from .problem import PlainSolution, Problem, SolvedProblem
 if TYPE_CHECKING:
     from .nuisance import Nuisance
 
-#: Size of what runs share, together with columns of size 1: no penalty on the pattern holds it.
+#: Size of the columns that runs share, those of the pattern being 1: no penalty restrains them.
 _FREE: Final = 100.0
 
 

@@ -22,7 +22,7 @@ _MOST_CLUSTERS: Final = 128
 #: Runs from which whole runs are the clusters.
 FEWEST_RUNS: Final = 3
 
-#: Runs from which they show by themselves how coefficients scatter.
+#: Fewest runs that show by themselves how coefficients scatter.
 ENOUGH_RUNS: Final = 8
 #: Share of white noise's variances below which runs are copies, or their residual a pattern.
 _COPIES: Final = 0.01
@@ -30,16 +30,15 @@ _COPIES: Final = 0.01
 #: Readings in a row whose correlation is looked at.
 _LOOKED_AT: Final = 65_536
 
-#: Correlation counts from this many of its standard errors; white noise shows it once in 1000.
+#: Standard errors from which a correlation counts; white noise reaches it once in 1000.
 _FOUND: Final = 3.1
-#: Probability of the scatter between runs from which it is not that of white noise.
+#: p-value of the scatter between runs below which it is not that of white noise.
 SCATTER: Final = 1e-3
 
 #: Readings in a row that are averaged when slow correlation is looked for.
 _STRETCHES: Final = (8, 64)
 
-#: A segment of readings counts as independent when it is this many times as long as their
-#: correlation time.
+#: Segments count as independent from this length on, in correlation times of the readings.
 _LONG: Final = 8.0
 #: Segments of a run, most and fewest.
 _MOST_STRETCHES: Final = 64
@@ -54,14 +53,14 @@ def coefficients_of(fitted: SolvedProblem) -> Array:
 
 
 def weight_sum(weights: Array | None, size: int) -> float:
-    """Sum of the weights of this many readings."""
+    """Sum of the weights of ``size`` readings."""
     return float(size) if weights is None else float(weights.sum())
 
 
 def clusters_of(
     problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], index: int, count: int
 ) -> list[NormalEquations]:
-    """Sums of a run in n segments of readings in a row, about the run's mean and the fit."""
+    """Sums of a run in ``count`` consecutive segments, about the run's mean and the fit."""
     sums = problem.products(weights, index, count)
     whole = np.sum(sums, axis=0)
     mean, found = whole[0] / whole[0, 0], coefficients_of(fitted)
@@ -71,7 +70,7 @@ def clusters_of(
 
 
 def runs_together(clusters: list[NormalEquations]) -> list[NormalEquations]:
-    """At most this many clusters: further runs are dealt to the first ones."""
+    """At most `_MOST_CLUSTERS` clusters: further runs are added to the first ones in turn."""
     if len(clusters) <= _MOST_CLUSTERS:
         return clusters
     return [total(clusters[i::_MOST_CLUSTERS]) for i in range(_MOST_CLUSTERS)]
@@ -152,8 +151,8 @@ def scatter_between(
 def white_variance_share(between: tuple[float, float] | None, runs: int) -> float:
     """Part of white noise's variances that many runs show; 1 where they show no less.
 
-    The residual holds more than what moves the coefficients where it is no white noise but, for
-    example, one fast line in the time: then the runs repeat better than their residual lets expect.
+    The residual contains more than what moves the coefficients if it is not white, for example
+    one fast line in time: the runs then repeat better than the residual suggests.
     """
     if between is None or runs < ENOUGH_RUNS:
         return 1.0
@@ -191,7 +190,7 @@ def residual_memory(
 
 
 def _of_neighbours(parts: list[Array], power: float, white: float) -> float:
-    """Correlation time of noise that decays by the same share per reading.
+    """Correlation time, in readings, of noise that decays by a fixed factor per reading.
 
     The correlation of neighbours in few residuals is off by what the fit took from them, as that
     of ``white`` noise is, and that of readings further apart is lost in it.

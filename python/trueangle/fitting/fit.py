@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from .summed import SummedReadings
 
 #: Rounding of angles around a whole turn, in parts of a turn: smaller deviations are
-#: never rejected as outliers.
+#: never treated as outliers.
 ROUNDING = 1e-12
 
 
@@ -99,7 +99,7 @@ def fit(
         right for any correlation within them; ``"hac"``: by segments of readings, right
         where the correlation dies out. ``"auto"``: white unless the residuals correlate in
         time or the runs scatter by more, then clusters (three runs and more) or segments; eight
-        runs and more that scatter by less show the noise by that. The notes report it. Intervals:
+        runs and more that scatter by less give the noise by that scatter; see the notes. Intervals:
         `FitResult.interval`.
     nuisance : {"none", "auto"} or iterable of str
         What is fitted jointly with the pattern and kept out of the model (`FitResult.nuisance`):
@@ -117,11 +117,11 @@ def fit(
         numbers, at most 2^17 to a turn). By default the fastest that keeps QR's accuracy.
     threads : int, optional
     prior : Fleet, optional
-        Units of the same design (`trueangle.fleet`): the coefficients are sampled to theirs as far
+        Units of the same design (`trueangle.fleet`): the coefficients are drawn to theirs as far
         as the readings leave them open, so that ten readings may do. Without ``orders`` those of
-        the fleet are fitted. Standard errors and intervals hold what the prior may take, and a note
-        states how much is the unit's own. Goes with no ``ridge``, ``nuisance``, ``covariance`` or
-        loss but the usual ones.
+        the fleet are fitted. Standard errors and intervals include the bias of the prior, and a
+        note states how much is the unit's own. Requires the default ``ridge``, ``nuisance`` and
+        ``covariance``, and the loss ``"auto"`` or ``"linear"``.
     **reading
         ``signals``, ``period``, ``by`` ... of files and tables, as in `trueangle.read_runs`.
 
@@ -217,9 +217,9 @@ def fitted_to(
     evidence: OrderSelection | None = None,
     candidates: Iterable[float] | None = None,
 ) -> FitResult:
-    """As `fit`; with ``summed`` of all readings of which the runs are some.
+    """As `fit`; with ``summed`` of all readings, of which the runs are a sample.
 
-    ``evidence`` represents a selection of orders among ``candidates`` that was made before.
+    ``evidence`` is a selection of orders among ``candidates`` that was made before.
     """
     check_choice("argument", argument, ARGUMENTS)
     check_covariance(covariance, len(found))

@@ -46,7 +46,7 @@ class FitData(PlainResult):
 
     @property
     def weights(self) -> list[Array] | None:
-        """Weights that a robust loss ended with; 0 marks readings rejected as outlying."""
+        """Weights that a robust loss ended with; 0 marks readings rejected as outliers."""
         return self.weighted.weights
 
     @property

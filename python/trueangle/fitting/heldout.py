@@ -1,4 +1,4 @@
-"""What a fit gains on readings that took no part in it: runs or folds of them omitted in turn."""
+"""What a fit gains on readings that took no part in it: runs or folds of them held out in turn."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def in_order(found: Sequence[HeldOutRun], runs: Sequence[CalibrationRun]) -> tup
 
 
 def folds(count: int, most: int) -> list[list[int]]:
-    """Places of the runs that are omitted together, at most ``most`` parts."""
+    """Places of the runs that are held out together, at most ``most`` parts."""
     folds = min(count, most)
     return [list(range(start, count, folds)) for start in range(folds)]
 
@@ -180,7 +180,7 @@ def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
         return _refit(fit, train, orders, shafts)
     estimate = fit.evidence.estimate
     if estimate is None or len(estimate.runs) != len(fit.runs):
-        # Readings of one run have several zeros: which are omitted with it is not known.
+        # Readings of one run have several zeros: which are held out with it is not known.
         return _refit(fit, train, None, fit.evidence.shafts)
     others = estimate.without(fold)
     problem = fit.problem
@@ -190,7 +190,7 @@ def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
     chosen = others.carriers(travel, beside)
     if not chosen:
         raise NoOrderError("no order is supported by the other runs")
-    # An order need not be a whole number: each is the first of a separate shaft.
+    # An order need not be a whole number: each is order 1 of its own shaft.
     lines = {f"order {k:g}": k for k in chosen}
     if fit.known is None:
         return _refit(fit, train, dict.fromkeys(lines, (1,)), lines)

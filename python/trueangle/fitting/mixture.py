@@ -93,7 +93,7 @@ def fit_mixture(
 
 
 def check_new_run(estimate: EvidenceEstimate, travel: Array, orders: Sequence[float]) -> None:
-    """Raise where what differs from run to run makes the gain of a further one uncertain."""
+    """Raise where runs differ so much that a gain in a further one is uncertain."""
     gain, spread = estimate.gain_of_a_run(travel)
     if gain <= _SURE * spread:
         listed = ", ".join(f"{order:g}" for order in orders[:6])
@@ -128,7 +128,7 @@ def _fitted(
     wanted = [k * shaft.cycles_per_turn for shaft in problem.shafts for k in shaft.orders]
     # Orders of shafts and of the estimate differ by rounding.
     named = [next((k for k in estimate.told if math.isclose(k, m)), m) for m in wanted]
-    # What is omitted on purpose is omitted: no other order holds it.
+    # What is omitted on purpose stays omitted: no other order takes its place.
     beside = selection.left_out
     mean, covariance = estimate.among(named, travel, beside)
     offsets, means, squares = [], [], 0.0

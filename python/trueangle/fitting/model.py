@@ -47,7 +47,7 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
     """What not to trust and why, one sentence each."""
     span, weighted = fit.span, fit.weighted
     if not span.full:
-        # In degrees, as zeros and positions are reported with it.
+        # In degrees, like the zeros and positions reported next to it.
         turn = 360.0 / fit.problem.period
         travel = span._replace(start=span.start * turn, stop=span.stop * turn)
         yield f"Fitted on {travel.describe(360.0)} only: outside it is extrapolated."

@@ -6,8 +6,8 @@
 
 with the unwrapped angle ``u``, the sense and the speed of travel, and a cubic spline ``g`` of
 the time of each run. They are fitted jointly with the pattern and taken out of the readings;
-the residual is fitted as ever, which gives the same pattern as one fit of all (Frisch and
-Waugh).
+what remains is then fitted as usual, which gives the same pattern as one joint fit (Frisch
+and Waugh).
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Nuisance:
     unseparated : tuple of str
         Kinds that lower the error as much but cannot be distinguished from the pattern.
     inflation : tuple of float
-        By how much the standard errors of ``A, B`` of each order grow with them.
+        Factor by which they increase the standard errors of ``A, B`` of each order.
     """
 
     kinds: tuple[str, ...] = ()

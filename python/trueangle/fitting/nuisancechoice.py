@@ -22,9 +22,9 @@ FOLDS: Final = 3
 
 #: A nuisance must lower the held-out sum of squares by this share, in most of the folds, ...
 _GAIN: Final = 0.01
-#: ... and this share of it must remain with the pattern: else the design cannot show them.
+#: ... and this share of it must remain next to the pattern: else they are not separable.
 _TOLD: Final = 0.02
-#: ... and no order's standard error may grow by more than this factor with it: else what the
+#: ... and no order's standard error may grow by more than this factor because of it: else what the
 #: nuisance takes away is the pattern.
 _GROWN: Final = 5.0
 #: Of nuisances that leave nearly the same the simplest is taken.
@@ -110,7 +110,7 @@ def best_spline(rows: FoldRows, chosen: Sequence[str]) -> str:
 
 
 def error_inflation(rows: FoldRows, chosen: Sequence[str]) -> list[float]:
-    """Standard errors of ``A, B`` of each order with the chosen groups, over those without."""
+    """Standard errors of ``A, B`` of each order with the chosen groups, over those without them."""
     pattern, design = rows.pattern, _design(rows, chosen)
     size = pattern.shape[1]
     if not size:
@@ -121,7 +121,7 @@ def error_inflation(rows: FoldRows, chosen: Sequence[str]) -> list[float]:
 
 
 def solve_with_groups(rows: FoldRows, chosen: Sequence[str]) -> dict[str, Array]:
-    """Coefficients of the chosen groups together with the pattern."""
+    """Coefficients of the chosen groups, fitted jointly with the pattern."""
     design = _design(rows, chosen)
     solution = least_squares(design, rows.error)
     ends = np.cumsum([rows.pattern.shape[1], *(rows.groups[n].shape[1] for n in chosen)])

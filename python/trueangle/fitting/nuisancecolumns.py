@@ -1,4 +1,4 @@
-"""Columns of effects in addition to a pattern in the readings, one group for each nuisance.
+"""Columns of the effects other than the pattern, one group for each nuisance.
 
 Each is taken about its run's mean, which the zero of that run takes.
 """
@@ -19,14 +19,14 @@ from .nuisancechoice import FOLDS, FoldRows
 #: Intervals of the spline of a run's time that are tried, from a cubic on.
 _INTERVALS: Final = (1, 2, 4, 6)
 
-#: Segments of each run that are held out, every third together: twice as long as the memory
-#: of the stiffest spline that they may judge. An odd number: way and return differ in fold.
+#: Segments of each run that are held out, every third together: twice as long as the reach
+#: of the stiffest spline tested on them. An odd number: way and return differ in fold.
 _STRETCHES: Final = 13
 
 #: Of twice as many readings and more every second, third, ... one is looked at.
 _LOOKED_AT: Final = 24_000
 
-#: Runs of which each may drift by itself, or have lines of the reference of its own.
+#: Most runs that may each have a separate drift, or separate lines of the reference.
 _MOST_DRIFTING: Final = 24
 
 

@@ -1,6 +1,6 @@
 """Nuisances fitted jointly with the pattern and taken out of the runs.
 
-The residual is fitted as ever, which gives the same pattern as one fit of all (Frisch and Waugh).
+What remains is fitted as usual: the pattern is that of one joint fit (Frisch and Waugh).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .nuisancechoice import (
 )
 from .nuisancecolumns import looked_at_stride, nuisance_columns, time_spline
 
-#: Orders of each shaft that nuisances are looked for together with.
+#: Orders of each shaft that are fitted jointly while nuisances are searched.
 _LIKELY: Final = tuple(range(1, 9))
 
 _MISSING: Final = {
@@ -44,7 +44,7 @@ def orders_beside_nuisance(
     fixed_member: str,
     shafts: Mapping[str, float] | None,
 ) -> list[ShaftOrders]:
-    """Orders together with which nuisances are looked for before any are chosen.
+    """Orders fitted jointly while nuisances are searched, before any orders are chosen.
 
     Those that come at least half a cycle over the travel: lower ones are a ramp there.
     """
@@ -65,9 +65,9 @@ def take_out_nuisance_beside(
     argument: str,
     reference_orders: Sequence[float] = (),
 ) -> tuple[list[CalibrationRun], Nuisance]:
-    """`take_out_nuisance` with the wanted and the likely orders.
+    """`take_out_nuisance` for the wanted orders, the kinds chosen jointly with the likely ones too.
 
-    What an order that is not in the model leaves is no ramp, though a ramp lowers it.
+    The residual of an order that is not in the model is no ramp, though a ramp lowers it.
     """
     if kinds is not None:
         return take_out_nuisance(runs, kinds, wanted, argument, reference_orders)
@@ -90,7 +90,7 @@ def take_out_nuisance(
 ) -> tuple[list[CalibrationRun], Nuisance]:
     """The runs without their nuisances, which are fitted jointly with these orders.
 
-    ``kinds`` of None are chosen by the error of segments held out.
+    With ``kinds`` None they are chosen by the error of held-out segments.
     """
     stride = looked_at_stride(runs)
     orders = [k * s.cycles_per_turn for s in shafts for k in s.orders]

@@ -28,7 +28,7 @@ class Phases:
 def run_phases(fit: FitResult) -> list[Phases]:
     """Amplitude and phase of the model's orders in every run fitted alone.
 
-    Runs whose readings cannot hold the orders by themselves are omitted.
+    Runs whose readings alone do not determine the orders are omitted.
 
     Raises
     ------

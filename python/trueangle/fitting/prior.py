@@ -8,7 +8,7 @@ With ``b ~ N(μ, T)`` and readings of noise s the coefficients are normal about
 
 with the covariance ``V = (X'X/s² + T⁻¹)⁻¹``: few readings suffice for what the units
 differ in little. Where runs of one unit differ by more than such noise makes them, by variances Q
-of their coefficients, a run shows its unit no better than that, and the covariance is
+of their coefficients, a run determines its unit no better than that, and the covariance is
 
 ::
 
@@ -39,11 +39,11 @@ from .argument import ARGUMENTS, AnyArgument
 from .problem import PlainSolution, Problem, SolvedProblem
 from .robust import Loss, RobustFit
 
-#: Rounds in which what is rejected settles, and the noise: each subtracts a part of the residual.
+#: Rounds in which the outliers and the noise settle: each round removes part of the difference.
 _ROUNDS: Final = 20
 _STEPS: Final = 200
 
-#: What does not go with a prior, and what each is where nothing was asked.
+#: Options that cannot be combined with a prior, and their defaults.
 _USUAL: dict[str, Any] = {
     "nuisance": "none",
     "covariance": "auto",
@@ -68,7 +68,7 @@ class Prior:
     noise_variance, noise_freedom : float
         Of one reading, and its degrees of freedom.
     units : int
-        From which it is known.
+        From which it was estimated.
     run_variance : ndarray, shape (2 K,), or None
         Of the coefficients of single runs about their unit's, beyond what the noise of readings
         makes of it; None where they do not differ.
@@ -160,7 +160,7 @@ def fleet_prior(given: Any, period: float) -> Prior:
 
 
 def posterior(problem: Problem, prior: Prior, loss: str) -> tuple[RobustFit, Posterior]:
-    """The fit under a prior; readings more than 8 deviations off rejected but with ``"linear"``.
+    """The fit under a prior; readings more than 8 deviations off are rejected unless ``"linear"``.
 
     Raises
     ------

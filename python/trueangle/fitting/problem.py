@@ -50,7 +50,7 @@ class PlainSolution(NamedTuple):
 
 
 class SolvedProblem:
-    """A solution and the series it represents."""
+    """A solution and its series."""
 
     def __init__(
         self,
@@ -219,7 +219,7 @@ class Problem:
         return np.ones((len(self.runs[index]), 1))
 
     def products(self, weights: Sequence[Array | None], index: int, count: int) -> list[Array]:
-        """Sums of products of ``[1, columns, error]`` of a run, in this many segments in a row."""
+        """Sums of products of ``[1, columns, error]`` of a run, in ``count`` segments."""
         run, weight = self.runs[index], weights[index]
         zero = circular_mean(run.indicated - run.reference, self.period)
         found = []

@@ -9,10 +9,10 @@ With ``S_p = Σ_(i at p) w_i x̃_i`` and the normal matrix G they move the coeff
 
     G⁻¹ Sᵀ K S G⁻¹,    K_pq = v δ_pq + s² (2/N) Σ_k cos(2πk (t_p - t_q))
 
-The sum is over all orders that are not fitted and that N positions on the turn can show, taken as
-equally strong: on a whole grid of N they are orthogonal to those fitted and add nothing, over
-part, and at places on no grid, they leak. What the residual at the positions is beyond the
-scatter of the runs there shows ``s²`` (a test of lack of fit, Seber and Lee, Linear Regression
+The sum is over all orders that are not fitted and that N positions on the turn can resolve, taken
+as equally strong: on a whole grid of N they are orthogonal to those fitted and add nothing; on
+part of it, and at places on no grid, they leak. The excess of the residual at the positions over
+the scatter of the runs there gives ``s²`` (a test of lack of fit, Seber and Lee, Linear Regression
 Analysis, 2003, section 4.4).
 """
 
@@ -37,10 +37,10 @@ from .problem import Problem, SolvedProblem
 from .rounding import COUNTED, rounding_variance
 from .uncertainty import CovarianceKind, Uncertainty
 
-#: Share of a variance from which what orders omitted add to it is worth a sentence.
+#: Share of a variance from which the contribution of omitted orders is reported.
 _TOLD: Final = 0.1
 
-#: Positions times orders up to which those omitted are looked at: 1000 places of a turn.
+#: Positions times orders up to which omitted orders are examined: 1000 places of a turn.
 _MOST: Final = 1_000_000
 
 
@@ -75,8 +75,8 @@ def covariance_with_repeats(
     What ``found`` holds of them by itself is not added again: one share of the readings at each
     position is among white residuals, and between runs scatters what differs from run to run.
     Of more than `COUNTED` readings positions are not counted, and where no position was read
-    again nothing is known about what repeats. Orders omitted count where the positions scatter more
-    than their readings (probability below `SCATTER`), and not for who needs white noise.
+    again nothing is known about what repeats. Omitted orders count if the positions scatter more
+    than their readings (p-value below `SCATTER`), and not if white noise was requested.
     """
     kept = sum(map(len, problem.runs))
     if kept < problem.readings or kept > COUNTED or not problem.is_periodic:
@@ -109,8 +109,8 @@ def covariance_with_repeats(
         return wider
     said = (
         "omitted orders repeat at every position and leak into the fitted "
-        f"ones: standard errors are {math.sqrt(all_of_it / noise):.2g} times larger, "
-        "which allows for omitted orders of equal size"
+        f"ones: standard errors are {math.sqrt(all_of_it / noise):.2g} times those of noise "
+        "alone, which allows for omitted orders of equal size"
     )
     return wider._replace(note="; ".join(filter(None, (found.note, said))))
 
@@ -133,7 +133,7 @@ def _repeats(
     of_run = _added(run, w, len(sizes))
     used = of_run > 0.0
     whole = np.where(used, of_run, 1.0)
-    # Each reading of a single run counts by itself.
+    # In a single run each reading counts by itself.
     units = run if used.sum() > 1 else np.arange(w.size)
     pairs, pair = np.unique((units * len(positions) + place)[w > 0.0], return_inverse=True)
     pair_unit, pair_place = np.divmod(pairs, len(positions))
@@ -174,9 +174,9 @@ def _added(index: NDArray[np.intp], rows: Array, count: int) -> Array:
 
 
 def _orders_left_out(problem: Problem, positions: Positions) -> Array | None:
-    """``U`` of ``s² U Uᵀ`` at the positions: orders omitted; None where none leaks.
+    """``U`` of ``s² U Uᵀ`` at the positions, for omitted orders; None where none leaks.
 
-    Of several shifted grids those fitted are kept apart from all that one of them shows.
+    Several shifted grids separate the fitted orders from all that one of the grids shows.
     """
     turns = positions.turns
     if positions.divisions is not None and len(positions.offsets) > 1:

@@ -30,7 +30,7 @@ _MOST: Final = 4_000_000
 #: Columns in square roots of readings below which the fit changes no such form by a tenth of
 #: what is looked for: its share of the noise is then far below the form's own deviation.
 _SLIGHT: Final = 0.3
-#: Part of the largest eigenvalue below which columns show nothing new.
+#: Part of the largest eigenvalue below which columns add nothing new.
 _RANK: Final = 1e-10
 
 
@@ -87,7 +87,7 @@ class ResidualSpace:
         return self._share(self._next, 0.0, 0.5 * pairs)
 
     def means(self, length: int) -> Share:
-        """Of the squared means of this many neighbours, times their number."""
+        """Of the squared means of ``length`` neighbours, times their number."""
         blocks = sum(size // length for size in self._sizes)
 
         def spread(columns: Array) -> Array:

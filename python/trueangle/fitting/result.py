@@ -39,13 +39,13 @@ class FitResult(FittedCoefficients):
     evidence : OrderSelection or None
         What was searched, when the orders were chosen by evidence; `selection` is what it found.
     joint : tuple
-        Gear ratio (or None) and fixed member, as reported.
+        Gear ratio (or None) and fixed member, as given.
     remarks : tuple of str
         What the choice of the angle, of the weights and of the runs found; among `notes`.
     covariance_asked : {"auto", "white", "cluster", "hac"}
         The covariance requested; `uncertainty` has the one taken.
     nuisance : Nuisance or None
-        What was taken out of the readings together with the pattern: `runs` are without it.
+        Effects other than the pattern that were removed from the readings: `runs` are without them.
     posterior : Posterior or None
         What a prior did: the share of each order that is the unit's own (`fit`, ``prior=``).
     known : Uncertainty or None
@@ -71,7 +71,7 @@ class FitResult(FittedCoefficients):
         return axes
 
     def to_dict(self) -> dict[str, Any]:
-        """The object that ``trueangle fit`` prints as JSON together with the model."""
+        """The object that ``trueangle fit`` prints as JSON in addition to the model."""
         return plain_fit(self)
 
     def summary(self, errors_in: ErrorsIn = "auto") -> str:

@@ -6,18 +6,18 @@ A ridge answers ``b̂ = (G + λ)⁻¹ X'Wy`` and is off by
 
     b̂ - b = (G + λ)⁻¹ X'W e - λ (G + λ)⁻¹ b
 
-The first part is noise. The second depends on the pattern itself, and just where readings state
-little of it. Patterns are taken as sampled with variances ``τ² (k / k₀)^(-2q)`` of both
-coefficients of order k, ``k₀`` the lowest of its shaft; how probable each size
-``τ`` and steepness q is, the readings show by their marginal likelihood. With
+The first part is noise. The second depends on the pattern itself, and just where the readings
+determine little of it. Patterns are treated as random, with variances ``τ² (k / k₀)^(-2q)`` of both
+coefficients of order k, ``k₀`` the lowest of its shaft; the marginal likelihood of the readings
+gives the probability of each size ``τ`` and steepness q. With
 ``D`` the mean of these variances the covariance of the second part is
 
 ::
 
     λ² (G + λ)⁻¹ D (G + λ)⁻¹
 
-Intervals from the sum of both hold the truth as often as they state on average over the travel,
-and over patterns (Wahba 1983, Nychka 1988): not for each angle by itself, and not for a
+Intervals from the sum of both reach their stated coverage on average over the travel and over
+patterns (Wahba 1983, Nychka 1988): not for each angle by itself, and not for a
 pattern whose sizes nothing in the travel shows.
 """
 
@@ -41,11 +41,11 @@ _PENALTIES = [0.0, *np.logspace(-9.0, 0.0, 19).tolist()]
 #: Parts of the arc held out in turn when there is one run only.
 _BLOCKS = 10
 
-#: The same where the error does not repeat after a turn: a joint goes on to turns that the
-#: fit was not fitted to, so whole segments are held out.
+#: The same where the error does not repeat after a turn: a joint goes on to turns
+#: outside the fitted travel, so whole segments are held out.
 _STRETCHES = 4
 
-#: The amplitudes may add up to this many times the range of the measured error. On a full
+#: Bound of the sum of the amplitudes, in ranges of the measured error. On a full
 #: turn the sum of amplitudes of a smooth error is about half its range.
 REACH = 3.0
 
@@ -90,7 +90,7 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
 
 
 def _folds(problem: Problem, weights: Sequence[Array | None]) -> list[tuple[Array, float]]:
-    """Triangles of ``[1 | harmonics | error]`` over readings omitted together, and weights."""
+    """Triangles of ``[1 | harmonics | error]`` over readings held out together, and weights."""
     several = len(problem.runs) > 1
     found: list[tuple[Array, float]] = []
     for run, weight, angles in zip(problem.runs, weights, problem.angles, strict=True):
@@ -114,7 +114,7 @@ def _zero(run: CalibrationRun) -> float:
 
 
 def _ends(angles: Array, count: int) -> list[float]:
-    """Where this many parts of the readings, equal in number, end on the travel."""
+    """Where ``count`` parts with equally many readings end on the travel."""
     looked_at = angles[:: max(1, angles.size // _LOOKED_AT)]
     ends: list[float] = np.quantile(looked_at, np.arange(1, count) / count).tolist()
     return ends
@@ -149,7 +149,7 @@ def pattern_variances(
 
     Examples
     --------
-    Where readings state all, it is the mean square of the coefficients:
+    Where the readings determine everything, it is the mean square of the coefficients:
 
     >>> b = np.tile([3.0, -4.0], 50)
     >>> found = pattern_variances(1e6 * np.eye(100), 1e6 * b, 1.0, np.ones(100), 100.0)

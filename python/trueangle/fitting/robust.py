@@ -37,17 +37,17 @@ WILD_COUNTS = 2.0
 #: Readings further off than this (robust standard deviations) are rare: 0.7 % of normal ones.
 FAR = 2.7
 
-#: Of fewer readings a share contains nothing.
+#: With fewer readings a share means nothing.
 FEW = 50
 
 #: With more than this share of them the scale itself is in doubt.
 MANY = 0.06
 
-#: Readings that hid behind the scale are outlying when without them it falls by this factor.
+#: Readings that had inflated the scale are outliers if without them it falls by this factor.
 HIDDEN = 5.0
 
 #: Rounds of re-weighting end when no weight moves by more than this, or after `STEPS`; of many
-#: orders, which each round solves anew, earlier: after this many multiplications, but not before
+#: orders, which each round solves anew, earlier: after `_WORK` multiplications, but not before
 #: `FEWEST_STEPS`.
 SETTLED = 1e-4
 STEPS = 50
@@ -56,10 +56,10 @@ _WORK = 4e9
 #: Readings for each unknown beyond which a solution takes them in one pass.
 _BY_ROWS = 32
 
-#: With this share of them a robust fit of several orders is at its end wherever they are ...
+#: With this share of them a robust fit of several orders fails wherever they are ...
 _MOST: Final = 0.15
 #: ... and with `MANY` where neighbours in angle agree this many times better than the fit:
-#: the readings that are apart are together, and the model has curved towards them.
+#: the wrong readings are adjacent, and the model has bent towards them.
 _BENT: Final = 3.0
 
 
@@ -83,11 +83,11 @@ def fit_robustly(problem: Problem, loss: Loss, floor: float) -> RobustFit:
     ``"linear"`` keeps the weights given. ``"huber"`` and ``"tukey"`` re-weight until the
     weights settle. ``"auto"`` fits by least squares, and only where a reading lies more
     than 8 robust standard deviations off rejects such readings (weight 0), starting
-    from the Huber fit so that they cannot hide each other; the remainder is plain least
+    from the Huber fit so that they cannot hide each other; the others are fitted by plain least
     squares, so clean data give the least-squares coefficients exactly.
 
-    Deviations below ``floor`` are rounding, never outlying; ``wild`` of the result counts readings
-    of weight 0 that were given more.
+    Deviations below ``floor`` are rounding, never outliers; ``wild`` of the result counts readings
+    whose weight became 0.
     """
     check_choice("loss", loss, LOSSES)
     if loss == "linear":
@@ -108,7 +108,7 @@ def fit_robustly(problem: Problem, loss: Loss, floor: float) -> RobustFit:
 
 
 def fit_without_outliers(problem: Problem, outliers: int) -> RobustFit:
-    """The plain fit of a problem from which this many outliers were rejected before."""
+    """The plain fit of a problem from which ``outliers`` readings were rejected before."""
     fitted = problem.solve(problem.base)
     if outliers:
         return RobustFit(fitted, None, outliers, outliers / problem.readings)
@@ -117,7 +117,7 @@ def fit_without_outliers(problem: Problem, outliers: int) -> RobustFit:
 
 
 def unsettled_weights_sentence(weighted: RobustFit) -> str:
-    """That re-weighting was broken off."""
+    """A sentence on re-weighting that did not settle."""
     return (
         f"outliers still changed after {weighted.unsettled} rounds of rejecting them, the "
         "limit for this number of orders: fit fewer, or use loss='linear'"
@@ -132,7 +132,7 @@ def _rounds(problem: Problem) -> int:
 
 
 def _share(residuals: Array, scale: float) -> float:
-    """Share of readings beyond `FAR` robust standard deviations; 0 of a few, which show none."""
+    """Share of readings beyond `FAR` robust standard deviations; 0 of a few, which show nothing."""
     if residuals.size < FEW:
         return 0.0
     return np.count_nonzero(np.abs(residuals) > FAR * scale) / residuals.size
@@ -196,7 +196,7 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
 
 
 def _wild(problem: Problem, fitted: SolvedProblem, floor: float) -> NDArray[np.bool_]:
-    """Which of all readings, run after run, are outlying; those of weight 0 never are."""
+    """Which of all readings, run after run, are outliers; those of weight 0 never are."""
     residuals = problem.residuals(fitted)
     given = [given_weights(b, r.size) for b, r in zip(problem.base, residuals, strict=True)]
     limit = max(WILD * robust_scale(_counted(problem, residuals)), floor)
@@ -251,7 +251,7 @@ def _tukey(distance: Array) -> Array:
 
 
 def robust_breakdown_sentence(problem: Problem, weighted: RobustFit) -> str:
-    """What to show of a robust fit at the end of its powers; empty where it is not."""
+    """A sentence on a robust fit that may have failed; empty otherwise."""
     share, robust = weighted.far, weighted.weights is not None or weighted.wild > 0
     if share <= MANY and not robust:
         return ""
@@ -265,7 +265,7 @@ def robust_breakdown_sentence(problem: Problem, weighted: RobustFit) -> str:
             "coefficients may be wrong by far more than their standard errors. Look at "
             "the residuals, and give wrong readings weight 0"
         )
-    # Most neighbours are equal where a joint rests or a grid is coarse: they show nothing.
+    # Most neighbours are equal where a joint rests or a grid is coarse: they give no scale.
     if not bent or near == 0.0:
         return ""
     # A block of readings that the few orders cannot follow widens the scale it is judged by.

@@ -1,14 +1,14 @@
 """What the rounding of a coarse sensor adds to errors where positions are read again.
 
 At one position a sensor that rounds to steps q has the same error each time, as far as its noise σ
-does not carry it to another step. Over the positions that part has the variance
+does not carry it to another step. Over the positions that repeated part has the variance
 
 ::
 
     v(σ) = Σ_k q²/(2π²k²) exp(-(2πkσ/q)²),    v(0) = q²/12,
 
 which further readings at the same positions do not make smaller. Their scatter about the mean of
-their position, ``s² = σ² + q²/12 - v(σ)``, shows σ. Source: Widrow and Kollar, Quantization Noise
+their position, ``s² = σ² + q²/12 - v(σ)``, gives σ. Source: Widrow and Kollar, Quantization Noise
 (2008), for the moments of a rounded normal number.
 """
 
@@ -69,7 +69,7 @@ def repeated_rounding_variance(step: float, scatter: float) -> float:
 
 
 def rounding_over_repeats(step: float, repeats: ReadingVariance | None, readings: float) -> float:
-    """``R v(σ)`` of this many readings at each position; 0 without a step or repeated readings."""
+    """``R v(σ)`` for R readings at each position; 0 without a step or repeated readings."""
     if not step or repeats is None:
         return 0.0
     return readings * repeated_rounding_variance(step, repeats.variance)

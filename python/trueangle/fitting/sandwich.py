@@ -1,4 +1,4 @@
-"""What a robust loss makes of variances: Huber's covariance of an M-estimate.
+"""How a robust loss changes variances: Huber's covariance of an M-estimate.
 
 Where the weights of a loss are treated as those of the readings, a reading far off counts in the
 noise by its distance, though it moves the coefficients by a bounded step.
@@ -17,7 +17,7 @@ from .robust import SETTLED
 
 
 class Sandwich(NamedTuple):
-    """What a loss makes of variances that take its weights for those of the readings.
+    """Factors for variances that were computed with the loss's weights as those of the readings.
 
     ``white``: of covariances of white noise; ``bread``: of those by how scores scatter;
     ``scores``: of the variance of a score.
@@ -31,7 +31,7 @@ class Sandwich(NamedTuple):
 def sandwich(
     problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], loss: str
 ) -> Sandwich:
-    """The factors of an M-estimate; 1 of least squares, with readings rejected or not.
+    """The factors of an M-estimate; 1 for least squares, whether readings were rejected or not.
 
     With ``ψ = w r`` and the weights b as given, its covariance is
 

@@ -138,14 +138,14 @@ class AngleCorrector(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # 
         return corrected
 
     def score(self, X: ArrayLike, y: ArrayLike) -> float:
-        """Share of the squared errors that the correction subtracts, on average over the columns.
+        """Share of the squared errors that the correction removes, on average over the columns.
 
         ::
 
             1 - Σ_i (θ̂_i - θ_i - z)² / Σ_i (r_i - θ_i - z₀)²
 
-        with a separate zero before and after: 1 leaves nothing, 0 gains nothing, less makes it
-        worse. A column without any error scores 1 where it stays as it is.
+        with a separate zero before and after: 1 is perfect, 0 gains nothing, less makes the
+        errors worse. A column without any error scores 1 where it stays as it is.
 
         Parameters
         ----------

@@ -57,7 +57,7 @@ def zeros_follow_speed(
 
 
 def zeros_follow_speed_sentence(delay: float, chance: float) -> str:
-    """What to show of zeros that follow the speed."""
+    """A sentence on zeros that follow the speed."""
     return (
         f"the zeros of the runs follow their speed, as with a delay of {brief_number(1e3 * delay)} "
         f"ms (p = {chance:.1g}): the model has only their mean. Run diagnose, which separates a "

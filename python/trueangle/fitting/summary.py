@@ -48,7 +48,7 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
 
 
 def fit_error_unit(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> ErrorUnit:
-    """One unit for all that is given and sampled of a fit, by the rms of pattern and residual."""
+    """One unit for tables and plots of a fit, by the rms of pattern and residual."""
     return error_unit(errors_in, sine_of_rms(_sizes(fit)[0]), fit.model.period)
 
 
@@ -175,7 +175,7 @@ def _evidence(found: FittedCoefficients) -> list[dict[str, Any]]:
 
 
 def _standard_error(found: FittedCoefficients, n: int) -> dict[str, Any]:
-    """Standard error and 95 % interval of one amplitude; null where nothing shows them."""
+    """Standard error and 95 % interval of one amplitude; null where they are not known."""
     if found.model.covariance is None:
         return {"std_arcsec": None, "interval_arcsec": None}
     period = found.model.period

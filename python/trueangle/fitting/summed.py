@@ -57,8 +57,8 @@ class SummedReadings:
         """What one pass cannot know, in one sentence."""
         kept = sum(map(len, self.runs))
         return (
-            f"the coefficients, their evidence and the span are of all "
-            "{self.readings} readings, in one pass. Positions, repeats, correlation and "
+            "the coefficients, their evidence and the span are of all "
+            f"{self.readings} readings, in one pass. Positions, repeats, correlation and "
             f"the ridge are estimated from {kept} of them, in random blocks"
         )
 

@@ -42,8 +42,8 @@ _TELLING: Final = 300
 class Uncertainty(NamedTuple):
     """Covariance of ``[constant, A, B, ...]``, its kind, and freedom of each variance.
 
-    ``noise_freedom``: the fewest degrees of freedom of any variance, what a penalty takes from
-    coefficients; None for those of ``freedom``.
+    ``noise_freedom``: the fewest degrees of freedom of any variance without the bias of a penalty;
+    None for those of ``freedom``.
     """
 
     kind: Literal["white", "cluster", "hac", "evidence"]
@@ -54,7 +54,7 @@ class Uncertainty(NamedTuple):
 
     @property
     def fewest(self) -> float:
-        """Fewest degrees of freedom of a variance in which noise is all there is."""
+        """Fewest degrees of freedom of a variance that is noise alone."""
         return float(self.freedom.min()) if self.noise_freedom is None else self.noise_freedom
 
     def among(self, count: int) -> Uncertainty:
@@ -64,7 +64,7 @@ class Uncertainty(NamedTuple):
         )
 
     def beside(self, bias: Array, known: float = math.inf) -> Uncertainty:
-        """The same with the covariance of a bias of this many degrees of freedom.
+        """The same with the covariance of a bias added, which has ``known`` degrees of freedom.
 
         ::
 
@@ -110,14 +110,14 @@ def coefficient_uncertainty(
     """Covariance of this kind; ``"auto"``: white unless correlation is found.
 
     A ``nuisance`` that was taken out of the runs is fitted jointly with the pattern
-    (`trueangle.fitting.beside`). What a robust ``loss`` weighs down is no less known for it
-    (`trueangle.fitting.sandwich`).
+    (`trueangle.fitting.beside`). A robust ``loss`` gives readings less weight,
+    which does not make them less precise (`trueangle.fitting.sandwich`).
 
-    Where eight runs and more repeat better than white noise of the residual lets expect, their
-    scatter pooled over the coefficients is the noise. Whole runs are the clusters where there are
-    three or more. With fewer, segments are, eight times as long as the correlation time of the
-    residuals: right where the correlation dies out within a run, which one run cannot prove, so
-    that a note states it. What a penalty takes from the coefficients is added to either
+    If eight runs or more repeat better than the residual as white noise suggests, their scatter,
+    pooled over the coefficients, is the noise. Whole runs are the clusters where there are
+    three or more. With fewer, the clusters are segments eight correlation times of the residuals
+    long: right where the correlation decays within a run, which one run cannot prove, so that a
+    note states it. The bias of a penalty is added to either
     (`trueangle.fitting.ridge`).
     """
     bent = sandwich(problem, fitted, weights, loss)
@@ -203,10 +203,10 @@ _SUMMED: Final = "One pass keeps no segments"
 def _thinned(
     white: Array, independent: float, unknowns: int, memory: float, said: str, why: str
 ) -> Uncertainty:
-    """As if n correlated readings were one independent reading.
+    """As if every ``memory`` correlated readings were one independent reading.
 
     The scatter of a few segments has fewer directions than there are coefficients: its
-    standard errors may come out as small as they like.
+    standard errors may come out arbitrarily small.
     """
     told = "standard errors as for independent readings"
     if round(memory) > 1:
@@ -214,7 +214,7 @@ def _thinned(
     note = (
         f"{said}{told}. {why}, and the covariance is not known: measure {ENOUGH_RUNS} runs and more"
     )
-    # Of this many independent readings the fit takes its unknowns, and the residuals are smaller.
+    # The fit takes its unknowns from the independent readings, which makes the residuals smaller.
     left = max(independent - unknowns, 1.0)
     wider = memory * max(independent / left, 1.0)
     return Uncertainty("hac", white * wider, np.full(len(white), left), note)
@@ -269,15 +269,15 @@ def _between(clusters: int, runs: int) -> str:
     note = f"standard errors by the scatter between {clusters} "
     note += "runs" if clusters == runs else f"groups of the {runs} runs"
     if clusters < ENOUGH_RUNS:
-        note += f"; this few give only rough ones: {ENOUGH_RUNS} runs and more give good ones"
+        note += f"; so few give rough values only, {ENOUGH_RUNS} runs or more give good ones"
     return note
 
 
 def _repeated(share: float, runs: int) -> str:
-    """Standard errors by runs that repeat better than their residual lets expect, in words."""
+    """Standard errors by runs that repeat better than their residual suggests, in words."""
     return (
         f"the {runs} runs repeat better than the residual suggests (scatter "
-        "{math.sqrt(share):.2g} times that of white noise): standard errors by that scatter, "
+        f"{math.sqrt(share):.2g} times that of white noise): standard errors by that scatter, "
         "pooled over the coefficients"
     )
 
@@ -286,9 +286,9 @@ _CANCEL: Final = "the covariance is that of white noise: orders nearly cancel"
 
 
 def _with_constant(white: Array, covariance: Array, freedom: Array) -> tuple[Array, Array]:
-    """The constant together with the coefficients: wider by as much as they are in the middle.
+    """The covariance with the constant: widened by the coefficients' median factor.
 
-    How the zeros of the runs scatter shows nothing of it, for each may be another.
+    The scatter of the runs' zeros does not show its error, because each run may have its own.
     """
     ratio = np.sqrt(np.diag(covariance) / np.diag(white)[1:])
     scale = np.concatenate([[max(1.0, float(median(ratio)))], ratio])

@@ -24,7 +24,7 @@ _RUNS: Final = 512
 #: A run is unlike the others when their pattern misses this share of the energy that its own
 #: would explain (its coefficients are about half of the pattern off) ...
 _SHARE: Final = 0.2
-#: ... and by this many times what its noise, correlated as it is, lets coefficients scatter.
+#: ... and by this many times the scatter that its noise, correlated as it is, gives coefficients.
 _SCATTER: Final = 25.0
 
 #: Where no direction of a run's design is shorter than this part of the longest, each
@@ -87,7 +87,7 @@ def far_runs(runs: Sequence[NormalEquations]) -> list[tuple[int, float]]:
 
 
 def _solved(sums: NormalEquations) -> tuple[Array, int, bool]:
-    """Least squares from normal equations: directions observed, and whether all clearly."""
+    """Least squares from normal equations: its rank, and whether all of it is well determined."""
     found = sums.solved()
     values = np.linalg.eigvalsh(sums.gram)
     clear = bool(values[0] > _SPEAKS**2 * values[-1])
@@ -95,7 +95,7 @@ def _solved(sums: NormalEquations) -> tuple[Array, int, bool]:
 
 
 def run_names(runs: Sequence[CalibrationRun]) -> list[str]:
-    """What to call each run: its label, or its file where that separates runs, or its number."""
+    """What to call each run: its label, or its file if that differs between runs, or its number."""
     labels = [run.label or "" for run in runs]
     files = ["" if run.source is None else run.source.file for run in runs]
     several = len(set(files)) > 1

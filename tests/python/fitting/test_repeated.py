@@ -158,7 +158,7 @@ def test_it_is_said_with_how_much_wider_they_are():
     fit = ta.fit(read(rng, places, 10, 0.3, left_out(rng, places, 4.0, range(2, 18))), orders=[1])
     alone = coefficient_uncertainty(fit.problem, fit.fitted, fit.problem.base, 0.0, "auto")
     sums = [np.trace(matrix[1:, 1:]) for matrix in (fit.covariance, alone.covariance)]
-    times = f"{math.sqrt(sums[0] / sums[1]):.2g} times larger"
+    times = f"{math.sqrt(sums[0] / sums[1]):.2g} times those of noise"
     assert sum("mitted orders repeat at every position" in note for note in fit.notes) == 1
     assert any(times in note for note in fit.notes)
     # The 20 places, less the line and the zero, tell how strong they are: 17, and a little noise.

@@ -26,7 +26,7 @@ SHAFT_HARMONICS: Final = (1, 2, 3, 4)
 HIGHEST_SCANNED: Final = 450
 
 #: Coherence from which two orders are hardly separated: they come half a cycle apart over the
-#: travel. Fitted side by side they nearly cancel, and part again where nothing was read.
+#: travel. Fitted jointly they nearly cancel, and differ again where nothing was read.
 _UNRESOLVED: Final = 2.0 / math.pi
 
 #: Coherence from which two orders are one at the positions, whatever the noise.
@@ -77,12 +77,12 @@ class Candidates:
     effective : Positions
         The positions as a grid even where small shifts of the zero blur it.
     unresolved : mapping of float to float
-        Orders of the gear that are not looked at, for over this travel they are hardly
-        distinguished from a low order, which represents both.
+        Orders of the gear that are not candidates, because over this travel they are hardly
+        distinguishable from a low order, which represents both.
     shafts : mapping of str to float
         Further shafts that were declared, and their cycles per output turn.
     local : frozenset of float
-        Of ``reference``: orders that a short single pass does not distinguish from drift in time.
+        Of ``reference``: orders that a short single pass cannot distinguish from drift in time.
     """
 
     orders: tuple[float, ...]
@@ -119,10 +119,10 @@ class Candidates:
         return [i for i, k in enumerate(self.orders) if k in self.main]
 
     def probabilities(self) -> list[float]:
-        """Of each order before any reading: one in five sets has one without a reason.
+        """Of each order before any reading: one in five sets has an order without a known cause.
 
-        Reasons are known about 1, 2 and 4 of the output (eccentricity, tilt and the sensor's
-        quadrature) and of the shafts that were declared.
+        Causes are known for orders 1, 2 and 4 of the output (eccentricity, tilt and the sensor's
+        quadrature) and of the declared shafts.
         """
         cycles = declared_cycles(self.gear_ratio, self.shafts)
         return prior_probabilities(self.orders, cycles, self.reference)
@@ -131,7 +131,7 @@ class Candidates:
 def prior_probabilities(
     orders: Sequence[float], cycles: Iterable[float], fitted: Iterable[float] = ()
 ) -> list[float]:
-    """Of each order with shafts of this many cycles per turn; those ``fitted`` are certain."""
+    """Of each order, given the shafts' cycles per turn; those ``fitted`` are certain."""
     chance = min(_LIKELY, _UNKNOWN / max(1, len(orders)))
     reasons = {k * f for k in _KNOWN for f in (1.0, *map(abs, cycles))}
     certain = set(fitted)
@@ -166,7 +166,7 @@ def choose_candidates(
     """Candidates as requested, or low orders, the gear's own and a scan.
 
     ``travelled`` are angles of the readings in turns, whole turns kept: they show how far an
-    order that is not whole is distinguished from its neighbours. Undeclared orders below
+    order that is not whole can be distinguished from its neighbours. Undeclared orders below
     ``held_from`` are fitted jointly and not kept.
 
     Raises
@@ -192,7 +192,7 @@ def choose_candidates(
     else:
         unresolved = _unresolved(gear, min(HIGHEST_LOW_ORDER, highest), travelled)
         told = [m for m in gear if m not in unresolved]
-        # A gear none of whose orders can be determined contains nothing about where to look.
+        # A gear none of whose orders can be determined does not narrow the search.
         limit = HIGHEST_LOW_ORDER if told else HIGHEST_FREE_ORDER
         main = [float(k) for k in range(1, min(limit, highest) + 1)]
         for m in told:
@@ -224,7 +224,7 @@ def choose_candidates(
 
 
 def _unresolved(gear: Sequence[float], low: int, travelled: Array | None) -> dict[float, float]:
-    """Orders of the gear hardly distinguished from a low order over the travel, and that order."""
+    """Orders of the gear that the travel hardly separates from a low order, and that order."""
     found: dict[float, float] = {}
     if travelled is None:
         return found

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Method: TypeAlias = Literal["evidence", "paper"]
 
-#: Angles looked at to show whether a gear's orders are resolved over the travel.
+#: Angles examined to determine whether a gear's orders are resolved over the travel.
 _LOOKED_AT: Final = 4096
 
 
@@ -72,7 +72,7 @@ def selected_orders(
     choice = choose_argument(kept, argument)
     if choice.argument == "indicated":
         kept = [run_at_indicated(run) for run in kept]
-    # The ends of the travel are known about all readings.
+    # The ends of the travel are those of all readings.
     ends = [] if summed is None else [CalibrationRun(summed.ends, summed.ends, kept[0].period)]
     positions = distinct_positions([*kept, *ends], tolerance)
     held_from = held_orders(kept, declared_cycles(gear_ratio, shafts))

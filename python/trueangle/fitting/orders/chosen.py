@@ -11,8 +11,8 @@ from ...estimation.linear import pseudo_inverse
 from ...support.arrays import Array
 from .harmonicsums import HarmonicSums
 
-#: A candidate whose columns keep less than this of their energy together with those already
-#: chosen is an alias of them.
+#: A candidate is an alias of the chosen orders if less than this share of its columns' energy
+#: is independent of them.
 COLLINEAR: Final = 1e-8
 
 
@@ -32,7 +32,7 @@ def held_out_gains(
 ) -> tuple[Array, Array, float]:
     """Held-out sum of squares with and without each order, one unit held out at a time.
 
-    The left-out unit keeps its own zero, the chosen orders come from the other units.
+    The held-out unit keeps its own zero, the chosen orders come from the other units.
 
     Returns
     -------

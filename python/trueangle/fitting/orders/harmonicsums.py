@@ -22,7 +22,7 @@ from ...support.arrays import Array
 from .unitgroups import GROUPS, MOST_UNITS, sums_of_unit_means, units_in_groups
 from .zerogroups import ZeroGroupReadings
 
-#: From this many readings on the core's piecewise moments are faster than this file's powers.
+#: Readings from which the core's piecewise moments are faster than this file's powers.
 _LARGE: Final = 1024
 
 #: Units of fewer readings whose spectra are kept, some 40 kB each.

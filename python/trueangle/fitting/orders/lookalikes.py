@@ -2,7 +2,7 @@
 
 On one grid an alias explains exactly as much. Where the zeros of the runs differ a
 little, an order m turns by ``m`` times the shift: given noise and amplitude, that may
-or may not decide. The likelihood states which.
+or may not suffice to decide. The likelihood determines it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ DECISIVE: Final = 10.0
 #: From here on two orders are one at the positions, whatever the noise.
 _SAME: Final = 1.0 - 1e-9
 
-#: Only orders this alike at the positions are tried: one below explains at most
+#: Only orders at least this coherent at the positions are tried: one below explains at most
 #: ``coherence^2`` of the other's energy and fails by itself.
 _ALIKE: Final = 0.9
 

@@ -20,7 +20,7 @@ def orders_beyond_rounding(
     limit: float,
     forced: int = 0,
 ) -> list[int]:
-    """Places of those orders, the strongest first, that the steps of the readings show of.
+    """Places of the orders that rounding alone does not explain, the strongest first.
 
     Parameters
     ----------
@@ -28,10 +28,10 @@ def orders_beyond_rounding(
     step : float
         Of the sensor, in the unit of the errors.
     orders : sequence of float
-        Strongest first; the first ``forced`` of them are always in the model and not reported of.
+        Strongest first; the first ``forced`` of them are always in the model and not returned.
     limit : float
-        Log of the probability below which an order is one: of the likelihood ratio with both of its
-        coefficients, which is of χ² with two degrees of freedom without it.
+        Log of the p-value below which an order is accepted: by the likelihood ratio for both of its
+        coefficients, which without it is χ² with two degrees of freedom.
     """
     error = np.concatenate([unit.error for unit in units])
     theta = 2.0 * np.pi * np.concatenate([unit.turns for unit in units])

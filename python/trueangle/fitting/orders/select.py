@@ -48,8 +48,8 @@ def select_orders(
     orders may be. Before the readings, orders 1, 2 and 4 of a shaft are likely, and one of all
     others is expected.
 
-    Where orders represent each other over the travel, they share their probability: those that hold
-    the curve together are among ``orders`` with the verdict "shared".
+    Orders that are collinear over the travel share their probability: those that hold the curve
+    together are among ``orders`` with the verdict "shared".
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ def select_orders(
         Each run with its own zero; readings of weight 0 take no part. Files, folders, patterns
         and tables in memory as `trueangle.read_runs` takes them.
     candidates : iterable of float, optional
-        Orders to look at. By default 1.. 17 and the gear's own orders when
-        ``gear_ratio`` is given, else 1.. 100, as far as the positions can show them; and
+        Orders to look at. By default 1 to 17 and the gear's own orders when
+        ``gear_ratio`` is given, else 1 to 100, as far as the positions resolve them; and
         a scan up to order 450 where the angles are free.
     gear_ratio : float, optional
         Motor turns per output turn.
@@ -134,7 +134,7 @@ def _as_fitted(
         return selection
     try:
         with warnings.catch_warnings():
-            # What the fit would warn of is reported by `trueangle.fit`.
+            # `trueangle.fit` reports what the fit would warn about.
             warnings.simplefilter("ignore", UnlikeRunsWarning)
             fit = fitted_to(
                 runs,

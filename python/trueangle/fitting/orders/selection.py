@@ -30,7 +30,7 @@ from .zerogroups import folds_of_run, some_angles, some_readings, zero_groups
 if TYPE_CHECKING:
     from ..summed import SummedReadings
 
-#: Probability, over the whole search, that the rounding of a coarse sensor alone makes an order.
+#: Probability, over the whole search, of an order made by a coarse sensor's rounding alone.
 FALSE_ALARM: Final = 0.005
 
 #: An order is omitted as negligible when its amplitude is below this share of the whole
@@ -40,8 +40,8 @@ NEGLIGIBLE_SHARE: Final = 0.01
 #: change the error of no reading by anything to speak of.
 NEGLIGIBLE_NOISE: Final = 0.1
 
-#: Bound of the error's slope that the retained orders must keep: from 1 on an indicated
-#: angle represents several true ones, as ill-determined orders on a short arc make it.
+#: Bound of the error's slope that the retained orders must keep: from 1 on several
+#: true angles give one reading, which ill-determined orders on a short arc can cause.
 STEEPEST: Final = 0.95
 
 #: Amplitudes below this part of a turn are rounding of angles.
@@ -68,7 +68,7 @@ class EvidenceSelection:
             sum(unit.turns.size for unit in units) if summed is None else summed.moments.count
         )
         self.step = rounding_step(runs, self.positions)
-        #: Angles of the readings in radians, as many as show the travel.
+        #: Angles of the readings in radians, enough to represent the travel.
         self.travel = some_angles([unit.turns for unit in units], 1.0)
         self.units = some_readings(units)
         self.orders = list(candidates.orders)
@@ -119,7 +119,7 @@ class EvidenceSelection:
         """Orders to omit so that the error can be corrected: the steepest weak ones.
 
         One by one that order goes which adds most slope for the energy that it explains,
-        its order over its amplitude, until the greatest slope of the remainder is below `STEEPEST`.
+        its order over its amplitude, until the greatest slope of the others is below `STEEPEST`.
         """
         gone = list[int]()
         orders = np.array([self.orders[i] for i in places], dtype=float)
@@ -270,5 +270,5 @@ class EvidenceSelection:
         return np.asarray(np.sqrt(2.0 * half))
 
     def _false_alarm(self, statistic: float) -> float:
-        """Log10 of the probability that noise alone makes any order are significant as much."""
+        """Log10 of the probability that noise alone gives any order this statistic."""
         return min(0.0, math.log10(len(self.orders)) - 0.5 * statistic / math.log(10.0))

@@ -13,10 +13,10 @@ from ...support.layout import counted, laid_out, wrapped_lines
 from ...support.plainresult import finite_or_none
 from .table import OrderRow, OrderTable
 
-#: Parts of the noise that are reported: of its standard deviation at least.
+#: Least share of the noise's standard deviation from which a part of it is reported.
 _SHOWN: Final = 0.2
 
-#: Rejected orders listed together with the retained ones, the strongest first.
+#: Rejected orders listed in addition to the retained ones, the strongest first.
 _REJECTED = 8
 
 
@@ -59,7 +59,7 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
 
 
 def selection_error_unit(selection: OrderTable, errors_in: ErrorsIn = "auto") -> ErrorUnit:
-    """One unit for all that is reported and sampled of a selection, by the rms before it."""
+    """One unit for tables and plots of a selection, by the rms before correction."""
     before = arcsec(selection.holdout_rms[0], selection.period)
     return error_unit(errors_in, sine_of_rms(before), selection.period)
 
@@ -87,7 +87,7 @@ def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
 
 
 def _explanations(rows: Sequence[OrderRow]) -> list[str]:
-    """What each retained order may be by itself; aliases are reported with what they hinder."""
+    """Possible causes of each retained order; its aliases are reported separately."""
     lines = []
     for row in rows:
         names = [e.name for e in row.explanations if e.order == row.order and not e.assumed]
@@ -98,7 +98,7 @@ def _explanations(rows: Sequence[OrderRow]) -> list[str]:
 
 
 def _source(selection: OrderTable, unit: ErrorUnit) -> str:
-    """Where the noise is known from, or the parts that a reading shows."""
+    """How the noise was estimated, or its parts in a reading."""
     noise = selection.noise
     if selection.estimate is not None:
         white, *drifts = (arcsec(math.sqrt(v), selection.period) for v in selection.estimate.noise)

@@ -38,14 +38,14 @@ class OrderRow:
         ``"reference"``, ``"rounding"``, ``"shared"``, ``"too long"``; with method
         ``"paper"`` also ``"small"`` and ``"phase varies"``.
     cosine, sine : float
-        Coefficients A and B together with all retained orders.
+        Coefficients A and B, fitted jointly with all retained orders.
     standard_error : float
         Of each of A and B, and of the amplitude where it is well above zero; of a retained
         order that of the fit (`FitResult.amplitude_std`).
     statistic : float
         Reduction of the sum of squares over the noise variance; about 2 for noise.
     log10_false_alarm : float
-        Logarithm of the probability that noise alone does as well in the whole search.
+        Logarithm of the probability that noise alone reaches this statistic in the whole search.
     holdout_gain : float
         Part by which the held-out mean square falls when this order joins the other
         retained ones (negative: it makes new data worse).
@@ -60,10 +60,10 @@ class OrderRow:
         True when an alias of a retained order is a known line of the joint or was a
         candidate too.
     phase_std : float
-        Standard error of the phase in radians where a fit shows it, else NaN.
+        Standard error of the phase in radians where a fit gives it, else NaN.
     needed : float
         Amplitude from which it would be significant in the whole search, at the phase that it has;
-        NaN where the readings do not show it.
+        NaN where the readings do not determine it.
     probability : float
         That the order is in the error, given the readings; NaN where sums alone are known.
     """
@@ -168,7 +168,7 @@ class OrderTable(PlainResult):
         """The same with coefficients and standard errors of retained orders as a fit has them.
 
         One order has one amplitude and one standard error, wherever they are shown; ``errors``
-        are those of amplitudes and phases, where a fit shows them.
+        are those of amplitudes and phases, where a fit gives them.
         """
         lines = {
             order * shaft.cycles_per_turn: (shaft.cosine[i], shaft.sine[i])

@@ -16,14 +16,14 @@ import numpy as np
 from ...support.arrays import Array
 from .zerogroups import ZeroGroupReadings
 
-#: With more units than this they are taken together, in this many groups.
+#: With more than `MOST_UNITS` units they are combined into `GROUPS` groups.
 MOST_UNITS: Final = 96
 GROUPS: Final = 32
 
 #: Powers of e^{ix} between two fresh evaluations.
 _RESEED: Final = 64
 
-#: Numbers of a block of units: it stays small together with the readings.
+#: Numbers in a block of units: small compared with the readings.
 _BLOCK: Final = 1 << 21
 
 

@@ -55,7 +55,7 @@ _VERDICTS: Final = {
 
 
 def verdict_reason(verdict: str) -> str:
-    """Why an order of this verdict is not retained, as the remainder of a sentence."""
+    """Why an order of this verdict is not retained, as the end of a sentence."""
     return _VERDICTS[verdict]
 
 

@@ -27,7 +27,7 @@ _GOLDEN: Final = 0.5 * (math.sqrt(5.0) - 1.0)
 #: Readings from which orders are chosen; of more, some blocks are taken.
 MOST_READINGS: Final = 8000
 
-#: Angles that show the travel.
+#: Angles that represent the travel.
 _TOLD: Final = 2000
 
 #: Readings a run up to which the call of a function costs more than what it computes.
@@ -56,7 +56,7 @@ class ZeroGroupReadings(NamedTuple):
     time: Array | None = None
 
     def given(self) -> RunReadings:
-        """The same as the evidence takes it: angles in radians, nothing where all are equal."""
+        """The same as the evidence takes it: angles in radians, no weights where all are 1."""
         return RunReadings(
             2.0 * math.pi * self.turns,
             self.error,
@@ -108,7 +108,7 @@ def some_angles(angles: Sequence[Array], period: float) -> Array:
 def some_readings(
     units: Sequence[ZeroGroupReadings], most: int = MOST_READINGS
 ) -> list[ZeroGroupReadings]:
-    """About n of the readings, in blocks that follow each other in time and lie anywhere."""
+    """About ``most`` of the readings, in blocks of consecutive ones spread over the record."""
     total = sum(unit.turns.size for unit in units)
     if total <= most:
         return list(units)
