@@ -58,7 +58,7 @@ class CalibrationSums:
     when: str | None = None
 
     def add(self, run: CalibrationRun, orders: Array, periodic: bool) -> None:
-        """Take in a run, its isolated outliers omitted."""
+        """Add a run, its isolated outliers omitted."""
         run = without_spikes(run if periodic else over_turns(run))
         error = run.centred_error
         share = np.ones(error.size) if run.weights is None else run.weights
@@ -118,7 +118,7 @@ class CalibrationSums:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What one day's readings show of a unit.
+    """What one day's readings determine about a unit.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ class Calibration:
     def blocks(self) -> Array:
         """Covariance of each order's cosine and sine for readings of unit variance, (K, 2, 2).
 
-        Where runs show that the readings are not independent, that of such readings.
+        Where runs show correlated readings, that of such readings.
         """
         k = 2 * np.arange(self.coefficients.size // 2)
         rows = np.array([[k, k], [k + 1, k + 1]]).transpose(2, 0, 1)

@@ -41,7 +41,7 @@ def fleet(
     shafts: Mapping[str, float] | None = None,
     **reading: Any,
 ) -> Fleet:
-    """Units of one design: outliers, the shared pattern, changes since the last time.
+    """Compare units of one design: outliers, shared pattern, changes since the last time.
 
     ::
 
@@ -58,8 +58,8 @@ def fleet(
         As `trueangle.read_runs`, with the columns ``unit`` and ``when`` (ISO 8601) where there
         are several dates. Files are summed one after the other and not kept.
     by : {"unit", "run"}
-        What separates the units. Where no column ``unit`` does, the files or the labels of
-        the runs, whichever are more.
+        What identifies the units. Without a column ``unit``, the files or the labels of the runs,
+        whichever are more.
     orders : iterable of int, or mapping, optional
         Default: those that the first 32 units together support by evidence, and 1 and 2.
     share, confidence : float

@@ -17,7 +17,7 @@ from ..support.times import parsed_time
 from .calibration import Calibration, order_columns
 from .outliers import LEVEL, Deviates, deviates, level_by_order
 
-#: Units with a second date from which their changes show what an ordinary change is.
+#: Fewest units with a second date whose changes define an ordinary change.
 _FEWEST: Final = 4
 
 #: Places of a turn at which a change of the pattern is looked at.
@@ -42,12 +42,12 @@ class HistoryOrder(NamedTuple):
 
 
 class HistoryRow(NamedTuple):
-    """What one further calibration of a unit states.
+    """Result of one further calibration of a unit.
 
     ``order`` is the order that moved most (None: the zero); ``statistic`` its T^2 and ``limit``
     what it stays below in 99 % of fleets in which nothing moved. ``bound`` is that of 95 % of the
     greatest change over a turn since the first date, in the unit of the period; the day at which
-    it reaches the permitted error, growing straight in time, is ``next_calibration``. ``orders``
+    it reaches the permitted error, growing linearly in time, is ``next_calibration``. ``orders``
     has the charts of all orders (`charted`), which pass ``cusum_limit`` once in
     465 dates where nothing moves, those of a unit together.
     """
@@ -265,9 +265,9 @@ def next_calibration(
     calibrations: Sequence[tuple[Calibration, float]],
     permitted: float | None,
 ) -> tuple[str | None, bool]:
-    """The day at which a drift of this bound reaches the permitted error, straight in time.
+    """The day at which a drift of this bound reaches the permitted error, linearly in time.
 
-    And whether that is extrapolated: beyond twice the time observed.
+    And whether that is extrapolated: beyond twice the measured time.
     """
     if permitted is None:
         return None, False

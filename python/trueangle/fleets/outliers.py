@@ -12,19 +12,18 @@ from numpy.typing import NDArray
 from ..support.arrays import Array
 from .variance import robust_variance
 
-#: Probability that a fleet without an outlier is reported with one.
+#: Probability of a false outlier in a fleet of sound units.
 LEVEL: Final = 0.01
 
-#: Shares of that probability: of a unit by one of its orders, the remainder by all together; and of
-#: outliers that hide behind others (a later step, where an earlier one reported none), the
-#: remainder by themselves.
+#: Shares of that probability: one order of a unit, else all orders together; outliers
+#: masked by others (found in a later step, where an earlier one found none), else the others.
 _BY_ORDER: Final = 0.9
 _HIDDEN: Final = 0.2
 
 #: Shares of the level of those orders of the output in which damage shows: eccentricity and tilt.
 _DAMAGE: Final = {1.0: 0.4, 2.0: 0.2}
 
-#: This share of the units and one more can be outliers: by the others they are reported.
+#: This share of the units and one more can be outliers: they are judged by the others.
 _MOST: Final = 0.25
 
 #: Degrees of freedom of the scale that an order needs.
@@ -98,9 +97,9 @@ def deviates(
 
     is Fisher's F with d and N - d degrees of freedom for normal units. A unit's probability is that
     of the smallest of its orders', each over its share of the level (weighted Bonferroni), or of
-    all together (Fisher's sum of logarithms). The farthest unit is rejected again and again; as
-    many are outliers as the last whose probability, times the units then left, is below the level,
-    but those that are none together with the units left.
+    all together (Fisher's sum of logarithms). The farthest unit is removed repeatedly. Outliers
+    are all units up to the last whose probability, times the number of units then left, is below
+    the level, except those that are not significant against the units left.
 
     Parameters
     ----------
@@ -117,7 +116,7 @@ def deviates(
 
     Notes
     -----
-    n times orders for every unit rejected, a quarter of them and one more at most.
+    Cost: n times orders for every unit removed, at most a quarter of them and one more.
     """
     n = len(values[0])
     variances = np.array([_variance(v, s, aligned) for v, s in zip(values, own, strict=True)])
@@ -148,7 +147,7 @@ def deviates(
         chance, size = _chances(values, weights, ~outlying, aligned)
         unit = _combined(chance, share_of)
         limit = (1.0 - _HIDDEN) * level / float((~outlying).sum())
-        # What was rejected before one that hid is an outlier by itself, or none.
+        # A unit removed before a masked one is an outlier only if significant by itself.
         back = outlying & (unit > limit)
         if not back.any():
             return Deviates(chance, size, unit, outlying, variances, limit)
@@ -200,7 +199,7 @@ def _f_tail(f: Array, d: int, free: Array) -> Array:
 
 
 def _combined(chance: Array, shares: Array) -> Array:
-    """Probability of a unit by the least of its orders' or by all together."""
+    """Probability of a unit by the least of its orders' or by all orders together."""
     orders = chance.shape[1]
     least = (chance / shares).min(axis=1)
     if orders == 1:

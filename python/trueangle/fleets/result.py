@@ -291,7 +291,7 @@ def _calendar(fleet: Fleet, shown: ErrorUnit, scale: float, width: int) -> list[
 
 
 def _save_fleet(prior: Prior, told: dict[str, Any], path: str | PathLike[str]) -> None:
-    """Write a fleet: its prior, and what it shows as plain values; see `Fleet.save`."""
+    """Write a fleet: its prior, and its results as plain values; see `Fleet.save`."""
     runs = prior.run_variance
     content = {
         "format": FORMAT,

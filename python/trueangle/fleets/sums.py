@@ -19,17 +19,17 @@ from ..runs.run import CalibrationRun
 from ..support.times import local_day
 from .calibration import Calibration, CalibrationSums, normal_matrix, output_orders
 
-#: Units by which orders are chosen: of the first this many.
+#: Number of units, the first ones, by which orders are chosen.
 _SAMPLE: Final = 32
 
 #: Orders of the output that are looked at, at most, and readings for each.
 _HIGHEST: Final = 110
 _READINGS_EACH: Final = 6
 
-#: Orders that stay whether they are significant or not: eccentricity and tilt, where damage shows.
+#: Orders that stay, significant or not: eccentricity and tilt, where damage shows.
 _ALWAYS: Final = (1, 2)
 
-#: Least eigenvalue of the normal matrix, its columns scaled, with which orders are separated.
+#: Least eigenvalue of the normal matrix, its columns scaled, from which orders are separable.
 _TOLD: Final = 1e-3
 
 
@@ -127,7 +127,7 @@ class FleetSums:
         return bool((self.orders == np.round(self.orders)).all())
 
     def _choose(self) -> None:
-        """The orders by the units observed so far, whose runs are then summed."""
+        """Choose the orders by the units read so far, whose runs are then summed."""
         names = self._names(self._waiting)
         together: dict[str, list[CalibrationRun]] = {}
         for unit, runs in self._waiting.items():
@@ -141,7 +141,7 @@ class FleetSums:
         self._waiting = {}
 
     def calibrations(self) -> tuple[list[list[Calibration]], list[str]]:
-        """Of every unit in the order of its dates, and the units that show no coefficients.
+        """Of every unit in the order of its dates, and the units without coefficients.
 
         Raises
         ------
@@ -234,7 +234,7 @@ def worth_keeping(
 def _told_apart(
     units: Sequence[Sequence[CalibrationRun]], shafts: Sequence[ShaftOrders]
 ) -> list[ShaftOrders]:
-    """As many of the output's lowest orders as the places of the first unit separate."""
+    """As many of the output's lowest orders as the positions of the first unit separate."""
     run = units[0][0]
     for highest in sorted(
         {k for s in shafts if s.name == "output" for k in s.orders}, reverse=True

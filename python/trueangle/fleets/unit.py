@@ -42,10 +42,10 @@ class FleetUnit:
     left : float
         Standard deviation of the readings about the unit's own pattern.
     p : float
-        Probability of as much where nothing is the matter, the unit's orders allowed for: of its
-        distance from the other units or, where it moved, of its change.
+        Probability that a sound unit deviates or, where it moved, changes this much, allowing for
+        the number of its orders.
     limit : float
-        At or below which ``p`` is reported: 1 % of fleets for all units together.
+        At or below which ``p`` is reported: in 1 % of sound fleets, for all units together.
     """
 
     unit: str

@@ -40,7 +40,7 @@ _PASSES, _EXCHANGED = 4, 400
 
 @dataclass(frozen=True)
 class UnitPlan(PlainResult):
-    """Readings of a unit whose coefficients are sampled as those of its fleet.
+    """Readings of a unit whose coefficients are distributed as those of its fleet.
 
     Attributes
     ----------
@@ -61,8 +61,8 @@ class UnitPlan(PlainResult):
     own : dict of order to float
         Share of each order's spread between units that the readings take away.
     readings_without : int or None
-        Readings that the same uncertainty takes without the fleet; None where the arc shows the
-        orders by no number of them.
+        Readings needed for the same uncertainty without the fleet; None if no number of them
+        determines the orders on this arc.
     units : int
         From which the prior is known.
     notes : tuple of str
@@ -225,7 +225,7 @@ def plan_unit(
 
 
 def _without(start: float, stop: float, known: Spread, uncertainty: float) -> int | None:
-    """Readings that the same takes where nothing is known about the unit."""
+    """Readings needed for the same uncertainty if nothing is known about the unit."""
     try:
         plan = plan_arc(start, stop, known.orders, noise=known.noise, uncertainty=uncertainty)
     except ArgumentError:

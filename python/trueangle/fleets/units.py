@@ -20,7 +20,7 @@ from .variance import BetweenUnits, held_out_score, reml
 #: Fewest units for finding outliers: each is compared with the others.
 FEWEST: Final = 5
 
-#: Share of the units that are rejected as outliers, at most (one may always be).
+#: Largest share of the units that is rejected as outliers (one may always be).
 FEW: Final = 0.05
 
 #: Places of a turn for each cycle of the highest order.
@@ -158,8 +158,8 @@ def run_variance(calibrations: Sequence[Calibration], noise: Array, louder: Arra
 class UnitNoise(NamedTuple):
     """Variance of a reading, of every unit, and what a further unit's is like.
 
-    ``variance`` is that of all units together, ``freedom`` its degrees of freedom
-    as a guess of a further unit's (infinite where units do not differ).
+    ``variance`` is that of all units together, ``freedom`` its degrees of freedom as a
+    prediction for a further unit (infinite where units do not differ).
     """
 
     units: Array

@@ -45,7 +45,7 @@ def reml(values: Array, own: Array, aligned: bool) -> BetweenUnits:
         b_u ~ N(μ, τ I + S_u),
         l = -1/2 Σ_u [log|V_u| + r_u' V_u⁻¹ r_u] - 1/2 log|Σ_u V_u⁻¹|
 
-    by Fisher's scoring in ``τ ≥ 0``; without a separate mean by maximum likelihood.
+    by Fisher's scoring in ``τ ≥ 0``; by maximum likelihood if not ``aligned``.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a joint declares together with its gear: further shafts, bearings, reading heads."""
+"""What a joint declares in addition to its gear: further shafts, bearings, reading heads."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class DeclaredShaft:
 
 @dataclass(frozen=True)
 class Bearing:
-    """A rolling bearing, whose lines are at orders that are not whole.
+    """A rolling bearing, whose lines have orders that are not whole.
 
     With n balls and x the ratio of ball to pitch diameter (times the cosine of the contact
     angle), per turn of the shaft: cage ``(1-x)/2``, outer race ``n(1-x)/2``, inner

@@ -178,7 +178,7 @@ class _DescriptionReader(Decoder):
             member,
             self.signals(table.get("signals", _NOTHING), f"{at}.signals"),
             self.shafts(table.get("shafts", _NOTHING), f"{at}.shafts"),
-            # Together with the robot file, wherever the command is called.
+            # Relative to the robot file, wherever the command is called.
             None
             if simulation is None
             else self.path.parent / self.text(simulation, f"{at}.simulation"),

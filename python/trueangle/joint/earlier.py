@@ -16,8 +16,8 @@ def earlier_signals(signals: Signals, delay_s: float) -> Signals:
 
         θ(t - τ) ≈ θ(t) - vτ
 
-    Where the readings of a run are closer than the delay, the angle is read off their own record
-    instead, so that the joint may gather speed meanwhile.
+    Where the readings of a run are closer together than the delay, the angle is interpolated in
+    their own record instead, which allows the joint to accelerate meanwhile.
 
     The signals need a velocity; ``delay_s`` is τ, negative for a time after.
 

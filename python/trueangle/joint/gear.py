@@ -14,7 +14,7 @@ from .shafts import shaft_cycles
 #: Gear ratios of common strain wave gears, tried where none is declared.
 COMMON_RATIOS: Final = (30, 50, 80, 100, 120, 160)
 
-#: Low orders wanted by default: what 36 positions can hold together with the constant.
+#: Low orders wanted by default: what 36 positions determine in addition to the constant.
 HIGHEST_LOW_ORDER: Final = 17
 
 

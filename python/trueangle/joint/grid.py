@@ -39,7 +39,7 @@ class UniformGrid:
 
 
 def folded_order(order: float, rate: float) -> float:
-    """The lowest order with the same values at this many equal steps a turn."""
+    """The lowest order with the same values at ``rate`` equal steps a turn."""
     rest = order % rate
     return min(rest, rate - rest)
 
@@ -54,7 +54,7 @@ def aliases_of(order: float, rate: float, count: int) -> list[float]:
 def uniform_grid(theta: NDArray[np.float64]) -> UniformGrid | None:
     """The uniform grid that all angles (radians) lie on, or None.
 
-    Equal steps that close after a turn, or an arc of them, some omitted: at a polygon's places
+    Equal steps that close after a turn, or an arc of them, with gaps allowed: at a polygon's places
     the same orders are collinear wherever the joint stops.
 
     Examples
@@ -82,7 +82,7 @@ def uniform_grid(theta: NDArray[np.float64]) -> UniformGrid | None:
 
 
 def _lies_on(turns: NDArray[np.float64], positions: int) -> bool:
-    """Whether all places, in turns, lie on this many of equal steps."""
+    """Whether all places, in turns, lie on a grid of ``positions`` equal steps."""
     shift = np.angle(np.mean(np.exp(2j * np.pi * positions * turns))) / (2.0 * np.pi)
     away = turns * positions - shift
     return float(np.abs(away - np.round(away)).max()) < ON_GRID

@@ -44,7 +44,7 @@ class Joint:
         Further shafts: a worm, a belt, the wheels of a gear train.
     bearings : tuple of Bearing
     heads : tuple of Head
-        Reading heads on the disc, each with a separate column; none for the one usual.
+        Reading heads on the disc, each with a separate column; none for the usual single head.
 
     Examples
     --------
@@ -66,7 +66,7 @@ class Joint:
             found: tuple[object, ...] = all_of_type(name, getattr(self, name), kind, wanted)
             object.__setattr__(self, name, found)
         check_choice("fixed_member", self.fixed_member, FIXED_MEMBERS)
-        shaft_cycles(self.gear_ratio, self.fixed_member)  # refuses 0, and a generator that is
+        shaft_cycles(self.gear_ratio, self.fixed_member)  # rejects 0 and a generator at rest
         check_choice("encoder_side", self.encoder_side, ENCODER_SIDES)
         if self.pole_pairs < 1:
             raise ArgumentError(f"pole_pairs must be at least 1, got {self.pole_pairs!r}")
@@ -111,7 +111,7 @@ class Joint:
         return found
 
     def bearing_lines(self, order: float) -> list[str]:
-        """Lines of bearings that are, slip allowed for, at an output order."""
+        """Lines of bearings that lie, allowing for slip, at an output order."""
         return [
             f"bearing on {bearing.shaft.replace('_', ' ')}: {what}"
             for bearing in self.bearings

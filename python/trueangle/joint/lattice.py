@@ -17,8 +17,8 @@ from .grid import uniform_grid
 ON_LATTICE = 0.05
 LEAST_STEP = 1e-9
 
-#: Probability below which moves on a finer lattice are on it for a reason, and steps of it looked
-#: for.
+#: Probability below which moves do not lie on a finer lattice by chance, and steps tried in the
+#: search for it.
 BY_CHANCE, STEPS_TRIED = 1e-3, 200
 
 #: Cells of a turn beyond which digits that were cut off are not looked behind, steps within the
@@ -29,7 +29,7 @@ MOST_CELLS, LEAST_STEPS, WIDEST_CELL = 400_000, 20, 0.3
 #: of the true positions from which on it is the design's.
 ON_COUNTS, OF_DESIGN = 0.97, 0.5
 
-#: Difference of coherences that readings do not show.
+#: Difference of coherences that readings cannot resolve.
 ALIKE = 0.004
 
 #: Share of the moves from reading to reading that stay where they are, as at turning points,
@@ -80,7 +80,7 @@ def lattice_step(values: NDArray[np.float64]) -> float:
     if steps.size < 3:
         return 0.0
     step = float(steps.min())
-    # The finest difference may be several counts: a whole part then.
+    # The finest difference may be several counts: the step is then a whole part of it.
     for parts in (1, 2, 3):
         away = steps * (parts / step)
         if np.abs(away - np.round(away)).max() < ON_LATTICE:
@@ -89,10 +89,10 @@ def lattice_step(values: NDArray[np.float64]) -> float:
 
 
 def even_rate(runs: Sequence[NDArray[np.float64]]) -> float:
-    """Equal steps in a turn that all runs keep to, each from a separate place; 0 for none.
+    """Equal steps in a turn that all runs keep to, each from its own start; 0 for none.
 
-    A line whose phase every run draws anew is there the same numbers as one that turns this many
-    times more or less, whether the steps close after a turn or not.
+    There, a line whose phase is new in every run has the same values as one whose order is higher
+    or lower by this rate, whether the steps close after a turn or not.
 
     ``runs`` are the angles of each run, in turns.
 
@@ -111,8 +111,8 @@ def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
     """Step of the lattice that all values lie on to their last digit; 0 where there is none.
 
     At places of equal steps all counts of a sensor lie near a lattice of those steps, and the
-    moves from count to count show the step by how they differ: 113 and 114 are no multiples
-    of 113.
+    differences between moves from count to count give the step: 113 and 114 are not both
+    multiples of 113.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def step_behind(values: NDArray[np.float64], true: NDArray[np.float64], digit: f
 
         R(N) = |mean exp(2πi N v)| = sinc(N digit)
 
-    for N counts in a turn, and probability, ``exp(-n R²)``, for other N.
+    for N counts in a turn; for other N, R is random with the tail ``exp(-n R²)``.
 
     Parameters
     ----------
@@ -223,8 +223,8 @@ def step_behind(values: NDArray[np.float64], true: NDArray[np.float64], digit: f
 def table_move(runs: Sequence[NDArray[np.float64]], step: float) -> float:
     """Move from each reading of a table of equal steps to the next, in turns; 0 for no table.
 
-    Where each reading is one and the same number of steps from the one before, the design put
-    it there: such a lattice is no property of the sensor.
+    If all readings are the same number of steps apart, the design placed them: such a lattice
+    is no property of the sensor.
 
     ``runs`` are the angles of each run and ``step`` that of their lattice (`lattice_step`), in
     turns.

@@ -1,4 +1,4 @@
-"""Which member of a strain wave gear is still."""
+"""Which member of a strain wave gear is fixed."""
 
 from __future__ import annotations
 

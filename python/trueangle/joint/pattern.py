@@ -118,7 +118,7 @@ class Pattern:
         turns_per_s: Array,
         response: Callable[[Array], NDArray[np.complex128]],
     ) -> Array:
-        """The pattern as observed through a filter while moving.
+        """The pattern as measured through a filter while moving.
 
         ``response(f)`` is the filter's complex gain at the signed frequency f in Hz;
         a line of order m at v turns per second is at ``m v``.

@@ -194,7 +194,7 @@ class Signals:
         )
 
     def play(self, half_width_deg: float, start_state: float = 1.0) -> Array:
-        """Where the angle is in a play of that half width, in [-1, 1].
+        """Position of the angle within a play of that half width, in [-1, 1].
 
         It goes from one side to the other over twice the half width after each reversal; a run
         starts at ``start_state * d``: 0 in the middle, 1 at the side of its direction.
@@ -243,7 +243,7 @@ def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
 
 
 def _common_table(first: Signals, later: Signals) -> int:
-    """Positions of a turn on which all readings are; 0 where later ones are with them."""
+    """Positions of a turn on which all readings lie; 0 if later ones lie between them."""
     grid = uniform_grid(np.concatenate([first.theta, later.theta]))
     if grid is not None or first.table != later.table:
         return 0 if grid is None else grid.positions

@@ -1,4 +1,4 @@
-"""Direction and speed of readings about a turning point, where the reference alone shows them.
+"""Direction and speed of readings about a turning point, where only the reference determines them.
 
 The step that leads to the reading farthest out may hold the turning point: the joint then moves
 the other way already. Of the two lines that the readings before and after it make in time,
@@ -7,7 +7,7 @@ the other way already. Of the two lines that the readings before and after it ma
 
     θ₋(t), θ₊(t),
 
-it belongs to the one that states its angle. A difference of angles across the turning point is no
+it belongs to the one that predicts its angle. A difference of angles across the turning point is no
 speed either: the last reading before it and the first one after it have the slope of the
 parabola through the readings on their own side.
 """
@@ -20,8 +20,8 @@ import numpy as np
 
 from ..support.arrays import Array
 
-#: Share of the one line's error below which the other one's must be to have the reading: where
-#: both are alike the joint may have stopped there, and came the way it came.
+#: Share of the one line's error below which the other one's must be to claim the reading: where
+#: both are similar the joint may have stopped there, and the direction stays.
 CLEARLY = 0.5
 
 #: Readings that make a line, and a parabola.
@@ -29,7 +29,7 @@ LINE, PARABOLA = 2, 3
 
 
 def direction_at_turns(angle: Array, clock: Array, direction: Array) -> Array:
-    """Directions of the steps, put right for readings that had turned back already.
+    """Directions of the steps, corrected for readings taken after the turning point.
 
     ``angle`` is unwrapped, ``clock`` holds times, or places in the record where none were recorded,
     and ``direction`` is that of the step that led to each reading.
@@ -58,7 +58,7 @@ def direction_at_turns(angle: Array, clock: Array, direction: Array) -> Array:
 
 
 def velocity_at_turns(angle: Array, time: Array, direction: Array, velocity: Array) -> Array:
-    """Velocities by central differences, put right together with turning points.
+    """Velocities by central differences, corrected next to turning points.
 
     Examples
     --------

@@ -38,14 +38,14 @@ from ..support.files import partition_keys
 from ..support.times import local_day
 from .keeping import SAMPLE, KeptReadings
 
-#: Roles whose columns separate runs.
+#: Roles whose columns identify runs.
 LABELS = ("unit", "run")
 
 #: Readings taken together: what is computed of them stays in the cache.
 _BLOCK = 1 << 16
 #: Readings, at most, of the first batch that are checked for wrong units and signs.
 _LOOKED_AT = 4096
-#: Bytes that a reading takes, to show how much of a log is done.
+#: Bytes of a reading, to estimate how much of a log is done.
 _BYTES = 16
 
 #: Called after every batch with its rows and the bytes that those took.
@@ -58,7 +58,7 @@ class LogFitSettings:
 
     ``orders`` maps shaft names to all orders that may be requested, ``shafts`` shaft names
     to their turns per output turn. Of every log ``kept`` readings are kept, a ``part`` of the
-    blocks at most, and outliers omitted where it is reported what they are.
+    blocks at most, and outliers are omitted where their limits are given.
     """
 
     orders: Mapping[str, tuple[int, ...]]
@@ -153,7 +153,7 @@ class Accumulated:
     indicated_sign: int = 1
 
     def add(self, other: Accumulated) -> Accumulated:
-        """Itself with the next segment of the same log, or the next log, taken in."""
+        """Itself with the next segment of the same log, or the next log, added."""
         self.moments.merge(other.moments)
         self.kept.add(other.kept)
         self.rows += other.rows

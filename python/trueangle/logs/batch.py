@@ -70,7 +70,7 @@ def correct_logs(
     scheduler : str, optional
         Address of a Dask scheduler whose workers share the file system.
     threads : int, optional
-        At most this many for the correction itself.
+        Most threads for the correction itself.
     progress : {"auto", "text", "json", "none"}
         On stderr; see `Progress`.
     report : callable
@@ -137,7 +137,7 @@ def correct_logs(
 
 
 def _warn_of_units(logs: Sequence[LogReport]) -> None:
-    """Show once of each column whose readings look like another unit, and of how many logs."""
+    """Warn once for each column whose readings look like another unit, with the number of logs."""
     told: dict[str, list[str]] = {}
     for log in logs:
         for joint in (log.result or {}).get("joints", ()):

@@ -205,7 +205,7 @@ def _search(path: object, header: Sequence[str], joint: str | None) -> str:
 
 
 def _joint_names(joint: str) -> Iterator[list[str]]:
-    """Names that the angle of a joint may have, the most showing first."""
+    """Names that the angle of a joint may have, the most specific first."""
     indicated = [f"indicated_{unit}" for unit in UNITS]
     yield [
         name

@@ -25,7 +25,7 @@ from .turns import TurnCounter, TurnSpan
 class CorrectionTask:
     """One log to correct: can be sent to another process.
 
-    ``before`` shows, by joint, where the log before stopped; ``manifest`` is the folder
+    ``before`` gives, by joint, where the log before stopped; ``manifest`` is the folder
     whose manifest notes the output.
     """
 
@@ -113,7 +113,7 @@ def states_after(result: Mapping[str, Any]) -> dict[str, JointState]:
 
 
 def count_turns(source: Path, settings: LogSettings) -> dict[str, TurnSpan]:
-    """What logs corrected side by side must know about each other, by joint that needs it.
+    """What logs corrected in parallel must know about each other, by joint that needs it.
 
     One pass over the angle columns.
     """

@@ -60,7 +60,7 @@ def fit_logs(
 
     by least squares with one zero per run: what `fit` gives for the runs of these files. Up to
     2^20 readings are read into runs and fitted so. Of more, all are summed (`Moments`) and some
-    65 000 are kept, in blocks at random: these show what needs readings in their order, the sums
+    65 000 are kept, in blocks at random: these give what needs readings in their order, the sums
     all else, and a note reports it.
 
     Parameters
@@ -71,8 +71,8 @@ def fit_logs(
         omitted and counted.
     orders : iterable of int, mapping of shaft to orders, "auto" or None
     gear_ratio, fixed_member, shafts, argument, covariance
-        As in `fit`. ``"hac"`` takes whole runs apart, which sums do not: as if one in this many
-        correlated readings were one independent reading.
+        As in `fit`. ``"hac"`` needs segments of runs, which sums do not keep: standard errors are
+        those of fewer independent readings, by the correlation time of the residuals.
     loss : {"auto", "linear"}
         As in `fit`: ``"auto"`` rejects outliers, which takes a second pass where there are
         some.

@@ -36,7 +36,7 @@ from .statistics import CorrectionStatistics, UnitEvidence
 from .turns import TurnCounter, TurnState
 
 Array: TypeAlias = NDArray[np.floating[Any]]
-#: Range of a channel, in its largest size, that goes round; and in that, of one that is still.
+#: Range of a channel that goes round, over its largest value; of a constant one, over that range.
 _ROUND, _STILL = 0.5, 0.01
 
 
@@ -53,7 +53,7 @@ class LogJoint:
         Of the indicated angle; searched by name where None.
     signals : mapping of str to (str, str or None)
         Columns of the signals that terms of the model need, and their units, where their
-        names do not state.
+        names do not state them.
     unit : str, optional
         Of the indicated angle.
     file, sha256 : str
@@ -95,7 +95,7 @@ class LogJoint:
 
 @dataclass(frozen=True)
 class LogSettings:
-    """What `trueangle correct` does to every log.
+    """Settings that `trueangle correct` applies to every log.
 
     ``topic`` and ``output_topic`` belong to ROS bags; ``threads`` bounds the threads of
     the correction.
@@ -117,7 +117,7 @@ class LogSettings:
     ) -> list[JointChannel]:
         """One channel per joint for a log with the columns ``header``.
 
-        ``before`` shows by joint how the log before ended; ``unit`` is that of the log's
+        ``before`` gives by joint how the log before ended; ``unit`` is that of the log's
         format where it defines one.
 
         Raises
@@ -180,7 +180,7 @@ class LogSettings:
 
 
 def _signal_columns(path: object, header: Sequence[str], joint: LogJoint) -> dict[str, RoleColumn]:
-    """Columns of the signals that the joint's model uses; time is in for velocity.
+    """Columns of the signals that the joint's model uses; time can replace velocity.
 
     Raises
     ------
@@ -356,7 +356,7 @@ class JointChannel:
         }
 
     def _dead_channel(self) -> str:
-        """What is reported about a channel that is still while the other one goes round."""
+        """A sentence on a channel that is constant while the other one goes round."""
         for name, other in permutations(self._ranges, 2):
             low, high = self._ranges[other]
             goes_round = high - low > _ROUND * max(abs(low), abs(high))
@@ -390,7 +390,7 @@ def logged_joints(
         model = load_robot(model)
     if isinstance(model, Robot):
         known = {**model.signals, **(signals or {})}
-        for joint in column if isinstance(column, Mapping) else ():  # represents that of the fit
+        for joint in column if isinstance(column, Mapping) else ():  # replaces that of the fit
             known[joint] = {k: v for k, v in known.get(joint, {}).items() if k != "indicated"}
         signals = known
     by_name: Mapping[Any, Any] = model if isinstance(model, Mapping) else {None: model}

@@ -1,4 +1,4 @@
-"""Readings of logs that are kept as they are, next to the sums of all."""
+"""Readings of logs that are kept as they are, in addition to the sums of all."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from ..support.arrays import Array
 
-#: Up to this many readings, 16 bytes each, are all read into runs...
+#: Number of readings, 16 bytes each, up to which all are read into runs ...
 KEPT: Final = 1 << 20
-#: ... and of more this many are kept: what is decided by them costs a part of a second.
+#: ... and of more, the number that is kept: what they decide takes a fraction of a second.
 SAMPLE: Final = 1 << 16
 
-#: Readings in a row that are kept or left together: neighbours show whether noise correlates.
+#: Readings in a row that are kept or omitted together: neighbours show whether noise correlates.
 _BLOCK: Final = 256
 
 
@@ -56,7 +56,7 @@ class KeptReadings:
         self.readings += other.readings
 
     def thinned(self, most: int) -> KeptReadings:
-        """The same with at most this many readings."""
+        """The same with at most ``most`` readings."""
         self.most = most
         self._thin()
         return self

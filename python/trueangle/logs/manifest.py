@@ -92,8 +92,8 @@ class Manifest:
             "settings": settings,
             "result": dict(result),
         }
-        # One write at the end of the file: processes of a cluster append side by side. The
-        # first line end is periodic the half line of a killed process; blank lines are skipped.
+        # One write at the end of the file: processes of a cluster append in parallel. The
+        # first line end closes the half line of a killed process; blank lines are skipped.
         handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         try:
             os.write(handle, b"\n" + json.dumps(entry).encode() + b"\n")

@@ -1,4 +1,4 @@
-"""Passes over logs whose readings are summed: one, and more where outliers need it."""
+"""Passes over logs whose readings are summed: one, or more if outliers require it."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _PASSES = 4
 
 
 class Passes:
-    """Passes over logs: one, and more where outliers or the angle of the errors need it."""
+    """Passes over logs: one, or more if outliers or the angle of the errors require it."""
 
     def __init__(
         self,
@@ -102,7 +102,7 @@ class Passes:
     def settled(
         self, argument: AnyArgument, fitted: Callable[[SummedReadings], FitResult]
     ) -> FitResult:
-        """The fit of all readings but the outliers, which `weigh` would rejected as well."""
+        """The fit of all readings but the outliers, which `weigh` would reject as well."""
         plain = _Judged(self.first(argument), fitted)
         start = plain.start()
         if start is None:

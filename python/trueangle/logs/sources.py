@@ -26,7 +26,7 @@ class LogTarget(NamedTuple):
 
 
 def logs_hold_at_most(paths: Iterable[Path], most: int, topic: str | None = None) -> bool:
-    """Whether logs hold at most this many rows, by what they state about themselves."""
+    """Whether logs hold at most ``most`` rows, by their own headers and sizes."""
     for path in paths:
         if not path.is_dir() and path.stat().st_size > RUNS_BYTES:
             return False
@@ -44,7 +44,7 @@ def _rows(path: Path, most: int, topic: str | None) -> int:
     try:
         return find_format(path).extent(path, (), topic).rows
     except TrueAngleError:
-        return 0  # who reads it whole states what is wrong
+        return 0  # reading it whole reports what is wrong
 
 
 def output_places(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..support.angles import UNIT_PERIODS, arcsec, unit_name
 
-#: Readings that fill a turn of another unit, and no further, to this share...
+#: Readings fill a turn of another unit, and nothing beyond it, to this share ...
 _FILLED: Final = 0.9
 #: ... and jump over its border by as much, while a usual step is below a tenth.
 _WRAPPED: Final = 0.8
@@ -20,7 +20,7 @@ _STEP: Final = 0.1
 #: Turns from which whole numbers or angles of one turn at most are likelier another unit.
 _MANY: Final = 10.0
 
-#: Readings from which something can be reported.
+#: Fewest readings from which a unit is suspected.
 _FEWEST: Final = 20
 
 
@@ -159,7 +159,7 @@ class UnitEvidence:
         return None
 
     def _fits(self, span: tuple[float, float], factor: float) -> bool:
-        """Whether the readings lie next to the span, and in it where they are another unit."""
+        """Whether the readings lie outside the span, and inside it in another unit."""
         if self.high - self.low <= 0.0:
             return False
 
@@ -174,7 +174,7 @@ class UnitEvidence:
         return apart and not outside(self.low * factor, self.high * factor)
 
     def sentence(self, column: str, span: tuple[float, float] | None) -> str | None:
-        """What to show, or None."""
+        """The warning, or None."""
         unit = self.unit(span)
         if unit is None:
             return None

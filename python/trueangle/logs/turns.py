@@ -11,7 +11,7 @@ from ..support.arrays import Array
 
 
 class TurnState(NamedTuple):
-    """Where a reading stopped: the last angle observed and the turns counted up to it."""
+    """Where a record stopped: the last angle read and the turns counted up to it."""
 
     last: float | None = None
     turns: int = 0

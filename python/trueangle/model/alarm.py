@@ -1,4 +1,4 @@
-"""Windows of a watched joint: what each stated about every order, and what an alarm is about."""
+"""Windows of a watched joint: their estimate of every order, and the cause of an alarm."""
 
 from __future__ import annotations
 

@@ -179,7 +179,7 @@ class Corrector:
         """
         return self._core.step
 
-    def __reduce__(self) -> tuple[Any, ...]:  # copies go on from where this one is
+    def __reduce__(self) -> tuple[Any, ...]:  # copies continue from this one's state
         return _rebuild, (self._model, self.state)
 
     def reset(self) -> None:

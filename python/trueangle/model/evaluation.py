@@ -76,7 +76,7 @@ class Evaluation(ShownResult):
         out : ndarray, optional
             Where to put the result, of the result's shape and type; may be ``theta``.
         threads : int, optional
-            At most this many; by default all allowed to the process for large arrays.
+            At most; by default all allowed to the process for large arrays.
         path : {"table", "cubics", "exact", "direct", "counts"}, optional
             Forces a way of evaluation, of a model without terms ("cubics": float32 only).
         direction, velocity, temperature, torque, current : float or array_like, optional
@@ -180,11 +180,11 @@ class SpanGuard:
     """
 
     def __init__(self, span: tuple[float, float] | None, repeats: bool = True) -> None:
-        #: What the core is to look at; None where there is nothing to state (any more).
+        #: What the core is to look at; None where there is nothing to report (any more).
         self.stretch: Stretch | None = None if span is None else (*span, repeats)
 
     def __call__(self, outside: int, total: int) -> None:
-        """Show of ``outside`` of ``total`` angles; contains nothing more once it has warned."""
+        """Warn of ``outside`` of ``total`` angles; only the first time."""
         if not outside or self.stretch is None:
             return
         start, stop, _ = self.stretch

@@ -86,7 +86,7 @@ def load_model(path: str | PathLike[str]) -> HarmonicModel:
 
 
 def embedded_model(text: str, path: str | PathLike[str]) -> HarmonicModel:
-    """Model of the text of a model file that is in another file; raises as `load_model`."""
+    """Model of the text of a model file embedded in another file; raises as `load_model`."""
     file = Path(path)
     return model_of_part(file, json_value(file, text, ModelFileError, "a model file"), "")
 
@@ -100,7 +100,7 @@ def model_file_content(path: Path, wanted: str) -> dict[str, Any]:
 
 
 def model_of_part(path: Path, value: Any, prefix: str) -> HarmonicModel:
-    """The model that a part of a file is; ``prefix`` is before its keys in messages."""
+    """The model that a part of a file is; messages put ``prefix`` before its keys."""
     reader = _ModelReader(path, ModelFileError)
     reader.prefix = prefix
     return reader.model_of(value)
@@ -112,7 +112,7 @@ class _ModelReader(RecordReader):
     prefix = ""
 
     def error(self, problem: str, key: str | None = None) -> FileError:
-        """The error that states ``problem`` of ``key``."""
+        """The error that reports ``problem`` at ``key``."""
         return super().error(problem, ".".join(filter(None, (self.prefix, key))) or None)
 
     def content(self, wanted: str) -> dict[str, Any]:

@@ -58,7 +58,7 @@ class HarmonicModel(ErrorModel):
     covariance : array_like, optional
         Of ``[C_0, A, B of each order of each shaft in turn]``.
     condition_number : float, optional
-        Of the design the fit has observed.
+        Of the design matrix of the fit.
     fit : FitRecord, optional
     provenance : Provenance, optional
     terms : iterable of Term, optional

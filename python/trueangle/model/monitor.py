@@ -27,7 +27,7 @@ from .model import HarmonicModel
 _MARGIN: Final = 1.25
 
 #: Share of the model's largest line that the sums of a window may lack of it, at one spacing of the
-#: readings in every window: within a bin the model is reported to second order.
+#: readings in every window: within a bin the model is represented to second order.
 _ROUNDING: Final = 1e-4
 
 #: Highest order that is watched: a window's sums grow with it.

@@ -8,13 +8,13 @@ from typing import Any
 from ..support.decoding import Decoder, shown_value
 from ..support.files import InputFile
 
-#: Ends of a span are within this many turns.
+#: Bound of the ends of a span, turns.
 MOST_TURNS = 1e9
 
 #: Ranges of signals and runs or files that a record lists, at most.
 MAX_TERMS = 64
 MAX_OFFSETS = 1_000_000
-#: Sentences that a record states about what its model is blind to.
+#: Most sentences of a record about what its model is blind to.
 _MOST_SENTENCES = 1000
 
 
@@ -24,7 +24,7 @@ class TableRecord:
 
     ``target`` is the machine's name in `trueangle.export_model`, ``argument`` the angle at which it
     looks up; ``rms`` and ``max_abs`` are what its own arithmetic (lines between its entries,
-    whole numbers) does next to the model, in the unit of the model's period.
+    whole numbers) adds to the model's error, in the unit of the model's period.
     """
 
     target: str
@@ -37,7 +37,7 @@ class TableRecord:
 class FitRecord:
     """How a model was fitted: what its file states under ``fit``.
 
-    ``span`` is the segment of angles the fit has observed, ``(0, period)`` for a full turn;
+    ``span`` is the range of angles that was fitted, ``(0, period)`` for a full turn;
     ``residual`` is the residual standard deviation (None where no reading is left over to
     take it from), ``offsets`` the zero of every run and ``offset_spread`` their standard
     deviation, all in the unit of the model's period. ``positions`` counts the distinct

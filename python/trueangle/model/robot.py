@@ -23,7 +23,7 @@ from .corrector import JointsStep, exchangeable_step
 from .model import HarmonicModel
 from .writing import save_robot
 
-#: Columns of a log by role, each with its unit where its name does not show it.
+#: Columns of a log by role, each with its unit where its name does not state it.
 Columns: TypeAlias = Mapping[str, tuple[str, str | None]]
 
 
@@ -121,8 +121,8 @@ class Robot(ShownResult, Mapping[str, HarmonicModel]):
         **signals : array_like
             ``velocity``, ``torque`` ... where terms of a model need them: of the shape of the
             positions or one that numpy spreads to it (a value per joint, ``(N, 1)`` for all).
-            What a joint is coupled to is taken from the positions; ``coupled_JOINT`` represents
-            a joint that is not among them.
+            What a joint is coupled to is taken from the positions; ``coupled_JOINT`` gives the
+            angle of a joint that is not among them.
 
         Returns
         -------

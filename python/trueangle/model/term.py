@@ -92,7 +92,7 @@ class Term:
 
     @property
     def travel(self) -> tuple[float, float] | None:
-        """Segment, over the turns, outside of which the term is held; None where it has none."""
+        """Range over the turns outside of which the term is constant; None without one."""
         return None
 
     def check(self) -> None:

@@ -20,7 +20,7 @@ ROUNDING = 1e-6
 #: Samples per period of the highest order: the greatest of them is at most 0.5 % low.
 _SAMPLES: Final = 32
 
-#: Below this the sum of amplitudes states enough.
+#: Below this the sum of amplitudes is a sufficient bound.
 _LOW: Final = 0.5
 
 

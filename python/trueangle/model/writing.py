@@ -96,7 +96,7 @@ def save_robot(
 
 
 def _record(record: FitRecord) -> dict[str, Any]:
-    """The record; what only a calibration without a reference states, only of one."""
+    """The record; the keys of a calibration without a reference only for such a one."""
     table = asdict(record)
     if not record.calibrated_without_reference:
         del table["calibrated_without_reference"], table["blind"]

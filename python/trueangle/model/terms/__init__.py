@@ -6,8 +6,8 @@ A `HarmonicModel` with ``terms`` corrects, with ``φ = θ - vτ``,
 
     indicated = φ + ε_h(φ) + Σ_i ε_i(φ, signals)
 
-A term states which forms of the compiled core it takes; which effect it subtracts, and what cannot
-be subtracted while the joint runs, state the effects (`trueangle.effects`). Missing orders,
+A term states which forms of the compiled core it takes; the effects (`trueangle.effects`)
+state which effect it removes and what cannot be removed while the joint runs. Missing orders,
 sidebands and the argument of the pattern need no term: they are harmonics and the argument of the
 model itself.
 """

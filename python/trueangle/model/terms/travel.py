@@ -21,15 +21,15 @@ class BacklashTerm(Term):
 
     The direction d is the sign of ``direction`` or ``velocity`` where one is given (0 keeps
     the last one). Otherwise it is that of the indicated angle, through the play operator:
-    the joint is taken to be until the indicated angle has crossed the whole play 2b.
+    the joint is assumed at rest until the indicated angle has crossed the whole play 2b.
     Before the first motion ``d = 0``, the middle of the play.
 
     Parameters
     ----------
     half_width : float
         b: half of the error forward minus the error backward, on average over a turn. Play
-        that is negative somewhere (the reference's own) needs a direction, for the angle
-        alone does not show it.
+        that is negative somewhere (the reference's own) needs a direction, because the
+        angle alone does not determine it.
     orders, cosine, sine : sequence of float
         How the play varies with the place: output orders m, and coefficients.
     """
@@ -64,8 +64,8 @@ class DirectionalPatternTerm(Term):
 
         ε = d Σ_m A_m cos mφ + B_m sin mφ
 
-    It needs the direction of travel d (or the velocity), which the angle alone does not show
-    where the play is negative.
+    It needs the direction of travel d (or the velocity), which the angle alone does not
+    determine where the play is negative.
 
     Parameters
     ----------
@@ -97,8 +97,8 @@ class PreslidingHysteresisTerm(Term):
 
         dz / ds = (d - z) / L,    z(s) = d - (d - z₀) e^(-s/L)
 
-    for travel s since the last reversal, where the state was ``z₀`` (Dahl); after a
-    long segment ``z₀ = -d`` and ``z = d (1 - 2e^(-s/L))``. Several elements of
+    for travel s since the last reversal, where the state was ``z₀`` (Dahl); after
+    long travel ``z₀ = -d`` and ``z = d (1 - 2e^(-s/L))``. Several elements of
     different lengths add up to a Maxwell-slip model.
 
     Parameters
