@@ -20,10 +20,10 @@ from .result import ArcPlan
 #: Readings where neither their number nor what they are for is given.
 READINGS = 60
 
-#: Readings of a plan at most: more take minutes to place, and nobody that long to read.
+#: Readings of a plan at most: more take minutes to place, and no rig needs them.
 MOST = 1_000_000
 
-#: Orders requested where none are named, as far as the arc shows them.
+#: Orders planned for where none are named, as far as the arc resolves them.
 USUAL = (1.0, 2.0, 3.0, 4.0)
 
 #: Noise factor from which on an order is not determined: a thousand times the readings of a
@@ -72,7 +72,7 @@ def plan_arc(
     start, stop : float
         Ends of the arc, degrees; at most one turn apart.
     orders : iterable of float, optional
-        Output orders wanted; by default 1 to 4, as far as the arc shows them.
+        Output orders wanted; by default 1 to 4, as far as the arc resolves them.
     readings : int, optional
         In all runs together; by default 60, or as many as the wanted error needs.
     runs : int
@@ -175,7 +175,7 @@ def check_arc(start: float, stop: float) -> None:
 def _columns(
     wanted: tuple[float, ...], start: float, stop: float, usual: bool, notes: list[str]
 ) -> tuple[OrthonormalColumns, tuple[float, ...]]:
-    """Columns of the orders; of the usual ones those that the arc shows."""
+    """Columns of the orders; of the default ones those that the arc resolves."""
     while True:
         try:
             columns = OrthonormalColumns(wanted, start / 360.0, stop / 360.0)

@@ -30,8 +30,8 @@ _LOOKS = 9
 #: Logarithm of a determinant that is lost in rounding.
 _ROUNDING = 1e-10
 
-#: Share of the largest singular value of the columns below which an arc does not show them: the
-#: variance of what it is lost in grows with the square of its inverse.
+#: Share of the largest singular value of the columns below which an arc does not resolve them:
+#: the variance grows with the square of its inverse.
 _SINGULAR = 1e-7
 
 #: Passes of exchanges of single readings.
@@ -176,7 +176,7 @@ def _merged(grid: Array, weights: Array, least: int) -> tuple[Array, Array]:
 
 
 def _settled(columns: OrthonormalColumns, places: Array) -> tuple[Array, Array, float]:
-    """As many places as coefficients, each at its best together with the others; their excess.
+    """As many places as coefficients, each optimal given the others; their excess.
 
     By Newton's method for all places together, by a sweep over them where that loses.
     """

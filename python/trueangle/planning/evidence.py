@@ -158,7 +158,7 @@ def evidence_between(
 def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Ambiguity]) -> bool:
     """Whether readings with this cause would leave it uncertain, whatever their evidence.
 
-    ``spots`` are what the design of the readings cannot show.
+    ``spots`` are what the design of the readings cannot distinguish.
     """
     error = one.errors(regression.signals, regression.belief)[0]
     shown, found = _shown(regression, one, 0, error)
@@ -174,7 +174,7 @@ def _shown(
 ) -> tuple[Regression, Extension | None]:
     """The same readings with the error of a hypothesis, and what its cause proposes of them.
 
-    What follows from the motion is worked out once, and the remainder once for each draw.
+    What follows from the motion is computed once, all else once for each draw.
     """
 
     def build() -> tuple[Regression, Extension | None]:
@@ -209,7 +209,7 @@ def _imitators(cause: str, rivals: Sequence[Hypothesis]) -> list[str]:
 def deviance_left(
     regression: Regression, error: Array, noise: ReadingNoise, imitation: Extension | None = None
 ) -> float:
-    """Deviance of an error together with all that a regression fits, and an imitation."""
+    """Deviance of an error that a regression, and an imitation, leave unexplained."""
     if imitation is None:
         squares = float(np.sum(regression.projected(error[:, None])[0] ** 2))
     else:

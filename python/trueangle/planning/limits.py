@@ -23,14 +23,14 @@ SPEEDS = (1.0, 60.0)
 #: Readings of one run at most, where not stated and no earlier run had more.
 SAMPLES = 360
 
-#: Readings of one run at most, where not stated, of earlier ones that were logs: what this many do
-#: not show another motion does, or none; more can be stated.
+#: Readings of one run at most, where not stated, where earlier ones were logs: what these do
+#: not show needs another motion, if any shows it; more can be stated.
 MOST_SAMPLES = 2000
 
 #: Degrees of travel from which on a joint is one that turns whole turns.
 WHOLE = 350.0
 
-#: What lies a little beyond what was detected: kelvin, turns of the reference on its mount (deg),
+#: What lies a little beyond the earlier runs: kelvin, turns of the reference on its mount (deg),
 #: and a load (Nm) and current (A) where there was none.
 WARMER, MOUNTS, LOAD, CURRENT = 15.0, (0.0, 130.0, 250.0), 10.0, 2.0
 
@@ -111,10 +111,10 @@ class Limits:
 
     @classmethod
     def of(cls, signals: Signals) -> Limits:
-        """Those that are known about readings, for where none are stated.
+        """Those of earlier readings, used where none are stated.
 
         One turn or the arc measured so far, 1 to 60 deg/s, the loads, temperatures, mounts and
-        currents observed, and as many readings as an earlier run had (2000 at most).
+        currents measured, and as many readings as an earlier run had (2000 at most).
         """
         bounds = signals.run_bounds()
         limits = cls(
@@ -143,7 +143,7 @@ class Limits:
         return cls.of(join_runs(runs))
 
     def wider(self) -> Limits:
-        """A little beyond what was detected, as most rigs can be."""
+        """A little beyond what was measured, which most rigs allow."""
         low, high = self.torque_Nm
         load = max(abs(low), abs(high), self.gravity_Nm) or LOAD
         mounts = dict.fromkeys((*self.mount_deg, *MOUNTS))

@@ -18,15 +18,16 @@ from .further import run_steps
 
 @dataclass(frozen=True)
 class RivalEvidence:
-    """Expected evidence of the next runs for causes.
+    """Expected evidence of the next runs for rival causes.
 
     Attributes
     ----------
     causes : tuple of str
     seen : bool
-        One of them is; otherwise each is taken to be three times as large as the noise.
+        The readings show that one of them is present; otherwise each is assumed to be three times
+        as large as the noise.
     told : bool
-        With these runs the design shows them, and the probability is as wanted.
+        The design of these runs distinguishes them, with the probability wanted.
     expected_bic : float or None
         The least expected difference of BIC, of any cause over any other.
     chance_named : float or None
@@ -54,20 +55,20 @@ class NextRuns(PlainResult):
     Attributes
     ----------
     runs : tuple of RunDesign
-        None where no run within the limits shows anything more.
+        Empty where no run within the limits distinguishes anything more.
     between : tuple of RivalEvidence
-        First what these runs are for, then what else they would show.
+        First what these runs are for, then what else they would distinguish.
     alone : bool
-        To be diagnosed by themselves: the earlier runs did not record what shows.
+        To be diagnosed by themselves: the earlier runs lack a column that is needed.
     beyond : tuple of str
-        What these runs need beyond all that was detected.
+        What these runs need beyond all that was measured so far.
     seconds : float
-        What the runs take, without what is done between them.
+        Time of the runs, without the work between them.
     simulation : Simulation
         The assumed model, with these runs: ready to be simulated.
     notes : tuple of str
     hypotheses : tuple
-        Of every entry of ``between`` that was requested, the size of each of its causes.
+        The assumed form and size of each cause in question, by entry of ``between``.
     """
 
     runs: tuple[RunDesign, ...]
@@ -137,7 +138,7 @@ class NextRuns(PlainResult):
                 text += f": BIC better by {entry.expected_bic:.0f} expected for the true one"
                 by = f" ({entry.trials} simulated)" if entry.trials else ""
                 text += f", named in {100.0 * entry.chance_named:.0f} %{by}"
-            if text not in lines:  # of two lines of the pattern the same may be asked
+            if text not in lines:  # two lines of the pattern may give the same text
                 lines.append(text)
         if shown:
             lines.append(f"  shows {', '.join(dict.fromkeys(shown))}")

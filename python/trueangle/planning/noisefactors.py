@@ -116,7 +116,7 @@ def mount_noise_factors(divisions: int, offsets_deg: ArrayLike, orders: Sequence
             [fold(int(orders[i]), divisions)[1] * orders[i] * offsets for i in members], axis=-1
         )
         if 2 * folded == divisions:
-            # Only cos(N/2 x) is detected, so an order takes two mounts.
+            # Only cos(N/2 x) is identifiable, so an order takes two mounts.
             if 2 * len(members) > mounts:
                 continue
             factors[..., members] = _half_factors(phase)

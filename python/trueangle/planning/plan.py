@@ -189,8 +189,8 @@ def plan_tilts(
 ) -> CalibrationPlan:
     """Off-null readings of an autocollimator at equally spaced tilts, without a remount.
 
-    The joint is ``-tilt.. +tilt`` away from every facet's null and the autocollimator
-    reads the tilt. Its scale must be calibrated: 0.1 % of 1200 arcsec is 1.2 arcsec.
+    The joint is up to ``tilt`` away from every facet's null, on either side, and the
+    autocollimator reads the tilt. Its scale must be calibrated: 0.1 % of 1200 arcsec is 1.2 arcsec.
 
     Examples
     --------
@@ -250,7 +250,7 @@ def plan_encoder(
 ) -> CalibrationPlan:
     """Jittered equispaced positions against a free reference encoder.
 
-    Each position is sampled within its own cell, so no order is an exact alias of another.
+    Each position is random within its own cell, so no order is an exact alias of another.
     Without ``positions`` there are ``2 * highest order + 20`` of them (820 for ratio 100).
 
     Examples

@@ -40,7 +40,7 @@ _PASSES = 3
 #: Steps of a level (speed, temperature, load ...), as shares of its range.
 _STEPS = (0.25, 0.1)
 
-#: Readings of a run at least: held out, one of 12 shows its zero and lines so coarsely that one
+#: Fewest readings of a run: a held-out run of 12 gives its zero and lines so coarsely that one
 #: diagnosis in ten does not confirm what it finds.
 LEAST = 18
 
@@ -61,7 +61,7 @@ def next_runs(
     noise: ReadingNoise,
     limits: Limits | None = None,
 ) -> NextRuns:
-    """The runs within limits that are expected to show most of what is open.
+    """The runs within limits that are expected to decide most of the open questions.
 
     Parameters
     ----------
@@ -70,19 +70,19 @@ def next_runs(
     believed : Simulation
         With all that is confirmed.
     spots : sequence of Blindness
-        What to show: where something is detected in some of them, those; else all.
+        What to distinguish: those that the readings show something of, if any; else all.
     noise : ReadingNoise
     limits : Limits, optional
-        Without them those of the earlier runs (`Limits.of`), and where these show nothing a
+        Without them those of the earlier runs (`Limits.of`), and where these do not decide, a
         little beyond (`Limits.wider`).
 
     Notes
     -----
     One choice after the other is changed to the best there is (speed, motion, load, temperature,
-    mount, current, then the levels between), run after run, until all is reported or nothing more
-    is. Readings are then lowered to the fewest that do, and runs are looked for that need half of
-    those, as long as there are any. Half a second to some seconds; after as much work as two
-    diagnoses where no time is given, the best so far is the answer, and ``notes`` report it.
+    mount, current, then the levels between), run after run, until all is distinguished or nothing
+    more is. Readings are then reduced to the fewest that suffice, and runs that need half of those
+    are searched as long as there are any. Half a second to some seconds; after as much work as two
+    diagnoses where no time is given, the best so far is the answer, and ``notes`` state it.
     """
     with with_deadline() as at, at.bounded(WORK), one_blas_thread():
         return _next_runs(earlier, believed, spots, noise, limits)
@@ -120,7 +120,7 @@ def _told(plan: NextRuns) -> int:
 def _found(
     scales: DesignScales, limits: Limits, others: Sequence[Ambiguity], seen: Limits
 ) -> NextRuns:
-    """The best runs within limits, together with the earlier ones or by themselves."""
+    """The best runs within limits, added to the earlier ones or by themselves."""
     search, earlier, alone = RunSearch(scales, limits), scales.earlier, False
     designs, worth = search.best(earlier)
     if not worth.told and scales.lack:
@@ -149,7 +149,7 @@ def _entries(
     others: Sequence[Ambiguity],
     start: Signals | None,
 ) -> Iterator[RivalEvidence]:
-    """What the runs state about every question, and of what nobody requested."""
+    """Evidence of the runs for every question, and for causes that were not in question."""
     if start is None and not designs:
         return
     answers = scales.answers(designs, start)
@@ -188,7 +188,7 @@ def _beyond(designs: Sequence[RunDesign], seen: Limits) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class RunSearch:
-    """Runs within limits that show most, with as few readings as serve.
+    """Runs within limits that distinguish most, with as few readings as possible.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ class RunSearch:
     limits: Limits
 
     def best(self, start: Signals | None) -> tuple[_Designs, Worth]:
-        """The best runs together with earlier ones, or by themselves."""
+        """The best runs, added to earlier ones or by themselves."""
         self.scales.afresh()
         designs, worth = self._built(start)
         designs, worth = self._without_idle(designs, worth, start)
@@ -211,7 +211,7 @@ class RunSearch:
         return designs, worth
 
     def repeated(self, designs: _Designs, worth: Worth) -> tuple[_Designs, Worth]:
-        """The first run several times: levels that need separate runs are decided so."""
+        """The first run repeated: this determines levels that vary from run to run."""
         for count in range(2, self.limits.runs + 1 if designs else 0):
             again = [replace(designs[0], label=_label(k)) for k in range(count)]
             found = self.scales.weighed(again, None)
@@ -228,12 +228,12 @@ class RunSearch:
             design = plainest_run(self.limits, _label(len(designs)))
             if self.scales.needs_current and (start is None or start.current is not None):
                 low, _ = self.limits.current_A
-                design = replace(design, current_A=low)  # reported where every run recorded it
+                design = replace(design, current_A=low)  # usable if every run recorded it
             designs, worth = self._improved([*designs, design], len(designs), start)
             if worth.gained > best.gained or not kept:
                 best, kept = worth, [*designs]
-            # Zeros of the runs' own are reported by several at once: one that opens nothing may
-            # help.
+            # Separate zeros of the runs are determined by several at once: one that decides nothing
+            # may help.
             done = self._tells_all(best) and (best.foretold or start is not None)
             if done or len(designs) - len(kept) == _IN_VAIN:
                 break
@@ -243,7 +243,7 @@ class RunSearch:
         return worth.told == len(self.scales.questions)
 
     def _improved(self, designs: _Designs, k: int, start: Signals | None) -> tuple[_Designs, Worth]:
-        """Run k changed to the best there is: choices, and levels where these do not show all."""
+        """Run k changed to the best there is: choices, and levels where these do not decide all."""
         kinds = [*run_choices(self.limits, self.scales.needs_current, designs[k].samples)]
         best = self.scales.weighed(designs, start, count_of_changes(designs[k], kinds))
         for _ in range(_PASSES):
@@ -282,7 +282,7 @@ class RunSearch:
     def _without_idle(
         self, designs: _Designs, worth: Worth, start: Signals | None
     ) -> tuple[_Designs, Worth]:
-        """The runs without those that show nothing together with the later ones."""
+        """The runs without those that add nothing to the later ones."""
         for design in designs[:-1]:
             fewer = [other for other in designs if other is not design]
             found = self.scales.weighed(fewer, start, 0, barely(worth.reached))
@@ -293,7 +293,7 @@ class RunSearch:
     def _lean(
         self, designs: _Designs, worth: Worth, start: Signals | None
     ) -> tuple[_Designs, Worth]:
-        """The runs with the fewest readings that show as much, and others that need fewer still."""
+        """The runs with the fewest readings that decide as much, or others that need even fewer."""
         goal = worth.reached
         designs, worth = self._fewest(designs, worth, goal, start)
         while not self.scales.over:
@@ -312,7 +312,7 @@ class RunSearch:
     def _shared_out(
         self, designs: _Designs, worth: Worth, start: Signals | None
     ) -> tuple[_Designs, Worth]:
-        """The same readings in as many different runs as held-out ones need to confirm them."""
+        """The same readings in enough different runs for held-out ones to confirm the causes."""
         for times in range(1, self.limits.runs // len(designs) + 1):
             again = [one for one in _with_readings(designs, 1.0 / times) for _ in range(times)]
             again = [replace(one, label=_label(k)) for k, one in enumerate(again)]

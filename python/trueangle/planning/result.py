@@ -114,10 +114,10 @@ class CalibrationPlan(PlainResult):
     positions : int
         Positions per mount (or in all, for a free reference encoder).
     mount_offsets_deg : tuple of float
-        How far the joint is from the first mount's positions, per mount or tilt.
+        Offset of the joint from the first mount's positions, per mount or tilt.
     facet_shifts : tuple of int
         By how many facets to turn the artefact at each mount, so that its own errors
-        separate from the joint's.
+        can be separated from the joint's.
     facet_noise_factor : float
         Worst factor of an order of the joint when the artefact's errors are fitted too,
         relative to one mount with a perfect artefact; infinite where they stay mixed.
@@ -144,7 +144,7 @@ class CalibrationPlan(PlainResult):
 
     @property
     def worst_noise_factor(self) -> float:
-        """The largest factor of the orders that can be detected at all."""
+        """The largest factor of the orders that are identifiable."""
         return max((f for f in self.noise_factors.values() if math.isfinite(f)), default=math.inf)
 
     @property
@@ -256,7 +256,7 @@ class SelfPlan(PlainResult):
     speed_ratio_factors : dict of ratio to float
     turns, readings, seconds : float or int or None
     knots_per_turn : float or None
-        At most this many, in the slowest part.
+        At most, in the slowest part.
     notes : tuple of str
     """
 
@@ -275,13 +275,13 @@ class SelfPlan(PlainResult):
 
     @property
     def worst_noise_factor(self) -> float:
-        """The largest factor of the orders that are detected."""
+        """The largest factor of the orders that are identifiable."""
         seen = [f for f in self.noise_factors.values() if math.isfinite(f)]
         return max(seen, default=math.inf)
 
     @property
     def blind_orders(self) -> tuple[float, ...]:
-        """Wanted orders that are not detected."""
+        """Wanted orders that are not identifiable."""
         return tuple(k for k, f in self.noise_factors.items() if not math.isfinite(f))
 
     def to_dict(self) -> dict[str, Any]:

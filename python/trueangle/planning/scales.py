@@ -1,4 +1,4 @@
-"""Designs of further runs weighed, together with earlier runs or by themselves."""
+"""Designs of further runs weighed, added to earlier runs or by themselves."""
 
 from __future__ import annotations
 
@@ -39,25 +39,25 @@ from .worth import (
     worth_of_evidence,
 )
 
-#: Error of a cause of which nothing is detected, in standard deviations of a reading.
+#: Assumed error of a cause that the readings do not show, in standard deviations of a reading.
 UNSEEN = 3.0
 
-#: Questions up to which rivals are searched for though nothing is detected of them.
+#: Questions up to which rivals are searched although the readings show none of them.
 SEARCHED = 3
 
 #: Standard deviations from which on readings show a cause, and the parts of which a diagnosis
 #: holds out one at a time.
 SHOWN, PARTS = 3.0, 5
 
-#: Designs of which the evidence is worked out, at most: some ten seconds.
+#: Most designs whose evidence is computed: some ten seconds.
 MOST_WEIGHED = 250
 
-#: Earlier readings that are looked at, at most: of more, one of every this many.
+#: Earlier readings that are looked at, at most: of more, evenly spaced ones.
 MOST_READINGS = 2000
 
 
 class DesignScales:
-    """Weighs designs for a set of questions, together with earlier runs or by themselves.
+    """Weighs designs for a set of questions, added to earlier runs or by themselves.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class DesignScales:
         return any(getattr(self.earlier, name) is None for name in needs)
 
     def _possible(self, question: Question, estimated: Collection[str]) -> Question:
-        """Without causes whose own estimate nobody would see: they are not what is detected."""
+        """Without causes whose own estimate is too small to be what the readings show."""
         if self.earlier is None or not estimated:
             return question
         regression = self._readings(self.earlier)
@@ -138,11 +138,11 @@ class DesignScales:
         changes: int = 0,
         least: Worth = NOTHING,
     ) -> Worth:
-        """What designs show together with earlier runs.
+        """What designs decide, added to earlier runs if there are any.
 
-        ``changes`` are those from the plainest run. The evidence of designs with at
-        most ``least`` whatever it is, is not computed. A search comes back to designs that it has
-        weighed: one in six.
+        ``changes`` are those from the plainest run. The evidence of designs that
+        cannot exceed ``least``, whatever it is, is not computed. One design in six has been weighed
+        before.
         """
         key = (*designs,), start is None
         if key in self._known:
@@ -188,12 +188,12 @@ class DesignScales:
         return self._at(designs, start)[1]
 
     def repeated(self, designs: Sequence[RunDesign], start: Signals | None) -> bool:
-        """Whether runs that are held out will confirm every cause: the others show it as well.
+        """Whether held-out runs will confirm every cause: the other runs must show it as well.
 
-        A diagnosis holds a fifth of the runs out at a time. Of a cause that only those show the
-        others state nothing, and what is held-out data contradict it; so of a form that a grid
-        leaves open and a single run off the grid shows. Of runs by themselves it omits one speed
-        after the other as well.
+        A diagnosis holds out a fifth of the runs at a time. A cause that only these show is not
+        estimated from the others, and the held-out readings contradict it; likewise a form that
+        only a single run off the grid determines. If the runs are diagnosed by themselves, one
+        speed after the other is held out as well.
         """
         regression, _ = self._at(designs, start)
         runs = len(regression.bounds)
@@ -246,7 +246,7 @@ class DesignScales:
         return signals if start is None else start.followed_by(signals)
 
     def _readings(self, signals: Signals) -> Regression:
-        """Noise at these readings, together with the assumed model."""
+        """Noise at these readings, with the assumed model fitted jointly."""
         whites = np.random.default_rng(0).standard_normal(len(signals)) * self.noise.sigma
         return Regression.of(signals, whites, self.around, rho=self.noise.correlation)
 
@@ -269,13 +269,13 @@ class DesignScales:
 
     @staticmethod
     def _hidden(question: Question, spots: Sequence[Ambiguity]) -> bool:
-        """Whether the design of the readings shows one of the causes in nothing."""
+        """Whether the design of the readings hides one of the causes completely."""
         return any(spot.hides(cause) for spot in spots for cause in question.causes)
 
     def _unclear(self, question: Question, spots: Sequence[Ambiguity]) -> set[str]:
         """Effects on whole runs that may be confused with a cause in question.
 
-        What cannot act at all, as a spring without a load, takes the place of nothing.
+        What cannot act at all, as a spring without a load, is confused with nothing.
         """
         shared = [spot for spot in spots if len(spot.causes) > 1]
         hidden = {cause for spot in shared for cause in spot.causes if spot.hides(cause)}

@@ -22,11 +22,11 @@ from .result import SelfPlan
 
 #: Ratios of start to end speed whose costs are reported.
 _RATIOS: Final = (1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0)
-#: Turns below which neighbouring turns are too few to be separated from the motion.
+#: Turns below which the pattern cannot be separated from the motion.
 _TURNS: Final = 10.0
 #: Knots per turn of a motion that leaves order 1 to within half a percent.
 _KNOTS: Final = 0.5
-#: Angles are found to this many degrees; blind below this share.
+#: Resolution of the angles in degrees; blind below this share.
 _STEP: Final = 0.1
 _BLIND: Final = 1e-3
 
@@ -49,7 +49,7 @@ def angle_factors(angles_deg: ArrayLike, orders: Sequence[float]) -> Array:
     Returns
     -------
     ndarray, shape (..., len(orders))
-        Infinite where all angles show the order equally.
+        Infinite where the order has the same value at all angles.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def angle_factors(angles_deg: ArrayLike, orders: Sequence[float]) -> Array:
 def best_angles(count: int, orders: Sequence[float]) -> tuple[float, ...]:
     """Angles of ``count`` heads or shifts with the least worst factor, the first one 0.
 
-    Two are at ``360/(K + 1)`` (closed form for orders 1 to K); more are searched from fixed
+    Two are ``360/(K + 1)`` apart (closed form for orders 1 to K); more are searched from fixed
     random starts, to a tenth of a degree.
 
     Examples
@@ -105,7 +105,7 @@ def best_angles(count: int, orders: Sequence[float]) -> tuple[float, ...]:
 
 
 def speed_factor(ratio: float) -> float:
-    """Noise factor when ripple columns are together with the pattern, coasting by ``ratio``.
+    """Noise factor when ripple is fitted jointly with the pattern, coasting by ``ratio``.
 
     Examples
     --------
@@ -219,7 +219,7 @@ def _spin_down(
     readings = _readings(noise, error, factor)
     notes = [
         "coast with the drive off: a loop closed on the encoder hides the orders it follows",
-        "without a change of speed encoder and ripple are confounded: plan a ratio of 3 or more",
+        "without a change of speed, encoder and ripple are confounded: plan a ratio of 3 or more",
         "the zero is not identifiable",
     ]
     turns, seconds = _TURNS, None

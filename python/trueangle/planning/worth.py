@@ -1,4 +1,4 @@
-"""The information of further runs: questions that are open, answers, evidence."""
+"""The information in further runs: open questions, answers, evidence."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .evidence import ExpectedEvidence, Hypothesis
 
-#: Probability of a strong difference of evidence that is wanted.
+#: Wanted probability of a strong difference of evidence.
 WANTED = 0.95
 
 #: Standard deviations of evidence beyond which a design is not better: a tenth of the readings
@@ -34,30 +34,30 @@ MOST_EVIDENCE = round(2.0 * math.log(ENOUGH) / math.log(ALIKE))
 #: Rounds in which the size of an effect is brought to that of the noise, and how near.
 _ROUNDS, _NEAR = 12, 0.02
 
-#: Draws of a cause that has no estimate: whatever it is, it is to be found.
+#: Draws of a cause that has no estimate: the runs must find it whatever its form.
 _DRAWS = 4
 
 #: Draws of an effect before a cause counts as one that such a joint cannot have.
 _TRIES = 4
 
-#: Share of the size requested below which a cause of bounded size is too small to be what is
-#: detected.
+#: Share of the wanted size below which a cause of bounded size is too small to explain what the
+#: readings show.
 _REACHED = 0.5
 
 
 @dataclass(frozen=True)
 class Question:
-    """Causes to be separated, or one and none, each as it would be.
+    """Causes to be distinguished, or one cause from none, each with its assumed form.
 
     Attributes
     ----------
     causes : tuple of str
     hypotheses : tuple of Hypothesis
-        Of those that can be in readings of this joint, and so large.
+        Of those that readings of this joint can contain in this size.
     seen : bool
-        One of them explains what is detected: the hypotheses are estimates of it.
+        The readings show something that one of them explains: the hypotheses are estimates of it.
     draws : tuple of Hypothesis
-        Of causes that have no estimate, others that are sampled: another place, frequency, order.
+        Further random forms of causes without an estimate: another place, frequency, order.
     """
 
     causes: tuple[str, ...]
@@ -86,7 +86,7 @@ def question_of(spot: Ambiguity, rich: Signals, around: JointPattern, rms: float
     for cause in spot.causes:
         effects = tuple(known.get(cause, ())) or _alike(cause, known, around)
         if any(special.kind in spot.causes for special in EFFECTS[cause].contains):
-            effects = ()  # its estimate is the special case, where the runs do not show them
+            effects = ()  # its estimate is the special case, where the runs do not separate them
         if not effects:
             made = [effect_of_size(cause, rms, rich, around, k * _TRIES) for k in range(_DRAWS)]
             drawn = [Hypothesis(cause, (one,)) for one in made if one is not None]
@@ -150,10 +150,10 @@ def effect_of_size(
 
 @dataclass(frozen=True, order=True)
 class Worth:
-    """What runs show, the most important first.
+    """What runs decide, the most important first.
 
-    ``clear`` counts, below zero, what could not be named though it may be confused with a cause in
-    question: then neither is.
+    ``clear`` counts, as a negative number, causes that cannot be named and may be confused with one
+    in question: that one is then not named either.
     """
 
     opened: int
@@ -175,7 +175,7 @@ class Worth:
         return self.opened, self.told, self.foretold, self.clear
 
 
-#: What is reported before anything is tried.
+#: Result before anything is tried.
 NOTHING = Worth(0, 0, False, -1_000, -1_000, 0, 0.0)
 
 
@@ -199,9 +199,9 @@ def is_strong_answer(evidence: Sequence[ExpectedEvidence]) -> bool:
 
 
 def run_is_foretold(regression: Regression) -> bool:
-    """Whether the zero and lines of any run follow from the others: what is held out needs that.
+    """Whether the zero and lines of any run follow from the others: holding out needs that.
 
-    On average over a run they are predicted no worse than one reading shows them.
+    On average over a run they are predicted at least as well as one reading gives them.
     """
     grams = [regression.base[a:b].T @ regression.base[a:b] for a, b in regression.bounds]
     every = np.sum(grams, axis=0)

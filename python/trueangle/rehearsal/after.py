@@ -1,4 +1,4 @@
-"""`plan_after`: the runs that show what a diagnosis could not, planned and rehearsed."""
+"""`plan_after`: the runs that decide what a diagnosis could not, planned and rehearsed."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def plan_after(
     progress: str = "none",
     **reading: Unpack[ReadingOptions],
 ) -> NextRuns:
-    """State which runs to measure next, so that causes are separated.
+    """Plan the runs to measure next, so that rival causes are distinguished.
 
     The runs are diagnosed. Of the further runs that limits allow those are taken whose expected
     evidence between the causes in question is greatest, by what the one leaves that the other
@@ -61,8 +61,8 @@ def plan_after(
 
         T_{A|B} = min_b |W(s_A - Xβ - Z_B b)|² / (σ² (1 - ρ²))
 
-    with as few readings as serve; then every cause in turn is taken to be the true one, all runs
-    are simulated and diagnosed, and it is counted how often it is named.
+    with as few readings as possible. Then every cause in turn is assumed to be the true one, all
+    runs are simulated and diagnosed, and the plan counts how often it is named.
 
     Parameters
     ----------
@@ -71,12 +71,12 @@ def plan_after(
     sim : Simulation
         The assumed model.
     between : iterable of str, optional
-        Causes to be separated; by default what is detected and was not reported, and where nothing
-        is, all that these runs could not have shown.
+        Causes to be distinguished; by default those that the readings show without deciding between
+        them, else all that these runs could not have shown.
     limits : Limits, optional
         What a run may be (`trueangle.planning.load_limits`). By default one turn or the arc
-        measured so far, 1 to 60 deg/s, the loads, temperatures and mounts observed; where no such
-        run shows, a little beyond, which the plan states (``beyond``).
+        measured so far, 1 to 60 deg/s, the loads, temperatures and mounts measured; where no such
+        run decides, a little beyond, which the plan states (``beyond``).
     seeds : int
         Simulated diagnoses of every cause; 0 for none.
     seed : int
@@ -147,7 +147,7 @@ def _rehearsed(
         failed = [bool(e.trials) and (e.chance_named or 0.0) < WANTED for e in entries]
         if not any(failed) or full or current_deadline().over:
             untried = any(e.seen and e.told and not e.trials for e in entries)
-            # What trials name too seldom these runs do not show, whatever was expected of them.
+            # What trials name too rarely is not distinguished, whatever evidence was expected.
             told = (
                 replace(e, told=False) if short else e
                 for e, short in zip(entries, failed, strict=True)
@@ -208,7 +208,7 @@ class _FurtherTrials:
         runs = simulate_along(truth, motion, rng, self.noise.correlation)
         at = current_deadline()
         left = None if at.within is None else max(at.within - at.seconds, 1e-3)
-        with under_deadline(Deadline(left)) as own:  # its shares are of the remaining time
+        with under_deadline(Deadline(left)) as own:  # its parts share the remaining time
             found = diagnose(runs, self.stated)
         at.stopped = at.stopped or own.stopped
         return trial_outcome(found, hypothesis.cause).is_named if found.complete else None

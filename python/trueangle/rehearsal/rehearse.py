@@ -32,7 +32,7 @@ SEEDS = 20
 #: Share of the time given for the search for further runs.
 FOR_NEXT_RUNS = 0.2
 
-#: What must be known about every rehearsal.
+#: Note of every rehearsal.
 FORMS = (
     "the effects hidden have the library's own forms; real ones are never exact, so count on "
     "larger sizes than these"
@@ -59,7 +59,7 @@ def rehearse(
     workers: int | None = None,
     progress: str = "none",
 ) -> Rehearsal:
-    """State which causes a diagnosis of these runs would name, and from which size on.
+    """Estimate which causes a diagnosis of these runs would name, and from which size on.
 
     Every cause in turn is hidden in readings simulated with the joint, the noise and the runs of
     ``sim`` and diagnosed against ``sim``. It counts as named where a confirmed finding (or, where
@@ -78,8 +78,8 @@ def rehearse(
     causes : iterable of str, optional
         Of the vocabulary; all where not given.
     seeds : int
-        Trials of a cause at most, each with noise, angles and all parameters but the size sampled
-        anew.
+        Trials of a cause at most, each with noise, angles and all parameters but the size
+        drawn anew.
     seed : int
         Equal seeds give equal results, whatever the number of workers, where all trials are made.
     within : float, optional
@@ -104,7 +104,7 @@ def rehearse(
     -----
     Sizes are searched in steps of a quarter of an octave: first up by a factor of 4 and down by
     2.8, two trials each, from where a perfect knowledge of the form would gain a deviance of 40;
-    then four at a time where the probability is thought to be 30, 75 and 95 % (twice). The
+    then four at a time where the estimated probability is 30, 75 and 95 % (twice). The
     thresholds are medians of the weight that the trials give to mu, w and lambda, with 95 %
     intervals; one beyond the sizes tried is not given. It costs the trials: one diagnosis each,
     about a second for 2000 readings, ``seeds`` for every cause.
@@ -202,7 +202,7 @@ def _checked(
 def _opening(
     sim: Simulation, signals: Signals, closed: Collection[str], blind: Mapping[str, Ambiguity]
 ) -> NextRuns | None:
-    """The further runs that show what these cannot; None where there are none."""
+    """The further runs that decide what these cannot; None where there are none."""
     asked: dict[str, Ambiguity] = {}
     for cause in closed:
         spot = blind.get(cause) or Ambiguity((cause,), "", "")
@@ -286,8 +286,8 @@ def next_sizes(
 class SizeSearch:
     """The sizes of one cause, the trials made and those of the round at work.
 
-    Only what is known about the cause itself decides, in rounds, so that the sizes do not depend on
-    who else is at work.
+    Only results of the same cause decide, in rounds, so that the sizes do not depend on the other
+    workers.
     """
 
     cause: str
@@ -330,7 +330,7 @@ class SizeSearch:
         return [Trial(self.cause, s, self.sizes.size(s), n) for n, (s, _) in self.round.items()]
 
     def answered(self, trial: Trial, outcome: TrialOutcome) -> list[Trial]:
-        """Take an answer; the next round where it was the last of its round."""
+        """Record an answer; return the next round if it was the last of its round."""
         self.round[trial.number] = trial.step, outcome
         if any(answer is None for _, answer in self.round.values()):
             return []

@@ -41,13 +41,13 @@ class RehearsedCause(ShownResult):
     intervals : dict of float to (float or None, float or None)
         95 % interval of each, the less visible end first; None where it is open to that side.
     told : dict of str to int
-        Trials by what the diagnosis stated: ``named``, ``not_confirmed``, ``not_told_apart``,
+        Trials by the answer of the diagnosis: ``named``, ``not_confirmed``, ``not_told_apart``,
         ``taken_for_another``, ``unexplained``, ``nothing``.
     confused_with : dict of str to int
         Causes it was confused with or not distinguished from, with the number of trials, most often
         first.
     beside : dict of str to int
-        Causes that were confirmed with it and were not there.
+        Causes that were confirmed in addition and were not there.
     blind_because, measure : str or None
         Why the design cannot show it, and what would; None where it can.
     grows : bool
@@ -157,7 +157,7 @@ class Rehearsal(PlainResult):
     ----------
     causes : list of RehearsedCause
     next_runs : NextRuns or None
-        The further runs that show most of what these cannot; None where none show any.
+        The further runs that decide most of what these cannot; None where none do.
     readings, runs : int
     noise : float
         Arcsec.
@@ -210,7 +210,7 @@ class Rehearsal(PlainResult):
         return f"{named} of {causes} named, {trials}{ended}"
 
     def summary(self) -> str:
-        """The table of sizes, what is not detected and why, and the runs that would help most."""
+        """The table of sizes, what is never named and why, and the runs that would help most."""
         lines: list[str] = []
         for note in self.notes:
             if note.startswith("INCOMPLETE"):
@@ -249,7 +249,7 @@ class Rehearsal(PlainResult):
 
 
 def _table(causes: list[RehearsedCause]) -> list[str]:
-    """Sizes by cause, with intervals, trials, and what it is confused with below them."""
+    """Sizes by cause, with intervals and trials, and what it is confused with below them."""
     rows = [("cause, size", "named in 50 %", "named in 95 %", "trials", "else")]
     for c in causes:
         rows.append(
@@ -291,7 +291,7 @@ def _end(size: float | None) -> str:
 
 
 def _else(cause: RehearsedCause) -> str:
-    """What a diagnosis states where it names nothing instead."""
+    """The other answers of the diagnosis."""
     other = [verdict.replace("_", " ") for verdict in cause.told if verdict != "named"]
     return ", ".join(other)
 

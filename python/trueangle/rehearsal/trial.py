@@ -1,4 +1,4 @@
-"""One trial: an effect hidden in simulated readings, and what a diagnosis of them states."""
+"""One trial: an effect hidden in simulated readings, and their diagnosis."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ..joint.signals import Signals, join_runs
 from ..simulation.simulation import Simulation, simulate
 
 #: Answers of a diagnosis for a hidden cause: it is confirmed; it is listed and not confirmed;
-#: it is one of several that are not separated; another cause is in its place; something is
-#: unexplained; nothing is detected. A diagnosis that failed is a defect; one that was ended no
+#: it is one of several that are not distinguished; another cause is named instead; something is
+#: unexplained; nothing is found. A diagnosis that failed is a defect; one that was ended is no
 #: answer.
 NAMED, LISTED, UNTOLD, OTHER, UNEXPLAINED, NOTHING = (
     "named",
@@ -51,7 +51,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialOutcome:
-    """What a diagnosis stated about a hidden cause.
+    """Answer of a diagnosis for a hidden cause.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class TrialOutcome:
     instead : tuple of str
         Causes that were named in its place, or that it was not distinguished from.
     beside : tuple of str
-        Causes that were named though they were not there, together with the true one.
+        Causes that were named in addition to the true one, although they were not there.
     failure : str
         Why the diagnosis failed.
     """
@@ -76,7 +76,7 @@ class TrialOutcome:
 
 
 def trial_rng(seed: int, cause: str, number: int) -> np.random.Generator:
-    """Random numbers of a trial: the same whoever needs it, and when."""
+    """Random numbers of a trial: the same on any worker, at any time."""
     return np.random.default_rng([seed, zlib.crc32(cause.encode()), number])
 
 
@@ -109,7 +109,7 @@ def run_trial(sim: Simulation, signals: Signals, trial: Trial, seed: int) -> Tri
 
 
 def trial_outcome(result: Diagnosis, cause: str) -> TrialOutcome:
-    """What a diagnosis states where ``cause`` alone is hidden."""
+    """Answer of a diagnosis where ``cause`` alone is hidden."""
     confirmed = [finding.cause for finding in result.findings if finding.confirmed]
     refuted = [belief.what for belief in result.beliefs if belief.verdict != "confirmed"]
     others = tuple(dict.fromkeys(c for c in confirmed if c != cause))

@@ -18,11 +18,11 @@ from .trial import drawn_effect, trial_rng
 #: Steps of the search in a factor of two of size.
 STEPS = 4
 
-#: Deviance that an effect of the first size would save, were it all that is requested: about
-#: twice what a cause of a few parameters must pay.
+#: Deviance that an effect of the first size would explain if its form were known exactly: about
+#: twice the penalty of a cause with a few parameters.
 FIRST = 40.0
 
-#: Sizes go down to this share of the first, and up to this many times the noise.
+#: Sizes go down to this share of the first, and up to `UP` times the noise.
 DOWN, UP = 1.0 / 16.0, 30.0
 
 #: Draws of an effect for which the deviance is averaged.
@@ -109,7 +109,7 @@ def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Size
 def _deviance(
     effect: Effect, regression: Regression, rng: np.random.Generator, sim: Simulation
 ) -> float:
-    """What the effect adds together with the zero and the lines, in units of the noise."""
+    """What the effect adds to the zero and the lines, in units of the noise."""
     around = sim.surroundings
     column = effect.signal(regression.signals, around, rng)
     x, excited = regression.projected(column[:, None])

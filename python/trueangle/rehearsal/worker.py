@@ -12,7 +12,7 @@ from .trial import measured_signals, run_trial
 
 
 def serve_trials(source: BinaryIO, target: BinaryIO) -> None:
-    """Answer every trial that comes until there are none."""
+    """Answer every trial that comes until the input ends."""
     sim, seed = pickle.load(source)
     signals = measured_signals(sim)
     while True:
@@ -30,7 +30,7 @@ def serve_trials(source: BinaryIO, target: BinaryIO) -> None:
 
 
 if __name__ == "__main__":
-    # Ctrl-C is for the one who asked: it ends its workers.
+    # Ctrl-C is for the calling process, which ends its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with contextlib.suppress(BrokenPipeError, EOFError):
         answers = sys.stdout.buffer

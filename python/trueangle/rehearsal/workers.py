@@ -19,7 +19,7 @@ from ..simulation.simulation import Simulation
 from ..support.deadline import Deadline, current_deadline, under_deadline
 from .trial import ENDED, Trial, TrialOutcome, run_trial
 
-#: Variables that state how many threads a linear algebra library may use.
+#: Variables that set how many threads a linear algebra library may use.
 THREADS = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
