@@ -1,8 +1,8 @@
 """Several shafts without iteration: a chain of inverted tables, slow shaft first.
 
 Subtract the output's table, then look up the motor's table, inverted beforehand as a
-function of its reading, at the remainder. One look-up a shaft, and what the order neglects is the
-slope of the slow pattern times the fast one: 0.03 arcsec where one pass of the plain error
+function of its own reading, at the result. This needs one look-up a shaft. The sequence neglects
+the slope of the slow pattern times the fast one: 0.03 arcsec, where one pass of the plain error
 leaves 4.
 """
 

@@ -39,8 +39,8 @@ def code_parts(name: str) -> dict[str, str]:
 def filled_code(text: str, **values: object) -> str:
     r"""``text`` with values in the places of ``@name@``, one after the other.
 
-    What is alone in a line has that line's indentation in every line, and takes the
-    line with it where it is empty.
+    All lines of a value that is alone in a line get that line's indentation; an empty one removes
+    the line.
 
     Examples
     --------

@@ -51,8 +51,8 @@ class Comparison(PlainResult):
         Angle of which it is a function: the reading where one of them was read from a table that
         is looked up there, which knows no other zero.
     table_rms_arcsec, table_max_abs_arcsec : float or None
-        What tables that were read do in addition to their models: the lines between their entries
-        and their whole numbers add at most so much; None where neither was read from one.
+        What tables that were read add to their models by interpolation between their entries and
+        by whole numbers, at most; None where neither model was read from a table.
     differ_in : list of str
         Terms that only one of them has, or with other parameters: not compared.
     verdict : {"same", "changed"} or None
@@ -80,7 +80,7 @@ class Comparison(PlainResult):
     false_alarms: float = FALSE_ALARMS
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything."""
+        """All attributes."""
         return dict(vars(self))
 
     def _brief(self) -> str:

@@ -86,7 +86,7 @@ def c_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) -> s
     start = "@n@_pattern(reading)" if at_indicated else "reading"
     bumps = [form for form in terms.smooth if isinstance(form, forms.Bump)]
     if at_indicated and bumps:
-        # The table holds them at its own angle: what is searched has them subtracted.
+        # The table holds them at its own angle: their sum is added again before the search.
         sums = [
             line for form in bumps for line in _form(form, RunTimeWaves((), (), ()), "", _FIXED)[1]
         ]
@@ -229,7 +229,7 @@ def _travel(terms: RunTimeTerms, arithmetic: CArithmetic, zero: float) -> list[s
 
 
 def _function(name: str, arguments: tuple[str, ...], sums: list[str]) -> str:
-    """A function that adds up; what it is given and does not use is reported to the compiler."""
+    """A function that adds up; arguments that it does not use are cast to void."""
     used = "\n".join(sums)
     names = [argument.split()[-1].lstrip("*") for argument in arguments]
     unused = [f"(void){word};" for word in names if not re.search(rf"\b{word}\b", used)]

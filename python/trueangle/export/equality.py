@@ -14,10 +14,11 @@ from ..support.distributions import f_tail
 #: Probability that two calibrations of one pattern are reported to differ.
 FALSE_ALARMS: Final = 0.01
 
-#: Orders tested at once: those that a selection looks at in two models.
+#: Number of tests by which the p-value of a single order is multiplied: orders that a selection
+#: tests in two models.
 _LOOKED_AT: Final = 220
 
-#: Degrees of freedom of a scatter at least: fewer show nothing.
+#: Fewest degrees of freedom of a scatter: fewer contain no information.
 _FEWEST: Final = 0.1
 
 #: Least pivot of the covariance, its rows scaled, with which it is inverted.
@@ -25,7 +26,7 @@ _TOLD: Final = 1e-10
 
 
 class Equality(NamedTuple):
-    """``statistic`` is T^2 over the tested orders, ``p`` its probability by noise alone."""
+    """``statistic`` is T^2 over the tested orders, ``p`` its p-value under noise alone."""
 
     verdict: Literal["same", "changed"]
     p: float
@@ -40,9 +41,9 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
 
         T² = (b₂ - b₁)' (S₁ + S₂)⁻¹ (b₂ - b₁),    T² / 2K ~ F(2K, ν)
 
-    with the degrees of freedom of both residual variances together (Satterthwaite). Where a
-    covariance comes from the scatter of few runs none of its numbers is known, not only their
-    size: each order is then independent,
+    with the degrees of freedom of both residual variances together (Satterthwaite). A covariance
+    from the scatter of few runs is known neither in size nor in shape: each order is then tested
+    separately,
 
     ::
 
@@ -50,8 +51,8 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
 
     (Hotelling 1931; Sidak 1967). An order that
     one of them lacks was chosen by its size in the other: it is tested by itself, with twice its
-    covariance (the other's readings know it as well) and its probability multiplied by the orders
-    that a selection looks at. The zero, which mounting moves, is kept out.
+    covariance (the other's readings determine it as well) and its p-value multiplied by the number
+    of orders that a selection tests. The zero, which mounting moves, is excluded.
 
     Returns
     -------
@@ -112,7 +113,7 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
 
 
 def _by_orders(apart: Array, scaled: Array, freedom: float) -> float:
-    """Probability of the order that differs most, of a covariance of which nothing is known."""
+    """P-value of the order that differs most, with a covariance of unknown size and shape."""
     least = 1.0
     for i in range(0, apart.size, 2):
         pair = apart[i : i + 2]
@@ -123,18 +124,18 @@ def _by_orders(apart: Array, scaled: Array, freedom: float) -> float:
 
 
 def _pair_tail(squares: float, freedom: float) -> float:
-    """Probability of Hotelling's T² of two numbers whose covariance has n degrees of freedom."""
+    """P-value of Hotelling's T² of two numbers; ``freedom`` is that of their covariance."""
     left = max(freedom - 1.0, _FEWEST)
     return f_tail(squares * left / (2.0 * freedom), 2.0, left)
 
 
 def _known_tail(squares: float, freedom: float) -> float:
-    """The same of a covariance that is known but for its size."""
+    """The same for a covariance that is known except for its size."""
     return f_tail(squares / 2.0, 2.0, freedom)
 
 
 def _coefficients(model: HarmonicModel) -> dict[float, tuple[tuple[int, int], tuple[float, float]]]:
-    """Of each output order: rows of the covariance, cosine and sine. Twice given, it is omitted."""
+    """Rows of the covariance, cosine and sine of each output order; those given twice omitted."""
     found: dict[float, tuple[tuple[int, int], tuple[float, float]]] = {}
     twice = set()
     at = 1
@@ -149,7 +150,7 @@ def _coefficients(model: HarmonicModel) -> dict[float, tuple[tuple[int, int], tu
 
 
 def _freedom(model: HarmonicModel) -> float:
-    """Of the covariance, or readings less unknowns; infinite where the model does not state."""
+    """Of the covariance, or readings less unknowns; infinite where the model states neither."""
     if model.fit is None:
         return math.inf
     if model.fit.freedom is not None:

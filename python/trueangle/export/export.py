@@ -64,7 +64,7 @@ def export_model(
     path : path, optional
         File to write; without, the text is in the result only.
     max_arcsec : float, optional
-        Take the smallest table that differs by at most this, what is omitted included, or
+        Use the smallest table that differs by at most this, including what is omitted, or
         refuse.
     **options
         Of the target: ``entries``, ``bits``, ``method``, ``number`` ...

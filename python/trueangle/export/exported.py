@@ -35,12 +35,12 @@ _ARCSEC = re.compile(r"(\d[\d.]*(?:e[-+]\d+)?) arcsec\b")
 HEADER_DIGITS = 6
 _SUMMARY_DIGITS = 4
 
-#: Readings to a turn, and turns before those that count: what winds up with travel has done so.
+#: Readings to a turn, and turns before those that count: hysteresis has settled by then.
 _GRID = 4096
 _AHEAD = 2
 
-#: What a signal goes over where the model does not state: one unit, about the temperature that a
-#: term counts from. Velocities are in degrees per second.
+#: Units of signals whose range the model does not state: it is then one unit, about the reference
+#: temperature of a term. Velocities are in degrees per second.
 _UNITS = {"velocity": "deg/s", "temperature": "degC", "torque": "Nm", "current": "A"}
 
 
@@ -127,7 +127,7 @@ class Exported(PlainResult):
         first = where + self.difference(unit, _SUMMARY_DIGITS)
         if not self.left_out:
             first = laid_out([first])
-        # Else it stays one line, however wide: who reads one reads all that is omitted.
+        # Else it stays one line, however wide: whoever reads it also reads what is omitted.
         lines: list[str] = []
         if self.entries:
             lines.append(

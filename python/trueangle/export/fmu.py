@@ -314,7 +314,7 @@ def _pattern(terms: RunTimeTerms, zero: str) -> str:
 
 
 def _sense(terms: RunTimeTerms, zero: str, at_indicated: bool) -> str:
-    """What an encoder states: the pattern and the terms, and the travel that they follow."""
+    """What an encoder reads: the pattern and the terms, and the travel that they follow."""
     held = "state->stretch.direction" if terms.springs else "state->direction"
     travel, direction = "(void)state;", "0"
     if terms.travels:

@@ -1,8 +1,8 @@
 """Klipper's ``[angle]`` section: the values of an existing ``calibrate`` list, made anew.
 
 The list is no table of corrections. It holds the sensor's reading at consecutive full steps of
-the motor; Klipper solves 64 knots from it. Where step 0 is against the motor's phases is
-not in a model of the angle, so the list that Klipper made is wanted, and only its values change.
+the motor; Klipper solves 64 knots from it. A model of the angle does not contain the position of
+step 0 relative to the motor's phases. So Klipper's own list is needed; only its values change.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Klipper(Target):
         steps = len(present)
         direction = -1 if is_backwards(present) else 1
         places = direction * np.arange(steps) / steps
-        # Where step 0 is: the mean of what the present list states, by this model.
+        # The position of step 0: the mean over the present list, by this model.
         there = present / TURN - pattern.correction(present / TURN) - pattern.zero - places
         start = float(np.angle(np.mean(np.exp(2j * np.pi * there)))) / (2.0 * math.pi)
         away = there - start
@@ -111,7 +111,7 @@ class Klipper(Target):
         knots, _ = solved_knots(present)
 
         def function(x: Array) -> Array:
-            # Between the whole counts that Klipper makes, as its knots are.
+            # Interpolated between knots, without Klipper's rounding to whole counts.
             counts = x % 1.0 * TURN
             bucket = np.minimum((counts / _BUCKET).astype(np.intp), KNOTS - 1)
             share = counts / _BUCKET - bucket

@@ -94,7 +94,7 @@ def _left(error: Array) -> float:
 #: beyond the half takes most of the gain in rms, and the maximum grows with it.
 _FARTHEST = 0.55
 
-#: Sweeps after which rounding ends; each lowers the remainder, and ten are enough.
+#: Sweeps after which rounding ends; each lowers the error, and ten are enough.
 _SWEEPS = 50
 
 

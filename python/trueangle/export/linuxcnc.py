@@ -58,7 +58,7 @@ class LinuxCnc(Target):
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         travel = SetpointTravel.of(pattern, self.name, options, MOST, usual=180)
-        # The motor is reported position + trim: the trim is the error.
+        # The motor is commanded to position + trim: the trim is the error.
         forward, reverse = (
             np.round(values * 360.0, _DECIMALS) for values in (travel.forward, travel.reverse)
         )
@@ -86,7 +86,7 @@ class LinuxCnc(Target):
             lost=lambda: travel.lost(pattern),
             notes=(
                 f"set COMP_FILE_TYPE = {options['type']} of the joint",
-                f"at v deg/s the trim moves at up to {slope:.3g} v deg/s, accelerates at up to "
+                f"at v deg/s the trim moves at up to {slope:.3g} v deg/s and accelerates at up to "
                 f"{bend:.3g} v^2 deg/s^2 at its corners: LinuxCNC gives it half of the joint's "
                 "MAX_ACCELERATION",
             ),

@@ -117,7 +117,7 @@ def _without_backward_steps(away: Array) -> tuple[Array, str]:
 
 
 def _device(table: Array) -> Correction:
-    """What is subtracted readings by degrees that the firmware holds as floats."""
+    """What the firmware subtracts from readings, by degrees that it holds as floats."""
     single = table.astype(np.float32).astype(np.float64) / 360.0
 
     def correction(angles: Places) -> Array:

@@ -145,7 +145,7 @@ class Moteus(Target):
 
 
 def _device(table: NDArray[np.int8], scale: np.float32, bits: int) -> tuple[Correction, ...]:
-    """What the firmware subtracts, without and with contracted products."""
+    """What the firmware subtracts from readings, without and with contracted products."""
 
     def correction(angles: Places, contracted: bool) -> NDArray[np.float64]:
         reading = angles % 2**32 >> (32 - bits)

@@ -15,8 +15,8 @@ from ..model.terms import LocalDefect
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 
-#: Steps of regula falsi. A bracket that holds a line needs one; of a curve each step leaves
-#: the share of it by which the bracket is curved, a hundredth and less.
+#: Steps of regula falsi. A bracket with a straight function needs one; with a curved one each
+#: step leaves a share of the error equal to its relative curvature, a hundredth or less.
 _STEPS = 8
 
 #: Turns: the rounding of a double.
@@ -61,7 +61,7 @@ class TurnPattern:
         return np.asarray(indicated - corrected - self.zero)
 
     def taken_off(self, indicated: Array) -> Array:
-        """All that correcting subtracts readings in turns: ``g`` and the constant."""
+        """All that a correction subtracts from readings in turns: ``g`` and the constant."""
         return self.correction(indicated) + self.zero
 
     def error(self, theta: Array) -> Array:
@@ -97,7 +97,7 @@ class TurnPattern:
 
     @property
     def has_direction(self) -> bool:
-        """Whether something of what is omitted follows the direction of travel alone."""
+        """Whether some of the omitted terms follow the direction of travel alone."""
         return any(of_direction(term) for term in self.source.terms)
 
     # -- what it consists of ----------------------------------------------------------
@@ -128,7 +128,7 @@ class TurnPattern:
 
     @property
     def is_periodic(self) -> bool:
-        """Whether one turn of the output holds everything."""
+        """Whether the error is periodic in one turn of the output."""
         return self.model.is_periodic
 
     def least_entries(self) -> int:

@@ -27,14 +27,14 @@ from .target import CommentBlock, Made, Option, TablePart, Target
 
 Places = NDArray[np.int64]
 
-#: Sizes that are tried, where none is requested up to the largest default.
+#: Sizes that are tried; where none is requested, up to the largest default.
 _SIZES = tuple(1 << bits for bits in range(3, 17))
 _LARGEST_DEFAULT = 4096
 
-#: Lines of more segments take more flash than cubics that are as near.
+#: Lines with more segments take more flash than cubics of the same accuracy.
 _LARGEST_LINES = 1024
 
-#: Of the model's uncertainty that a default table may add: a twentieth more in all.
+#: Share of the model's uncertainty that a default table may add: a twentieth more in all.
 _SHARE = 1.0 / 3.0
 
 #: Readings of the self-test: spread, and none of them a knot.
@@ -321,7 +321,7 @@ def _portable_model(text: str, path: str, target: Target) -> HarmonicModel:
 
 
 def _stated(match: re.Match[str], path: str) -> tuple[int, int, float]:
-    """Entries, shift and cycles that the comment states of a table."""
+    """Entries, shift and cycles that the comment states for a table."""
     try:
         entries, shift, cycles = int(match["entries"]), int(match["shift"]), float(match["cycles"])
     except ValueError:

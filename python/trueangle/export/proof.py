@@ -15,7 +15,7 @@ from ..errors import ArgumentError
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 
-#: Readings of this many bits are all evaluated; finer ones on the grid of these, with a bound.
+#: Bits of a reading up to which every reading is evaluated; finer ones on this grid, with a bound.
 EVERY_INPUT_BITS = 24
 
 #: Readings evaluated at once: they fit the caches together with what is made of them.
@@ -33,7 +33,7 @@ Correction = Callable[[Places], Array]
 
 @dataclass(frozen=True)
 class Proof:
-    """What was found over the inputs, everything of the corrected angle at the joint.
+    """What was found over the inputs, all in terms of the corrected angle at the joint.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Proof:
     rms_arcsec : float
         Over the inputs evaluated.
     inputs : int
-        This many were evaluated.
+        Number of inputs evaluated.
     every_input : bool
         They are all there are; else ``margin_arcsec`` bounds what lies between them and
         is part of ``max_arcsec``.
@@ -73,7 +73,7 @@ class Proof:
 
 
 def rounded_up(value: float, digits: int = 6) -> float:
-    """``value`` rounded up to this many digits: a bound that is printed stays one.
+    """``value`` rounded up to ``digits`` digits, so that a printed bound remains a bound.
 
     Examples
     --------
@@ -90,7 +90,7 @@ def rounded_up(value: float, digits: int = 6) -> float:
 def enough_bits(asked: int, entries: float) -> int:
     """Bits of inputs that are close enough for what lies between them to be bounded.
 
-    Of a line between two of ``entries`` the steps next to its ends are found then.
+    Then the steps next to the ends of a line between two of ``entries`` are evaluated.
     """
     if not 1 <= asked <= 32:
         raise ArgumentError(f"bits must be from 1 to 32, got {asked}")

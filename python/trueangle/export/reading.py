@@ -1,4 +1,4 @@
-"""Tables that are there become models, which state what they correct."""
+"""Models made from existing tables, to show what these correct."""
 
 from __future__ import annotations
 
@@ -31,8 +31,7 @@ _LARGEST_GRID = 1 << 18
 #: Readings at which a table's own arithmetic is compared with the model made of it.
 _PROBES = 1 << 18
 
-#: Orders smaller than this many standard deviations of the table's rounding are not distinguished
-#: from it.
+#: Orders below this many standard deviations of the table's rounding are not significant.
 _SIGNIFICANT = 3.0
 
 
@@ -110,7 +109,7 @@ def function_model(
     Where those are too steep to be corrected by, they are of T itself, at the indicated angle.
     The standard deviation of their coefficients is that of numbers rounded to the table's
     step; orders that do not exceed three of it are omitted. What ``device``, the target's own
-    arithmetic, does next to the harmonics is in the record of the fit.
+    arithmetic, adds to the harmonics is in the record of the fit.
 
     ``travel``, in degrees, is what the table covers where that is less than a turn.
 
@@ -196,7 +195,7 @@ def _arithmetic(
     turns: int,
     travel: tuple[float, float] | None,
 ) -> tuple[float, float]:
-    """Rms and maximum, in turns, of what a device does next to its model, their zeros apart."""
+    """Rms and maximum difference of a device from its model, in turns, without their zeros."""
     probes = np.arange(_PROBES, dtype=np.int64)
     places = probes * (turns * 2**32 // _PROBES)
     if travel is not None:

@@ -25,7 +25,7 @@ from ..model.term import Term
 from ..model.terms import LocalDefect
 from ..support.signals import coupled_joint
 
-#: What shows the direction of travel.
+#: Sources of the direction of travel.
 DIRECTIONS = ("auto", "angle", "velocity", "signal")
 
 #: Units of 2^-32 turns by which rounding to them moves an angle, and of its sum by which float
@@ -67,7 +67,7 @@ class RunTimeWaves(NamedTuple):
 
 
 def is_own_signal(term: Term) -> bool:
-    """Whether the joint's own signals show it: a program of one has no angles of others."""
+    """Whether a term needs the joint's own signals only: a program has no angles of others."""
     return not any(coupled_joint(name) for name in term.needs)
 
 
@@ -85,7 +85,7 @@ class RunTimeTerms:
         Of the numbers among them, either way: a power of two at which the terms are below half a
         turn, or the range on record where that is larger. Signals beyond it are faults.
     way : str
-        What shows the direction of travel: "angle", "velocity" or "direction"; empty where no
+        Source of the direction of travel: "angle", "velocity" or "direction"; empty where no
         term follows it.
     delay : float
         Seconds.
@@ -119,7 +119,7 @@ class RunTimeTerms:
         Raises
         ------
         ArgumentError
-            The direction is taken from the angle, which does not show it.
+            The direction was to be taken from the angle, which does not determine it.
         """
         period = model.period
         lines = [
@@ -176,13 +176,13 @@ class RunTimeTerms:
 
     @property
     def whole(self) -> bool:
-        """Whether one turn of the output shows every place."""
+        """Whether the terms are periodic in one turn of the output."""
         ramps = any(isinstance(form, forms.Ramp) for form in self.smooth)
         return not ramps and all(w.whole for w in (*self.waves, self.places))
 
     @property
     def shaped(self) -> bool:
-        """Whether something of it depends on the angle, so that it is searched."""
+        """Whether some term depends on the angle, so that a search is needed."""
         return bool(self.springs or self.places.orders) or any(
             bool(w.orders) or _is_shaped(form)
             for form, w in zip(self.smooth, self.waves, strict=True)

@@ -73,7 +73,7 @@ def _part(part: str, **values: object) -> str:
 
 def _table(table: Table) -> str:
     name = source_identifier(table.shaft)
-    # A separate ending: no shaft has the name of another constant.
+    # With an ending, so that no shaft has the name of another constant.
     knots = f"{name.upper()}_KNOTS"
     values = np.asarray(table.knots)
     kind = _TYPES[table.number]
@@ -100,7 +100,7 @@ def _element(value: Any, number: str) -> str:
 
 
 def _step(chain: Chain, table: Table) -> str:
-    """What a table subtracts ``left``, an expression in it and in ``start``."""
+    """What a table subtracts from ``left``, an expression in it and in ``start``."""
     at, name = "start" if chain.at_indicated else "left", source_identifier(table.shaft)
     if table.cycles != int(table.cycles):
         at = f"{name}_place({at})"
@@ -193,7 +193,7 @@ def _rust_step(terms: RunTimeTerms, zero: int, at_indicated: bool, whole: bool) 
     parts += [find, *_travel(terms, zero)]
     start = "pattern(reading)" if at_indicated else "reading"
     if at_indicated and bumps:
-        # The table holds them at its own angle: what is searched has them subtracted.
+        # The table holds them at its own angle: their sum is added again before the search.
         sums = [line for form in bumps for line in _form(form, RunTimeWaves((), (), ()), "")[1]]
         parts.append(_function("bumps", ["x: i64"], sums))
         start += " + to_angle(bumps(pattern(reading)))"

@@ -1,6 +1,6 @@
 """What controls that move the set point have in common: a table of the true angle over travel.
 
-The drive makes its encoder read what it is reported. To are at theta it must be reported
+The drive makes its encoder read the commanded angle. To be at theta it must be commanded to
 ``theta + error(theta)``: the values are the error at the true angle, without an inversion, one
 column for each direction of travel.
 """
@@ -138,8 +138,8 @@ class SetpointTravel:
     def part(self, pattern: TurnPattern, forward: Array, reverse: Array) -> TablePart:
         """Proof of printed values (turns of error) at set points over the travel.
 
-        The drive is where its encoder reads the set point and the value: how far the joint
-        is then from the set point is what counts.
+        The drive stops where its encoder reads the set point plus the value. The error is the
+        distance of the joint from the set point there.
         """
 
         def standing(values: Array, direction: int) -> Correction:
@@ -196,7 +196,7 @@ def _calibrated_travel(pattern: TurnPattern) -> tuple[float, float]:
     span = pattern.source.partial_span
     if span is None:
         return 0.0, 360.0
-    # Degrees as one would write them: the list of a control may have no further digits.
+    # Degrees with the digits that one would write: the list of a control may not have more.
     start, stop = (round(end / pattern.period * 360.0, 4) for end in span)
     return start, stop
 
@@ -249,9 +249,9 @@ def travel_model(
     """Model of ``nominal, forward, reverse`` in degrees: errors at the true angle.
 
     The mean of the two columns is the pattern; the mean of half of their difference is a
-    backlash term. The remainder of the difference changes with the place and is reported. A table
-    of less than a turn is closed by a cubic from its end to its start; the model holds over the
-    table's travel, and reports it.
+    backlash term. The remainder of the difference changes with the angle and is reported. A table
+    of less than a turn is closed by a cubic from its end to its start; the model states that it
+    holds over the table's travel only.
 
     Parameters
     ----------
@@ -266,7 +266,7 @@ def travel_model(
     Raises
     ------
     FileError
-        A travel of at most three entries.
+        A travel of fewer than four entries.
     """
     from ..model.terms import Backlash
 
@@ -320,7 +320,7 @@ def _closed(nominal: Array, pattern: Array, spacing: float) -> tuple[Array, Arra
     width = stop - start
     entries = min(max(4, round(width / spacing)), _MOST_ENTRIES)
     t = np.linspace(0.0, 1.0, _WAY_BACK * entries + 1)[1:]
-    # Slopes over the travel next to the ends, as lines have them.
+    # Slopes of the lines next to the ends of the travel.
     first = (pattern[-1] - pattern[-2]) / (nominal[-1] - nominal[-2]) * width
     last = (pattern[1] - pattern[0]) / (nominal[1] - nominal[0]) * width
     way = (

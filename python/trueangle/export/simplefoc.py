@@ -207,7 +207,7 @@ class SimpleFoc(Target):
 
 
 def _device(variant: str, table: NDArray[Any]) -> tuple[Correction, ...]:
-    """What a version of the library subtracts, without and with contracted products."""
+    """What a version of the library subtracts from readings, without and with contraction."""
 
     def correction(angles: Places, contracted: bool) -> NDArray[np.float64]:
         raw = (angles * (2.0 * math.pi / 2.0**32)).astype(np.float32)

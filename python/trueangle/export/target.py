@@ -36,14 +36,14 @@ class Option(NamedTuple):
 
 @dataclass(frozen=True)
 class CommentBlock:
-    """What is known when a file is written and is in its comment.
+    """What is known when a file is written, for its comment.
 
     Attributes
     ----------
     name : str
         Of the functions, where there are any.
     difference : str
-        One line: how far the corrected angle is from the model's, all that is omitted with it.
+        One line: how far the corrected angle is from the model's, including what is omitted.
     proof : Proof
     source : tuple of str
         Lines on the model: its file and sha256, what it was made from, where it holds.
@@ -57,13 +57,13 @@ class CommentBlock:
     notes: tuple[str, ...]
 
     def comment(self, lead: str, *own: str) -> list[str]:
-        """Lines of a file's comment: the difference first, ``own`` words on the table, rest."""
+        """Lines of a file's comment: the difference, ``own`` words on the table, the others."""
         parts = [self.difference, *own, *self.source, *(f"Note: {note}." for note in self.notes)]
         return [line for part in parts for line in _comment_lines(98, part, lead)]
 
 
 class TablePart(NamedTuple):
-    """What a target does of itself, and what it should do.
+    """What a target computes, and what it should compute.
 
     Attributes
     ----------

@@ -180,7 +180,7 @@ def power_sums(
         right = columns[part] + 0j
         for first in range(0, count, _RESEED):
             powers = np.empty((min(_RESEED, count - first), within.size), dtype=np.complex128)
-            # The product m * t loses what lies before the point: subtract it first.
+            # The integer part of m * t costs digits and has no effect: it is subtracted first.
             phase = first * within
             powers[0] = np.exp(2j * math.pi * (phase - np.round(phase)))
             filled, stride = 1, step

@@ -91,7 +91,7 @@ def _refuse(
 
 
 class _Names(dict[str, Any]):
-    """What the names in a declaration represent; those that are not known, for anything."""
+    """What the names in a declaration mean; unknown names mean any type."""
 
     def __init__(self, function: Any) -> None:
         import builtins
@@ -114,7 +114,7 @@ class _Names(dict[str, Any]):
 
 
 def _fits(value: Any, kind: Any) -> bool:
-    """Whether a value is of a kind, as far as a look at it can show."""
+    """Whether a value is of a kind, as far as its type and its first items show."""
     import typing
     from os import PathLike
     from types import UnionType
@@ -178,8 +178,8 @@ def of_type(
 ) -> T:
     """``value``, which must be a ``kind``.
 
-    Messages call the argument ``what``, and state in words what is ``wanted`` and what is meant
-    where such a value is given (``instead``).
+    Messages call the argument ``what``, and state what is ``wanted`` and what to use in place of
+    the given value (``instead``).
 
     Raises
     ------

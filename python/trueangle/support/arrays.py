@@ -19,10 +19,10 @@ _ALIKE = 1e-7
 
 
 def first_largest(values: NDArray[np.floating[Any]]) -> int:
-    """Where the first value is that is as large as the largest, to 1e-7 of it.
+    """Index of the first value that is as large as the largest, within 1e-7 of it.
 
-    Mirror images are equally good; which of them wins would else be up to the last digit, and
-    differ between processors.
+    Mirror images are equally good; otherwise the last digit, which differs between processors,
+    would decide which of them is chosen.
     """
     most = float(values.max())
     return int(np.argmax(values >= (most - _ALIKE * abs(most) if math.isfinite(most) else most)))

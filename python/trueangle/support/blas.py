@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-#: Names by which builds of OpenBLAS need and set their threads.
+#: Names of the functions by which builds of OpenBLAS return and set their number of threads.
 NAMES = tuple(
     (f"{before}openblas_get_num_threads{after}", f"{before}openblas_set_num_threads{after}")
     for before in ("scipy_", "")
@@ -27,10 +27,10 @@ _before = 1
 def one_blas_thread() -> Iterator[None]:
     """Let the OpenBLAS that came with numpy work in one thread for a while.
 
-    They wait for each other in a loop, which costs a second processor and more time than they
-    save where products take some microseconds. Given back at the end of the last of several
-    that overlap; holds for the whole process. Nothing is done where numpy brought no OpenBLAS,
-    or was reported by ``OPENBLAS_NUM_THREADS=1`` to have one thread only.
+    Threads wait for each other in a loop, which costs a second processor and more time than they
+    save where products take some microseconds. Threads are restored at the end of the last of
+    several calls that overlap; holds for the whole process. Nothing is done where numpy brought
+    no OpenBLAS, or where ``OPENBLAS_NUM_THREADS=1`` limits it to one thread.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def one_blas_thread() -> Iterator[None]:
 
 @cache
 def blas_threads() -> tuple[Callable[[], int], Callable[[int], None]] | None:
-    """How to read and to set the threads of numpy's own OpenBLAS; None without one."""
+    """Functions that return and set the threads of numpy's own OpenBLAS; None without one."""
     package = Path(np.__file__).parent
     folders = (package.parent / "numpy.libs", package / ".dylibs")
     paths = [path for folder in folders for path in sorted(folder.glob("*openblas*"))]

@@ -1,8 +1,7 @@
-"""Time of long work: how far it is, the remainder, when it must end.
+"""Time of long work: its progress, the time left, when it must end.
 
-What works consults the `Deadline` that is in force (`current_deadline`) and needs no argument for
-it; who requested the work enters one with `with_deadline`, and may let Ctrl-C end it early
-(`ending_early`).
+Long work consults the `Deadline` that is in force (`current_deadline`) and needs no argument for
+it. The caller enters one with `with_deadline`, and may let Ctrl-C end it early (`ending_early`).
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ from typing import Final, TextIO
 from ..errors import ArgumentError
 from .suggestions import check_choice
 
-#: Work that may be done where no time was given, in numbers of columns that are fitted or scored:
-#: this many, or this many for each item of many. Ordinary readings take a tenth to a third of that.
+#: Most work where no time was given, in numbers of columns that are fitted or scored: in all, and
+#: for each item where that is more. Ordinary readings take a tenth to a third of that.
 LEAST, PER_ITEM = 1e8, 6e3
 
 #: Ways of showing progress.
@@ -32,7 +31,7 @@ _FIRST, _INTERVAL = 1.0, 0.5
 
 
 class Deadline:
-    """How far a piece of work is, and whether it must end.
+    """The progress of a piece of work, and whether it must end.
 
     Parameters
     ----------
@@ -103,7 +102,7 @@ class Deadline:
         return late or self.stopped
 
     def spend(self, numbers: int) -> None:
-        """Count numbers of columns that are fitted or scored."""
+        """Count ``numbers`` in columns that are fitted or scored as work done."""
         self._spent += numbers
 
     @property
@@ -120,10 +119,10 @@ class Deadline:
 
     @contextlib.contextmanager
     def bounded(self, items: int) -> Iterator[None]:
-        """Work on this many items that must come to an end where no time was given.
+        """Limit work on ``items`` items where no time was given.
 
-        What is done is counted (`spend`), and no clock looked at: the same readings give the same
-        account on any machine, however busy.
+        The work done is counted (`spend`), without a clock: the same readings give the same
+        result on any machine, however busy.
         """
         before = self._spent, self._bound, self._cut
         self._spent, self._bound, self._cut = 0.0, max(LEAST, PER_ITEM * items), ""
@@ -139,7 +138,7 @@ class Deadline:
 
     @contextlib.contextmanager
     def part(self, share: float) -> Iterator[None]:
-        """Work that must end when ``share`` of the time is up: rest is for what follows."""
+        """Work that must end after ``share`` of the time; the rest is for later work."""
         before, self._share = self._share, min(share, self._share)
         try:
             yield
@@ -149,9 +148,9 @@ class Deadline:
     def at(
         self, stage: str, done: int, total: int, then: float = 0.0, bound: str = "at least"
     ) -> None:
-        """``done`` of ``total`` are done of a stage; seconds that follow it, where known.
+        """Report ``done`` of ``total`` of a stage, and the seconds of later stages, if known.
 
-        ``bound`` states what the time left is where none was given.
+        ``bound`` states how the time left is to be read where none was given.
         """
         now = self._clock()
         if stage != self._stage or done == 0:
@@ -216,9 +215,9 @@ def under_deadline(own: Deadline) -> Iterator[Deadline]:
 
 @contextlib.contextmanager
 def with_deadline(within: float | None = None, style: str = "none") -> Iterator[Deadline]:
-    """Work at a separate pace; parameters are those of `Deadline`.
+    """Work under a deadline of its own; parameters are those of `Deadline`.
 
-    Work inside other work that needs neither has the pace of that.
+    Inner work that sets neither parameter has the deadline of the outer work.
     """
     outer = _CURRENT.get()
     if outer is not None and within is None and style == "none":
@@ -236,10 +235,10 @@ class _Interruption:
 
 @contextlib.contextmanager
 def ending_early() -> Iterator[_Interruption]:
-    """Let a first Ctrl-C request the work to end with what it has; a second is as before.
+    """Let a first Ctrl-C end the work with its results so far; a second acts as usual.
 
-    Where no pace is in force, outside the main thread, or where Ctrl-C is ignored (a job in the
-    background), it is what it always is.
+    Where no deadline is in force, outside the main thread, or where Ctrl-C is ignored (a job in
+    the background), Ctrl-C acts as usual.
     """
     found = _Interruption()
     ignored = signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, None)

@@ -23,7 +23,7 @@ MAX_LINE_ORDERS = 1e7
 
 
 def shown_value(value: Any, most: int = 60) -> str:
-    """``value`` as it is reported in a message: in one piece, of bounded length, as files have it.
+    """``value`` as messages show it: in one piece, of bounded length, as files have it.
 
     Examples
     --------
@@ -132,7 +132,7 @@ class Decoder:
         self.kind = kind
 
     def error(self, problem: str, key: str | None = None) -> FileError:
-        """The error that states ``problem`` of ``key``."""
+        """The error that reports ``problem`` of ``key``."""
         return self.kind(self.path, f"key '{key}': {problem}" if key else problem)
 
     def table(

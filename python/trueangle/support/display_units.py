@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, TypeAlias
 from ..errors import ArgumentError
 from .suggestions import check_choice
 
-#: What may be requested by name; a number is the counts of a turn.
+#: Units that can be requested by name; a number gives the counts of a turn.
 ERROR_UNITS: Final = ("auto", "arcsec", "deg", "mrad", "count")
 
 ErrorsIn: TypeAlias = str | float
@@ -72,7 +72,7 @@ class ErrorUnit(NamedTuple):
         return f"{value} {self.name}" if spread == "-" else f"{value} +- {spread} {self.name}"
 
     def decimals(self, arcsec: float, digits: int = _UNCERTAIN_DIGITS) -> int:
-        """Decimals that show this many digits of an error; none where it is zero or unknown.
+        """Decimals that show ``digits`` digits of an error; none where it is zero or unknown.
 
         Examples
         --------
@@ -103,22 +103,22 @@ class ErrorUnit(NamedTuple):
 def error_unit(
     asked: ErrorsIn = "auto", largest: float = 0.0, period: float | None = None
 ) -> ErrorUnit:
-    """The unit requested; by itself arcsec, or degrees where errors are that large.
+    """The requested unit; by default arcsec, or degrees where errors are that large.
 
     Parameters
     ----------
     asked : str or float
         One of `ERROR_UNITS`, or the counts of a turn.
     largest : float
-        How large the errors are, arcsec; ``"auto"`` goes by it. Of readings it is `sine_of_rms`:
-        then all that is reported of the same readings is in one unit, and no outlier decides.
+        How large the errors are, arcsec; it decides ``"auto"``. Of readings it is `sine_of_rms`:
+        then all results of the same readings are in one unit, and no outlier decides.
     period : float, optional
         Of the readings: the counts of a turn where they are in counts.
 
     Raises
     ------
     ArgumentError
-        Another word; counts where nothing states how many a turn has.
+        Another word; counts where the counts of a turn are unknown.
 
     Examples
     --------
@@ -171,7 +171,7 @@ def rounded_phase(phase_deg: float, std_deg: float | None) -> tuple[str, str]:
 
 
 def significant_digits(value: float, digits: int = _DIGITS) -> str:
-    """``value`` with this many significant digits, written without an exponent.
+    """``value`` with ``digits`` significant digits, written without an exponent.
 
     Examples
     --------

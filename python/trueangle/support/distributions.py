@@ -1,7 +1,7 @@
 """Tail probabilities and quantiles of the normal, Student, chi-squared and F distributions.
 
-The installed package needs numpy alone, which has none of them. All rest on the two
-incomplete functions, by the continued fraction or the series that converges there.
+The installed package needs numpy alone, which has none of them. All use the two incomplete
+functions, computed by the continued fraction or the series, whichever converges.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _MOST_STEPS: Final = 200_000
 #: Steps of the search for a quantile at most; ten are usual.
 _MOST_HALVINGS: Final = 200
 
-#: Represents a zero denominator in a continued fraction (Lentz).
+#: Replaces a zero denominator in a continued fraction (Lentz).
 _TINY: Final = 1e-300
 
 #: Degrees of freedom beyond which Student's distribution is the normal one to rounding.

@@ -1,6 +1,6 @@
 """Data with labels: series of pandas and polars, arrays of xarray, taken apart and put together.
 
-None of these libraries is imported: whoever passes such data has done so. narwhals would represent
+None of these libraries is imported: whoever passes such data has done so. narwhals would replace
 two of the four functions below (series of pandas and polars); it knows no xarray and no index of a
 frame, and would be one more dependency of a package that needs numpy alone.
 """

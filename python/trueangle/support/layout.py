@@ -18,16 +18,16 @@ _NARROWEST, _WIDEST, _USUAL = 60, 100, 80
 _ENDLESS: Final = 1_000_000
 _UNFOLDED: Final = ContextVar("unfolded", default=False)
 
-#: Columns that words have behind a label at least; else they are below it.
+#: Fewest columns for the words behind a label; with fewer they are put below it.
 _ROOM: Final = 20
 
-#: How a line begins that is there to be copied, and stays whole.
+#: How lines begin that are meant to be copied and are not folded.
 _COPIED: Final = ("--", "trueangle ")
 
-#: What represents a blank at which no line is cut.
+#: The character that replaces a blank at which no line is cut.
 _JOINED: Final = "\0"
 
-#: What further lines of an entry are under: the text behind a mark, a number or a label.
+#: Further lines of an entry are aligned with the text behind its mark, number or label.
 _LEAD: Final = re.compile(r"\s*(?:- |! |\[\d+\] |\d+\. |note: |\S.{0,28}? {2,}(?=\S))?")
 
 
@@ -72,7 +72,7 @@ def text_columns() -> int:
 
 
 def wrapped_lines(text: str, indent: int = 0, first: int = 0) -> list[str]:
-    """Lines of a paragraph; ``first`` and ``indent`` are how far the first and others are in.
+    """Lines of a paragraph; ``first`` and ``indent`` indent the first line and the others.
 
     Words are never broken, so that options and paths can be copied.
 

@@ -1,6 +1,6 @@
 """A result as a notebook shows it: its summary with tables, and one small picture.
 
-The words, numbers and digits are those of the summary, so that a result states one thing wherever
+The words, numbers and digits are those of the summary, so that a result reads the same wherever
 it is shown.
 """
 
@@ -15,14 +15,14 @@ from typing import Final
 
 from .layout import unfolded_text
 
-#: Blanks that part the cells of a line.
+#: Blanks that separate the cells of a line.
 _APART: Final = re.compile(r" {2,}")
 _WORD: Final = re.compile(r"\S+")
 
 #: Cells of a line from which it belongs to a table; two are a name and what it is.
 _CELLS: Final = 3
 
-#: Em that a blank at the beginning of a line is in.
+#: Indentation, in em, for each blank at the beginning of a line.
 _EM: Final = 0.5
 
 _NUMBER: Final = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?|[-\N{EN DASH}]")
@@ -56,7 +56,7 @@ def notebook_html(result: object) -> str:
 
 
 def _counts(lines: Sequence[str]) -> list[int]:
-    """Cells of every line, `_CELLS` for more; what is within a table belongs to it."""
+    """Cells of every line, `_CELLS` for more; a line within a table belongs to it."""
     found = [min(len(_APART.split(line.strip())), _CELLS) for line in lines]
     for i in range(1, len(found) - 1):
         if found[i - 1] == found[i + 1] == _CELLS and lines[i].strip():
@@ -65,7 +65,7 @@ def _counts(lines: Sequence[str]) -> list[int]:
 
 
 def _line(line: str) -> str:
-    """A line of words, as far in as it is; a blank one is room."""
+    """A line of words with its indentation; a blank line becomes empty space."""
     indent = len(line) - len(line.lstrip())
     style = f' style="padding-left:{_EM * indent:g}em"' if indent else ""
     return f"<div{style}>{escape(line.strip()) or '&nbsp;'}</div>"
@@ -111,7 +111,7 @@ def _head(line: str, spans: Sequence[tuple[int, int]], data: Sequence[str]) -> l
 
 
 def _rows(rows: Sequence[Sequence[str]], heads: int = 0) -> str:
-    """Rows of a separate table, this many cells of each heads."""
+    """Rows of a table of their own; the first ``heads`` cells of each are header cells."""
     return "".join(
         "<tr>"
         + "".join(

@@ -17,8 +17,8 @@ _SHORT = 30
 class ShownResult:
     """A result that shows itself: one line as ``repr``, its summary as text and in notebooks.
 
-    A class states what its line holds by ``_brief``, the two or three numbers that matter, and has
-    a ``summary``; without them its plain fields are shown.
+    A class defines its line by ``_brief``, the two or three numbers that matter, and has a
+    ``summary``; without them its plain fields are shown.
     """
 
     __slots__ = ()

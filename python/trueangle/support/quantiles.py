@@ -26,7 +26,7 @@ def median(values: ArrayLike, axis: int = -1) -> Any:
 
 
 def quantile(values: ArrayLike, share: float, axis: int = -1) -> Any:
-    """What `numpy.quantile` gives: the straight line between the two ranks next to ``share``.
+    """As `numpy.quantile`: linear interpolation between the two ranks next to ``share``.
 
     Examples
     --------
@@ -41,7 +41,7 @@ def quantile(values: ArrayLike, share: float, axis: int = -1) -> Any:
 
 
 def _beside(values: ArrayLike, share: float, axis: int) -> tuple[Any, Any, float, Any]:
-    """The values of the two ranks next to ``share``, how far between them it lies, the last."""
+    """The values of the two ranks next to ``share``, its position between them, the last value."""
     given = np.moveaxis(np.asarray(values, dtype=np.float64), axis, -1)
     last = given.shape[-1] - 1
     if last < 0:

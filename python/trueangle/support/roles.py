@@ -56,13 +56,14 @@ _SPELLINGS = {
 }
 #: A name and what is in brackets behind it.
 BRACKET = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
-#: Roles next to the angles and the signals.
+#: Roles in addition to the angles and the signals.
 LABELS: Final = ("run", "unit", "when")
-#: Angles that are no signals; a second thing that is added to the reference is reference_offset2.
+#: Angles, which are not signals; a second offset that is added to the reference is
+#: reference_offset2.
 ANGLES = ("reference", "indicated", "error")
 _OFFSET = re.compile(r"reference_offset[1-9]?[0-9]?")
 
-#: Columns requested: by role, the name and the unit where it is reported.
+#: Requested columns: by role, the name and the unit, if it is given.
 Wanted: TypeAlias = Mapping[str, tuple[str, str | None]]
 
 
@@ -73,9 +74,9 @@ class RoleColumn(NamedTuple):
     ----------
     role, name : str
     unit : str or None
-        None where nothing shows it.
+        None where it is unknown.
     is_asked : bool
-        It was named, not found by its name.
+        It was requested, not found by its name.
     is_reversed : bool
         Its values are taken with the other sign.
     """
@@ -132,7 +133,7 @@ def role_kind(role: str) -> str:
     Raises
     ------
     ArgumentError
-        There is no such role; states what may be meant.
+        There is no such role; the message suggests similar ones.
     """
     if role in ANGLES or _OFFSET.fullmatch(role):
         return "angle"

@@ -72,7 +72,7 @@ def _one_sided(allowance: float, limit: float, shift: float) -> float:
 
 @lru_cache(maxsize=64)
 def chart_limit(allowance: float, length: float) -> float:
-    """The limit of a two-sided sum that alarms once in this many values where nothing changes.
+    """The limit at which a two-sided sum alarms once in ``length`` values without a change.
 
     Examples
     --------

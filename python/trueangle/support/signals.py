@@ -1,4 +1,4 @@
-"""Signals of a run next to its two angles: the one list of their names, units and columns.
+"""Signals of a run in addition to its two angles: the list of their names, units and columns.
 
 A further signal is a line of `SIGNALS`: columns of files, `CalibrationRun.signal` and the
 option for signals follow it.
@@ -48,7 +48,7 @@ class GivenSignals(TypedDict, Generic[T], total=False):
     current: T | None
 
 
-#: Names of the signals that a correction may take, next to angles of other joints.
+#: Names of the signals that a correction may take, in addition to angles of other joints.
 AT_RUN_TIME: tuple[str, ...] = tuple(GivenSignals.__annotations__)
 
 #: Before the name of another joint: the signal that is its angle.
@@ -189,7 +189,7 @@ def signal_columns(
 def signal_column(name: str, values: ArrayLike, size: int | None) -> NDArray[np.float64]:
     """``values`` as a read-only one-dimensional float array of ``size`` finite numbers.
 
-    One number represents ``size`` of them; without ``size`` any length but zero will do.
+    One number is repeated ``size`` times; without ``size`` any length but zero is accepted.
     """
     try:
         array = np.array(values, dtype=np.float64)

@@ -35,7 +35,7 @@ def did_you_mean(got: str, known: Iterable[str]) -> str:
     """
     import difflib  # needed only where something is wrong
 
-    # A wide log has thousands: more are searched in vain.
+    # A wide log has thousands of names: a search through more of them rarely finds one.
     words = {word.lower(): word for word in reversed(list(islice(known, _LOOKED_AT)))}
     near = difflib.get_close_matches(got.lower(), words, n=3, cutoff=0.6)
     # Words are begun right more often than ended right.
@@ -49,7 +49,7 @@ def check_choice(name: str, got: object, known: Iterable[str]) -> str:
     Raises
     ------
     ArgumentError
-        It is none of them; states which there are, and which is near.
+        It is none of them; the message lists them, and suggests the nearest.
 
     Examples
     --------

@@ -21,13 +21,13 @@ MODEL_BYTES: Final = 256 << 20
 SIMULATION_BYTES: Final = 16 << 20
 RUNS_BYTES: Final = 1 << 30
 
-#: Bytes requested at a time where the size is not known before.
+#: Bytes read at a time where the size is not known before.
 _CHUNK: Final = 1 << 20
 
 #: Milliseconds between two looks for Ctrl-C while a pipe is waited for.
 _LOOK_MS: Final = 100
 
-#: Marks of a missing value.
+#: Mark of a missing value.
 _NOTHING: Final = "__HIVE_DEFAULT_PARTITION__"
 
 
@@ -227,8 +227,7 @@ def named_again(
 ) -> str | None:
     """The input that ``output`` is, or None.
 
-    A folder among the inputs represents the files in and below it that have one of the
-    ``endings``.
+    A folder among the inputs means the files in and below it that have one of the ``endings``.
     """
     known = tuple(endings)
     for entry in inputs:
@@ -247,7 +246,7 @@ def _files(folder: str | PathLike[str]) -> Iterator[str]:
 
 
 def irregular_file_kind(mode: int) -> str:
-    """What a thing that is no regular file is, as a message states it."""
+    """The kind of a thing that is not a regular file, in words for a message."""
     names = (
         (stat.S_ISDIR, "a folder"),
         (stat.S_ISFIFO, "a pipe"),

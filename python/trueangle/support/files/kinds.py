@@ -52,7 +52,7 @@ def declare_endings(promises: Mapping[str, tuple[str, ...]]) -> None:
 
 
 def log_endings() -> tuple[str, ...]:
-    """Endings of the files that a folder among the inputs represents."""
+    """Endings of the files that are read from a folder among the inputs."""
     return tuple(ending for endings in _LOGS.values() for ending in endings)
 
 

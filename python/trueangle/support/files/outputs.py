@@ -33,7 +33,7 @@ __all__ = [
     "written_atomically",
 ]
 
-#: Errors of the system for writing only.
+#: Errors of the system that occur in writing only.
 _OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 #: Bytes that a file must take for its disk not to be full.
@@ -57,7 +57,7 @@ def check_output(
     kind : Kind, optional
         What is written; its endings are checked.
     inputs : iterable of paths
-        What was read: nothing is overwritten.
+        What was read: none of it is overwritten.
     hashes : iterable of str
         sha256 of what was read, where its place is not known.
     regular : bool
@@ -136,8 +136,8 @@ def written_atomically(
 
     It is written next to the file that ``path`` leads to (links are followed and stay) under
     a hidden name and renamed at the end; an exception inside the block, or a full disk,
-    leaves ``path`` as it was. The null device takes everything and keeps its place. What
-    may be written is reported by `check_output`, which takes the other arguments.
+    leaves ``path`` as it was. The null device takes everything and keeps its place.
+    `check_output`, which takes the other arguments, decides what may be written.
     """
     target = check_output(path, kind, inputs, hashes)
     if target.exists() and not target.is_file():  # the null device
@@ -155,7 +155,7 @@ def written_atomically(
 def external_output(target: Path) -> Iterator[Path]:
     """Path of a file to be made by another program, which has the name ``target`` at the end.
 
-    It is alone in a separate folder with it. Of the null device that is elsewhere.
+    It is alone in a new folder next to ``target``; for the null device the folder is elsewhere.
     """
     if target.exists() and not target.is_file():  # the null device
         import tempfile
@@ -185,7 +185,7 @@ def _file_beside(target: Path) -> contextlib.AbstractContextManager[Path]:
 def publish(aside: str | PathLike[str], target: str | PathLike[str]) -> None:
     """Sync the finished file or folder ``aside`` to the disk and rename it ``target``.
 
-    A symbolic link stays; what it leads to is replaced, a folder as `renamed` states. A
+    A symbolic link stays; what it leads to is replaced, a folder as `renamed` describes. A
     file that is replaced hands on its permissions; the null device takes the file and stays.
     Where the disk does not take the new name, the old state comes back.
     """
@@ -241,11 +241,11 @@ def named_output(
     making: contextlib.AbstractContextManager[Path],
     read: str | PathLike[str] | None = None,
 ) -> Iterator[Path]:
-    """Write ``path`` in what ``making`` makes; name errors of the system.
+    """The place that ``making`` makes to write ``path`` in; errors of the system name the file.
 
-    Libraries report a full disk in other words, or as damage of what they read: whether that
-    is the cause is tested on the disk. An error without a name, and not of writing alone, is
-    one of reading ``read`` (default: of ``path``).
+    Libraries report a full disk in their own words, or as damage of what they read: whether the
+    disk is full is tested by writing. An error without a name that does not occur in writing only
+    is one of reading ``read`` (default: ``path``).
     """
     try:
         with making as place:
@@ -264,7 +264,7 @@ def named_output(
 
 
 def _check_room(place: Path) -> None:
-    """Write on at the end of every file of a place that is given up, and of a new one.
+    """Write at the end of every file of a place that is given up, and to a new file.
 
     Raises
     ------
@@ -283,7 +283,7 @@ def _check_room(place: Path) -> None:
 
 @contextlib.contextmanager
 def _named_by(path: str | PathLike[str]) -> Iterator[None]:
-    """Errors of the system without a name, or with another, reported by this one."""
+    """Report errors of the system without a name, or with another, under this name."""
     try:
         yield
     except OSError as error:

@@ -33,7 +33,7 @@ _EXCHANGE: Final = 2
 
 
 def hidden_beside(target: Path) -> Path:
-    """A new name next to ``target``: no other file has it, because nobody draws 64 bits twice."""
+    """A new name next to ``target``, unique by its 64 random bits."""
     return target.with_name(f"{hidden_name(target)}.{os.urandom(8).hex()}{PARTIAL}")
 
 
@@ -90,7 +90,7 @@ def _lock(handle: int) -> None:
 def workplace(target: Path) -> Iterator[Path]:
     """Path of the same name in a new hidden folder next to ``target``, removed at the end.
 
-    Of a symbolic link that is the file it leads to: `publish` renames with it.
+    For a symbolic link ``target`` is the file it leads to: `publish` renames next to that.
     """
     target = Path(os.path.realpath(target))
 
