@@ -31,7 +31,7 @@ _FREE: Final = 100.0
 
 
 class BesideProblem(Problem):
-    """The problem of a pattern together with nuisances, of which nothing is left in the readings.
+    """The problem of a pattern fitted jointly with nuisances that were removed from the readings.
 
     ``shared`` and ``own`` are columns of each run: of all runs together, and of itself.
     """

@@ -65,7 +65,7 @@ def far_runs(runs: Sequence[NormalEquations]) -> list[tuple[int, float]]:
     if len(runs) < 2:
         return []
     alone = [_solved(run) for run in runs]
-    # Most runs decide where each can speak: one that is unlike moves the mean of all.
+    # Most runs decide where each can speak: one that differs moves the mean of all.
     if len(runs) > 2 and all(clear for _, _, clear in alone):
         common = median([solution for solution, _, _ in alone], axis=0)
     else:

@@ -53,7 +53,7 @@ _OUTPUT_SIDE: Final = {
     "a turn",
 }
 
-#: A line this many times larger than its multiple makes that one too.
+#: A line larger than its multiple by this factor explains that one too.
 _LARGER: Final = 3.0
 
 #: Highest multiple of a line that is put down to it.

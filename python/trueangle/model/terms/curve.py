@@ -81,7 +81,7 @@ class CurveTerm(Term):
 
     @property
     def follows_travel(self) -> bool:  # type: ignore[override]
-        """The direction is remembered from sample to sample."""
+        """The direction is kept from sample to sample."""
         return self.follows == "direction"
 
     @property
