@@ -91,7 +91,7 @@ class PreparedData:
         ratio: GearedLinesRatio | None = None,
         delay: Delay | None = None,
     ) -> PreparedData:
-        """With another ratio, or as the simulation states it; as they were a time before."""
+        """With another gear ratio or with that of the simulation, and with the delay subtracted."""
         if ratio is not None:
             sim = ratio.simulation
             every = signals_at_ratio(sim, every, error)

@@ -94,7 +94,7 @@ def diagnose(
     sim : Simulation, optional
         The assumed model; may be omitted where there is a log.
     simulated : path, table, iterable of CalibrationRun or MeasuredMinusSimulated, optional
-        What any other simulator states about the same motion
+        The log of any other simulator of the same motion
         (`trueangle.runs.joining.minus_simulated`): it is subtracted from the readings, and ``sim``
         and its extension describe the difference. Where both have the torque of the drive, that is
         accounted for as well (`Diagnosis.torque`).
@@ -103,8 +103,8 @@ def diagnose(
     within : float, optional
         Seconds that it may take. By itself work is counted and no clock looked at, so that the
         same readings give the same account on any machine, however busy; ordinary ones need a
-        third of what may be done. When either is up, the account so far is given and states that
-        it is incomplete (`Diagnosis.complete`, ``notes``): causes may be missing, and what was
+        third of what may be done. When either is up, the account so far is returned and marked
+        as incomplete (`Diagnosis.complete`, ``notes``): causes may be missing, and what was
         not held out is not confirmed. Seven tenths of the time are for the choice of causes.
     progress : {"none", "auto", "text", "json"}
         What is done and how much is left, on stderr, after the first second; ``"auto"`` is

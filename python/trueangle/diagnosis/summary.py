@@ -137,7 +137,7 @@ def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
 
 
 def _is_material(item: Evidence) -> bool:
-    """Whether what a test states about the noise is more than a few percent of the stated one."""
+    """Whether the noise differs by more than a few percent from the stated one."""
     return item.test != AGAINST_STATED or abs(item.statistic - 1.0) > MATERIAL
 
 

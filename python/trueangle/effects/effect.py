@@ -296,7 +296,7 @@ class Effect(TabledParameters):
         )
 
     def over(self, start_deg: float, stop_deg: float) -> Self:
-        """The effect over this travel, where it is corrected over a stated one and states none."""
+        """The effect with this travel, where its correction needs one and it has none."""
         return self
 
     def to_lines(self) -> Sequence[tuple[str, float]]:

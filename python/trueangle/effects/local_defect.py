@@ -52,7 +52,7 @@ ON_BUMP = 0.1
 LEAST_READINGS = 4.0
 
 #: Travel (turns) from which on lines and bumps differ for certain: over less a bump can
-#: represent several lines at once.
+#: imitate several lines at once.
 WHOLE_TURN = 0.9
 
 

@@ -45,9 +45,9 @@ NEAR_REVERSAL = 3
 AFTER = (1, 2, 4, 8)
 GATHERED = 1e-3
 
-#: Outliers smaller than this many standard deviations hide in the noise: of sizes
-#: spread evenly up to ``size`` that is a share of ``HIDDEN / size``, which the form of the
-#: wide normal supplies and no reading shows. It counts as the fraction's uncertainty.
+#: Outliers smaller than this many standard deviations are not detected. If sizes are uniform
+#: up to ``size``, their share is ``HIDDEN / size``; it follows from the form of the wide normal
+#: and no reading shows it. It counts as the uncertainty of the fraction.
 HIDDEN = 3.0
 
 #: Standard deviations from which on an isolated deviation is not used to predict neighbours.

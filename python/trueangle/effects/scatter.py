@@ -8,7 +8,7 @@ from ..estimation.regression import Regression
 from ..support.distributions import chi_squared_tail
 from .search import Array
 
-#: Squared residuals are taken at most this many of their own variances large.
+#: Multiple of their variances to which squared residuals are clipped.
 SQUARE_CLIP = 9.0
 
 # Of z^2 of a normal z where it is below the clip, moments by tails of chi squared (1, 3 and 5

@@ -130,7 +130,7 @@ def tangent_covariance(regression: Regression, terms: Sequence[Fitted], tangents
     """
     chosen = [extension for extension, _, _ in terms]
     others = [term for term in regression.terms if all(term is not one for one in chosen)]
-    # Under the noise together with these terms: without them what they explain looks correlated.
+    # Under the noise found with these terms: without them what they explain looks correlated.
     x, _ = regression.with_terms(others, regression.whiten.rho).projected(tangents)
     # Each of length 1: what the readings hardly determine has a large variance, and not none.
     sizes = np.sqrt(np.einsum("ij,ij->j", x, x))

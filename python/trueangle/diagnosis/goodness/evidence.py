@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...support.plainresult import finite_or_none
 
-#: Times that a search is repeated with signs at random, and units from which on they differ enough.
+#: Repetitions of a search with random signs, and units from which on the signs differ enough.
 DRAWS, ENOUGH_UNITS = 32, 6
 
 

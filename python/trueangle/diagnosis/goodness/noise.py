@@ -32,7 +32,7 @@ MOST_ORDERS, READINGS_PER_COLUMN = 12, 12
 #: Readings used at most: whole runs, from the first on.
 MOST_READINGS = 12_000
 
-#: Residuals are taken at most this many robust standard deviations large.
+#: Robust standard deviations to which residuals are clipped.
 CLIP = 4.0
 
 #: Correlations that are tried first; the best is refined by parabolas.

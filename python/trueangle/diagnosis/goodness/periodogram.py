@@ -323,7 +323,7 @@ def _blocks(size: int, over: float) -> tuple[NDArray[np.int64], Array]:
 
 
 def _likeliest(total: Array, freedom: float, cells: Array) -> tuple[float, int]:
-    """Smallest p value of a bin, each against a level known from this many cells; and its bin."""
+    """Smallest p value of a bin, each against a level from its number of ``cells``; and its bin."""
     best = (1.0, 0)
     cuts = np.flatnonzero(np.diff(cells)) + 1
     edges = np.concatenate([[0], cuts, [total.size]])

@@ -218,7 +218,7 @@ def _smallest(
 
 @dataclass(frozen=True)
 class ModulatedSums:
-    """Sums over units of a modulator times the residual, and the size that they represent."""
+    """Sums over units of a modulator times the residual, and the amplitude they correspond to."""
 
     sums: Array
     size: float
