@@ -27,7 +27,7 @@ from .penalty import regression_without
 #: Standard errors by which the size of a cause must differ from zero.
 TOLD = 2.0
 
-#: Share of what can be subtracted at a level held out above which more is taken than left.
+#: Share of what can be subtracted at a held-out level above which more is removed than left.
 MORE_THAN_LEFT = 0.5
 
 #: Parts of the travel, of equally many readings, in each of which a ramp must be found again, and
@@ -194,7 +194,7 @@ def alike_columns(
 ) -> Iterator[tuple[int, int, float]]:
     """Pairs of confirmed findings that add nearly one column to all else; their correlation.
 
-    Of what each explains, together with the terms of neither (`trueangle.diagnosis.overlap`).
+    Of what each explains, given the terms of all others (`trueangle.diagnosis.overlap`).
     """
     confirmed = [k for k, finding in enumerate(findings) if finding.confirmed]
     for i, j, found in finding_overlaps(regression, [findings[k].group for k in confirmed]):

@@ -157,7 +157,7 @@ def reducible_share(
     A draw without any unit that shows more than noise has nothing to subtract, and no share: loads
     in two of four runs are in all but 6 % of the draws.
     """
-    _, unit = np.unique(unit, return_inverse=True)  # a run all of outliers contains nothing
+    _, unit = np.unique(unit, return_inverse=True)  # a run with only outliers has no information
     count = np.bincount(unit).astype(np.float64)
     power0 = np.bincount(unit, weights=before**2)
     power1 = np.bincount(unit, weights=after**2)

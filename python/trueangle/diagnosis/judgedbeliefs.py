@@ -23,7 +23,7 @@ from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
 from .unnamed import effect_or_unnamed
 
-#: Fields of effects, together with those in arcsec, that their signal is proportional to.
+#: Fields of effects, in addition to those in arcsec, that their signal is proportional to.
 LINEAR = ("delay_s", "relative_error", "pattern_per_K", "coefficient")
 
 #: Departure of a scaled effect's signal from the scaled signal, of its largest value.
@@ -94,7 +94,7 @@ def effects_as_measured(
 
 
 def _factor(regression: Regression, column: Array) -> tuple[float, float] | None:
-    """How many times a column is in the readings together with all else, and its standard error."""
+    """Coefficient of a column fitted jointly with all else, and its standard error."""
     if not np.any(column) or float(np.abs(column).max()) < ROUNDING:
         return None
     x, excited = regression.projected(column[:, None])
@@ -114,7 +114,7 @@ def judged_beliefs(
     """Verdicts on every line and effect, and the simulation with refuted ones as measured.
 
     Lines that something else acts on, or that may hide behind another cause in these runs,
-    are not judged; the latter become entries of what cannot be determined.
+    are not judged; the latter become entries of what is not identifiable.
     """
     lines, harmonics = _lines(regression, sim, spots, with_gain)
     effects: list[Belief] = []

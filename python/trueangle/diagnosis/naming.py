@@ -47,7 +47,7 @@ class NamedCauses:
 
     @property
     def curves(self) -> list[Curve]:
-        """What represents factors in the simulation that no name fits."""
+        """The curves that represent factors without a fitting name in a simulation."""
         return [c for factor in self.factors if not factor.named_by for c in factor.effects]
 
     @property
@@ -91,7 +91,7 @@ def named_causes(
 
 
 def is_decided_by_factors(spot: Ambiguity, factors: Sequence[Factor]) -> bool:
-    """Whether one alone of the causes that a design does not separate is a form of a factor.
+    """Whether only one of the causes that a design does not separate is a form of a factor.
 
     A zero of each run and a drift with the temperature may have the same columns in a few runs;
     of more, the evidence decides for the one that needs fewer of them.
@@ -142,8 +142,8 @@ def _named(
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
     held, factors = stated_factors(chosen, findings)
-    # Causes that are not distinguished, or were not tried, state other things of other runs: no
-    # curve does.
+    # Causes that are not distinguished, or were not tried, predict different errors in other
+    # runs: no curve represents them.
     seen = [spot for spot in spots if spot.supported]
     factors = [
         replace(f, effects=()) if at.cut or any(_is_either(spot, f) for spot in seen) else f

@@ -17,13 +17,13 @@ from .extension import curves_of
 from .factor import Factor, FactorCurve
 from .group import FACTORS, Group
 
-#: Readings used at most; of more, one of every this many in a row.
+#: Readings used at most; of more, every n-th.
 MOST_READINGS: Final = 2500
 
 #: Part of the variance that each factor may have where the noise is first looked for.
 AT_FIRST: Final = 0.3
 
-#: Columns and orders of groups that the noise is first looked for together with.
+#: Columns and orders that groups may have to be fitted where the noise is first estimated.
 FEW: Final = 4
 LOWEST: Final = 4.0
 
@@ -100,7 +100,7 @@ class FactorAccount:
     def less(self, given: Sequence[float], tau: Sequence[float]) -> FactorAccount:
         """Of what groups that are given leave by themselves: the others of a model.
 
-        Where both are the same columns, everything is theirs.
+        Columns that both have are theirs alone.
         """
         _, mean, _ = self.sums.posterior(list(given))
         others = np.where(np.array(given) > 0.0, 0.0, tau).tolist()
@@ -288,7 +288,7 @@ def _alike(
 ) -> tuple[str, ...]:
     """Factors any of which explains as much in the place of one, or is nearly the same columns.
 
-    The evidence may choose the latter, and shows errors of the signals.
+    The evidence may distinguish the latter, but only by errors of the signals.
     """
     rest = account.without(members)
     own, _ = account.best_beside(rest, members)

@@ -1,4 +1,4 @@
-"""The groups of columns that readings of these runs can show."""
+"""The groups of columns that readings of these runs can determine."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from .group import GRID, Group
 LOW: Final = 12
 BANDS: Final = ((13, 24), (25, 48))
 
-#: Lines that products with a factor are always requested.
+#: Orders whose products with a factor are always tried.
 ALWAYS: Final = (1.0, 2.0)
 
-#: Lines of a spectrum that are requested together with, and by how much each must be significant of
-#: the mean power: of noise alone about one of 500 does.
+#: Lines of a spectrum that are tried in addition, and the least ratio of each to the mean power:
+#: of noise alone about one of 500 exceeds it.
 PEAKS: Final = 5
 STANDS_OUT: Final = 8.0
 
-#: Orders that a spectrum is looked at up to, and readings for each.
+#: Highest order of a spectrum, and readings for each order.
 ORDERS: Final = 400
 SAMPLED: Final = 2.5
 
@@ -137,7 +137,7 @@ def factor_groups(
 
 
 class _PeakSpectrum:
-    """Lines that are significant, of values at angles in radians."""
+    """The strongest lines of values at angles in radians."""
 
     def __init__(self, theta: Array) -> None:
         self.count = int(min(ORDERS, theta.size / SAMPLED))
@@ -347,7 +347,7 @@ def _clock(signals: Signals) -> Iterator[Axis]:
 
 
 def _of_runs(signals: Signals, lines: Sequence[float]) -> Iterator[Group]:
-    """Zeros of the runs, their trend, and separate patterns."""
+    """Zeros of the runs, their trend, and a pattern of each run."""
     if signals.runs < 2:
         return
     run = signals.run.astype(np.float64)
