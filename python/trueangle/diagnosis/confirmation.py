@@ -36,7 +36,7 @@ FOLLOWS = 28.0
 #: Probability from which on a line in time is there, whatever else is.
 SEEN = 1e-6
 
-#: Runs from which on the evidence of each can be requested.
+#: Runs from which on the evidence of each run is tested.
 ENOUGH_RUNS = 4
 
 #: Resamples of runs, and the lower quantile that must lie above zero.
@@ -54,11 +54,11 @@ def confirmation_status(
 
     A cause that transfers is confirmed by a gain on held-out data whose interval excludes
     zero. One that every run draws anew has none: it must explain the noise of the runs one
-    by one. Whatever explains the residual (`is_flexible`, causes of the scatter) is not
+    by one. A cause that fits any residual (`is_flexible`, causes of the scatter) is not
     confirmed while something is ``unexplained``, but for a line in time that a test which needs
     no name sees at the same frequency. Nor is a cause that is smaller than what is unexplained: it
     may be a part of that. A free path in time follows anything: it is noise to other causes, and
-    none itself; nor is what explains anything confirmed together with a drift that is larger.
+    no cause itself. Nor is a flexible cause confirmed where a larger drift is found.
     """
     effect = EFFECTS[cause]
     takes_up = is_flexible(effect) or _of_scatter(cause)
@@ -114,8 +114,8 @@ def _of_scattered_zeros(
         runs = regression.signals.runs
         return f"it shows only in the zeros of {runs} runs, and every run may have a new zero"
     return (
-        "the zeros of the runs scatter more than the noise and may cause an effect of this size in "
-        f"{regression.signals.runs} runs at random (p {chance:.2g})"
+        "the zeros of the runs scatter more than the noise, and may alone cause an effect of this "
+        f"size in {regression.signals.runs} runs (p {chance:.2g})"
     )
 
 
@@ -136,7 +136,7 @@ def _drift(regression: Regression) -> float:
 
 
 def _is_seen_without_a_name(regression: Regression | None, group: Sequence[int]) -> bool:
-    """Without it the surest of the residual is a line in time at its frequency."""
+    """Whether the residual without it has a line in time at its frequency, and none surer."""
     if regression is None or not group or regression.signals.runs < 2:
         return False
     if not is_line_in_time(regression.terms[group[0]]):

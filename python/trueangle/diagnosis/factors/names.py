@@ -36,7 +36,7 @@ FAMILIES: Final = (
     {"run", "run_time", "temperature"},
 )
 
-#: Factor of settling after a reversal: reported, but no cause is named by it.
+#: Factor of settling after a reversal, which any form may have: names are not tested by it.
 TRANSITION: Final = "reversal_time"
 
 #: Bumps of one place from which on they are one function of it; and how near, in their widths,
@@ -53,7 +53,7 @@ SAME: Final = 3.0
 def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]) -> Group | None:
     """A finding's own columns at some readings as a group; None of what has none.
 
-    What states how the noise goes has none: the account has a separate noise.
+    A finding that describes the noise has none: the account has its own noise.
     """
     parts = []
     for k in finding.group:
@@ -84,7 +84,7 @@ def _group(columns: Array, sought: float) -> Group | None:
 
 
 class NamedForms:
-    """Findings as groups together with the free functions of an account.
+    """Findings as groups in addition to the free functions of an account.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class NamedForms:
     places : dict of int to int
         Group of a finding by its place in the list of findings.
     base : int or None
-        Group that is in together with all others.
+        Group that is in every model.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class NamedForms:
         start: Sequence[float] | None = None,
         without: Sequence[str] = (),
     ) -> tuple[float, list[float]]:
-        """Score and groups of the best free functions, without some factors, with findings."""
+        """Score and groups of the best free functions added to findings, without some factors."""
         allowed = [k for k in self.free if not self.is_of(k, without)]
         if start is not None:
             start = [0.0 if self.is_of(k, without) else tau for k, tau in enumerate(start)]
@@ -136,7 +136,7 @@ class NamedForms:
         return score - sum(self.price(name) for name in names if name in self.places), tau
 
     def price(self, name: int) -> float:
-        """What a finding costs together with free functions, of which it is one, of one size."""
+        """Penalty of a finding next to free functions: for the choice of it and of its size."""
         own = self.account.groups[self.places[name]].alternatives
         return float(np.log(len(self.account.groups) * SIZES * own))
 
@@ -147,7 +147,7 @@ class NamedForms:
         tau: Sequence[float],
         factors: Sequence[str],
     ) -> tuple[float, float]:
-        """Variance that some findings take, and that free functions of factors take of rest."""
+        """Variance that findings explain, and that free functions of factors explain of others."""
         given = self.given(sure)
         rest = self.account.less(given, tau)
         free = [k for k in self.free if self.is_of(k, factors)]
@@ -181,8 +181,8 @@ def names_by_form(
     """The findings, those not confirmed whose form is not better than the free function.
 
     One is confirmed where a free function of any factors in its place has at most a log
-    Bayes factor of 3 in its favour, and where with it the free functions of its own factors
-    take at most 5 % of what both take.
+    Bayes factor of 3 in its favour, and where the free functions of its own factors explain
+    at most 5 % of what it and they explain together.
     """
     found = list(findings)
     for reason_of in (_one_function, _no_counts):

@@ -84,7 +84,7 @@ def stated_factors(
 
 
 def _factors(names: NamedForms, found: Sequence[Finding], shafts: dict[str, float]) -> list[Factor]:
-    """What the readings follow with its names, and together with all names what has none."""
+    """The factors that the readings follow: those with names, then those beyond all names."""
     account = names.account
     stated, named = [], set()
     for factor in factors_of(account, shafts):
