@@ -64,7 +64,7 @@ def _not_carried(finding: Finding) -> str:
     if low > 0.0 and (by_level.reducible_share or 0.0) > MORE_THAN_LEFT:
         return ""
     return (
-        f"its fitted form does not carry over to a {_NOUNS[by_level.factor]} that was left out "
+        f"its fitted form does not carry over to a {_NOUNS[by_level.factor]} that was held out "
         f"(share {by_level.reducible_share:.2f}, {low:.2f} to {high:.2f})"
     )
 

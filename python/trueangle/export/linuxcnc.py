@@ -86,7 +86,7 @@ class LinuxCnc(Target):
             lost=lambda: travel.lost(pattern),
             notes=(
                 f"set COMP_FILE_TYPE = {options['type']} of the joint",
-                f"at v deg/s the trim moves at up to {slope:.3g} v deg/s and accelerates at up to "
+                f"at v deg/s the trim moves at up to {slope:.3g} v deg/s. It accelerates at up to "
                 f"{bend:.3g} v^2 deg/s^2 at its corners: LinuxCNC gives it half of the joint's "
                 "MAX_ACCELERATION",
             ),

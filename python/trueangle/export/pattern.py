@@ -169,8 +169,8 @@ class TurnPattern:
         if not self.is_periodic:
             strangers = [s.name for s in self.model.shafts if s.cycles_per_turn % 1.0]
             raise ArgumentError(
-                f"{target} holds one turn of the output, and shaft {', '.join(strangers)} is "
-                "not back at its start after it: export its model from the shaft's own "
+                f"{target} holds one turn of the output, and shaft {', '.join(strangers)} is not "
+                "periodic in it. Export its model from the shaft's own "
                 'encoder, or use `target="c"`, which writes one function per shaft'
             )
 

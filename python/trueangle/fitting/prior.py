@@ -132,9 +132,9 @@ class Posterior(NamedTuple):
     def note(self) -> str:
         """The share in words."""
         return (
-            f"fitted with a prior from {self.units} units of its design: {100.0 * self.share:.0f} "
-            "% of the coefficients is the unit's own readings, on average over the orders; "
-            "standard errors and intervals include the bias of the prior, for units of this design"
+            f"fitted with a prior from {self.units} units of its design. {100.0 * self.share:.0f} "
+            "% of the coefficients is the unit's own readings, on average over the orders. "
+            "Standard errors and intervals include the bias of the prior, for units of this design"
         )
 
 

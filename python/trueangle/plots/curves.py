@@ -225,5 +225,5 @@ def residual_points(fit: FitResult, against: Signal = "angle") -> list[Points]:
         scale = 360.0 / run.period if against == "speed" else 1.0
         found.append(Points(run_label(run, number), scale * np.asarray(x), factor * rest))
     if not found:
-        raise ArgumentError(f"no run has {against}: it cannot be drawn against the residual")
+        raise ArgumentError(f"no run has {against}: it cannot be plotted against the residual")
     return found

@@ -92,7 +92,7 @@ def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     ax.bar(place[seen], factors[seen], 0.75, color=palette.AFTER)
     for i in place[~seen]:
         ax.annotate(
-            "not seen",
+            "not detected",
             (float(i), 0.02),
             rotation=90,
             ha="center",

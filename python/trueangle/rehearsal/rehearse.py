@@ -344,7 +344,7 @@ class SizeSearch:
         if self.spot is not None:
             because, measure = self.spot.because, self.spot.measure
         elif self.sizes is None:
-            because = "these runs of this joint show nothing of it, however large it is"
+            because = "these runs do not show it, at any size"
             measure = effect.measure or None
         name = effect.size_name or fields(effect)[0].name  # type: ignore[arg-type]
         return rehearsed_cause(self.cause, name, self.sizes, self.answers, because, measure)

@@ -279,8 +279,8 @@ def _entries(table: FileReadings, counts: float | None) -> _RunColumns:
     unit = column.unit or unit_in_name(name, "indicated") or (None if counts is None else "count")
     if unit is None or (unit == "count" and counts is None):
         raise table.error(
-            "one column is read as a table with entry i of n at i/n of a turn, "
-            f"and its unit is unknown: give {role_code('indicated', name, 'deg')} (or another "
+            "one column is read as a table with entry i of n at i/n of a turn. "
+            f"Its unit is unknown: give {role_code('indicated', name, 'deg')} (or another "
             "unit), or `counts_per_turn=`; or name the file's reference column",
             name,
         )

@@ -84,7 +84,7 @@ def _walk(folder: Path, above: tuple[tuple[int, int], ...] = ()) -> Iterable[Pat
         if path.name.startswith(".") or path.name == MANIFEST:
             continue
         if not path.exists():
-            warnings.warn(f"{path}: is a link to nothing and is left out", stacklevel=4)
+            warnings.warn(f"{path}: is a link to nothing and is omitted", stacklevel=4)
             continue
         if known_format(path):
             yield path

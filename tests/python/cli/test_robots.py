@@ -381,7 +381,7 @@ def test_a_joint_that_rests_does_not_stop_the_others(tmp_path, capsys, monkeypat
     assert ta.load_robot("robot.json").joints == ("a",)
     assert main(["report", "arm.csv", *signals, "-o", "arm.html"]) == 0
     page = (tmp_path / "arm.html").read_text()
-    assert "There is none, as said above." in page
+    assert "There is none, as stated above." in page
     assert "The orders that were looked for" not in page
 
 

@@ -57,7 +57,7 @@ def reason(found: Finding) -> str:
 def test_a_law_must_carry_to_a_level_left_out(share, low, high, passes):
     told = reason(finding("latency", gain=carried(share, low, high)))
     assert (told == "") == passes
-    said = f"a speed that was left out (share {share:.2f}, {low:.2f} to {high:.2f})"
+    said = f"a speed that was held out (share {share:.2f}, {low:.2f} to {high:.2f})"
     assert passes or told.endswith(said)
     # A mount is not carried to others, and where no interval is known nothing is said.
     gain = carried(share, low, high)

@@ -57,7 +57,7 @@ def test_what_is_left_out_is_named_with_its_size(target, model, tmp_path):
         flowing = re.sub(r"\n(?: +| \*|//!|//|#|;) *", " ", made.text)
         assert re.search(r"[Dd]iffers from the model by at most \S+ arcsec", flowing)
         for row in made.left_out:
-            assert re.search(rf"left out: .*{row['term']} \S+ arcsec", flowing)
+            assert re.search(rf"omitted: .*{row['term']} \S+ arcsec", flowing)
         assert made.sha256 in flowing
         assert "rig/axis_7.csv" in flowing
         assert "trueangle " in flowing

@@ -174,7 +174,7 @@ def test_runs_are_asked_for_what_is_blind_in_groups(asked: dict[str, Any]) -> No
     # What the design cannot tell is tried large: at step 16 of 20.
     assert [*found["latency"].tried] == [3.0 * 2.0**4]
     assert [*found["scale_error"].tried] == [3.0]
-    said = "these runs of this joint show nothing of it, however large it is"
+    said = "these runs do not show it, at any size"
     assert found["thermal_drift"].blind_because == said
     assert found["thermal_drift"].measure == (EFFECTS["thermal_drift"].measure or None)
 

@@ -124,7 +124,7 @@ def test_a_cause_without_sizes_is_not_tried() -> None:
         assert found.tried == {}
         if spot is None:
             assert found.blind_because is not None
-            assert found.blind_because.startswith("these runs of this joint show nothing of it")
+            assert found.blind_because.startswith("these runs do not show it")
             assert found.measure == (EFFECTS["thermal_drift"].measure or None)
             assert found.measure
         else:

@@ -141,7 +141,7 @@ def test_a_broken_link_does_not_stop_a_folder(logs, tmp_path, model, capsys):
     assert main(["correct", str(logs), "-m", model, "-o", str(tmp_path / "out")]) == 0
     captured = capsys.readouterr()
     assert "60 of 60" in captured.out
-    assert "broken.csv: is a link to nothing and is left out" in captured.err
+    assert "broken.csv: is a link to nothing and is omitted" in captured.err
     assert captured.err.count("\n") == 1
 
 

@@ -85,7 +85,7 @@ def row_with_verdict(
     named = {e.order for e in explanations}
     low = _seen_at(row.order, candidates)
     if low is not None and not rivals:
-        reason += f", and these positions tell it from {low}"
+        reason += f", and these positions distinguish it from {low}"
     # Where the readings only hint at a high order, the low one is a rival too.
     rivals += [f"{m:g}" for m in row.aliases if m in candidates.main and m not in named]
     if rivals:

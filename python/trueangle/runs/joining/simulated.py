@@ -101,7 +101,7 @@ class MeasuredMinusSimulated(ShownResult):
         if self.left_out:
             verb = "is" if self.left_out == 1 else "are"
             silent = counted(self.left_out, "reading")
-            text += f"; {silent} at which it says nothing {verb} left out"
+            text += f"; {silent} without a simulated value {verb} omitted"
         return "\n".join(wrapped_lines(". ".join([text, *self.notes]) + "."))
 
 
@@ -179,7 +179,7 @@ def minus_simulated(
         expected = _expected(run, log, by, source)
         if np.count_nonzero(expected.known) < LEAST:
             raise ArgumentError(
-                f"{source} says nothing of {np.count_nonzero(~expected.known)} of the {len(run)} "
+                f"{source} has no value for {np.count_nonzero(~expected.known)} of the {len(run)} "
                 f"readings of run {run.label or '1'}: its {expected.by} is another"
             )
         kept.append(_lowered(run, expected))

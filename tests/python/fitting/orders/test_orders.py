@@ -68,7 +68,7 @@ def test_two_mounts_tell_low_orders_from_gear_orders(seed, offsets):
     # bet (400 of seed 3); nothing is retained that is more than that.
     others = set(chosen.orders) - {1, 100, 200, 202}
     assert all(chosen.row(k).probability < 0.6 for k in others)
-    assert chosen.row(202).reason.endswith("and these positions tell it from 14")
+    assert chosen.row(202).reason.endswith("and these positions distinguish it from 14")
     assert not any(row.doubtful for row in chosen.table)
     # Six groups know an amplitude to 5 sqrt(2/216) = 0.48 arcsec, two to 0.83.
     for order, (amplitude, phase) in GEAR.items():
