@@ -104,7 +104,7 @@ def test_a_file_with_comments_is_read_back(target, model, tmp_path):
 
 def test_max_arcsec_is_of_all_that_is_left(model, tmp_path):
     path = tmp_path / "a.h"
-    with pytest.raises(ta.errors.ArgumentError, match=r"leaves out backlash 18.* latency 6"):
+    with pytest.raises(ta.errors.ArgumentError, match=r"omits backlash 18.* latency 6"):
         ta.export_model(model, "tinymovr", path, max_arcsec=2.0)
     assert list(tmp_path.iterdir()) == []
     made = ta.export_model(model, "c", path, max_arcsec=2.0, bits=14)

@@ -54,7 +54,7 @@ def test_the_most_that_is_told_of_a_joint_bounds_its_correction(period):
     robot = ta.Robot({"a": model(period, 1), "b": single, "c": moved})
     told = {}
     for joint, most, beside in re.findall(
-        r"(\w): .* at most (\S+) arcsec( beside its terms)?,", robot.summary()
+        r"(\w): .* at most (\S+) arcsec( plus terms)?,", robot.summary()
     ):
         told[joint] = float(most)
         assert bool(beside) == bool(robot[joint].terms)

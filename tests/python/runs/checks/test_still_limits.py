@@ -149,7 +149,7 @@ def test_the_place_and_the_first_row_are_told() -> None:
     record = Record("warm", reference, indicated, np.arange(11, 411), time=time)
     limit, stale = stuck_readings([record])
     assert limit.rows == tuple(range(312, 411))
-    assert "angle of run warm stands at 310.5 deg, the end of its range, in 99 rows" in limit.says
+    assert "angle of run warm stays at 310.5 deg, the end of its range, in 99 rows" in limit.says
     assert "(first: row 312) while the joint moves on" in limit.says
     assert stale.rows == (*range(111, 115), *range(211, 215))
     assert "8 indicated readings of run warm (first: row 111) repeat" in stale.says
