@@ -209,8 +209,8 @@ def _sorted_out(
         blind.append(
             Blind(
                 lost,
-                f"order {order_ranges(lost)} of {ENCODER} together with {what}: less than "
-                f"{LEAST_RETAINED:.0%} of them is left jointly with it",
+                f"order {order_ranges(lost)} of {ENCODER} and {what} are confounded: the fit "
+                f"retains less than {LEAST_RETAINED:.0%}",
                 "turn faster or more steadily, with more inertia",
             )
         )

@@ -338,13 +338,14 @@ def test_a_summary_tells_every_number() -> None:
         tests, ("careful",), 1.5, 900, 12.34,
     )  # fmt: skip
     text = result.summary("arcsec")
-    assert "calibrated without a reference (dual): 900 readings, 12.3 turns, noise 1.5" in text
+    told = " ".join(text.split())
+    assert "calibrated without a reference (dual): 900 readings, 12.3 turns, noise 1.5" in told
     assert "1.20" in text
     assert "0.800" in text
     assert "odd turns predict even turns: 9" in text
     assert "they agree (p = 0.5)" in text
     assert "forward predicts backward: 9" in text
-    assert "they DISAGREE (p = 0.0005)" in " ".join(text.split())
+    assert "they DISAGREE (p = 0.0005)" in told
     assert "note: careful" in text
     assert "orders 2, 3.5: x" in text
     assert "  of" not in text.split("blind")[0].replace("  of the", "")

@@ -52,7 +52,7 @@ _ONWARD: Final = 0.7
 #: Readings on both sides whose speeds are compared.
 _BESIDE: Final = 5
 
-#: A column has a lattice where its steps take this few values, each this many times.
+#: A column has a lattice where its steps take at most this many values, each at least this often.
 _VALUES: Final = 12
 _TIMES: Final = 5
 
