@@ -91,10 +91,17 @@ class MissingOrder(Effect):
         penalties = 2.0 * np.log(np.where(lines.plausible, 2 * expected, 2 * gains.size))
         gains = np.where(shows_line(regression.signals, lines.orders), gains, 0.0)
         # At equal steps higher orders are the same numbers as low ones, but for the error by
-        # which the angles miss the steps: only the noise separates them there.
-        grid = regression.signals.grid
-        if grid is not None:
-            gains = np.where(2.0 * lines.orders > grid.positions, 0.0, gains)
+        # which the angles miss the steps: what distinguishes them there is the noise.
+        # At few places, however they lie, lower orders make up any pattern: a higher one is there
+        # for what is known of the gear alone.
+        signals = regression.signals
+        hidden = 2.0 * lines.orders > signals.places
+        if signals.grid is None:
+            known = np.array(known_orders(regression.belief))
+            hidden &= np.abs(lines.orders[:, None] - known).min(axis=1, initial=np.inf) > 1e-9
+        else:
+            hidden = 2.0 * lines.orders > signals.grid.positions
+        gains = np.where(hidden, 0.0, gains)
         best = int(np.argmax(gains - penalties))
         if gains[best] <= 0.0:
             return None

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runs.aliasing import count_positions
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array, distinct
@@ -32,8 +33,8 @@ ON_COUNTS, OF_DESIGN = 0.97, 0.5
 #: Difference of coherences that readings cannot resolve.
 ALIKE = 0.004
 
-#: Share of the moves from reading to reading that stay where they are, as at turning points,
-#: up to which readings are a table: a sensor that rounds lingers at its counts.
+#: Share of the moves from reading to reading that stay where they are, as at turning points, or
+#: omit positions, up to which readings are a table: a sensor that rounds repeats its counts.
 LINGERS = 0.05
 
 #: Share of a step by which the steps of a table may miss to fill a turn, as rounded angles do.
@@ -217,6 +218,10 @@ def step_behind(values: NDArray[np.float64], true: NDArray[np.float64], digit: f
     if not count or (np.flatnonzero(told > told[count] - ALIKE) % count).any():
         return 0.0
     of_design = abs(np.exp(2j * np.pi * count * true).mean()) > OF_DESIGN
+    # Even places read with a slope are even, too: one place in each of adjacent cells.
+    seen = distinct(np.mod(np.round(values * count).astype(np.int64), count))
+    adjacent = np.count_nonzero(np.diff(seen) == 1) >= (1.0 - LINGERS) * (seen.size - 1)
+    of_design |= adjacent and count_positions(true) <= seen.size
     return 0.0 if of_design else 1.0 / count
 
 
@@ -224,7 +229,7 @@ def table_move(runs: Sequence[NDArray[np.float64]], step: float) -> float:
     """Move from each reading of a table of equal steps to the next, in turns; 0 for no table.
 
     If all readings are the same number of steps apart, the design placed them: such a lattice
-    is no property of the sensor.
+    is no property of the sensor. A few positions may be missing.
 
     ``runs`` are the angles of each run and ``step`` that of their lattice (`lattice_step`), in
     turns.
@@ -239,8 +244,13 @@ def table_move(runs: Sequence[NDArray[np.float64]], step: float) -> float:
     if step <= 0.0:
         return 0.0
     moves = np.concatenate([np.diff(run) for run in runs])
-    counts = np.round(np.abs(moves - np.round(moves)) / step)
+    moves = np.abs(moves - np.round(moves))
+    counts = np.round(moves / step)
     moved = counts[counts > 0.0]
-    if moved.size < max(3.0, (1.0 - LINGERS) * counts.size) or np.ptp(moved) > 0.0:
+    if moved.size < max(3.0, (1.0 - LINGERS) * counts.size):
         return 0.0
-    return float(moved[0] * step)
+    least = moved.min()
+    gaps = moved > least
+    if np.count_nonzero(gaps) > LINGERS * moved.size or (moved % least).any():
+        return 0.0
+    return float(least * moves[counts > 0.0].sum() / moved.sum())

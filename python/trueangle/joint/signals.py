@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runs.aliasing import count_positions
 from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 from ..support.quantiles import median
@@ -108,6 +109,11 @@ class Signals:
     def grid(self) -> UniformGrid | None:
         """Equal steps of a turn on which the design put the readings, or None."""
         return UniformGrid(self.table) if self.table else None
+
+    @cached_property
+    def places(self) -> int:
+        """Distinct places of a turn: orders above half as many are not identifiable alone."""
+        return count_positions(self.theta / (2.0 * np.pi))
 
     @cached_property
     def even_rate(self) -> float:

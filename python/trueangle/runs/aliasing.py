@@ -176,18 +176,7 @@ def distinct_positions(
     if not 0.0 < width < 0.5:
         raise ArgumentError(f"tolerance must lie between 0 and half a turn, got {tolerance!r}")
     turns = np.concatenate([run.reference for run in found]) / period
-    turns -= np.floor(turns)
-    order = np.argsort(turns, kind="stable")
-    ascending = turns[order]
-    # Begin behind the largest gap: no cluster is then cut at 0 = 1 without need.
-    gaps = np.diff(ascending, append=ascending[0] + 1.0)
-    first = (int(np.argmax(gaps)) + 1) % ascending.size
-    order = np.roll(order, -first)
-    unrolled = np.roll(ascending, -first)
-    unrolled[ascending.size - first :] += 1.0
-    cluster = _places(unrolled) if tolerance is None else None
-    if cluster is None:
-        cluster = _clusters(unrolled, width)
+    order, unrolled, cluster = _sorted_clusters(turns, None if tolerance is None else width)
     count = np.bincount(cluster)
     place = np.bincount(cluster, weights=unrolled) / count
     place -= np.floor(place)
@@ -201,6 +190,36 @@ def distinct_positions(
     distinct = place[ascent]
     divisions, offsets = _grids(distinct, width)
     return Positions(distinct, index, divisions, offsets)
+
+
+def count_positions(turns: Array) -> int:
+    """Number of distinct positions of angles in turns, modulo a turn.
+
+    Examples
+    --------
+    >>> count_positions(np.array([0.0, 0.25, 0.5, 1.0, 1.25]))
+    3
+    """
+    return int(_sorted_clusters(turns, None)[2][-1]) + 1
+
+
+def _sorted_clusters(
+    turns: Array, width: float | None
+) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
+    """Order in which angles ascend, the angles in it, and the cluster of each."""
+    turns = turns - np.floor(turns)
+    order = np.argsort(turns, kind="stable")
+    ascending = turns[order]
+    # Begin behind the largest gap: no cluster is then cut at 0 = 1 without need.
+    gaps = np.diff(ascending, append=ascending[0] + 1.0)
+    first = (int(np.argmax(gaps)) + 1) % ascending.size
+    order = np.roll(order, -first)
+    unrolled = np.roll(ascending, -first)
+    unrolled[ascending.size - first :] += 1.0
+    cluster = _places(unrolled) if width is None else None
+    if cluster is None:
+        cluster = _clusters(unrolled, POSITION_TOLERANCE if width is None else width)
+    return order, unrolled, cluster
 
 
 def closure_errors(

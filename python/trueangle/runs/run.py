@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError, KindError
-from ..support.angles import check_period, checked_sign, circular_mean, wrap
+from ..support.angles import check_period, checked_sign, circular_mean, unwrapped, wrap
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.files import InputFile
@@ -207,8 +207,8 @@ class CalibrationRun:
 
     @property
     def unwrapped_reference(self) -> Array:
-        """``reference`` without jumps at 0/period (steps are taken below half a turn)."""
-        return np.unwrap(self.reference, period=self.period)
+        """``reference`` without jumps at 0/period (`trueangle.support.angles.unwrapped`)."""
+        return unwrapped(self.reference, self.period)
 
     @property
     def speed(self) -> Array | None:

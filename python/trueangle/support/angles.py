@@ -22,6 +22,7 @@ __all__ = [
     "circular_mean",
     "from_arcsec",
     "unit_name",
+    "unwrapped",
     "wrap",
     "zero_text",
 ]
@@ -132,6 +133,28 @@ def wrap(angle: ArrayLike, period: float = 2.0 * math.pi) -> NDArray[np.float64]
     half = 0.5 * period
     wrapped = np.where(wrapped <= -half, wrapped + period, wrapped)
     return np.where(wrapped > half, wrapped - period, wrapped)
+
+
+def unwrapped(angle: ArrayLike, period: float = 2.0 * math.pi) -> NDArray[np.float64]:
+    """``angle`` without jumps at 0/period: a step is at most half a turn.
+
+    Angles that cover more than one turn are not wrapped, and stay as they are: positions
+    12.05 turns apart are that far apart. The outermost twentieth, and at least one reading, at
+    each end do not count: they may be outliers.
+
+    Examples
+    --------
+    >>> unwrapped([350.0, 10.0, 30.0], 360.0).tolist()
+    [350.0, 370.0, 390.0]
+    >>> unwrapped([0.0, 4338.0, 8676.0, 13014.0], 360.0).tolist()
+    [0.0, 4338.0, 8676.0, 13014.0]
+    """
+    values = np.asarray(angle, dtype=np.float64)
+    ascending = np.sort(values)
+    outer = values.size // 20 + 1
+    if values.size > outer and ascending[-1 - outer] - ascending[outer] > period:
+        return values
+    return np.unwrap(values, period=period)
 
 
 def circular_mean(

@@ -182,3 +182,44 @@ def test_counts_that_are_all_read_are_counts(readings):
     indicated = np.round((places + 0.1 * np.sin(np.radians(places))) * 1024 / 360.0) * 360.0 / 1024
     told = join_runs([ta.CalibrationRun(places, indicated, period=360.0)]).count
     assert told == pytest.approx(1296000.0 / 1024)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    ("places", "even"), [(36, "indicated"), (72, "reference"), (96, "indicated")]
+)
+def test_a_table_with_a_position_omitted_has_its_low_orders_and_their_aliases(places, even, seed):
+    """Order 98 had been confirmed for 2, and the correction made the error larger."""
+    rng = np.random.default_rng([SEED, places, seed])
+    grid = np.arange(places) * 360.0 / places
+    lines = ((1, 420.0, 20.0), (3, 610.0, 200.0))
+    error = sum(a * np.sin(np.radians(k * grid + p)) for k, a, p in lines) / 3600.0
+    error = error + rng.normal(0.0, 60.0, places) / 3600.0
+    kept = np.arange(places) != rng.integers(2, places - 2)
+    pair = (grid, grid + error) if even == "reference" else (grid - error, grid)
+    run = ta.CalibrationRun(*(angles[kept] for angles in pair), period=360.0)
+    found = ta.diagnose([run], Simulation(sigma_arcsec=30.0))
+    named = {
+        f.parameters["output_order"].value: f.parameters for f in found.findings if f.confirmed
+    }
+    assert set(named) == {1.0, 3.0}
+    assert named[3.0]["aliases"].value[:1] == [places - 3.0]
+
+
+@pytest.mark.parametrize(("count", "apart"), [(10, 7.31), (12, 0.93), (11, 5.17)])
+def test_few_places_many_turns_apart_have_the_orders_that_so_many_places_show(count, apart):
+    """Order 2 had been confirmed for 1, and `check` took 120 turns for none."""
+    rng = np.random.default_rng([SEED, count])
+    targets = np.arange(count) * apart * 360.0
+    runs = []
+    for k in range(8):
+        way = targets if k % 2 == 0 else targets[::-1]
+        error = 0.35 * np.sin(np.radians(way + 200.0)) + 0.25 * np.sin(np.radians(3.0 * way + 40.0))
+        runs.append(
+            ta.CalibrationRun(way, way + error + rng.normal(0.0, 0.04, count), period=360.0)
+        )
+    found = ta.diagnose(runs, Simulation(sigma_arcsec=150.0))
+    named = {f.parameters["output_order"].value for f in found.findings if f.confirmed}
+    assert named == {1.0, 3.0}
+    assert runs[0].unwrapped_reference[-1] == pytest.approx(targets[-1])
+    assert "hardly moved" not in ta.check(runs).summary()

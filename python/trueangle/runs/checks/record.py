@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...support.angles import wrap
+from ...support.angles import unwrapped, wrap
 from ...support.arrays import Array
 from ...support.roles import offsets_of, unit_in_name
 from ..files import read_columns
@@ -70,7 +70,7 @@ class Record:
             across = np.abs(wrap(error[2:] - error[:-2], 360.0)) < 90.0
             alone = np.flatnonzero(step[:-1] & step[1:] & across) + 1
             indicated[alone] = self.reference[alone] + error[alone - 1]
-        return np.unwrap(self.reference, period=360.0), np.unwrap(indicated, period=360.0)
+        return unwrapped(self.reference, 360.0), unwrapped(indicated, 360.0)
 
     @cached_property
     def run(self) -> CalibrationRun:
