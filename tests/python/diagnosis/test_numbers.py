@@ -142,7 +142,7 @@ def test_the_share_is_of_what_can_be_taken_off():
     found, _ = reducible_share(before, after, unit, 1.0, rng)
     assert found == pytest.approx((9.0 - 1.0) / (9.0 - 1.0))
     found, _ = reducible_share(before, after, unit, 5.0, rng)
-    assert found == pytest.approx(8.0 / 4.0)
+    assert found == 1.0  # more than the variance, an estimate, calls reducible
 
 
 def test_exchanged_levels_are_those_of_other_runs(signals):
