@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..effects import Effect
 from ..effects.ambiguity import Ambiguity
@@ -18,10 +19,12 @@ from ..simulation.simulation import Simulation
 from ..support.arrays import Array
 from ..support.distributions import normal_tail
 from .beliefs import LEVEL, Belief, judge_line, verdict_of_factor
+from .formerrors import with_unseen_orders
 from .gain import measure_belief_gains
 from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
 from .unnamed import effect_or_unnamed
+from .unseenorders import is_low_over_arc
 
 #: Fields of effects, in addition to those in arcsec, that their signal is proportional to.
 LINEAR = ("delay_s", "relative_error", "pattern_per_K", "coefficient")
@@ -116,7 +119,7 @@ def judged_beliefs(
     Lines that something else acts on, or that may hide behind another cause in these runs,
     are not judged; the latter become entries of what is not identifiable.
     """
-    lines, harmonics = _lines(regression, sim, spots, with_gain)
+    lines, harmonics = _lines(with_unseen_orders(regression), sim, spots, with_gain)
     effects: list[Belief] = []
     refuted: list[tuple[int, tuple[Array, Array]]] = []
     for old, new in zip(sim.effects, believed.effects, strict=True):
@@ -162,6 +165,24 @@ def _effect(regression: Regression, sim: Simulation, old: Effect, new: Effect) -
     )
 
 
+def believed_columns(regression: Regression) -> NDArray[np.bool_]:
+    """Columns of the base that are low orders over an arc, as large as they are believed."""
+    held = np.zeros(regression.base.shape[1], dtype=bool)
+    wider = with_unseen_orders(regression)
+    for k, order in enumerate(regression.belief.pattern.orders):
+        where = slice(1 + 2 * k, 3 + 2 * k)
+        if is_low_over_arc(regression, float(order)):
+            held[where] = _judged_line(wider, k, "").verdict == "confirmed"
+    return held
+
+
+def _judged_line(regression: Regression, k: int, what: str) -> Belief:
+    """Verdict on a line of the pattern."""
+    pattern, where = regression.belief.pattern, np.arange(1 + 2 * k, 3 + 2 * k)
+    believed = pattern.cosine[k], pattern.sine[k]
+    return judge_line(what, believed, regression.coefficients[where], regression.robust(where))
+
+
 def _lines(
     regression: Regression, sim: Simulation, spots: list[Ambiguity], with_gain: bool
 ) -> tuple[list[Belief], tuple[Harmonic, ...]]:
@@ -178,12 +199,11 @@ def _lines(
         if order in modulated:
             continue  # modulation takes from its carrier what it gives to the sidebands
         where = slice(1 + 2 * k, 3 + 2 * k)
-        change = regression.coefficients[where]
-        spread = regression.robust(np.arange(where.start, where.stop))
         shaft, number = joint.name_order(float(order)) or ("output", float(order))
-        what = f"{shaft} order {number:g}"
-        belief = judge_line(what, (pattern.cosine[k], pattern.sine[k]), change, spread)
+        belief = _judged_line(regression, k, f"{shaft} order {number:g}")
         if belief.verdict != "confirmed":
+            change = regression.coefficients[where]
+            spread = regression.robust(np.arange(where.start, where.stop))
             doubt = _doubt(regression, float(order), change, spread, spots)
             if doubt:
                 continue

@@ -46,6 +46,12 @@ def arc_note(regression: Regression) -> str:
     )
 
 
+def is_low_over_arc(regression: Regression, order: float) -> bool:
+    """Whether a line of the output may be any smooth function of the place: over an arc."""
+    turns = _turns(regression)
+    return turns < WHOLE_TURN and _is_of_few(order, turns)
+
+
 def _turns(regression: Regression) -> float:
     """Travel of all runs together."""
     return float(np.ptp(regression.signals.theta)) / (2.0 * np.pi)
@@ -64,5 +70,8 @@ def _is_low(term: Extension, turns: float) -> bool:
     """Whether a cause is a ramp, or a whole order of few cycles over the travel."""
     if term.cause != MissingOrder.kind:
         return term.cause == ScaleError.kind
-    order = float(term.shape["output_order"])
+    return _is_of_few(float(term.shape["output_order"]), turns)
+
+
+def _is_of_few(order: float, turns: float) -> bool:
     return order == round(order) and order * turns <= FEW_CYCLES

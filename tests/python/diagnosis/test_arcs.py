@@ -11,7 +11,7 @@ from trueangle.effects.missing_order import MissingOrder
 from trueangle.effects.scale_error import ScaleError
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
-from trueangle.simulation import Simulation
+from trueangle.simulation import Harmonic, Joint, Simulation
 
 SEED = 59_300
 BELIEVED = Simulation(sigma_arcsec=5.0)
@@ -112,3 +112,46 @@ def test_beside_a_ramp_that_was_found_there_is_no_other():
     without, beside = (unseen_order_columns(found_in(0.8, {2.0: 80.0}, r)) for r in (0.0, 900.0))
     assert without.shape[1] - beside.shape[1] == 1
     assert beside.std() > 5.0 * without.std()  # of what both make of the readings
+
+
+def arc_runs(rng, error, span: float, runs: int = 3, readings: int = 350):
+    """There and back over an arc from 30 deg on, in noise of 1 arcsec."""
+    found = []
+    for _ in range(runs):
+        time = np.sort(rng.uniform(0.0, 2.0, readings))
+        theta = 30.0 + span * (1.0 - np.abs(1.0 - time))
+        measured = theta + (error(theta) + rng.normal(0.0, 1.0, readings)) / 3600.0
+        found.append(ta.CalibrationRun(theta, measured, period=360.0, time=5.0 * time))
+    return found
+
+
+@pytest.mark.parametrize("span", [95.0, 140.0])
+@pytest.mark.parametrize("refuted", [False, True])
+@pytest.mark.parametrize("smooth", [0.0, 5.0])
+def test_over_an_arc_a_belief_that_may_be_right_stays_and_the_rest_is_a_curve(
+    span, smooth, refuted
+):
+    """A cubic beside a right belief had made the belief wrong, and the correction with it."""
+    rng = np.random.default_rng([71, int(span), int(smooth), refuted])
+    believed = Simulation(
+        Joint(1.0, "none"), (Harmonic("output", 1, 40.0, 70.0),), sigma_arcsec=1.0
+    )
+    middle = 30.0 + 0.5 * span
+
+    def error(theta):
+        order = (52.0 if refuted else 40.0) * np.sin(
+            np.radians(theta + (85.0 if refuted else 70.0))
+        )
+        return order + smooth * ((theta - middle) / (0.5 * span)) ** 3
+
+    found = ta.diagnose(arc_runs(rng, error, span), believed)
+    (belief,) = found.beliefs
+    if not refuted:
+        assert belief.verdict == "confirmed"
+    theta = np.linspace(30.0, 30.0 + span, 200)
+    fresh = ta.CalibrationRun(theta, theta, period=360.0)
+    left = error(theta) - found.extended.predict(fresh)
+    assert np.std(left) < 0.2
+    if smooth and not refuted:
+        assert {factor.factor for factor in found.factors} == {"place"}
+        assert not any(finding.confirmed for finding in found.findings)
