@@ -17,7 +17,7 @@ from ..model.term import Term
 from ..model.terms.travel import PreslidingHysteresisTerm
 from ..support.angles import from_arcsec
 from ..support.deadline import current_deadline
-from .ambiguity import Ambiguity, share_left
+from .ambiguity import OWN_OF_VELOCITY, Ambiguity, share_left
 from .backlash import ONE_WAY, Backlash, goes_both_ways
 from .departures import spring_transitions
 from .effect import Effect
@@ -241,19 +241,23 @@ class PreslidingHysteresis(Effect):
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
         signals = regression.signals
-        if signals.velocity is None and bool(np.ptp(signals.direction) > 0.0):
+        direction = signals.direction[:, None]
+        both, speed = bool(np.ptp(signals.direction) > 0.0), signals.velocity
+        one = speed is None or share_left(regression, speed[:, None], direction) < OWN_OF_VELOCITY
+        if both and one:
+            # Play is distinguished from a delay where velocity is known (`Latency.blind_spots`).
+            others = (Backlash, Latency) if speed is None else (Latency,)
+            why = "velocity is unknown" if speed is None else "one speed"
             yield cls.blind(
-                "velocity is unknown: a delay looks like a reversal error, and one that builds up "
+                f"{why}: a delay looks like a reversal error, and one that builds up "
                 "where the joint gathers speed",
-                Backlash,
-                Latency,
+                *others,
                 first=False,
                 factor="velocity",
             )
         if not goes_both_ways(signals):
             yield cls.blind(ONE_WAY)
             return
-        direction = signals.direction[:, None]
         transitions = np.column_stack(
             [signals.presliding(length, 1.0) for length in (1.0, 3.0, 10.0)]
         )
