@@ -40,7 +40,7 @@ from .goodness import Unexplained, goodness_of_fit
 from .judgedbeliefs import judged_beliefs
 from .naming import named_causes
 from .penalty import regression_without
-from .remainder import leftover_of, unexplained_remainder
+from .remainder import leftover_of
 from .result import Diagnosis
 from .rounding import rounding_of
 from .unseenorders import arc_note
@@ -185,7 +185,10 @@ def _diagnosis(
     named = named_causes(account.choice.chosen, account.choice.spots, gain, sigma)
     chosen, rest, spots, factors = named.chosen, named.rest, named.spots, named.factors
     findings = list(named.findings)
-    beliefs, corrected = judged_beliefs(chosen, sim, account.believed, spots, gain)
+    # What a curve shows is no change of what is believed.
+    curves = named.curves
+    judged = _as_extended(chosen, findings, curves, sim) if curves else chosen
+    beliefs, corrected = judged_beliefs(judged, sim, account.believed, spots, gain)
     # What has lost its name may be what scatters.
     in_doubt = bool(named.lost) or any(spot.supported and not spot.common for spot in spots)
     faults = data_faults(records_of(measured))
@@ -212,11 +215,9 @@ def _diagnosis(
         ]
         factors.sort(key=lambda factor: -factor.rms)
     findings.sort(key=lambda finding: (not finding.confirmed, -finding.evidence["bic_gain"]))
-    curves = named.curves
     shown = _less_curves(chosen, curves, sim) if curves else chosen
-    if rest.found and curves:
-        # What a function of a factor explains is not unexplained, though it has no name.
-        rest = unexplained_remainder(shown, sigma)
+    if rest.found:
+        rest = named.less_factors(sigma)
     extended = corrected.with_effects(
         [*(e for finding in findings if finding.confirmed for e in finding.effects), *curves]
     )

@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..effects import EFFECTS, Curve
 from ..effects.ambiguity import Ambiguity
 from ..estimation.regression import Regression
 from ..support.deadline import current_deadline
 from .factors.factor import Factor
-from .factors.statement import stated_factors
+from .factors.statement import account_rows, stated_factors
 from .finding import Finding
 from .findings import findings_of, reconsidered_findings
 from .goodness.unexplained import Unexplained
-from .penalty import regression_without
-from .remainder import unexplained_remainder
+from .holdout import rebuilt_term
+from .penalty import regression_without, total_penalty
+from .remainder import free_paths, unexplained_remainder
 from .selection import select_again
 
 #: Share of the work that the names may take, with all before them.
@@ -49,6 +52,22 @@ class NamedCauses:
     def curves(self) -> list[Curve]:
         """The curves that represent factors without a fitting name in a simulation."""
         return [c for factor in self.factors if not factor.named_by for c in factor.effects]
+
+    def less_factors(self, sigma: float | None) -> Unexplained:
+        """What they leave beyond the factors without a name: what these explain is explained."""
+        explained = [f.fitted for f in self.factors if not f.named_by and f.fitted is not None]
+        if not explained:
+            return self.rest
+        chosen, rows = self.chosen, np.zeros(self.chosen.n, dtype=bool)
+        rows[account_rows(chosen)] = True
+        part = chosen.of_rows(rows)
+        less = part.of_readings(part.readings.less(np.sum(explained, axis=0)))
+        less = less.with_terms(rebuilt_term(term, rows) for term in chosen.terms)
+        for k in reversed(free_paths(less)):
+            # A path in time that only followed what the factors explain.
+            other = regression_without(less, [k], settled=True)
+            less = min(less, other, key=total_penalty)
+        return unexplained_remainder(less, sigma)
 
     @property
     def unnamed(self) -> float:
@@ -102,8 +121,14 @@ def is_decided_by_factors(spot: Ambiguity, factors: Sequence[Factor]) -> bool:
 
 
 def _is_either(spot: Ambiguity, factor: Factor) -> bool:
-    """Every cause that runs do not distinguish may be what a factor is."""
-    return len(_forms_of(spot, factor)) == len(spot.causes)
+    """Every cause that runs do not distinguish may be what a factor is, and more than it.
+
+    Functions of the factor alone predict the same for other runs, whichever it is.
+    """
+    alone = not factor.not_distinguished_from and all(
+        EFFECTS[cause].form_of == (factor.factor,) for cause in spot.causes
+    )
+    return not alone and len(_forms_of(spot, factor)) == len(spot.causes)
 
 
 def _forms_of(spot: Ambiguity, factor: Factor) -> list[str]:

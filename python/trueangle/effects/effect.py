@@ -197,6 +197,11 @@ class Effect(TabledParameters):
         return np.zeros((len(signals), 0))
 
     @classmethod
+    def form_columns(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
+        """Columns of its form, which is held against free functions of its factors."""
+        return np.hstack([term.columns for term, _ in terms])
+
+    @classmethod
     def bends(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
         """Columns by which the error of this cause's ``terms`` may depart from its form.
 

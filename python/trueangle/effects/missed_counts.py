@@ -125,6 +125,18 @@ class MissedCounts(Effect):
         return np.asarray(after.astype(np.float64)[:, None])
 
     @classmethod
+    def form_columns(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
+        # Counts are alike: steps are whole multiples of the sensor's, or of the smallest. What is
+        # taken back in the same run is no lost count.
+        sizes = np.array([float(coefficients[0]) for _, coefficients in terms])
+        runs = np.array([term.shape["run"] for term, _ in terms])
+        count = signals.count or float(np.abs(sizes).min())
+        whole = np.maximum(np.round(np.abs(sizes) / count), 1.0)
+        total = (runs[:, None] == runs) @ sizes
+        whole = np.sign(sizes) * whole * (np.sign(total) == np.sign(sizes))
+        return np.asarray(np.hstack([term.columns for term, _ in terms]) @ whole)[:, None]
+
+    @classmethod
     def report(
         cls, regression: Regression, terms: Sequence[Fitted]
     ) -> tuple[Parameters, list[Effect]]:

@@ -219,7 +219,7 @@ def factors_of(
         group = account.groups[k]
         if group.factor == NAME:
             continue
-        shaft = _shaft(group.orders, shafts) if group.orders else None
+        shaft = _shaft(group.orders, shafts) if group.orders or group.jump is not None else None
         kinds.setdefault((group.factor, shaft), []).append(k)
     bounds = account.bounds
     found = []
@@ -251,9 +251,25 @@ def factors_of(
                     [mean[bounds[k] : bounds[k + 1]] for k in members],
                     shafts,
                 ),
+                _jumps(account, members, mean),
+                tuple(e for k in members if (e := account.groups[k].event) is not None),
+                columns @ mean[at],
             )
         )
     return sorted(found, key=lambda f: (-f.rms, FACTORS.index(f.factor)))
+
+
+def _jumps(
+    account: FactorAccount, members: Sequence[int], mean: Array
+) -> tuple[tuple[float, float], ...]:
+    """Where a function of the place jumps, and by how much upwards."""
+    found = []
+    for k in members:
+        where = account.groups[k].jump
+        if where is not None:
+            below, above = account.groups[k].functions_at(where + np.array([-1e-6, 1e-6]))[:, 0]
+            found.append((where, float((above - below) * mean[account.bounds[k]])))
+    return tuple(sorted(found))
 
 
 def _size(columns: Array, mean: Array, covariance: Array) -> tuple[float, float]:

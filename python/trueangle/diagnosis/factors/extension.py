@@ -42,7 +42,7 @@ def curves_of(
     shafts : mapping of str to float
         Turns of each in one turn of the output.
     """
-    own = [(group, mean) for group, mean in zip(groups, means, strict=True) if not group.once]
+    own = [(group, mean) for group, mean in zip(groups, means, strict=True) if group.event is None]
     if factor in PRODUCTS:
         cycles = shafts.get(shaft or "output", 1.0)
         return [
@@ -52,7 +52,7 @@ def curves_of(
         ]
     if factor == "place" and any(group.at[-1] - group.at[0] == 360.0 for group, _ in own):
         # A ramp over several turns is no pattern of one.
-        own = [(group, mean) for group, mean in own if group.orders]
+        own = [(group, mean) for group, mean in own if group.orders or group.jump is not None]
     return [_alone(factor, own)] if factor in VALUES and own else []
 
 
@@ -62,9 +62,13 @@ def _alone(factor: str, own: Sequence[tuple[Group, Array]]) -> Curve:
     if highest:
         turns = (at[-1] - at[0]) / 360.0
         count = max(LEAST, int(np.ceil(POINTS * highest * turns)))
-        at = np.linspace(at[0], at[-1], 1 + count)
+        jumps = [group.jump for group, _ in own if group.jump is not None]
+        places = own[0][0].at
+        ends = [places[np.searchsorted(places, jump) - 1 :][:2] for jump in jumps]
+        at = np.concatenate([np.linspace(at[0], at[-1], 1 + count), *ends])
+    at = np.unique(plain_numbers(at))
     values = sum((group.values_about_mean(at) @ mean for group, mean in own), np.zeros(at.size))
-    return Curve(factor, plain_numbers(at), plain_numbers(values))
+    return Curve(factor, tuple(at.tolist()), plain_numbers(values))
 
 
 def _product(factor: str, shaft: str, cycles: float, group: Group, mean: Array) -> list[Curve]:

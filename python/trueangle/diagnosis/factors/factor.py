@@ -93,6 +93,12 @@ class Factor(PlainResult):
     curve : FactorCurve
     effects : list of Curve
         What represents it in a simulation; none of what other runs do not show.
+    jumps : tuple of (float, float)
+        Where in a turn the function of the place jumps, degrees, and by how much, arcsec.
+    events : tuple of (int, int)
+        Runs and rows, from 0, at which something happened once.
+    fitted : ndarray or None
+        Its function at the readings of the account, arcsec.
     """
 
     factor: str
@@ -107,6 +113,9 @@ class Factor(PlainResult):
     not_distinguished_from: tuple[str, ...]
     curve: FactorCurve = field(repr=False)
     effects: Sequence[Curve] = field(repr=False, default=())
+    jumps: tuple[tuple[float, float], ...] = ()
+    events: tuple[tuple[int, int], ...] = ()
+    fitted: Array | None = field(repr=False, default=None)
 
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``factors``."""
@@ -134,6 +143,12 @@ class Factor(PlainResult):
             of = "" if self.shaft in (None, "output") else f" of the {self.shaft}"
             text += f" (order{'s' if len(self.orders) > 1 else ''} {shown}{more}{of})"
         n = unit.number
+        if self.jumps:
+            sizes = [f"{n(size)} {unit.name} at {at:.1f} deg" for at, size in self.jumps]
+            text += f" ({'jumps' if len(sizes) > 1 else 'a jump'} of {' and '.join(sizes)})"
+        if self.events:
+            shown = " and ".join(f"run {run + 1} at row {row + 1}" for run, row in self.events)
+            text += f" ({'events' if len(self.events) > 1 else 'an event'} in {shown})"
         text += f", {n(self.rms)} {unit.name} rms ({n(self.low)} to {n(self.high)})"
         names = ", ".join(self.named_by)
         if names:

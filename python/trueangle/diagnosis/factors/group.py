@@ -57,9 +57,11 @@ class Group:
         of a group that is none.
     unit : str
     alternatives : float
-        Groups of which it was the one that was out.
-    once : bool
-        It is of one run, and no other will show it.
+        Groups of which it was the one that stood out.
+    event : tuple of int or None
+        Run and row of what happened once, which no other run will show.
+    jump : float or None
+        Where a ramp over a turn falls back, degrees.
     """
 
     factor: str
@@ -69,7 +71,8 @@ class Group:
     function: Callable[[Array], Array] | None
     unit: str
     alternatives: float = 1.0
-    once: bool = False
+    event: tuple[int, int] | None = None
+    jump: float | None = None
 
     @cached_property
     def values(self) -> Array:

@@ -33,6 +33,10 @@ STANDS_OUT: Final = 8.0
 ORDERS: Final = 400
 SAMPLED: Final = 2.5
 
+#: Places of a jump that are tried at once, and jumps: a facet has two.
+JUMPS: Final = 360
+ENDS: Final = 2
+
 #: Shares of the range by which a factor must change to be one.
 SPEED_CHANGES, LOAD_CHANGES, TEMPERATURE_CHANGES = 0.1, 0.05, 0.1
 
@@ -114,8 +118,8 @@ def factor_groups(
     theta = signals.theta
     left = _without_low(theta, error, signals.run)
     known = [m for m in dict.fromkeys(lines) if m > 0.0]
-    spectrum = _PeakSpectrum(theta)
-    groups = [*_place(signals, [*known, *spectrum.peaks(left, LOW)])]
+    spectrum = _PeakSpectrum(theta, signals.places)
+    groups = [*_place(signals, error, [*known, *spectrum.peaks(left, LOW)])]
     for axis, product in _axes(signals):
         groups += axis.alone()
         if product is not None:
@@ -139,8 +143,8 @@ def factor_groups(
 class _PeakSpectrum:
     """The strongest lines of values at angles in radians."""
 
-    def __init__(self, theta: Array) -> None:
-        self.count = int(min(ORDERS, theta.size / SAMPLED))
+    def __init__(self, theta: Array, places: int) -> None:
+        self.count = int(min(ORDERS, theta.size / SAMPLED, 0.5 * places))
         self.turns = float(np.ptp(theta)) / (2.0 * np.pi)
         self.sums = OrderSpectrum(theta, [0], 1.0, 1.0, self.count) if self.count > LOW else None
 
@@ -157,36 +161,75 @@ class _PeakSpectrum:
 
 def _without_low(theta: Array, error: Array, run: NDArray[np.int64]) -> Array:
     """The error less what its mean by run and the low orders take of it."""
-    inside = [line_columns(theta, float(k)) for k in range(1, LOW + 1)]
-    columns = np.column_stack([np.ones(theta.size), *inside])
-    left = error - columns @ np.linalg.lstsq(columns, error, rcond=1e-9)[0]
+    left = _less_low_orders(theta, error)
     counts = np.maximum(np.bincount(run), 1)
     return np.asarray(left - (np.bincount(run, left) / counts)[run])
 
 
-def _place(signals: Signals, lines: Iterable[float]) -> Iterator[Group]:
-    """Lines, bands of lines, and over an arc a smooth function of the place."""
+def _less_low_orders(theta: Array, values: Array) -> Array:
+    """Columns of values less what the low orders and a constant take of them."""
+    inside = [line_columns(theta, float(k)) for k in range(1, LOW + 1)]
+    columns = np.column_stack([np.ones(theta.size), *inside])
+    return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=1e-9)[0])
+
+
+def _jumps(degrees: Array, error: Array) -> list[tuple[float, float, int]]:
+    """Pairs of neighbouring places between which ramps over the turn fall back, and of how many.
+
+    Of all gaps between places that whose ramp, less its own low orders, explains most, and then the
+    next: a sensor that does not use all of its counts jumps where they begin, a facet at both ends.
+    """
+    places = np.unique(np.mod(degrees, 360.0))
+    if places.size <= 2 * LOW + 2:
+        return []
+    after = np.append(places[1:], places[0] + 360.0)
+    left = _less_low_orders(np.radians(degrees), error)
+    found: list[int] = []
+    while len(found) < ENDS:
+        tried = np.unique(np.linspace(0, places.size - 1, min(places.size, JUMPS)).astype(int))
+        while True:
+            ramps = np.mod(degrees[:, None] - 0.5 * (places + after)[tried], 360.0)
+            ramps = _less_low_orders(np.radians(degrees), ramps)
+            k = int(np.argmax((left @ ramps) ** 2 / np.maximum(np.sum(ramps**2, axis=0), 1e-12)))
+            if tried.size < 3 or tried[-1] - tried[0] == tried.size - 1:
+                break
+            tried = np.arange(tried[max(k - 1, 0)], tried[min(k + 1, tried.size - 1)] + 1)
+        found.append(int(tried[k]))
+        ramp = ramps[:, k]
+        left = left - ramp * (ramp @ left) / max(float(ramp @ ramp), 1e-12)
+    return [(float(places[k]), float(after[k]), places.size) for k in found]
+
+
+def _place(signals: Signals, error: Array, lines: Iterable[float]) -> Iterator[Group]:
+    """Lines, bands of lines, a jump, and over an arc a smooth function of the place."""
     theta = signals.theta
     start, span = float(theta.min()), float(np.ptp(theta))
     turns = span / (2.0 * np.pi)
     whole = turns >= ARC
     at = np.linspace(0.0, 360.0, 73) if whole else np.degrees(np.linspace(start, start + span, 49))
     degrees = signals.degrees
+    jumps = _jumps(degrees, error) if whole else []
+    at = np.union1d(at, [place % 360.0 for jump in jumps for place in jump[:2]])
 
     def waves(orders: Sequence[float]) -> Basis:
         return lambda x: np.hstack([line_columns(np.radians(x), m) for m in orders])
 
-    low = [float(k) for k in range(1, LOW + 1)]
+    low = [float(k) for k in range(1, LOW + 1) if 2 * k <= signals.places]
     for m in dict.fromkeys([*low, *lines]):
         group = Group.of_function("place", degrees, waves([m]), at, "deg", (m,))
         if group is not None:
             yield group
     for first, last in BANDS:
-        if last * SAMPLED < theta.size:
+        if last * SAMPLED < theta.size and 2 * last <= signals.places:
             band = tuple(float(k) for k in range(first, last + 1))
             group = Group.of_function("place", degrees, waves(band), at, "deg", band)
             if group is not None:
                 yield group
+    for before, after, count in jumps:
+        where = (0.5 * (before + after)) % 360.0
+        group = Group.of_function("place", degrees, partial(_falls_back, where), at, "deg")
+        if group is not None:
+            yield replace(group, alternatives=count, jump=where)
     middle = np.degrees(start + 0.5 * span)
 
     def smooth(x: Array) -> Array:
@@ -198,6 +241,11 @@ def _place(signals: Signals, lines: Iterable[float]) -> Iterator[Group]:
     group = Group.of_function("place", degrees, smooth, travel, "deg")
     if group is not None:
         yield group
+
+
+def _falls_back(where: float, x: Array) -> Array:
+    """A ramp over a turn, degrees."""
+    return np.mod(x - where, 360.0)[:, None]
 
 
 def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:
@@ -397,20 +445,25 @@ def _of_frequencies(signals: Signals, frequencies: Sequence[float]) -> Iterator[
 
 
 def _of_events(signals: Signals, events: Sequence[tuple[int, int]]) -> Iterator[Group]:
-    """What rises before an event of one run and settles after it, whatever step it leaves."""
+    """What rises before an event of one run and settles after it, and the step that it leaves.
+
+    That lasts to the end of the run, or through those after it.
+    """
     longest = int(signals.row.max(initial=0)) + 1
     at = np.linspace(-0.3, 0.3, GRID) * longest
     lengths = np.array(SETTLES) * longest
 
     def both(x: NDArray[Any], scale: float = 1.0) -> Array:
-        decays = np.exp(-np.abs(x)[:, None] / lengths) / scale
-        return np.hstack([decays * (x < 0.0)[:, None], decays * (x > 0.0)[:, None]])
+        decays = np.exp(-np.abs(x)[:, None] / lengths)
+        before, after = x[:, None] < 0.0, x[:, None] > 0.0
+        return np.hstack([decays * before, decays * after, after, after]) / scale
 
     for run, row in events:
-        inside = signals.run == run
+        inside, later = signals.run == run, signals.run > run
         away = signals.row - (row - 0.5)
         columns = both(away) * inside[:, None]
+        columns[:, -1] += later
         scale = float(np.sqrt(np.sum(np.var(columns, axis=0))))
         if scale > 0.0:
             own, count = partial(both, scale=scale), len(signals)
-            yield Group("run_time", columns / scale, (), at, own, "reading", count, once=True)
+            yield Group("run_time", columns / scale, (), at, own, "reading", count, (run, row))

@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects import EFFECTS
-from ...effects.local_defect import LocalDefect
-from ...effects.missed_counts import MissedCounts
 from ...effects.missing_order import MissingOrder
 from ...effects.time_periodic import TimePeriodic
 from ...estimation.factor import orthonormal_basis
@@ -19,6 +17,7 @@ from ...estimation.regression import Regression
 from ...support.arrays import Array
 from ..confirmation import NOT_CONFIRMED
 from ..finding import Finding
+from ..judgedbeliefs import believed_columns
 from .account import ALIKE, NAME, FactorAccount
 from .factor import WORDS
 from .group import Group
@@ -39,15 +38,8 @@ FAMILIES: Final = (
 #: Factor of settling after a reversal, which any form may have: names are not tested by it.
 TRANSITION: Final = "reversal_time"
 
-#: Bumps of one place from which on they are one function of it; and how near, in their widths,
-#: two are that are one.
-MOST_BUMPS, NEAR = 3, 3.0
-
 #: Part of columns that is left together with others that are the same.
 _SAME: Final = 1e-6
-
-#: Standard errors within which a step is a whole number of counts, or as large as another.
-SAME: Final = 3.0
 
 
 def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]) -> Group | None:
@@ -55,23 +47,29 @@ def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]
 
     A finding that describes the noise has none: the account has its own noise.
     """
-    parts = []
-    for k in finding.group:
-        term = regression.terms[k]
-        if EFFECTS[finding.cause].describes_noise(term):
-            continue
-        if term.run_effect is None:
-            parts.append(term.columns)
-            continue
-        runs = regression.signals.run[:, None, None] == np.arange(regression.signals.runs)[:, None]
-        parts.append((term.run_effect.columns[:, None, :] * runs).reshape(regression.n, -1))
+    effect, fitted = EFFECTS[finding.cause], regression.fitted()
+    own = [fitted[k] for k in finding.group if not effect.describes_noise(regression.terms[k])]
+    fixed = [pair for pair in own if pair[0].run_effect is None]
+    parts = [effect.form_columns(regression.signals, fixed)] if fixed else []
+    runs = regression.signals.run[:, None, None] == np.arange(regression.signals.runs)[:, None]
+    for drawn in (term.run_effect for term, _ in own if term.run_effect is not None):
+        parts.append((drawn.columns[:, None, :] * runs).reshape(regression.n, -1))
+    if not parts:
+        return None
     sought = 0.5 * len(rows) if finding.cause == TimePeriodic.kind else 1.0
-    return _group(np.hstack(parts)[rows], sought) if parts else None
+    columns = np.hstack(parts)[rows]
+    # Places and lengths that were fitted with the columns (Schwarz).
+    searched = sum(term.parameters for term, _ in own) - columns.shape[1]
+    return _group(columns, sought * len(rows) ** (0.5 * max(searched, 0)))
 
 
 def base_group(regression: Regression, rows: NDArray[np.int64]) -> Group | None:
-    """What is free whatever is found, but for zeros, as a group; None where nothing is."""
-    return _group(regression.readings.base[rows], 1.0)
+    """What is free whatever is found, but for zeros, as a group; None where nothing is.
+
+    Low orders over an arc whose belief holds are not: a function of the place would be taken for
+    a change of them.
+    """
+    return _group(regression.readings.base[rows][:, ~believed_columns(regression)], 1.0)
 
 
 def _group(columns: Array, sought: float) -> Group | None:
@@ -185,9 +183,6 @@ def names_by_form(
     at most 5 % of what it and they explain together.
     """
     found = list(findings)
-    for reason_of in (_one_function, _no_counts):
-        for k, reason in reason_of(found, regression).items():
-            found[k] = replace(found[k], status=NOT_CONFIRMED, reason=reason)
     while True:
         sure = confirmed_names(names, found)
         wrong = _worst(names, found, sure)
@@ -236,13 +231,15 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
 
 
 def _related(found: Sequence[Finding], sure: Sequence[int]) -> list[list[int]]:
-    """Findings whose factors are functions of each other in motion to and fro: sets of several."""
-    sets = []
+    """Sets of several findings: of one cause, or of factors that hold each other's functions.
+
+    A row of bumps is better than nothing one by one, and worse than one function together.
+    """
+    causes = dict.fromkeys(found[k].cause for k in sure)
+    sets = [[k for k in sure if found[k].cause == cause] for cause in causes]
     for family in FAMILIES:
-        own = [k for k in sure if family & {*EFFECTS[found[k].cause].form_of}]
-        if len(own) > 1:
-            sets.append(own)
-    return sets
+        sets.append([k for k in sure if family & {*EFFECTS[found[k].cause].form_of}])
+    return [own for own in sets if len(own) > 1]
 
 
 def _followed(names: NamedForms, other: Sequence[float], tau: Sequence[float]) -> str:
@@ -250,53 +247,6 @@ def _followed(names: NamedForms, other: Sequence[float], tau: Sequence[float]) -
     new = [k for k in names.free if other[k] > 0.0 and tau[k] == 0.0]
     factors = dict.fromkeys(names.account.groups[k].factor for k in new)
     return " and ".join(WORDS[factor] for factor in factors) or "its factor"
-
-
-def _one_function(findings: Sequence[Finding], regression: Regression) -> dict[int, str]:
-    """Bumps that are one function of the place."""
-    bumps = [k for k, f in enumerate(findings) if f.confirmed and f.cause == LocalDefect.kind]
-    at = {k: _bump(findings[k]) for k in bumps}
-    because = "several adjacent bumps are one function of the place"
-    if len(bumps) > MOST_BUMPS:
-        return dict.fromkeys(bumps, because)
-    near = {
-        k
-        for k in bumps
-        for j in bumps
-        if j != k
-        and abs((at[k][0] - at[j][0] + 180.0) % 360.0 - 180.0) < NEAR * (at[k][1] + at[j][1])
-    }
-    return dict.fromkeys(sorted(near), because)
-
-
-def _bump(finding: Finding) -> tuple[float, float]:
-    values = [finding.parameters[name].value for name in ("place_deg", "width_deg")]
-    return float(values[0]), float(values[1])
-
-
-def _no_counts(findings: Sequence[Finding], regression: Regression) -> dict[int, str]:
-    """Steps that are taken back, or neither equal nor whole numbers of the sensor's counts."""
-    found = {}
-    for k, finding in enumerate(findings):
-        if not finding.confirmed or finding.cause != MissedCounts.kind:
-            continue
-        steps = finding.parameters["step_arcsec"]
-        if not isinstance(steps.value, list):
-            continue
-        runs = np.array(finding.parameters["run"].value)
-        signed, stds = np.array(steps.value), np.asarray(steps.std, dtype=np.float64)
-        together = (runs[:, None] == runs) & ~np.eye(len(runs), dtype=bool)
-        rest = np.abs(signed[:, None] + signed) / np.hypot(stds[:, None], stds)
-        if (together & (rest < SAME)).any():
-            found[k] = "a step that is taken back in the same run is an event: no count is lost"
-            continue
-        count, sizes = regression.signals.count, np.abs(signed)
-        known = count * np.round(sizes / count) if count else np.average(sizes, weights=stds**-2)
-        if (np.abs(sizes - known) > SAME * stds).any():
-            found[k] = (
-                "several steps of unequal sizes, none a whole number of counts, are one event"
-            )
-    return found
 
 
 def confirmed_names(names: NamedForms, findings: Sequence[Finding]) -> list[int]:

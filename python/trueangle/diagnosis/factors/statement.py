@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...effects import EFFECTS
 from ...effects.missed_counts import MissedCounts
 from ...estimation.regression import Regression
+from ...joint.signals import Signals
 from ...support.arrays import Array
 from ..finding import Finding
 from ..rounding import unrounded
@@ -30,8 +31,10 @@ from .names import (
     takes_all,
 )
 
-#: Steps whose surroundings are looked at.
+#: Steps whose surroundings are looked at, parts of a run in which its largest is looked for, and
+#: readings before and after by which its row is found.
 MOST_EVENTS: Final = 4
+WINDOWS, NEAREST = 40, 3
 
 #: Lines of shafts that are looked at, most of them.
 MOST_LINES: Final = 24
@@ -54,7 +57,7 @@ def stated_factors(
     findings : list of Finding
     factors : list of Factor
     """
-    rows = _rows(chosen)
+    rows = account_rows(chosen)
     signals = chosen.signals.take(rows)
     error = _less_what_no_factor_is(unrounded(chosen))[rows]
     groups = factor_groups(
@@ -63,7 +66,7 @@ def stated_factors(
         _lines(chosen),
         _orders(chosen, drawn=True),
         _frequencies(chosen),
-        _events(chosen),
+        [*_events(chosen), *_steps(signals, error)][:MOST_EVENTS],
     )
     places: dict[int, int] = {}
     named: list[Group] = []
@@ -108,7 +111,7 @@ def _less_what_no_factor_is(regression: Regression) -> Array:
     return error
 
 
-def _rows(regression: Regression) -> NDArray[np.int64]:
+def account_rows(regression: Regression) -> NDArray[np.int64]:
     """Readings that take part: no outliers, and one of every this many where there are many."""
     rows = np.flatnonzero(~regression.outlying)
     if rows.size <= MOST_READINGS:
@@ -129,7 +132,32 @@ def _frequencies(regression: Regression) -> list[float]:
 def _events(regression: Regression) -> list[tuple[int, int]]:
     """Run and row of the steps among the terms."""
     steps = [term.shape for term in regression.terms if term.cause == MissedCounts.kind]
-    return [(step["run"], step["row"]) for step in steps][:MOST_EVENTS]
+    return [(step["run"], step["row"]) for step in steps]
+
+
+def _steps(signals: Signals, error: Array) -> list[tuple[int, int]]:
+    """Run and row of the largest step of each run that noise alone does not make, largest first."""
+    found = []
+    for start, stop in signals.run_bounds():
+        own = error[start:stop]
+        width = own.size // WINDOWS
+        if width < NEAREST:
+            continue
+        row, size = _largest_step(own, width)
+        noise = float(np.median(np.abs(np.diff(own)))) / 0.6745 / np.sqrt(2.0)
+        if size**2 * width > 2.0 * noise**2 * 4.0 * np.log(own.size):
+            first = row - width
+            at = start + first + _largest_step(own[first : row + width], NEAREST)[0]
+            found.append((size, (int(signals.run[at]), int(signals.row[at]))))
+    return [place for _, place in sorted(found, reverse=True)]
+
+
+def _largest_step(values: Array, width: int) -> tuple[int, float]:
+    """Where means of so many values before and after differ most, and by how much."""
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    steps = np.abs(sums[2 * width :] - 2.0 * sums[width:-width] + sums[: -2 * width]) / width
+    k = int(np.argmax(steps))
+    return k + width, float(steps[k])
 
 
 def _orders(regression: Regression, *, drawn: bool) -> list[float]:

@@ -89,8 +89,14 @@ def test_a_flat_facet_is_a_function_of_the_place_and_no_row_of_bumps(rng):
     found = ta.diagnose(measured(rng, error, readings=400), EMPTY)
     assert "local_defect" not in confirmed(found)
     assert {factor.factor for factor in found.factors} == {"place"}
-    curve = found.factors[0].curve
-    assert 310.0 <= curve.at[np.argmax(curve.value)] <= 330.0 or curve.value.max() > 5.0
+    (up, size), (down, fall) = found.factors[0].jumps
+    assert (up, down) == (pytest.approx(133.0, abs=1.0), pytest.approx(147.0, abs=1.0))
+    assert (size, fall) == (pytest.approx(9.0, abs=1.0), pytest.approx(-9.0, abs=1.0))
+    assert "jumps of" in found.summary()
+    theta = np.linspace(0.0, 360.0, 1500)
+    fresh = ta.CalibrationRun(theta, theta, period=360.0, time=theta / 20.0)
+    left = error(theta) - found.extended.predict(fresh)
+    assert np.std(left) < 0.2 * np.std(error(theta))
     assert all(0.0 <= factor.share <= 1.0 for factor in found.factors)
 
 
@@ -236,3 +242,48 @@ def test_points_of_a_curve_increase_whatever_a_factor_takes(kind):
         )[kind]
         if np.ptp(made) > 1e-9 * np.abs(made).max():
             assert (np.diff(plain_numbers(grid_of(knots_of(made)))) > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("step", "noise", "turns"), [(1.3, 0.0, 3), (1.1, 0.04, 2), (2.4, 0.03, 6)]
+)
+def test_a_sensor_that_does_not_use_all_of_its_counts_jumps_where_they_begin(
+    rng, step, noise, turns
+):
+    """Low orders had been confirmed, or nothing: even places were taken for the sensor's counts."""
+    theta = np.arange(0.0, 360.0 * turns, step)
+    counts = np.floor(
+        40.0 + 16310.0 * (theta % 360.0) / 360.0 + rng.normal(0.0, 45.5 * noise, theta.size)
+    )
+    runs = [ta.CalibrationRun(theta, counts * 360.0 / 16384.0, period=360.0)]
+    found = ta.diagnose(runs, Simulation(sigma_arcsec=60.0))
+    assert not confirmed(found)
+    (factor,) = found.factors
+    ((place, size),) = factor.jumps
+    assert factor.factor == "place"
+    assert abs((place + 180.0) % 360.0 - 180.0) < 2.0 * step
+    assert size == pytest.approx(74.0 / 16384.0 * 1296000.0, rel=0.03)
+    assert "a jump of" in found.summary()
+
+
+@pytest.mark.parametrize(("stays", "settles"), [(0.7, 0.06), (0.0, 0.12), (0.5, 0.04)])
+def test_a_slip_that_settles_is_an_event_of_its_run_and_no_lost_counts(rng, stays, settles):
+    """Several steps of different sizes had been confirmed as lost counts."""
+    hit, span = 2, 650.0
+
+    def error(theta, d, v, t, r):
+        whole = 2.0 * span / v
+        since = t - 0.35 * whole
+        slip = 18.0 * (stays + (1.0 - stays) * np.exp(-np.maximum(since, 0.0) / (settles * whole)))
+        return slip * (since > 0.0) if r == hit else np.full(theta.size, 18.0 * stays * (r > hit))
+
+    runs = measured(rng, error, speeds=(28.0,), repeats=5, readings=350, span=span)
+    found = ta.diagnose(runs, EMPTY)
+    assert "missed_counts" not in confirmed(found)
+    first = found.factors[0]
+    assert first.factor == "run_time"
+    ((run, row),) = first.events
+    assert run == hit
+    assert abs(row - 0.35 * 350) < 12
+    assert not found.unexplained.found
+    assert f"an event in run {hit + 1}" in " ".join(found.summary().split())
