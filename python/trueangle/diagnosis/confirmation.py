@@ -8,14 +8,12 @@ import numpy as np
 
 from ..effects import EFFECTS
 from ..effects.drift_within_run import DriftWithinRun
-from ..effects.local_defect import LocalDefect
 from ..effects.non_integer_order import NonIntegerOrder
 from ..estimation.regression import Regression
 from ..joint.lines import line_columns
 from ..support.arrays import Array
 from ..support.display_units import brief_number
 from ..support.quantiles import quantile
-from .formerrors import FORM
 from .gain import Gain
 from .goodness import FREE_PATH, Unexplained
 from .goodness.periodogram import order_test, time_test
@@ -23,15 +21,12 @@ from .penalty import NEW_CAUSE, regression_without
 from .remainder import free_paths, remainder_of
 from .runzeros import CHANCE, chance_between_runs, zeros_scatter
 from .selection import is_flexible
-from .unnamed import is_line_in_time, is_line_of, is_named, modulator, modulators
+from .unnamed import is_line_in_time, is_line_of
 
 CONFIRMED, NOT_CONFIRMED = "confirmed", "not_confirmed"
 
 #: Distance from a whole order within which a line may be that one, changing over runs.
 NEAR = 0.4
-
-#: Deviance from which on a line follows a channel: a probability of 1e-6 for two coefficients.
-FOLLOWS = 28.0
 
 #: Probability from which on a line in time is there, whatever else is.
 SEEN = 1e-6
@@ -76,15 +71,10 @@ def confirmation_status(
                 f"the drift of {brief_number(drift)} arcsec rms, which is larger, may cause it"
             )
     beside = unexplained.beside_path
-    if beside and regression is not None and group:
-        if not takes_up and _size(regression, group) < beside:
-            return NOT_CONFIRMED, (
-                f"{brief_number(beside)} arcsec rms are unexplained, and this may be a part of them"
-            )
-        follows = _follows(regression, group)
-        if follows:
-            why = f"part of the error is unexplained, and this follows the {follows}"
-            return NOT_CONFIRMED, why
+    if regression and group and not takes_up and _size(regression, group) < beside:
+        return NOT_CONFIRMED, (
+            f"{brief_number(beside)} arcsec rms are unexplained, and this may be a part of them"
+        )
     if regression is not None and group and cause == NonIntegerOrder.kind:
         order = float(regression.terms[group[0]].shape["order"])
         if _is_whole(regression, group, order):
@@ -164,35 +154,6 @@ def _is_whole(regression: Regression, group: Sequence[int], order: float) -> boo
         for m in (whole, order)
     )
     return found.deviance > own.deviance - NEW_CAUSE
-
-
-def _follows(regression: Regression, group: Sequence[int]) -> str:
-    """What else a place-bound finding follows, where it is no fixed line or bump; or nothing.
-
-    One of which all but the share that a form may leave (`FORM`) stays where it is, is fixed.
-    """
-    term, coefficients = regression.fitted()[group[0]]
-    terms = [t for t in regression.terms if is_named(t)]
-    named = regression if len(terms) == len(regression.terms) else regression.with_terms(terms)
-    if term.line is not None:
-        columns = line_columns(regression.signals.theta, term.line)
-    elif term.cause == LocalDefect.kind:
-        columns = term.columns
-    else:
-        return ""
-    signals = regression.signals
-    found, most = "", FOLLOWS
-    for name, (mean, spread) in modulators(signals).items():
-        g = modulator(signals, name, mean, spread)
-        if g is None:
-            continue
-        moved = g[:, None] * columns
-        gain, sizes = named.gain(moved)
-        slight = FORM * float(np.var(term.columns @ coefficients))
-        # Of several that are alike the one that explains most is named.
-        if gain > most and float(np.var(moved @ sizes)) > slight:
-            found, most = name.replace("direction ", "direction and "), gain
-    return found
 
 
 def _of_scatter(cause: str) -> bool:

@@ -5,7 +5,6 @@ Each gate is a line of `GATES` and gives the reason why a finding is not confirm
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
@@ -13,26 +12,15 @@ import numpy as np
 
 from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
-from ..effects.presliding_hysteresis import PreslidingHysteresis
-from ..effects.scale_error import ScaleError
 from ..effects.wrong_gear_ratio import WrongGearRatio
 from ..estimation.regression import Regression
-from ..support.quantiles import quantile
 from .confirmation import NOT_CONFIRMED
 from .finding import Finding
 from .levels import UNITS
 from .overlap import finding_overlaps
-from .penalty import regression_without
-
-#: Standard errors by which the size of a cause must differ from zero.
-TOLD = 2.0
 
 #: Share of what can be subtracted at a held-out level above which more is removed than left.
 MORE_THAN_LEFT = 0.5
-
-#: Parts of the travel, of equally many readings, in each of which a ramp must be found again, and
-#: standard errors beyond which it is not: one ramp in a hundred, of noise alone.
-PARTS, TOLD_OF_PARTS = 4, 3.0
 
 #: Correlation of what two causes add to all others from which on they are one column.
 ALIKE = 0.95
@@ -69,72 +57,6 @@ def _not_carried(finding: Finding) -> str:
     )
 
 
-def _not_told_from_zero(finding: Finding) -> str:
-    """A size within two standard errors of zero."""
-    effect = EFFECTS[finding.cause]
-    name = effect.size_name
-    if name not in finding.parameters:
-        name = next(iter(finding.parameters), "")
-    size = finding.parameters.get(name)
-    if size is None:
-        return ""
-    values, stds = (
-        np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64)))
-        if isinstance(each, int | float) or (isinstance(each, list) and each and _numeric(each))
-        else np.zeros(0)
-        for each in (size.value, size.std)
-    )
-    if values.size == 0 or values.size != stds.size or not (stds > 0.0).all():
-        return ""
-    z = float((values / stds).max())
-    if z >= TOLD:
-        return ""
-    return f"its {name} is {z:.1f} standard errors from zero"
-
-
-def _against_friction(finding: Finding) -> str:
-    """A wind-up of friction that leads where friction holds back."""
-    size = finding.parameters.get(PreslidingHysteresis.size_name)
-    if finding.cause != PreslidingHysteresis.kind or size is None:
-        return ""
-    if isinstance(size.value, int | float) and size.value < 0.0:
-        return "friction holds back, and this leads: its amplitude is negative"
-    return ""
-
-
-def _not_in_every_part(regression: Regression, finding: Finding) -> str:
-    """A ramp whose slope over the remainder of its travel does not carry over to a part.
-
-    A ratio is equally wrong at every angle. What rises for a while and then stays (a wide
-    hysteresis, a creep) is another law, of which the ramp is the mean.
-    """
-    if finding.cause != ScaleError.kind or not finding.group:
-        return ""
-    (k,) = finding.group
-    column = regression.terms[k].columns[:, 0]
-    edges = [quantile(column, k / PARTS) for k in range(PARTS + 1)]
-    parts = np.column_stack([np.clip(column, *pair) for pair in itertools.pairwise(edges)])
-    rest = regression_without(regression, [k], settled=True)
-    own, excited = rest.projected(parts)
-    if not excited.all():
-        return ""
-    spread = np.linalg.pinv(own.T @ own) * regression.variance
-    slopes = spread @ (own.T @ rest.r) / regression.variance
-    for j in range(PARTS):
-        others = np.arange(PARTS) != j
-        weights = np.linalg.pinv(spread[np.ix_(others, others)]).sum(axis=0)
-        against = np.insert(-weights / weights.sum(), j, 1.0)  # its slope less that of the others
-        change, std = float(against @ slopes), float(np.sqrt(against @ spread @ against))
-        share = 1.0 - (change / slopes[j]) ** 2
-        if abs(change) > TOLD_OF_PARTS * std and share < MORE_THAN_LEFT:
-            found, expected = 1e6 * slopes[j], 1e6 * (slopes[j] - change)
-            return (
-                "its slope does not carry over to every part of the travel "
-                f"({found:.2g} ppm in one, {expected:.2g} in the others)"
-            )
-    return ""
-
-
 def not_the_only_ratio(finding: Finding) -> str:
     """A ratio that is one of several with the same lines at these positions.
 
@@ -155,8 +77,6 @@ def not_the_only_ratio(finding: Finding) -> str:
 #: Every gate, in the order in which reasons are given.
 GATES: tuple[Callable[[Finding], str], ...] = (
     _not_carried,
-    _not_told_from_zero,
-    _against_friction,
     not_the_only_ratio,
 )
 
@@ -174,7 +94,6 @@ def gated_findings(
         reason = ""
         if finding.confirmed:
             reason = next((r for gate in GATES if (r := gate(finding))), "")
-            reason = reason or _not_in_every_part(regression, finding)
         found.append(replace(finding, status=NOT_CONFIRMED, reason=reason) if reason else finding)
     spots: list[Ambiguity] = []
     shared: set[int] = set()
@@ -217,7 +136,3 @@ def many_causes(findings: Sequence[Finding]) -> str:
     if len(shared) > 1:
         text += f"; {', '.join(shared)} all follow {FOLLOWED[common]}"
     return text
-
-
-def _numeric(values: list[object]) -> bool:
-    return all(isinstance(value, int | float) for value in values)

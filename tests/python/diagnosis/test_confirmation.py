@@ -10,7 +10,7 @@ import pytest
 import trueangle as ta
 from trueangle.diagnosis.confirmation import confirmation_status
 from trueangle.diagnosis.gain import Gain
-from trueangle.diagnosis.goodness import Evidence, Noise, Unexplained
+from trueangle.diagnosis.goodness import Noise, Unexplained
 from trueangle.effects import TimePeriodic
 from trueangle.estimation.regression import Regression
 from trueangle.joint.lines import line_columns
@@ -117,34 +117,6 @@ def test_a_whole_order_that_changes_from_run_to_run_is_no_other_order(
     assert (status == "confirmed") != whole
     assert reason == (
         "order 3 with another size or phase in every run explains as much" if whole else ""
-    )
-
-
-@pytest.mark.parametrize(
-    ("part", "follows"), [(0.0, False), (0.02, False), (0.3, True), (-0.3, True)]
-)
-@pytest.mark.parametrize("channel", ["direction", "speed", "direction and speed"])
-def test_a_fixed_line_does_not_follow_what_else_is_recorded(
-    channel: str, part: float, follows: bool
-) -> None:
-    """A share of its size that follows it; a form may leave a thousandth of the energy."""
-    print("seed 20")
-    runs = tuple(replace(d, speed_deg_s=v) for d, v in zip(SIM.runs, (5.0, 40.0) * 2, strict=True))
-    signals = join_runs(ta.simulate(replace(SIM, runs=runs), 3))
-    speed = np.abs(signals.velocity)
-    factor = (speed - speed.mean()) / speed.std() if "speed" in channel else 1.0
-    factor = factor * signals.direction if "direction" in channel else factor
-    line = 60.0 * np.cos(3.0 * signals.theta) * (1.0 + part * factor)
-    noise = np.random.default_rng(20).normal(size=len(signals))
-    start = Regression.of(signals, line + noise, SIM.surroundings, rho=0.0)
-    columns = line_columns(signals.theta, 3.0)
-    term = start.propose("missing_order", {"order": 3.0}, columns, line=3.0)
-    left = [Evidence("run", 1.0, 1e-9, "", rms=0.5)]
-    rest = Unexplained(True, 1.0, 0.1, left, CALM.noise)
-    status, reason = confirmation_status("missing_order", None, start.with_terms([term]), [0], rest)
-    assert (status == "confirmed") != follows
-    assert reason == (
-        f"part of the error is unexplained, and this follows the {channel}" if follows else ""
     )
 
 
