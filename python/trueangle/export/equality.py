@@ -14,8 +14,7 @@ from ..support.distributions import f_tail
 #: Probability that two calibrations of one pattern are reported to differ.
 FALSE_ALARMS: Final = 0.01
 
-#: Number of tests by which the p-value of a single order is multiplied: orders that a selection
-#: tests in two models.
+#: Factor on the p-value of a single order: the orders that a selection tests in two models.
 _LOOKED_AT: Final = 220
 
 #: Fewest degrees of freedom of a scatter: fewer contain no information.

@@ -58,8 +58,7 @@ _SPELLINGS = {
 BRACKET = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 #: Roles in addition to the angles and the signals.
 LABELS: Final = ("run", "unit", "when")
-#: Angles, which are not signals; a second offset that is added to the reference is
-#: reference_offset2.
+#: Angles, which are not signals; a second offset of the reference is reference_offset2.
 ANGLES = ("reference", "indicated", "error")
 _OFFSET = re.compile(r"reference_offset[1-9]?[0-9]?")
 
