@@ -116,8 +116,8 @@ def certify(
     fit : FitResult, optional
         A fit of ``runs`` that is there already.
     model : HarmonicModel or path, optional
-        What the joint is corrected by: next to the values as found are those as left, of the
-        corrected readings, with a budget and a separate statement.
+        What the joint is corrected by: the values as left, of the corrected readings, follow those
+        as found, with their own budget and statement.
     errors_in : str or float
         Unit of every value and uncertainty of the pages: ``"arcsec"``, ``"deg"``,
         ``"mrad"``, ``"count"``, or the counts of a turn; ``"auto"`` is arcsec, or degrees
@@ -195,7 +195,7 @@ def certify(
 
 
 def _fitted(runs: list[CalibrationRun], orders: Any, gear: dict[str, Any]) -> FitResult:
-    """The fit; next to a reversal error where one is found, which has a separate line.
+    """The fit, jointly with a reversal error where one is found; that has a separate line.
 
     In the residuals it would be autocorrelated noise, and count twice.
     """

@@ -24,7 +24,7 @@ from .language import certificate_texts, note_in, translated
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Part of the span of the errors below which bars of U are not found with them.
+#: Part of the span of the errors below which bars of U at them are too small to see.
 _SMALL: Final = 0.04
 
 #: Largest logo.
@@ -84,14 +84,14 @@ def _compiled(content: dict[str, Any], logo: str | None, **how: Any) -> Any:
         raise MissingExtraError(
             "certificates need typst: pip install 'trueangle[certificate]'"
         ) from None
-    # typst reads below one folder only: its input is in one of its own.
+    # typst reads below one folder only: its input gets a separate one.
     with tempfile.TemporaryDirectory(prefix="trueangle-certificate-") as folder:
         file = lay_out(content, Path(folder), logo)
         return typst.compile(os.fspath(file), root=folder, ignore_system_fonts=True, **how)
 
 
 def _picture(content: dict[str, Any], said: dict[str, Any], small: bool) -> bytes:
-    """Value and U at every position as SVG; what would be too small on separate axes."""
+    """Value and U at every position as SVG; U on separate axes where it is too small to see."""
     shown = content["errors_in"]
     counts = shown["per_arcsec"] * ARCSEC_PER_TURN
     unit: Any = counts if shown["unit"] == "count" else shown["unit"]
@@ -99,7 +99,7 @@ def _picture(content: dict[str, Any], said: dict[str, Any], small: bool) -> byte
     parts = [rows] if left is None else [rows, left["positions"]]
     if left is None and small:
         parts.append([row | {"error_arcsec": 0.0} for row in rows])
-    # One below the other, each at a separate scale.
+    # One below the other, each with its own scale.
     with page_pictures(1.0):
         figure, axes = new_figure(len(parts), 1, 7.5, (2.8, 4.6)[len(parts) - 1], sharey=False)
     result = said["result"]

@@ -1,4 +1,4 @@
-"""Errors at nominal positions: what a fit states and leaves, reversal; runs that were corrected."""
+"""Errors at nominal positions: of a fit, of its residuals, of reversal; runs after correction."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _MOST_POSITIONS: Final = 720
 #: Places of a turn among which errors that the series lacks are looked for.
 _PLACES: Final = 360
 
-#: Standard errors beyond which a reversal counts as observed. Below it is noise, and adding
+#: Standard errors beyond which a reversal is significant. Below it is noise, and adding
 #: noise to the budget would make every U too wide.
 _SEEN: Final = 3.0
 
@@ -169,7 +169,7 @@ def left_at_places(fit: FitResult) -> Contribution:
 
 
 def reversal_halfwidth(fit: FitResult) -> Contribution | None:
-    """Half of the reversal error, where both directions were read and it is found.
+    """Half of the reversal error, where both directions were read and it is significant.
 
     ::
 

@@ -116,7 +116,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             with ending:
                 words = list(sys.argv[1:] if argv is None else argv)
-                # The others are looked at only where their names are to be reported.
+                # The others are imported only where their names are to be listed.
                 called = words[:1] if words and words[0] in COMMANDS else COMMANDS
                 parser = build_parser(words, called)
                 wording.parser = parser.commands.get(words[0] if words else "")
@@ -140,8 +140,7 @@ def process() -> NoReturn:
     """Run one command as a separate process, which ends with it."""
     gc.set_threshold(_KEPT, *gc.get_threshold()[1:])
     if sys.argv[1:2] != ["bench"]:
-        # Next to the core's own threads (`trueangle.support.blas`); a bench lets numpy have its
-        # own.
+        # The core has its own threads (`trueangle.support.blas`); a bench lets numpy have its own.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         sys.exit(main())
@@ -152,7 +151,7 @@ def process() -> NoReturn:
 def _failed(
     error: BaseException, ending: Ending, wording: Wording, args: argparse.Namespace
 ) -> int:
-    """Show an error in one line; the result is the exit status."""
+    """Print an error in one line; the result is the exit status."""
     if args.debug:
         import traceback  # brings the tokenizer with it
 
@@ -198,7 +197,7 @@ def _system(error: OSError) -> str:
 
 
 def _say(text: str) -> None:
-    """Show it in one line, whatever lines it came in."""
+    """Print it in one line, whatever lines it came in."""
     if sys.stderr is not None:
         with contextlib.suppress(OSError):  # a closed terminal
             # Blanks stay as they are: a name of a file may have two.

@@ -84,7 +84,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
         found = check(joint.args.files, **reading_options(joint.args))
         try:
             runs = read_runs(joint.args.files, **reading_options(joint.args))
-        except FileError:  # the check states what is wrong
+        except FileError:  # the check reports what is wrong
             runs = None
         return found, checked_rank(joint.name, found, runs)
 

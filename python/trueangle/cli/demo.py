@@ -88,7 +88,7 @@ def _between(seed: int) -> str:
 
 
 def short_report(study: Study) -> str:
-    """The whole study in ten lines: what 36 positions state, and what lies between."""
+    """The whole study in ten lines: what 36 positions show, and what lies between."""
     plan = study.plan
     offset = f"{plan.mount_offsets_deg[-1]:g}"
     lines = [
@@ -140,7 +140,7 @@ GROUPS: Final = 6
 #: sqrt(1 + 15/180) (15 unknowns from 180 readings).
 NOISE: Final = {"a": 6.03, "b": 4.17}
 
-#: Gear orders of ratio 100 that are at the paper's orders on 36 positions.
+#: Gear orders of ratio 100 that alias to the paper's orders on 36 positions.
 GEAR_ORDERS: Final = {8: 100, 7: 101, 16: 200, 15: 201, 14: 202, 12: 300, 4: 400}
 
 #: The paper's figures: peak-to-peak before and after in arcsec, reduction in percent.

@@ -145,7 +145,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _of_channels(args: argparse.Namespace) -> bool:
-    """Print what is wrong with channels, where nothing is assumed of the joint."""
+    """Print what is wrong with channels, where nothing is assumed about the joint."""
     stated = (args.simulation, args.simulated, args.gear_ratio, args.shaft or None)
     if any(given is not None for given in stated):
         return False
@@ -166,12 +166,12 @@ def _of_channels(args: argparse.Namespace) -> bool:
 def _minus_simulated(
     runs: list[CalibrationRun], args: argparse.Namespace, own: list[Any]
 ) -> MeasuredMinusSimulated:
-    """The runs without what the log of the simulator states, whose columns ``own`` names.
+    """The runs minus the error in the log of the simulator, whose columns ``own`` names.
 
     Raises
     ------
     FileError
-        The log lacks a column; states their names in the log.
+        The log lacks a column; the message gives the option that names it.
     """
     from ..runs.joining import minus_simulated
 
@@ -191,7 +191,7 @@ def _minus_simulated(
 
 
 def _refuse_idle(args: argparse.Namespace) -> None:
-    """Refuse options that need another one with them."""
+    """Refuse options that need another one."""
     if args.simulated is None:
         refuse_given(args, ("simulated_by",), "joins the log of a simulator: add --simulated LOG")
     if args.extend_into is None or _is_fmu(args.extend_into):
@@ -249,7 +249,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
 
 
 def _believed(args: argparse.Namespace, empty: bool = False) -> Simulation | None:
-    """The simulation: that of the file, or of a joint of which nothing else is assumed.
+    """The simulation: that of the file, or of a joint about which nothing else is assumed.
 
     ``empty`` where nothing need be stated of the joint.
 

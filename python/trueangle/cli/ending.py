@@ -95,7 +95,7 @@ class Ending:
 
     @property
     def status(self) -> int:
-        """The exit status, as a shell shows it."""
+        """The exit status, as a shell reports it."""
         return 128 + self.number
 
     @property

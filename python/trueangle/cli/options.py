@@ -103,7 +103,7 @@ def add_shared(parser: argparse.ArgumentParser, *names: str) -> None:
 
 
 def add_joint(parser: argparse.ArgumentParser) -> None:
-    """Options that show what joint the readings are of, and where they are."""
+    """Options that state which joint the readings are of, and where they are."""
     add_shared(parser, "gear-ratio", "fixed-member", "shaft")
     add_signals(parser)
 

@@ -12,7 +12,7 @@ from ..support.layout import text_columns
 from ..support.suggestions import did_you_mean
 from .paths import Input
 
-#: What argparse states about arguments that are not there, and what looks like an option.
+#: The message of argparse about missing arguments, and what looks like an option.
 _MISSING: Final = "the following arguments are required"
 _OPTION: Final = r"-{1,2}[A-Za-z]"
 
@@ -21,13 +21,13 @@ _CHOICE = r"argument (?P<name>.*): invalid choice: '(?P<got>.*)' \(choose from (
 #: Headings of a command's help, in this order.
 GROUPS: Final = ("input", "model", "output", "other")
 
-#: Options that show how files are read.
+#: Options that control how files are read.
 _INPUT: Final = (
     "--signal --column --unit --counts-per-turn --counts-per-turn-reference --topic --run --joint "
     "--unit-from"
 )
 
-#: Options that show what is printed or written, and how.
+#: Options that control what is printed or written, and how.
 _OUTPUT: Final = (
     "--output --output-topic --in-place --json --errors-in --progress --title --checksums"
 )
@@ -47,7 +47,7 @@ class Parser(argparse.ArgumentParser):
     """`argparse.ArgumentParser` with grouped help whose errors suggest what was meant.
 
     An argument belongs to the group of its type, `Input` or `Output`, or to that of its
-    name; what is neither read nor written states the request to the model.
+    name; what is neither read nor written is about the model.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -71,7 +71,7 @@ class Parser(argparse.ArgumentParser):
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
-        """Parse, and refuse what is not understood in the words of the command it is in."""
+        """Parse, and refuse what is not understood in the words of its command."""
         parsed, unknown = self.parse_known_args(args, namespace)
         if unknown:
             chosen = self.commands.get(getattr(parsed, "command", None) or "", self)
@@ -117,7 +117,7 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"usage: {self._in_short()}\n{self.prog}: error: {message}\n")
 
     def _in_short(self) -> str:
-        """How the command is called: what it needs, and where the remainder is reported."""
+        """How the command is called: what it needs, and where the other options are listed."""
         if self.commands:
             return f"{self.prog} COMMAND ...; {self.prog} --help lists the commands"
         needed = [
@@ -133,8 +133,8 @@ def declare(
 ) -> argparse.Action:
     """Declare an argument in the form of its help, as ``"-o --output FILE"`` or ``"runs RUNS..."``.
 
-    ``reported`` is its help, ``many=True`` lets an option be repeated, and ``more`` is what
-    `argparse.ArgumentParser.add_argument` takes otherwise.
+    ``told`` is its help, ``many=True`` lets an option be repeated, and ``more`` is what
+    `argparse.ArgumentParser.add_argument` takes in addition.
 
     Examples
     --------

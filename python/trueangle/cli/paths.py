@@ -76,7 +76,7 @@ def check_paths(args: argparse.Namespace) -> None:
 
 
 def _matched(name: str) -> list[str]:
-    """The file of this name, or those that a pattern represents."""
+    """The file of this name, or those that match a pattern."""
     if not has_magic(name):
         return [name]
     from ..runs.paths import matched_paths  # takes numpy, which most commands do without here

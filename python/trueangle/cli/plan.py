@@ -272,7 +272,7 @@ def add_after_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run_after(args: argparse.Namespace) -> int:
-    """Print the runs that show what those there are could not, and write them."""
+    """Print the runs that show what the present ones could not, and write them."""
     from ..planning.limits import load_limits
     from ..rehearsal.after import SEEDS, WITHIN, plan_after
     from ..simulation import load_simulation

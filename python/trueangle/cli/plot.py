@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw, write, state what is found."""
+    """Draw, write, and print what the picture shows."""
     import matplotlib as mpl
 
     from ..plots.canvas import text_alternative
@@ -101,7 +101,7 @@ def _of_runs(args: argparse.Namespace) -> Axes:
 
 
 def save_picture(drawn: Axes | Figure, path: str) -> None:
-    """Write a picture whole or not at all, as its ending states (PNG where it states none)."""
+    """Write a picture whole or not at all, in the format of its ending (PNG without one)."""
     ending = Path(path).suffix.lower()
     kind = ending[1:] if ending in PICTURE.endings else "png"
     figure = drawn if hasattr(drawn, "savefig") else drawn.get_figure(root=True)

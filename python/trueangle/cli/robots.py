@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: The name before a role that represents the log of a simulator, not for a joint.
+#: The name before a role that means the log of a simulator, not a joint.
 _SIMULATED = "simulated"
 
 
@@ -65,7 +65,7 @@ def joints_asked(args: argparse.Namespace) -> tuple[str, list[JointAsked]] | Non
     Raises
     ------
     ArgumentError
-        A joint that there is not; an option next to the robot file that this states itself.
+        A joint that there is not; an option for what the robot file states itself.
     """
     entries = list(args.signal or ())
     named = list(dict.fromkeys(e[0] for e in entries if e[0] not in (None, _SIMULATED)))

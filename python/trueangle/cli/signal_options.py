@@ -1,4 +1,4 @@
-"""Options that show which column holds what, and of sources that are read as they arrive."""
+"""Options that state which column holds what, and of sources that are read as they arrive."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ def silence_output() -> None:
         pass
 
 
-#: What is emphasised in a text: bold, red, yellow, green. Words state all that colours do.
+#: What is emphasised in a text: bold, red, yellow, green. Colours add nothing to the words.
 _RULES: Final = (
     (r"\berror:|\bNOT UNDERSTOOD\b|\bNO ORDER RETAINED\b|\bDISAGREE\b", "1;31"),
     (r"\bwarning:|^ *! |\bNOT CONFIRMED\b|^Listed and not confirmed:", "33"),
@@ -139,7 +139,7 @@ _RULES: Final = (
 
 
 def has_colours(stream: Any) -> bool:
-    """Whether a stream is a terminal that takes colours, and nobody stated that it should not."""
+    """Whether a stream is a terminal that takes colours, and no variable turns them off."""
     if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
         return False
     try:

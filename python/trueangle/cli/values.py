@@ -130,7 +130,7 @@ def orders_by_shaft(
 ) -> str | Sequence[float] | Mapping[str, Sequence[float]]:
     """``auto``, ``1-17``, ``1,4,8`` or ``output:1-3;motor:1,2`` as orders.
 
-    ``further`` names shafts next to those of `SHAFTS`.
+    ``further`` names shafts in addition to those of `SHAFTS`.
 
     Raises
     ------

@@ -169,7 +169,7 @@ def _is_text(node: ast.expr) -> bool:
 
 
 def _values(node: ast.expr) -> list[str]:
-    """What is after an option, once for each time it is given; nothing after a switch."""
+    """The values of an option, one for each time it is given; none of a switch."""
     import ast
     from shlex import quote
 
@@ -243,7 +243,7 @@ def _words(error: TrueAngleError, args: argparse.Namespace, build: _Build) -> li
     if isinstance(error, NoOrderError) and 0 < error.readings < _LEAST_READINGS:
         return ["plan", "--arc", "0:360", "--readings", str(_LEAST_READINGS)]
     if isinstance(error, NoModelError):
-        # Without a gear nothing but the output turns, and that is reported.
+        # Without a gear nothing but the output turns, and the command states that.
         known = args.gear_ratio is not None
         bare = () if known else ("--gear-ratio", "1", "--fixed-member", "none")
         output = getattr(args, "output", None)

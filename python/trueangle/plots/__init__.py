@@ -2,9 +2,9 @@
 
 Every function draws into ``ax`` (a new one when not given) and
 returns it, but `detection`, `fleet_overview`, `fleet_patterns`, `fleet_history` and
-`watched_windows`, which make a figure; `text_alternative` states in a sentence what
+`watched_windows`, which make a figure; `text_alternative` describes in a sentence what
 it shows. Angles are in degrees, errors in arcsec, or in degrees where one reaches a
-degree (``errors_in=`` needs another unit). Needs ``pip install trueangle[plot]``;
+degree (``errors_in=`` selects another unit). Needs ``pip install trueangle[plot]``;
 matplotlib is imported at the first picture.
 """
 
@@ -67,7 +67,7 @@ _FIT = {
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)  # what completion shows: no module next to the function of its name
+    return sorted(__all__)  # what completion shows: functions, not the modules of the same names
 
 
 def fit_plot(

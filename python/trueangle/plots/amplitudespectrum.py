@@ -36,7 +36,7 @@ _MOST_NAMED = 8
 _MOST_ANNOTATED = 12
 _LABEL_INCHES = 0.17
 
-#: Orders between which nothing was looked at over this many orders are in separate groups.
+#: A gap of this many orders in which none was tested separates two groups.
 _BREAK: Final = 12.0
 #: Groups side by side at most; more would leave no width for each.
 _MOST_GROUPS: Final = 6
@@ -189,7 +189,7 @@ def _title(line: OrderLine, unit: ErrorUnit, name: Callable[[float], str] | None
 
 
 def _apart(ranked: Sequence[int], place: Array, room: float) -> list[int]:
-    """Of dots, the most important first, those that have room together with the ones before."""
+    """Of dots, the most important first, those that have room next to the ones before."""
     kept: list[int] = []
     for i in ranked:
         if all(abs(place[i] - place[k]) >= room for k in kept):
@@ -214,7 +214,7 @@ def _order_groups(orders: Sequence[float]) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True)
 class OrderAxis:
-    """Where orders are on one axis with breaks.
+    """The places of orders on one axis with breaks.
 
     Attributes
     ----------
@@ -242,7 +242,7 @@ class OrderAxis:
         return cls(groups, starts, scales)
 
     def places(self, orders: ArrayLike) -> Array:
-        """Where orders are."""
+        """The places of orders on the axis."""
         wanted = np.asarray(orders, dtype=np.float64)
         group = np.searchsorted([low for low, _ in self.groups], wanted, side="right") - 1
         first = np.array([low for low, _ in self.groups])[group]
@@ -257,7 +257,7 @@ class OrderAxis:
         return np.full(place.size, 0.75 * min(least, 0.5))
 
     def room(self, ax: Axes, inches: float) -> float:
-        """Places that this many inches take on these axes."""
+        """How far these inches reach on these axes, in its places."""
         figure = ax.get_figure(root=True)
         wide = ax.get_position().width * figure.get_figwidth()  # type: ignore[union-attr]
         return inches * sum(self._spans()) / wide

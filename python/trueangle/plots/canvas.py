@@ -83,7 +83,7 @@ def new_figure(
 
 @contextmanager
 def page_pictures(scale: float = _SMALL) -> Iterator[None]:
-    """Within it new figures have another size, and no window and no notebook knows them."""
+    """Within it new figures have another size, and no window or notebook shows them."""
     before = _SCALE.set(scale)
     try:
         yield
@@ -105,7 +105,7 @@ def as_image(drawn: Axes | Figure) -> str:
 
 
 def _subplots(rows: int, columns: int, width: float, height: float, **how: Any) -> Any:
-    """A figure of this many inches and an array of its axes."""
+    """A figure of this size in inches and an array of its axes."""
     scale = _SCALE.get()
     try:
         if scale is None:
@@ -126,7 +126,7 @@ def marked(line: Line2D, **marks: Any) -> Line2D:
 
 
 def page_marks(artist: object) -> dict[str, Any]:
-    """What `marked` stated about it."""
+    """The marks that `marked` gave it."""
     found: dict[str, Any] = getattr(artist, "on_page", {})
     return found
 
@@ -163,7 +163,7 @@ def turn_axis(ax: Axes, low: float, high: float) -> None:
 def described(ax: Axes, text: str, title: str = "") -> Axes:
     """The axes with a text for who does not see them: see `text_alternative`.
 
-    A title is over axes that are alone in their figure: others have separate captions.
+    Axes that are alone in their figure get the title; others have separate captions.
     """
     ax.set_label(text)
     figure = ax.get_figure(root=True)
@@ -191,7 +191,7 @@ def text_alternative(ax: Axes) -> str:
 
 
 def legend(ax: Axes, title: str | None = None) -> None:
-    """The legend: inside while short, else with the picture; inside where it has neighbours."""
+    """The legend: inside while short, else next to the axes; inside where these have neighbours."""
     handles, labels = ax.get_legend_handles_labels()
     if not handles:
         return

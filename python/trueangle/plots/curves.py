@@ -30,7 +30,7 @@ _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 #: Points of a curve for each cycle of its highest order, and the least and most of them.
 _PER_CYCLE, _FEWEST, _MOST_SAMPLES = 20, 361, 12001
 
-#: Degrees without a reading that make a travel partial, where no model states what was detected.
+#: Degrees without a reading that make a travel partial, where no model states its span.
 _WIDE_GAP: Final = 90.0
 
 #: Periods from which on a curve fills the picture: it is plotted as an envelope...

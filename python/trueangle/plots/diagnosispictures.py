@@ -43,7 +43,7 @@ def gains(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
     """Share of the reducible error that each cause takes away, with 95 % intervals.
 
     Reducible is what is above the noise; 100 % leaves noise alone. Causes that are
-    sampled anew in each run (a slipped zero) have no such gain and are not plotted.
+    random in each run (a slipped zero) have no such gain and are not plotted.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def gains(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
 def error_left(diagnosis: Diagnosis, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
     """Rms left of held-out readings: with all causes in place, and with each one removed.
 
-    The numbers are those of the findings' gains, so that they cannot state otherwise.
+    The numbers are those of the findings' gains, so that the two cannot disagree.
 
     Parameters
     ----------

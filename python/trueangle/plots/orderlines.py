@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Orders stated in words.
 _TOLD: Final = 6
-#: Least amplitude of the logarithmic axis, as part of the smallest that has to be detected.
+#: Least amplitude of the logarithmic axis, as part of the smallest that must be visible.
 _FLOOR: Final = 0.4
 
 

@@ -62,7 +62,7 @@ def page_chart(
     Parameters
     ----------
     ax : matplotlib Axes
-        Of `page_axes`, plotted on.
+        Of `page_axes`, with the picture in it.
     title : str
         Above the chart.
     grow : float

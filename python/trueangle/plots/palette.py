@@ -1,7 +1,7 @@
 """Colours, markers and ink that survive colour blindness, grey print and dark pages.
 
-Six hues of Okabe and Ito, the two light ones darkened or exchanged, so that each is visible
-on white and on black paper by 3 to 1. What must be separated in grey has a separate marker.
+Six hues of Okabe and Ito, the two light ones darkened or exchanged, so that each has a contrast
+of 3 to 1 on white and on black. What must be distinguished in grey has a separate marker.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ _Role: TypeAlias = Literal["run", "before", "after", "measured", "simulated"]
 #: Title of an axis of angles.
 ANGLE: Final = "reference angle / deg"
 
-#: Periods of the segment that is shown together with an envelope.
+#: Periods of the segment that is shown next to an envelope.
 _PERIODS: Final = 4.0
 #: Bins of a running median, and the readings that make it worth its line.
 _BINS, _ENOUGH = 36, 360

@@ -16,7 +16,7 @@ from ..support.angles import arcsec, wrap
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_quantile
 
-#: Cells of a turn, orders that are looked at, and the probability that one of them is noise.
+#: Cells of a turn, orders that are tested, and the probability that noise alone makes one of them.
 CELLS: Final = 72
 _HIGHEST: Final = 32
 _ORDERS: Final = [list(range(1, _HIGHEST + 1))]
@@ -52,7 +52,7 @@ class Estimate:
         s_k² = Σ_w |c_kw - c_k,w-1|² / (4 n (n - 1))
 
     with the coefficients c of each of n turns: by their steps, in which a drift does not hide.
-    Noise that is not white is the median of neighbouring orders: of these, and of their sizes.
+    Noise that is not white is the median of these, and of the sizes, over neighbouring orders.
     The orders are settled when the last turn has changed none by more than its standard error.
 
     Parameters

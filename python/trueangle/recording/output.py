@@ -142,7 +142,7 @@ class RunsFile:
         self.label = label or next(number for number in numbers if number not in labels)
 
     def begin(self, names: Sequence[str]) -> None:
-        """State the columns, those of the rows behind the label of the run.
+        """Set the columns: the label of the run, then those of the rows.
 
         Raises
         ------

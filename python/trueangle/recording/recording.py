@@ -29,7 +29,7 @@ _SPEEDS = 1.5
 _LOSSES = 0.01
 #: Seconds between two looks for faults, and of silence that is one.
 _LOOK, _SILENT = 2.0, 2.0
-#: Readings that are looked at for faults, and how few show nothing.
+#: Readings that are looked at for faults, and the fewest that suffice.
 _LATEST, _LEAST = 4000, 50
 #: Part of a turn that one angle moves before the other one is stuck.
 _MOVED = 1.0 / 36.0
@@ -213,7 +213,7 @@ class LiveRecording:
         return new
 
     def _faults_of_readings(self) -> dict[str, str]:
-        """Those of `check`, in the latest readings, and an angle that is still."""
+        """Those of `check`, in the latest readings, and an angle that does not change."""
         reference, indicated, seconds = self._latest
         if reference.size < _LEAST or self.note:
             return {}
@@ -284,7 +284,7 @@ def record(
     show : callable
         Shows what is known by a time, and why it has ended, as `Screen.show`.
     stopped : callable
-        Called at every look: whether the recording is to end.
+        Called at every look; returns whether the recording is to end.
 
     Returns
     -------

@@ -166,9 +166,9 @@ def figures_of_diagnosis(
     sim: Simulation,
     scale: ErrorScale,
 ) -> dict[str, Figure]:
-    """Measured against simulated; the remainder without each of several causes.
+    """Measured against simulated; the residual without each of several causes.
 
-    A chart of one dot states less than the sentence next to it: it is omitted; so is a simulation
+    A chart of one dot shows less than the sentence next to it: it is omitted; so is a simulation
     that expects no error, with which the measured one would be plotted once more.
     """
     pairs = simulated_points(runs, sim)
@@ -183,7 +183,7 @@ def figures_of_diagnosis(
     left = error_left_of(diagnosis)
     if left is not None and len(left.rows) > 2:
         ax = page_axes(5.0, 1.0 + 0.3 * len(left.rows))
-        # The title states "without each cause".
+        # The title says "without each cause".
         rows = tuple((name.removeprefix("without "), rms) for name, rms in left.rows)
         draw_error_left(ax, replace(left, rows=rows), scale.unit)
         chart = page_chart(ax, height=f"height:{3 + 2.2 * len(left.rows):.3g}rem")

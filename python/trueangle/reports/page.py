@@ -86,7 +86,7 @@ def filled_template(template: str, **values: Any) -> str:
 class Page(ShownResult):
     """A result that is a page: one HTML file that needs no network.
 
-    A class states by ``_written`` what the page holds.
+    A class defines by ``_written`` what the page holds.
     """
 
     #: What it is written as.

@@ -99,7 +99,7 @@ class WatchReport(Page):
         return {"windows": [window.plain(self._scale) for window in self.windows]}
 
     def summary(self) -> str:
-        """How many windows, and what the first alarm states."""
+        """How many windows, and what the first alarm reports."""
         text = f"{counted(self.windows, 'window')}, {self._told()}"
         if not self.alarms:
             return text

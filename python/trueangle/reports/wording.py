@@ -18,7 +18,7 @@ FIGURE_TITLES: Final = {
     "factors": "Function of each factor",
 }
 
-#: Conditions of a run: where they are, their name and unit.
+#: Conditions of a run: their key in the content, name and unit.
 _CONDITIONS: Final = (
     ("speed_deg_s", "speed", "deg/s"),
     ("temperature_C", "temperature", "°C"),
@@ -35,13 +35,13 @@ _OTHERS: Final = 20
 #: Reduction, in percent, from which a correction is worth having.
 _WORTH: Final = 1.0
 
-#: Is where there is no number.
+#: Shown where there is no number.
 _NONE: Final = "\u2013"
 
-#: Is before negative numbers.
+#: The sign of negative numbers.
 MINUS: Final = "\u2212"
 
-#: Digits of an error that is alone, and of the smallest of a column of them.
+#: Digits of a single error, and of the smallest in a column of them.
 _DIGITS, _LEAST_DIGITS = 4, 3
 
 #: Lines of a list in a cell at most; of a longer one this many are shown.
@@ -49,7 +49,7 @@ _MOST_LINES, _SHOWN_LINES = 12, 6
 
 
 def figure_title(name: str, modelled: bool) -> str:
-    """What is above a figure.
+    """The title above a figure.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def by_kind(faults: list[dict[str, Any]]) -> list[tuple[dict[str, Any], list[str
 
 
 def entry_paths(pattern: str, entries: list[Any]) -> list[str]:
-    """Where the same number of every entry is in the content.
+    """Paths in the content of the same number of every entry.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def listed_orders(rows: list[dict[str, Any]]) -> list[int]:
 
 
 def gain_paths(findings: list[dict[str, Any]]) -> list[str]:
-    """Where the remainder after each finding is."""
+    """Paths in the content of the residual after each finding."""
     every = enumerate(findings)
     return [f"diagnosis.findings.{i}.gain.rms_after_arcsec" for i, f in every if f["gain"]]
 
@@ -224,7 +224,7 @@ class Numbers:
     def error(
         self, path: str, decimals: int | None = None, digits: int = _DIGITS, unit: bool = False
     ) -> Any:
-        """An error to this many decimals, or to this many digits."""
+        """An error to ``decimals``, or to ``digits`` significant digits."""
         value = lookup(self._content, path)
         if decimals is None:
             decimals = 0 if value is None else self.unit.decimals(value, digits)
