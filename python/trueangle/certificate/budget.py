@@ -82,7 +82,7 @@ class Estimates:
 
     @property
     def correlation(self) -> Array:
-        """Correlation coefficients; 0 next to a quantity that is known exactly."""
+        """Correlation coefficients; 0 with a quantity that is known exactly."""
         scale = np.where(self.standard > 0.0, self.standard, 1.0)
         return np.asarray(self.covariance / np.outer(scale, scale))
 

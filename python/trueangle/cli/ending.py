@@ -100,7 +100,7 @@ class Ending:
 
     @property
     def text(self) -> str:
-        """What is reported about it."""
+        """The message about it."""
         named = "" if self.number == signal.SIGINT else f" by {signal.Signals(self.number).name}"
         return f"interrupted{named}"
 

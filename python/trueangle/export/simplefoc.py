@@ -188,8 +188,8 @@ class SimpleFoc(Target):
         if whole != (variant == "minus-u16"):
             raise table_error(
                 path,
-                f"these are {'whole numbers' if whole else 'radians'}, and variant {variant} is "
-                f"required; give `variant={'minus-u16' if whole else 'minus-float'!r}`"
+                f"these are {'whole numbers' if whole else 'radians'}, not a table of variant "
+                f"{variant}; give `variant={'minus-u16' if whole else 'minus-float'!r}`"
                 f"{'' if whole else ' or plus-float'}",
                 line,
             )

@@ -100,7 +100,7 @@ class ArcPlan(PlainResult):
 
 def _factor(factor: float) -> str:
     """A noise factor, or that the places do not show the order."""
-    return f"{factor:.3g}" if math.isfinite(factor) else "not detected"
+    return f"{factor:.3g}" if math.isfinite(factor) else "undetermined"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Pictures of plans and rehearsals: where to read, which orders and causes that separates."""
+"""Pictures of plans and rehearsals: where to read, which orders and causes this separates."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     grid(ax, "y")
     blind = [f"{orders[i]:g}" for i in place[~seen]]
     told = f"worst {float(factors[seen].max(initial=0.0)):.3g}" + (
-        f"; not detected: {', '.join(blind)}" if blind else ""
+        f"; undetermined: {', '.join(blind)}" if blind else ""
     )
     text = f"Noise factor of {len(orders)} wanted orders: {told}."
     return described(ax, text, "Noise factor of every wanted order")
@@ -116,8 +116,8 @@ def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
 def detection(rehearsal: Rehearsal) -> Figure:
     """Share of the trials in which each cause was named, against its size.
 
-    Points are the sizes tried with 95 % binomial intervals, the line the probability they speak
-    for, dashed verticals the sizes named in 50 and 95 %. Causes that were never hidden are omitted.
+    Points are the sizes tried with 95 % binomial intervals, the line the probability fitted to
+    them, dashed verticals the sizes named in 50 and 95 %. Causes never hidden are omitted.
 
     Parameters
     ----------

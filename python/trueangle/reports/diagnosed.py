@@ -63,7 +63,7 @@ def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
         known = [q for q in finding["parameters"] if q["std"] is not None]
         sizes = [q for q in known if q["unit"].startswith("arcsec")]
         finding["sized"] = bool(sizes)
-        # The parameter that states how large it is: one that has a unit.
+        # The parameter that gives its size: one that has a unit.
         found = sizes or [q for q in known if q["unit"]]
         finding["size"] = found[0]["index"] if found else None
         gain = finding["gain"]

@@ -117,7 +117,7 @@ class ErrorScale:
         }[self.name]
 
     def to_dict(self) -> dict[str, Any]:
-        """For the content: the unit of the page, next to numbers that stay in arcsec."""
+        """For the content: the unit of the page; numbers of the content stay in arcsec."""
         return {"unit": self.name, "per_arcsec": self.factor, "defined": self.defined}
 
 
