@@ -28,7 +28,7 @@ CONFIRMED, NOT_CONFIRMED = "confirmed", "not_confirmed"
 #: Distance from a whole order within which a line may be that one, changing over runs.
 NEAR = 0.4
 
-#: Probability from which on a line in time is there, whatever else is.
+#: p-value below which a line in time is there, whatever else is.
 SEEN = 1e-6
 
 #: Runs from which on the evidence of each run is tested.

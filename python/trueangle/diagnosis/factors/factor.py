@@ -92,7 +92,7 @@ class Factor(PlainResult):
         Factors that are the same columns in these runs.
     curve : FactorCurve
     effects : list of Curve
-        What represents it in a simulation; none of what other runs do not show.
+        Its curves in a simulation; without parts that belong to one run only.
     jumps : tuple of (float, float)
         Where in a turn the function of the place jumps, degrees, and by how much, arcsec.
     events : tuple of (int, int)

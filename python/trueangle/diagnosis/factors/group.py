@@ -57,7 +57,7 @@ class Group:
         of a group that is none.
     unit : str
     alternatives : float
-        Groups of which it was the one that stood out.
+        Number of groups of which it was the strongest.
     event : tuple of int or None
         Run and row of what happened once, which no other run will show.
     jump : float or None

@@ -38,7 +38,7 @@ FAMILIES: Final = (
 #: Factor of settling after a reversal, which any form may have: names are not tested by it.
 TRANSITION: Final = "reversal_time"
 
-#: Part of columns that is left together with others that are the same.
+#: Part of columns that may remain outside the span of others that are the same.
 _SAME: Final = 1e-6
 
 

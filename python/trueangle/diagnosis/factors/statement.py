@@ -112,7 +112,7 @@ def _less_what_no_factor_is(regression: Regression) -> Array:
 
 
 def account_rows(regression: Regression) -> NDArray[np.int64]:
-    """Readings that take part: no outliers, and one of every this many where there are many."""
+    """Readings that take part: no outliers, and of many only every n-th."""
     rows = np.flatnonzero(~regression.outlying)
     if rows.size <= MOST_READINGS:
         return rows
@@ -153,7 +153,7 @@ def _steps(signals: Signals, error: Array) -> list[tuple[int, int]]:
 
 
 def _largest_step(values: Array, width: int) -> tuple[int, float]:
-    """Where means of so many values before and after differ most, and by how much."""
+    """Where means of ``width`` values before and after differ most, and by how much."""
     sums = np.concatenate([[0.0], np.cumsum(values)])
     steps = np.abs(sums[2 * width :] - 2.0 * sums[width:-width] + sums[: -2 * width]) / width
     k = int(np.argmax(steps))
