@@ -87,7 +87,7 @@ def test_stretches_of_one_long_run_hold_where_the_correlation_dies_out():
         low, high = found.interval()[1:].T
         hit.append((low < TRUE) & (high > TRUE))
     assert LOW - 0.02 <= np.mean(hit) <= HIGH
-    assert any("cannot be known from one run" in note for note in found.notes)
+    assert any("cannot be estimated from one run" in note for note in found.notes)
     # Of the two signs the nearer one is told: neighbours, of which 0.6 is remembered.
     (told,) = [note for note in found.notes if "white noise" in note]
     assert re.search(r"neighbours in time correlate by 0\.(5[5-9]|6[0-4])", told), told

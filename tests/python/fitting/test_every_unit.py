@@ -192,7 +192,7 @@ def test_phases_of_runs_are_those_of_each_alone(argument: str, period: float) ->
 def test_a_reference_that_is_homed_anew_is_told_by_how_much() -> None:
     found = ta.fit(runs_of("homed", 1.0), orders=[1, 2])
     assert found.model.argument == "indicated"
-    (said,) = re.findall(r"they differ by up to (\S+) deg", " ".join(found.notes))
+    (said,) = re.findall(r"\(by up to (\S+) deg\)", " ".join(found.notes))
     assert float(said) == pytest.approx(95.0 + 0.4, abs=0.1)
 
 

@@ -54,4 +54,4 @@ def test_the_run_of_another_joint_is_told_by_its_number(odd):
         runs.append(ta.CalibrationRun(x, x + error, period=360.0))
     with pytest.warns(UserWarning, match=rf"coefficients of run {odd + 1} \(of 4\)") as told:
         ta.fit(runs, orders=[1, 2])
-    assert len([w for w in told if "one pattern" in str(w.message)]) == 1
+    assert len([w for w in told if "different patterns" in str(w.message)]) == 1
