@@ -329,7 +329,7 @@ def _stated(match: re.Match[str], path: str) -> tuple[int, int, float]:
     if not 0.0 < cycles < 1 << 31 or shift > _LARGEST_SHIFT:
         raise table_error(
             path,
-            f"the table of shaft {match['shaft']} has a stated shift of "
+            f"the table of shaft {match['shaft']} states a shift of "
             f"{match['shift'][:20]} (0 to {_LARGEST_SHIFT}) and {match['cycles'][:30]} cycles",
         )
     return entries, shift, cycles

@@ -237,7 +237,7 @@ def _folded(selection: OrderSelection | None) -> list[dict[str, str]]:
         + " or ".join(f"{m:g}" for m in likely_aliases(row)[:_MOST_ALIASES])
         for row in sorted(folded, key=lambda row: -row.amplitude)
     ]
-    more = f", and {len(told) - _MOST_FOLDED} further orders" if len(told) > _MOST_FOLDED else ""
+    more = f", and {len(told) - _MOST_FOLDED} more orders" if len(told) > _MOST_FOLDED else ""
     return [
         _entry(
             f"whether {', '.join(told[:_MOST_FOLDED])}{more}",

@@ -177,7 +177,7 @@ def test_a_finding_has_its_own_gain_and_none_is_confirmed_without(
     told = reconsidered_findings(fitted, [*taking, flexible, refused, nothing], MORE)
     assert [f.status for f in told[:6]] == [CONFIRMED] * 6
     assert told[6].status == NOT_CONFIRMED
-    assert "something is unexplained" in told[6].reason
+    assert "part of the error is unexplained" in told[6].reason
     assert (told[7], told[8]) == (refused, nothing)
     assert reconsidered_findings(fitted, [flexible], CALM)[0].confirmed
 

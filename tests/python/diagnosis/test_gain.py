@@ -224,10 +224,14 @@ def test_a_law_is_held_against_each_level_that_was_left_out() -> None:
     ("levels", "held", "words"),
     [
         ((1.0, 2.0), (1.0, 2.0), "fitted at one level was carried to the other"),
-        ((1.0, 2.0), (2.0,), "carried to the other; without the levels not left out it cannot"),
+        ((1.0, 2.0), (2.0,), "carried to the other; it cannot be fitted without the levels"),
         ((1.0, 2.0, 3.0), (1.0, 2.0, 3.0), "carried to levels between and beyond"),
-        ((1.0, 2.0, 3.0), (3.0,), "between and beyond those it was fitted at; without the"),
-        ((1.0, 2.0, 3.0), (2.0,), "carried to levels between those it was fitted at; without"),
+        (
+            (1.0, 2.0, 3.0),
+            (3.0,),
+            "between and beyond those it was fitted at; it cannot",
+        ),
+        ((1.0, 2.0, 3.0), (2.0,), "carried to levels between those it was fitted at; it cannot be"),
     ],
 )
 def test_it_is_said_how_far_a_law_was_carried(levels, held, words) -> None:

@@ -54,7 +54,7 @@ def test_a_search_around_a_table_is_steeper_by_the_slopes_of_both(own, argument,
     wanted = (1e-9 + 1e-3 * 90.0 / ARCSEC) / (1.0 - slope - own) * ARCSEC
     assert rounding == pytest.approx(wanted)
     terms.steepness, terms.kinds = lambda ranges: 1.001 - slope, ("latency",)
-    with pytest.raises(ArgumentError, match="below 1 in all"):
+    with pytest.raises(ArgumentError, match="the sum must be below 1"):
         run_time_bound(TurnPattern(model(unit, argument)), terms, rows)
 
 

@@ -77,7 +77,8 @@ def test_readings_that_lie_over_what_describes_them_are_damage(tmp_path, model):
     source.write_bytes(whole.replace(where, struct.pack("<QQ", 2, 320)))
     report = ta.correct_logs(source, model, tmp_path / "b.h5")
     told = str(report.logs[0].error)
-    assert told.startswith(f"{source}, column 'indicated_deg': is damaged: its readings are others")
+    because = "is damaged: writing corrected readings changes the others"
+    assert told.startswith(f"{source}, column 'indicated_deg': {because}")
     assert not (tmp_path / "b.h5").exists()
 
 

@@ -30,7 +30,7 @@ def test_a_line_in_time_is_told_with_its_size_and_frequency(timed: bool, size: f
     assert found.rms == pytest.approx(size / np.sqrt(2.0), rel=0.15)
     unit = "Hz" if timed else "cycles per reading"
     assert f"a line of {found.at:.5g} {unit}" in found.says
-    assert ("or an alias of it" in found.says) == (not timed)
+    assert ("or an alias" in found.says) == (not timed)
     assert found.looks_like == "a line in time"
 
 
