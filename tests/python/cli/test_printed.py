@@ -184,7 +184,7 @@ def test_join_and_check(desk, capsys):
     told = json.loads(printed(capsys, "check", "j.csv", "--json"))
     text = " ".join(printed(capsys, "check", "j.csv").split())
     found = re.search(
-        r"(\d+) readings in (\d+) run, (\S+) deg of places, (\S+) turns at most", text
+        r"(\d+) readings in (\d+) run, (\S+) deg covered, longest run (\S+) turns\.", text
     )
     wanted = [told["readings"], told["runs"], told["span_deg"], told["turns"]]
     assert [float(x) for x in found.groups()] == pytest.approx(wanted, rel=FOUR)
