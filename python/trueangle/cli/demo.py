@@ -126,8 +126,8 @@ def _diagnosed(seed: int) -> str:
     true = replace(believed, effects=(Backlash(half_width_arcsec=8.0),))
     result = diagnose(simulate(true, seed=seed), believed)
     return (
-        "Where does the error come from? This joint has a backlash of +-8 arcsec that its\n"
-        f"   simulation does not have. The diagnosis of its runs:\n\n{result.summary()}"
+        "Where does the error come from? This joint has a backlash of +-8 arcsec that\n"
+        f"   its simulation does not have. The diagnosis of its runs:\n\n{result.summary()}"
     )
 
 

@@ -19,6 +19,9 @@ from .finding import Finding
 from .levels import UNITS
 from .overlap import finding_overlaps
 
+#: Standard errors by which the size of a cause must differ from zero.
+TOLD = 2.0
+
 #: Share of what can be subtracted at a held-out level above which more is removed than left.
 MORE_THAN_LEFT = 0.5
 
@@ -57,6 +60,29 @@ def _not_carried(finding: Finding) -> str:
     )
 
 
+def _not_told_from_zero(finding: Finding) -> str:
+    """A size within two standard errors of zero."""
+    effect = EFFECTS[finding.cause]
+    name = effect.size_name
+    if name not in finding.parameters:
+        name = next(iter(finding.parameters), "")
+    size = finding.parameters.get(name)
+    if size is None:
+        return ""
+    values, stds = (
+        np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64)))
+        if isinstance(each, int | float) or (isinstance(each, list) and each and _numeric(each))
+        else np.zeros(0)
+        for each in (size.value, size.std)
+    )
+    if values.size == 0 or values.size != stds.size or not (stds > 0.0).all():
+        return ""
+    z = float((values / stds).max())
+    if z >= TOLD:
+        return ""
+    return f"its {name} is {z:.1f} standard errors from zero"
+
+
 def not_the_only_ratio(finding: Finding) -> str:
     """A ratio that is one of several with the same lines at these positions.
 
@@ -77,6 +103,7 @@ def not_the_only_ratio(finding: Finding) -> str:
 #: Every gate, in the order in which reasons are given.
 GATES: tuple[Callable[[Finding], str], ...] = (
     _not_carried,
+    _not_told_from_zero,
     not_the_only_ratio,
 )
 
@@ -136,3 +163,7 @@ def many_causes(findings: Sequence[Finding]) -> str:
     if len(shared) > 1:
         text += f"; {', '.join(shared)} all follow {FOLLOWED[common]}"
     return text
+
+
+def _numeric(values: list[object]) -> bool:
+    return all(isinstance(value, int | float) for value in values)

@@ -68,6 +68,29 @@ def test_a_law_must_carry_to_a_level_left_out(share, low, high, passes):
     assert reason(finding("latency", gain=dataclasses.replace(gain, by_level=None))) == ""
 
 
+@pytest.mark.parametrize(
+    ("parameters", "passes"),
+    [
+        ({"amplitude_arcsec": quantity(4.0, 1.0), "length_deg": quantity(1.0, 2.0)}, True),
+        ({"amplitude_arcsec": quantity(1.9, 1.0), "length_deg": quantity(9.0, 2.0)}, False),
+        ({"amplitude_arcsec": quantity(4.0, None)}, True),
+        ({"amplitude_arcsec": quantity([1.0, 4.0], [1.0, 1.0])}, True),
+        ({"amplitude_arcsec": quantity([1.0, -1.0], [1.0, 1.0])}, False),
+        ({"amplitude_arcsec": quantity(2.01, 1.0)}, True),
+        ({"amplitude_arcsec": quantity(1.99, 1.0)}, False),
+        ({"other_arcsec": quantity(1.0, 1.0), "amplitude": quantity(9.0, 1.0)}, False),
+        ({"amplitude_arcsec": quantity(1.0, 0.0)}, True),
+        ({}, True),
+    ],
+)
+def test_a_size_must_differ_from_zero(parameters, passes):
+    told = reason(finding("presliding_hysteresis", parameters))
+    assert (told == "") == passes
+    assert passes or "standard errors from zero" in told
+    if parameters.keys() == {"amplitude_arcsec", "length_deg"} and not passes:
+        assert told == "its amplitude_arcsec is 1.9 standard errors from zero"
+
+
 @pytest.fixture(scope="module")
 def fitted():
     """Direction, a column that is nearly it, and one of its own, each of three arcsec."""

@@ -34,12 +34,12 @@ def test_a_headline_says_which_line_and_how_large(geared):
     first = " ".join(geared.summary().split())  # at whatever width
     sizes = [f.parameters["amplitude_arcsec"].value for f in geared.findings]
     assert first.startswith(
-        f"Confirmed: missing_order output order 1 ({sizes[0]:.2f} arcsec), missing_order output "
+        f"Confirmed: missing_order output order 1 ({sizes[0]:.3f} arcsec), missing_order output "
         f"order 2 ("
     )
     # One unit for all of a joint.
     in_degrees = geared.summary(errors_in="deg")
-    assert f"order 1 ({sizes[0] / 3600.0:.5f} deg)" in in_degrees
+    assert f"order 1 ({sizes[0] / 3600.0:.6f} deg)" in in_degrees
 
 
 def test_shares_are_of_the_variance_of_the_readings(geared):
@@ -58,10 +58,12 @@ def test_what_was_not_asked_is_one_line(geared):
     text, in_full = geared.summary(), geared.summary(verbose=True)
     assert "whether missing_order is due to torsional_compliance" in text
     assert "no temperature was recorded" not in text
-    (line,) = [x for x in text.split("\n\n")[-1].split("- ")[-1].split("\n") if "Not seen" in x]
+    (line,) = [
+        x for x in text.split("\n\n")[-1].split("- ")[-1].split("\n") if "Not detectable" in x
+    ]
     assert "either: " in line
     assert "no temperature was recorded" in in_full
-    assert "Not seen" not in in_full
+    assert "Not detectable" not in in_full
     # What may have made order 1 is not said of order 2.
     said = [f.parameters["explanations"].value for f in geared.findings]
     assert [any("gravity" in x for x in found) for found in said] == [True, False]

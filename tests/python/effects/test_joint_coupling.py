@@ -82,7 +82,7 @@ def coupled_runs(*ways, **changes):
 
 #: Ways of other joints, and what is said of their couplings.
 COLLINEAR = {
-    "at rest": ([{"a": [10.0]}, {"a": [50.0]}], "joint a stands still in every run"),
+    "at rest": ([{"a": [10.0]}, {"a": [50.0]}], "joint a is at rest in every run"),
     "in proportion": ([{"a": [0.0, 90.0, 0.0]}] * 2, "joint a moves in proportion to this joint"),
     "two alike": (
         [{"a": [0.0, 5.0, 90.0, 7.0], "b": [20.0, 25.0, 110.0, 27.0]}] * 2,

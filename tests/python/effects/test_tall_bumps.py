@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,7 +53,8 @@ def test_a_bump_is_where_it_is_however_tall(height, width):
 
 def test_the_length_of_a_wind_up_is_known_as_well_as_is_told():
     sweep = RunDesign(samples=240, turns=2.0, reversals=(0.2, 0.5, 0.8), speed_deg_s=10.0)
-    sim = Simulation(sigma_arcsec=1.0, harmonics=BASE.harmonics, runs=(sweep,) * 3)
+    runs = (sweep, replace(sweep, speed_deg_s=30.0), sweep)  # of one speed it may be a delay
+    sim = Simulation(sigma_arcsec=1.0, harmonics=BASE.harmonics, runs=runs)
     hidden = [PreslidingHysteresis(25.0, 3.0 + 0.1 * k) for k in range(24)]
     found = pulls(sim, hidden, ("amplitude_arcsec", "length_deg"))
     rms = np.sqrt(np.mean(found**2, axis=0))

@@ -81,7 +81,7 @@ def test_what_the_value_is_added_to_is_the_true_angle(model):
     assert made.max_difference_arcsec < 2.0
     # The check for the operator: by how much the axis moves where the value is largest.
     flowing = made.text.replace("\n; ", " ")
-    place = float(re.search(r"stand at (\S+) deg", flowing)[1])
+    place = float(re.search(r"move to (\S+) deg and switch", flowing)[1])
     moved = float(re.search(r"must move by (\S+) deg", flowing)[1])
     assert moved == pytest.approx(-np.interp(place, places, values), rel=1e-5)
     assert made.text.endswith("M17\n")

@@ -263,7 +263,7 @@ def test_a_shaft_that_does_not_come_back_gets_a_function_of_its_own(joint):
     made = ta.export_model(odd, "c", bits=14)
     assert "_correct(uint32_t indicated)" not in made.text
     assert any("correct_unwrapped takes the turns" in note for note in made.notes)
-    with pytest.raises(ta.errors.ArgumentError, match="shaft motor is not back at its start"):
+    with pytest.raises(ta.errors.ArgumentError, match="shaft motor is not periodic in it"):
         ta.export_model(odd, "csv")
 
 

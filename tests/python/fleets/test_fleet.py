@@ -67,7 +67,7 @@ def test_without_units_the_runs_are_units(runs):
     ]
     found = ta.fleet(plain, orders=[1, 2])
     assert len(found.units) == len(runs)
-    assert any("every run is taken for a unit" in note for note in found.notes)
+    assert any("every run is treated as a unit" in note for note in found.notes)
     assert len(ta.fleet(runs, by="run", orders=[1]).units) == 2
 
 

@@ -50,7 +50,7 @@ def test_a_table_of_entries_is_a_turn(ending, tmp_path):
     np.testing.assert_allclose(run.reference, place)
     model = ta.fit(run, orders=[1, 2]).model
     assert model.amplitudes[0] == pytest.approx(0.5, abs=1e-3)
-    with pytest.raises(FileError, match=r"its unit is not known.*`counts_per_turn=`"):
+    with pytest.raises(FileError, match=r"Its unit is unknown.*`counts_per_turn=`"):
         ta.read_runs(path)
 
 

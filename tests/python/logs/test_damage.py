@@ -149,8 +149,8 @@ CIRCLES = (
     (b"##CG", 0, b"##CG", "leads back to that at"),
     (b"##CN", 0, b"##CN", "leads back to that at"),
     (b"##FH", 0, b"##FH", "leads back to that at"),
-    (b"##HD", 0, b"##HD", "where no DG block stands"),
-    (b"##DG", 1, b"##DG", "where no CG block stands"),
+    (b"##HD", 0, b"##HD", "where there is no DG block"),
+    (b"##DG", 1, b"##DG", "where there is no CG block"),
 )
 
 

@@ -309,7 +309,9 @@ def test_packed_files_of_a_bag_share_the_limit(tmp_path, monkeypatch):
     with folder:
         assert {name: Path(folder.name, name).stat().st_size for name in sizes} == sizes
     monkeypatch.setenv("TRUEANGLE_UNPACKED_BYTES", "349")
-    with pytest.raises(FileError, match=r"may take 349 bytes together") as told:
+    with pytest.raises(
+        FileError, match=r"above the limit of 349 bytes for the files of a bag"
+    ) as told:
         unpacking.unpacked_folder(tmp_path)
     assert "c.db3.zstd" in str(told.value)
     assert list(work.iterdir()) == []

@@ -214,7 +214,7 @@ def test_what_cannot_be_watched_is_refused():
     with pytest.raises(ArgumentError, match="no orders to watch"):
         ta.Monitor(ta.HarmonicModel([], period=360.0))
     motor = ta.HarmonicModel([ta.Shaft("motor", 7.3, [1], [0.1], [0.0])], period=360.0)
-    with pytest.raises(ArgumentError, match="does not come back"):
+    with pytest.raises(ArgumentError, match="not periodic in one output turn"):
         ta.Monitor(motor)
     high = ta.HarmonicModel([ta.Shaft("output", 1, [5000], [1e-6], [0.0])], period=360.0)
     with pytest.raises(ArgumentError, match="above 4096"):

@@ -164,7 +164,7 @@ def test_less_than_a_turn_of_the_motor_is_refused_with_what_to_record(turns, tmp
         told = " ".join(capsys.readouterr().err.split())
         assert re.search(rf"short.csv: the motor made only {turns:.2g} turns", told)
         assert not out.exists()
-        advice = re.search(r"record more: trueangle (.+) plans the travel$", told)
+        advice = re.search(r"Record more: trueangle (.+) plans the travel$", told)
         assert main(advice[1].split()) == 0
         assert re.search(r"turns +3\n", capsys.readouterr().out)
 

@@ -100,7 +100,7 @@ def test_where_nothing_is_confirmed_nothing_is_written(tmp_path, capsys):
     sensor = tmp_path / "sensor.xml"
     more = ["--simulated", log, "--extend-into", str(sensor)]
     assert main(["diagnose", real, *more]) == 1
-    assert "nothing was confirmed" in capsys.readouterr().err
+    assert "no confirmed cause can be corrected" in capsys.readouterr().err
     assert not sensor.exists()
     assert main(["diagnose", real, "--simulated", log, "--extend-into", "sensor.csv"]) != 0
 

@@ -179,7 +179,7 @@ def _jumps(degrees: Array, error: Array) -> list[tuple[float, float, int]]:
     Of all gaps between places that whose ramp, less its own low orders, explains most, and then the
     next: a sensor that does not use all of its counts jumps where they begin, a facet at both ends.
     """
-    places = np.unique(np.mod(degrees, 360.0))
+    places = np.unique(np.round(degrees, 9) % 360.0)
     if places.size <= 2 * LOW + 2:
         return []
     after = np.append(places[1:], places[0] + 360.0)
@@ -194,9 +194,12 @@ def _jumps(degrees: Array, error: Array) -> list[tuple[float, float, int]]:
             if tried.size < 3 or tried[-1] - tried[0] == tried.size - 1:
                 break
             tried = np.arange(tried[max(k - 1, 0)], tried[min(k + 1, tried.size - 1)] + 1)
+        ramp = ramps[:, k] / max(float(np.linalg.norm(ramps[:, k])), 1e-6)
+        size = float(ramp @ left)
+        if not size**2 > 2.0 * STANDS_OUT * float(left @ left) / left.size:
+            break  # noise makes as much of one of many gaps
         found.append(int(tried[k]))
-        ramp = ramps[:, k]
-        left = left - ramp * (ramp @ left) / max(float(ramp @ ramp), 1e-12)
+        left = left - size * ramp
     return [(float(places[k]), float(after[k]), places.size) for k in found]
 
 
