@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         raise ArgumentError(f"--rate must be positive, got {args.rate!r}")
     choices = Choices(
         signals_of_both(args.signal),
-        source_options(args),
+        source_options(args, args.sources),
         (args.counts_per_turn, args.counts_per_turn_reference),
         args.rate,
         math.inf if args.seconds is None else args.seconds,

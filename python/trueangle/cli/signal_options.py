@@ -204,10 +204,21 @@ def add_source_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def source_options(args: argparse.Namespace) -> SourceOptions:
-    """What sources are opened with."""
-    from ..recording.sources import SourceOptions
+def source_options(args: argparse.Namespace, addresses: Sequence[str]) -> SourceOptions:
+    """What the sources at some addresses are opened with.
 
+    Raises
+    ------
+    ArgumentError
+        An option of another kind of source, or a baud rate that is none.
+    """
+    from ..recording.sources import SourceOptions, kind_of
+
+    kinds = {*map(kind_of, addresses)}
+    for name, kind, of in (("baud", "port", "a serial port"), ("dbc", "can", "a CAN bus")):
+        # An unknown source is refused by itself.
+        if getattr(args, name) is not None and kinds.isdisjoint((kind, "")):
+            raise ArgumentError(f"--{name} is for {of}; SOURCE is {addresses[0]}")
     baud = 115200 if args.baud is None else args.baud
     if baud < 1:
         raise ArgumentError(f"--baud must be positive, got {baud}")

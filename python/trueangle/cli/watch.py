@@ -140,7 +140,7 @@ def _batches(
             args, ("baud", "dbc", "pattern", "send"), "is for lines that arrive: SOURCE is a file"
         )
         return read_batches(Path(args.log), model, options)
-    return watched_batches(args.log, model, options, source_options(args))
+    return watched_batches(args.log, model, options, source_options(args, [args.log]))
 
 
 def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace) -> str:

@@ -388,6 +388,8 @@ WRONG = {
     "silent.fifo": "silent.fifo: nothing has come; does it send? --send",
     "tcp://127.0.0.1": "tcp://HOST:PORT or udp://:PORT is needed",
     "words.txt": "words.txt: no line that is a row has come, 5 lines rejected (o.csv.rejected); is",
+    "words.txt --baud 9600": "--baud is for a serial port; SOURCE is words.txt",
+    "PORT --dbc a.dbc": "--dbc is for a CAN bus; SOURCE is /dev/",
     "words.txt --send go": "send: nothing can be sent to words.txt",
     "PORT words.txt --signal a.indicated=enc:deg": "words.txt: no line that is a row has come",
 }
