@@ -156,7 +156,7 @@ pub enum Error {
 
     /// `indicated = theta + error(theta)` cannot be inverted.
     #[error(
-        "the error's slope reaches {slope:.6}: at 1 or more the indicated angle stands for several true angles and cannot be corrected"
+        "the error's slope reaches {slope:.6}: at 1 or more one indicated angle has several true angles and cannot be corrected"
     )]
     NotInvertible {
         /// A bound of `|d error / d angle|` that the model may reach.

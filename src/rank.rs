@@ -113,7 +113,7 @@ impl Dependence {
             format!("the {part} of {own} is the same at every angle of a run, like its zero")
         } else {
             let others = name(design, &orders_of(design, &self.partners));
-            format!("{own} cannot be told from {others} at these angles")
+            format!("{own} cannot be distinguished from {others} at these angles")
         }
     }
 }

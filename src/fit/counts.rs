@@ -27,7 +27,7 @@ const LANES: usize = 8;
 static ZEROS: [f64; CHUNK] = [0.0; CHUNK];
 static ONES: [f64; CHUNK] = [1.0; CHUNK];
 
-/// Whole numbers beyond this are not told from others by rounding.
+/// Whole numbers beyond this cannot be distinguished after rounding.
 const FARTHEST: f64 = (1u64 << 50) as f64;
 
 /// One mean error per count that was read.

@@ -169,7 +169,7 @@ impl Newton<'_> {
     }
 }
 
-/// Of every sample the last step after which the angle cannot be told from the solution.
+/// Of every sample the last step after which the angle equals the solution to rounding.
 struct Limits<'a> {
     indicated: &'a [f64],
     reach: f64,

@@ -25,7 +25,7 @@ pub struct Robust {
 /// CR2 of Bell and McCaffrey with their degrees of freedom, `sums.moment` the scores `X' W e`
 /// about the common fit and `penalty` what a ridge added to the diagonal.
 ///
-/// None where the clusters together do not tell all coefficients apart.
+/// None where the clusters together do not determine all coefficients.
 pub fn cluster_covariance(clusters: &[Sums], penalty: f64) -> Option<Robust> {
     let (count, first) = (clusters.len() as f64, clusters.first()?);
     let n = first.moment.len();

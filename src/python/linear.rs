@@ -152,7 +152,7 @@ pub fn cluster_covariance<'py>(
 ) -> PyResult<(Matrix<'py>, Bound<'py, PyArray1<f64>>)> {
     let clusters = sums(&grams, &scores, &vec![0.0; scores.shape()[0]])?;
     let found = detached(py, || linear::cluster_covariance(&clusters, penalty))?;
-    let found = told(py, found, "the clusters do not tell all coefficients apart")?;
+    let found = told(py, found, "the clusters do not determine all coefficients")?;
     Ok((rows(py, &found.covariance)?, vector(py, &found.freedom)?))
 }
 

@@ -254,13 +254,13 @@ REFUSALS: dict[str, tuple[Callable[[], list[ta.CalibrationRun]], list[str], str,
     "not told apart": (
         coarse,
         ["fit", "R", "-o", "m.json", "--orders", "1,37"],
-        "cannot be told from",
+        "cannot be distinguished from",
         "orders",
     ),
     "not told apart, other names": (
         coarse,
         ["fit", "R", "-o", "m.json", "--orders", "1,37", "--signal", "indicated=indicated_deg:deg"],
-        "cannot be told from",
+        "cannot be distinguished from",
         "orders",
     ),
     "no motion to calibrate by": (

@@ -113,7 +113,7 @@ def test_rank_deficiency_names_the_orders():
     moments.update(theta, np.cos(np.radians(theta)))
     with pytest.raises(RankError, match="sine of order 18 is zero"):
         moments.solve([1, 18])
-    with pytest.raises(RankError, match="order 20 cannot be told from order 16"):
+    with pytest.raises(RankError, match="order 20 cannot be distinguished from order 16"):
         moments.solve([16, 20])
     assert moments.solve([1, 16]).cosine == pytest.approx([1, 0], abs=1e-12)
 
