@@ -103,10 +103,10 @@ def short_report(study: Study) -> str:
             between = f"{whole:4.0f} -> {left:3.0f} ({found.in_between:+.0f} %)"
             lines.append(f"  {name} {what:21}  {there:18}  {between}")
 
-    add(study.published, "as published")
-    add(study.gear, "gear orders instead")
+    add(study.published, "of the paper")
+    add(study.gear, "of the gear")
     lines.append("  The 36 readings of both are the same: only other positions separate them.")
-    add(study.planned, f"read {offset} deg apart too")
+    add(study.planned, "of the gear, 2 mounts")
     lines.append(
         f"  `ta.plan_mounts(gear_ratio=100)`: mounts at 0 and {offset} deg, "
         f"noise factor {plan.worst_noise_factor:.2f}"

@@ -72,8 +72,8 @@ def joints_asked(args: argparse.Namespace) -> tuple[str, list[JointAsked]] | Non
     if args.robot is None and not named:
         if args.joint:
             raise ArgumentError(
-                "--joint names one of several joints: give the robot file with --robot FILE, or "
-                "columns with --signal JOINT.ROLE=NAME"
+                "--joint needs a file of several joints: add --robot FILE, or name their columns "
+                "with --signal JOINT.ROLE=NAME"
             )
         return None
     from ..joint.description import JointDescription, RobotDescription, load_description

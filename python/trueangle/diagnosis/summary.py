@@ -39,7 +39,7 @@ def diagnosis_summary(
         f"{n(d.peak_to_peak)}, max abs {n(d.max_abs)} ({diagnosis.readings} readings).",
         f"Noise of one reading: {unit.text(diagnosis.noise)}"
         + (
-            f", correlated by {diagnosis.correlation:.2f} from one to the next."
+            f", correlation between neighbours {diagnosis.correlation:.2f}."
             if diagnosis.correlation
             else "."
         ),
@@ -115,7 +115,7 @@ def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
         if not factor.named_by:
             lines += _wrapped(f"Follows {factor.sentence(unit)}.", 2)
     if doubtful:
-        lines += _wrapped(f"Listed and not confirmed: {', '.join(doubtful)}.", 2)
+        lines += _wrapped(f"Not confirmed: {', '.join(doubtful)}.", 2)
     if wrong:
         told = "; ".join(f"{b.what} {b.verdict.replace('_', ' ')}" for b in wrong[:4])
         lines += _wrapped(f"Wrong in the simulation: {told}.", 2)
@@ -126,7 +126,7 @@ def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
     if lines:
         for item in noise:
             if item.test == AGAINST_STATED:
-                lines += _wrapped(f"{item.says[0].upper()}{item.says[1:]}.", 2)
+                lines += _wrapped(f"{unit.spoken(item.says[0].upper() + item.says[1:])}.", 2)
     elif noise:
         lines = ["No pattern beyond the simulation, but the noise differs:"]
         for item in noise:

@@ -28,7 +28,7 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
         ("argument", f"{model.argument} angle"),
         ("zero", zero_text(model.constant, model.period) + _spread(fit, shown)),
         ("residual", f"{left}, {fit.degrees_of_freedom:.6g} degrees of freedom"),
-        ("solved by", f"{fit.method}, condition number {fit.condition_number:.3g}"),
+        ("method", f"{fit.method}, condition number {fit.condition_number:.3g}"),
     ]
     if model.covariance is not None:
         head.append(("intervals", _intervals(fit)))
@@ -81,13 +81,13 @@ def _intervals(fit: FittedCoefficients) -> str:
     least, most = float(found.freedom.min()), float(found.freedom.max())
     near, far = (student_quantile(0.975, v) for v in (most, least))
     times = f"{far:.3g}" if far < near + 0.05 else f"{near:.3g} to {far:.3g}"
-    held = " and what the ridge may have taken" if fit.ridge > 0.0 else ""
+    held = ", with the bias of the ridge" if fit.ridge > 0.0 else ""
     return f"95 % within {times} standard errors, {_KINDS[found.kind]}{held}"
 
 
 _KINDS = {
-    "white": "white noise",
-    "evidence": "noise of any correlation and what else it may be, by evidence",
+    "white": "for white noise",
+    "evidence": "with correlated noise and the choice of orders allowed for",
     "cluster": "by the scatter between runs",
     "hac": "by the scatter of segments of the readings",
 }

@@ -176,8 +176,8 @@ def _judged_fleet(
         )
     elif chosen.deviates.outlying.any():
         notes.append(
-            f"{int(chosen.deviates.outlying.sum())} of {n} units are outliers, more than damage "
-            "explains: is the fleet of several designs? They are counted in its spread and limits."
+            f"{int(chosen.deviates.outlying.sum())} of {n} units are outliers, too many for "
+            "damage: probably several designs. All units are included in the spread and limits."
         )
     names = [(shaft.name, k) for shaft in units.shafts for k in shaft.orders]
     repeats = _repeatability(units)

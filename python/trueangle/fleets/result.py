@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _TESTED = (
-    "  p: probability that a sound unit deviates, or changes, this much. Below the limit "
-    "it is reported; 1 % of sound fleets have such a unit"
+    "  p: probability that a sound unit deviates, or changes, this much. A unit with p below "
+    "the limit is reported; 1 % of sound fleets have such a unit"
 )
 
 #: Units that are fine of which the sizes are listed.
@@ -215,7 +215,7 @@ def _fleet_summary(fleet: Fleet, errors_in: ErrorsIn = "auto") -> str:
     if told:
         lines.append("")
     lines += [
-        f"  {'unit':<{width}}  verdict      peak-to-peak      left        p    limit",
+        f"  {'unit':<{width}}  verdict      peak-to-peak  residual        p    limit",
         f"  {'':<{width}}  {'':<11}  {shown.name:>12} {shown.name:>9}",
     ]
     listed = fleet.units[: len(odd) + _LISTED]
@@ -254,13 +254,13 @@ def _tolerance(fleet: Fleet, shown: ErrorUnit, scale: float) -> str:
     if bound.method == "none":
         return "  tolerance limits need two units at least"
     how = (
-        "by ranks, whatever the distribution"
+        "by ranks, for any distribution"
         if bound.method == "wilks"
-        else f"for normal logarithms, factor {bound.factor:.4g}"
+        else f"for a log-normal distribution, factor {bound.factor:.4g}"
     )
     return (
         f"  {100 * bound.share:g} % of units stay below {shown.text(scale * bound.peak_to_peak)} "
-        f"peak-to-peak and {shown.text(scale * bound.left)} left after correction, with "
+        f"peak-to-peak and {shown.text(scale * bound.left)} residual after correction, with "
         f"{100 * bound.confidence:g} % confidence ({how})"
     )
 

@@ -182,7 +182,7 @@ def _search(path: object, header: Sequence[str], joint: str | None) -> str:
         guess = next(filter(None, guesses), "")
         raise FileError(
             path,
-            f"{problem}: name the angle with `column=`{guess}; {listed_columns(header)}",
+            f"{problem}: name the angle's column with `column=`{guess}; {listed_columns(header)}",
             line=1,
         )
     for candidates in _joint_names(joint):

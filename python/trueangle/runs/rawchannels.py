@@ -17,6 +17,7 @@ from ..errors import ArgumentError
 from ..support.angles import check_period, checked_sign
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
+from ..support.display_units import ErrorUnit
 
 #: Names of the constants, in the order of their covariance.
 CONSTANTS: Final = ("offset_cosine", "offset_sine", "amplitude", "gain_ratio", "phase_deg")
@@ -280,10 +281,9 @@ class Channels:
             "phase_deg": "phase error, deg",
         }
         lines = [f"{'channels':24s} {'value':>12s} {'+-':>10s}"]
-        lines += [
-            f"{words:24s} {rows[name]['value']:12.6g} {rows[name]['std']:10.2g}"
-            for name, words in names.items()
-        ]
+        for name, words in names.items():
+            value, std = ErrorUnit("", 1.0).pair(*rows[name].values())
+            lines.append(f"{words:24s} {value:>12s} {std:>10s}")
         lines += [
             f"harmonic {h.order:<15d} {abs(complex(h.re, h.im)):12.5f} {h.std:10.2g}"
             for h in self.harmonics

@@ -337,10 +337,10 @@ def _changes(runs: Sequence[tuple[str, Channels]], known: bool) -> Iterable[Chan
             magnet = abs(_second(after) - _second(before))
         amplitude = math.log(size / was)
         sizes = {
-            "sensor_eccentricity": (sensor, "the sensor moved across the axis, or its gains"),
+            "sensor_eccentricity": (sensor, "the sensor moved off the axis, or the gains changed"),
             "magnet_eccentricity": (
                 magnet,
-                "the magnet moved across its axis" + ("" if known else ", or the offsets"),
+                "the magnet moved off the axis" + ("" if known else ", or the offsets changed"),
             ),
             "gap": (
                 abs(amplitude) / _AMPLITUDE,
@@ -350,7 +350,7 @@ def _changes(runs: Sequence[tuple[str, Channels]], known: bool) -> Iterable[Chan
         cause = max(sizes, key=lambda name: sizes[name][0])
         std = float(np.hypot(_stds(before), _stds(after))[:4].max())
         if sizes[cause][0] > max(_SURE * std, _LEAST):
-            says = f"run {label} against run {base}: {sizes[cause][1]}"
+            says = f"run {label} compared with run {base}: {sizes[cause][1]}"
             yield ChannelChange(label, cause, sensor, magnet, amplitude, says)
 
 

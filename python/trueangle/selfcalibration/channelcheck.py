@@ -171,8 +171,8 @@ def channel_faults(
         add(
             "no_centre",
             f"the channels do not go round zero but about {y:.6g} (sine) and {x:.6g} (cosine): "
-            "readings of a converter without a middle",
-            "nothing: the middle is estimated and subtracted",
+            "their values are not centred on zero",
+            "nothing: the offsets are estimated and subtracted",
         )
     if agreement < 0.0:
         add(

@@ -48,7 +48,7 @@ def channel_patterns(
     angles = [_unwrapped(channels, *pair) for pair in pairs]
     turns = sum(float(np.ptp(angle)) for angle in angles) / period
     diagnosis = channel_diagnosis(recordings, found)
-    apart = [f"{change.says}; calibrate each run alone" for change in diagnosis.changes]
+    apart = ["the curves of the runs differ: calibrate each run alone"] if diagnosis.changes else []
     faults = channel_faults(found, recordings, 0.0)
     notes = [followed, *(f"{fault.says}; {fault.mend}" for fault in faults), *apart]
     if found.correlated > 1.0:

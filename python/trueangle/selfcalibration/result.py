@@ -256,6 +256,8 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
         f"{answer}calibrated without a reference ({result.method}): {result.readings} readings, "
         f"{result.turns:.1f} turns, noise {unit.text(result.noise_arcsec)}",
     ]
+    if result.diagnosis is not None:
+        lines = [*result.diagnosis.lines(), "", *lines]
     if result.channels is not None:
         lines += ["", *_constants(result, unit)]
     if result.orders:
@@ -264,7 +266,7 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
         lines += ["", "not the encoder's alone:", *_table(result.sums, unit)]
     lines += ["", "cannot be identified"]
     for blind in result.blind:
-        lines += wrapped_lines(f"{blind_words(blind.orders)}: {blind.because}", 4, 2)
+        lines += wrapped_lines(unit.spoken(f"{blind_words(blind.orders)}: {blind.because}"), 4, 2)
         lines += wrapped_lines(f"to see it: {blind.measure}", 6, 4)
     if result.held_out:
         lines += ["", "held out"]
@@ -286,11 +288,9 @@ def _constants(result: SelfCalibration, unit: ErrorUnit) -> list[str]:
     sense = "rises" if result.channels.direction > 0 else "falls"
     if result.limit_arcsec is not None and result.coverage_deg is not None:
         lines.append(
-            f"the phase {sense} with the angle; {result.coverage_deg:.0f} deg of the period are "
-            f"covered; the constants determine the angle to {unit.text(result.limit_arcsec)}"
+            f"standard error of the angle from these constants: {unit.text(result.limit_arcsec)}; "
+            f"{result.coverage_deg:.0f} deg of the period covered; phase {sense} with the angle"
         )
-    if result.diagnosis is not None:
-        lines += result.diagnosis.lines()
     return lines
 
 

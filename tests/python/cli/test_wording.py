@@ -188,8 +188,8 @@ ASKED = {
     "an angle of a log": (
         lambda: corrected("q.csv", MODEL, "o.csv"),
         "correct q.csv -m m.json -o o.csv",
-        "name the angle with `column=`",
-        "name the angle with --column",
+        "name the angle's column with `column=`",
+        "name the angle's column with --column",
     ),
     "where to": (
         lambda: ta.correct_logs("r.csv", MODEL),

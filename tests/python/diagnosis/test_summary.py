@@ -103,7 +103,7 @@ def test_the_account_says_each_of_its_numbers_in_one_unit(result, unit, per_arcs
     assert told(rf"rms # {unit}, peak-to-peak #, max abs # \(600 readings\)") == pytest.approx(
         [81.0, 82.0, 83.0], **close
     )
-    assert told(rf"Noise of one reading: # {unit}, correlated by 0.42") == pytest.approx(
+    assert told(rf"Noise of one reading: # {unit}, correlation between neighbours 0.42") == pytest.approx(
         [77.0], **close
     )
     assert told(

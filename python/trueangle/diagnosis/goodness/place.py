@@ -109,7 +109,7 @@ def _step(left: Leftover) -> float:
 
 def _modulators(left: Leftover) -> list[_Modulator]:
     ones = np.ones(len(left))
-    text = "comes back at the same place in run after run"
+    text = "repeats at the same places"
     found = [_Modulator("place", ones, text, "depends on place")]
     moving = left.direction[left.direction != 0.0]
     both = moving.size > 0 and np.ptp(moving) > 0.0

@@ -171,6 +171,6 @@ def _against_stated(e: Array, noise: Noise, stated: float) -> Evidence:
         ratio,
         2.0 * normal_tail(abs(z)),
         f"the noise of one reading is {noise.sigma:.3g} arcsec where the simulation states "
-        f"{stated:.3g}",
+        f"{stated:.3g} arcsec",
         decides=False,
     )

@@ -83,7 +83,7 @@ class EvidenceSelection:
             if self.sums.units < len(self.units):
                 self.holdout = f"one of {self.sums.units} groups of runs at a time"
         else:
-            self.holdout = "whole blocks of neighbouring positions (single run)"
+            self.holdout = "blocks of neighbouring positions of the single run"
             parts = folds_of_run(units[0], self.positions) if len(units) == 1 else []
             self.folds = harmonic_sums(parts, self.orders) if parts else None
 

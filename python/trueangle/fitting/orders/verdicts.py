@@ -163,7 +163,7 @@ def selection_notes(
         if share > _UNDER_SAMPLED:
             notes.append(
                 f"{100.0 * share:.0f} % of the energy lies in the upper half of the orders that "
-                "these positions hold: the mark of orders beyond them"
+                "these positions resolve: there are probably higher orders that alias to them"
             )
     if aliased:
         notes.append(_sentence(positions, candidates))

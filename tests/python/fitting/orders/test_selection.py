@@ -32,7 +32,7 @@ def runs_of(
 @pytest.mark.parametrize(
     ("count", "mounts", "holdout", "zeros"),
     [
-        (1, 1, "whole blocks of neighbouring positions (single run)", 1),
+        (1, 1, "blocks of neighbouring positions of the single run", 1),
         (3, 1, "one run at a time", 3),
         (1, 3, "one mount at a time", 3),
         (3, 2, "one mount at a time", 6),
