@@ -4,6 +4,7 @@ PYTHON ?= .venv/bin/python
 
 .PHONY: check quick format lint types stub rust python docs bench develop aarch64 fuzz mutants sample
 .PHONY: looks transcripts nightly exam walks asan kills pythons readings chance chance-core pulls
+.PHONY: rehearse version
 
 # Damaged files for each loader, and loaders at a time: `make fuzz CASES=1000000 JOBS=2`.
 CASES ?= 20000
@@ -98,6 +99,12 @@ chance-core:        ## the same in the core, all in one build
 
 pulls:              ## errors that are stated and p values by SEEDS seeds, as a table
 	$(PYTHON) tests/pulls --seeds $(SEEDS)
+
+version:            ## VERSION=0.3.0 everywhere, and the changelog's heading
+	$(PYTHON) .ci/version $(VERSION)
+
+rehearse:           ## all of a release but the upload: artefacts, metadata, an installation without Rust
+	$(PYTHON) .ci/rehearse
 
 pythons:            ## the wheel tried on every Python that is to be had here
 	rm -rf target/tried

@@ -16,6 +16,7 @@ from trueangle.errors import LargeModelWarning
 from trueangle.model import writing
 
 SAVED = Path(__file__).parent / "saved"
+MODELS = [path for path in sorted(SAVED.glob("model-*.json")) if "corrected" not in path.stem]
 
 # Both versions solve to 1e-12 of a turn of 360 degrees.
 SOLVED = 2 * 360e-12
@@ -24,7 +25,7 @@ SOLVED = 2 * 360e-12
 MOVED = 2.5
 
 
-@pytest.mark.parametrize("path", sorted(SAVED.glob("model-*0550211.json")), ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
 def test_models_of_before_correct_as_they_did(path, tmp_path):
     model = ta.load_model(path)
     then = json.loads((SAVED / f"{path.stem}-corrected.json").read_text())
@@ -44,6 +45,17 @@ def test_models_of_before_correct_as_they_did(path, tmp_path):
     then, again = json.loads(path.read_text()), json.loads((tmp_path / "again.json").read_text())
     assert again["terms"] == then["terms"]
     assert again["shafts"] == then["shafts"]
+
+
+def test_robots_and_fleets_of_before_are_what_they_were():
+    robot = ta.load_robot(SAVED / "robot-0.2.0-91f1b46c.json")
+    then = [9.979510880413214, 200.0150818229647]
+    np.testing.assert_allclose(robot.correct([10.0, 200.0]), then, rtol=0, atol=SOLVED)
+    fleet = ta.load_fleet(SAVED / "fleet-0.2.0-91f1b46c.json")
+    assert [unit.verdict for unit in fleet.units] == ["fine"] * 4
+    first, fourth = fleet.common
+    assert (first.order, first.std, fourth.order) == (1.0, 0.0009081828834635185, 4.0)
+    assert fleet.prior.units == 4
 
 
 @pytest.mark.parametrize("path", sorted(SAVED.glob("simulation-*.toml")), ids=lambda p: p.stem)

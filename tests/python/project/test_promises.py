@@ -29,25 +29,3 @@ def test_every_part_of_the_night_has_a_job() -> None:
     assert sorted(parts) == sorted(jobs)
     for part in parts:
         assert re.search(rf"^{part}:.*##", makefile, re.MULTILINE), part
-
-
-def test_the_version_is_one_everywhere() -> None:
-    import tomllib
-
-    from trueangle import _core
-
-    cargo = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))
-    version = cargo["package"]["version"]
-    assert _core.__version__ == version
-    assert cargo["dependencies"]["trueangle-table"]["version"] == version
-    table = tomllib.loads((ROOT / "src" / "table" / "Cargo.toml").read_text(encoding="utf-8"))
-    assert table["package"]["version"] == version
-    locked = tomllib.loads((ROOT / "Cargo.lock").read_text(encoding="utf-8"))["package"]
-    own = [package for package in locked if package["name"].startswith("trueangle")]
-    assert {package["version"] for package in own} == {version}
-    log = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
-    released = re.findall(r"^## \[(\d\S*)\] - (\S+)$", log, re.MULTILINE)
-    assert released[0][0] == version
-    cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert f"\nversion: {version}\n" in cited
-    assert f"\ndate-released: {released[0][1]}\n" in cited

@@ -10,6 +10,7 @@ from conftest import ROOT
 
 sys.path.insert(0, str(ROOT / "docs"))
 import causes
+import interface
 import reference_pages
 
 FOLDER = ROOT / "docs" / "reference"
@@ -36,6 +37,11 @@ def test_the_pages_list_everything_that_the_package_shows():
     listed = {reference_pages.imported(name) for _, name in LISTED if callable_(name)}
     shown = {name: getattr(ta, name) for name in ta.__all__ if callable(getattr(ta, name))}
     assert [name for name, what in shown.items() if what not in listed] == []
+
+
+def test_the_page_of_the_interface_has_what_the_code_has():
+    page = interface.PAGE.read_text(encoding="utf-8")
+    assert interface.written(page) == page, "meant? `python docs/interface.py`, then read it"
 
 
 def callable_(name):
