@@ -294,7 +294,8 @@ def printed(folder: Path) -> Iterator[str]:
         before = np.sqrt(np.mean([centred(run)[1].var() for run in runs]))
         readings = ", ".join(dict.fromkeys(str(len(run.indicated)) for run in runs))
         yield f"{where}. {len(runs)} runs of {readings} readings;"
-        yield f"{before:.4g} arcsec rms uncorrected; declared orders {', '.join(map(str, source.orders))}."
+        yield f"{before:.4g} arcsec rms uncorrected; declared orders"
+        yield f"{', '.join(map(str, source.orders))}."
         yield ""
         columns = ["from 1 run", f"from {len(runs) - 1} runs"]
         yield from table(columns, list(judged(runs, source.orders)))
