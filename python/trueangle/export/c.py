@@ -23,6 +23,7 @@ class CHeader(PortableTarget):
     """Target ``c``: for any microcontroller with a C99 compiler."""
 
     name = "c"
+    decodes = True
     what = "a C99 header with tables and one inline function per shaft"
     kind: ClassVar[FileKind] = FileKind("a C header", (".h", ".hpp", ".txt"))
 

@@ -52,13 +52,7 @@ class Chain:
         """``part`` with the constants of the channels; empty without them."""
         if self.channels is None:
             return ""
-        *numbers, factor = self.channels.constants
-        names = ("offset_cosine", "offset_sine", "per_cosine", "per_sine", "slope")
-        values = dict(
-            zip(names, numbers, strict=True), factor=factor / self.channels.period * 2**32
-        )
-        literals = {name: float_literal(value, 17) for name, value in values.items()}
-        return filled_code(part, **literals)
+        return decoding(self.channels, part, 2.0**32)
 
     @property
     def whole(self) -> bool:
@@ -93,6 +87,14 @@ class Chain:
         """What is subtracted in all, in turns."""
         taken = np.asarray(places).astype(np.int64) - self.corrected_unwrapped(places, contracted)
         return np.asarray(taken / TURN)
+
+
+def decoding(channels: Channels, part: str, turn: float) -> str:
+    """``part`` of a program with the constants of channels; a turn is ``turn``."""
+    *numbers, factor = channels.constants
+    names = ("offset_cosine", "offset_sine", "per_cosine", "per_sine", "slope")
+    values = dict(zip(names, numbers, strict=True), factor=factor / channels.period * turn)
+    return filled_code(part, **{name: float_literal(v, 17) for name, v in values.items()})
 
 
 #: Turns after which shafts may be back together, and those looked at of shafts that never are.

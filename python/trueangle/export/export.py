@@ -106,7 +106,8 @@ def export_model(
     if "name" in given and given["name"] is None:
         given["name"] = "angle"
     pattern = TurnPattern(loaded.in_sensor_sense() if found.at_sensor else loaded)
-    holds_any = any(map(found.holds, pattern.left_out)) or found.may_be_empty(given)
+    decodes = found.decodes and pattern.source.channels is not None
+    holds_any = any(map(found.holds, pattern.left_out)) or decodes or found.may_be_empty(given)
     if pattern.is_empty and not holds_any:
         raise ArgumentError(
             "the model has no harmonics and nothing else that follows the angle: there is nothing "

@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 from xml.sax.saxutils import quoteattr
 
+import numpy as np
+
 from .._core import __version__
 from ..errors import ArgumentError
 from ..model.file import embedded_model
@@ -24,6 +26,7 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.writing import model_text
 from ..support.files import FileKind
+from .chain import decoding
 from .codetext import code_file, code_parts, filled_code
 from .cstep import DOUBLE, c_search, c_state, wave_tables
 from .pattern import TurnPattern
@@ -60,11 +63,13 @@ class Fmu(Target):
     kind: ClassVar[FileKind] = FileKind("a functional mock-up unit", (".fmu",))
     sign = "subtract"
     arithmetic_known = False
+    decodes = True
     options = {
         "variant": Option(
             ("correction", "sensor"),
             "correction",
-            "correction: indicated in, true_angle out; sensor: true_angle in, indicated out",
+            "correction: indicated (or sine and cosine) in, true_angle out; sensor: true_angle in, "
+            "indicated out",
         ),
         "noise_std": Option(float, 0.0, "of a sensor: white noise, standard deviation in rad"),
         "fmi": Option(("3", "2"), "3", "version of the standard"),
@@ -112,6 +117,7 @@ class Fmu(Target):
             floor_arcsec=0.0,
             lost=list,
             notes=tuple(notes),
+            decodes=not sensor and model.channels is not None,
             bits=12,
             packed=lambda text: _packed(model, variables, sensor, options["fmi"], text),
         )
@@ -228,9 +234,16 @@ def variables_of(model: HarmonicModel, sensor: bool, noise_std: float = 0.0) -> 
     true = "true angle of the joint"
     said = "angle that its encoder indicates"
     first, last = (("true_angle", true), ("indicated", said))[:: 1 if sensor else -1]
-    rows = [
-        ("time", "independent", "continuous", "s", 0.0, "time"),
-        (first[0], "input", "continuous", "rad", 0.0, first[1]),
+    rows = [("time", "independent", "continuous", "s", 0.0, "time")]
+    if sensor or model.channels is None:
+        rows.append((first[0], "input", "continuous", "rad", 0.0, first[1]))
+    else:
+        starts = model.channels.curve(np.zeros(1))
+        rows += [
+            (name, "input", "continuous", "", float(start[0]), f"{name} channel of its encoder")
+            for name, start in zip(("sine", "cosine"), starts, strict=True)
+        ]
+    rows += [
         ("velocity", "input", "continuous", "rad/s", 0.0, "velocity of the joint"),
         ("torque", "input", "continuous", "N.m", 0.0, "torque at the output"),
         ("temperature", "input", "continuous", "K", 293.15, "temperature of the joint"),
@@ -271,6 +284,10 @@ def fmu_source(
         late = f" + signals->velocity * {DOUBLE.number(terms.delay)}" if terms.delay else ""
         core.append(_part("correct", start=start, late=late))
     by_name = {variable.name: variable.reference for variable in variables}
+    reading = "me->value[1] / turn"
+    if "sine" in by_name and model.channels is not None:
+        core.append(decoding(model.channels, _part("channels"), 1.0))
+        reading = "m_decoded(me->value[1], me->value[2])"
     scale = {"velocity": " / turn", "temperature": " - 273.15"}
     signals = [
         f"known += signals.{name} = me->value[{by_name[name]}]{scale.get(name, '')};"
@@ -284,6 +301,7 @@ def fmu_source(
         seed=by_name.get("seed", 0),
         start=", ".join(DOUBLE.number(v.start) for v in variables),
         signals="\n".join(signals),
+        reading=reading,
     )
     text = "\n".join([*core, instance, ""])
     return f"{head}\n{_part('includes')}\n" + filled_code(text, n="m")

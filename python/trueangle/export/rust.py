@@ -33,6 +33,7 @@ class RustModule(PortableTarget):
     """Target ``rust``: a file to name in ``mod``; no std, no allocation, no dependencies."""
 
     name = "rust"
+    decodes = True
     what = "a Rust module without std, tables and one function per shaft"
     kind: ClassVar[FileKind] = FileKind("a Rust module", (".rs", ".txt"))
 

@@ -178,6 +178,9 @@ class Target(ABC):
     #: It takes what follows the direction of travel in addition to the pattern.
     takes_direction: ClassVar[bool] = False
 
+    #: It decodes a sine and a cosine channel where the model has some.
+    decodes: ClassVar[bool] = False
+
     def holds(self, term: Term) -> bool:
         """Whether a term that is no function of the angle gets into what is written."""
         return self.takes_direction and of_direction(term)

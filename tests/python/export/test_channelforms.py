@@ -164,12 +164,18 @@ fn main() {
 
 
 @pytest.mark.parametrize("target", ["c", "rust"])
-@pytest.mark.parametrize(("direction", "periods"), [(1, 1), (-1, 3)])
-def test_both_channels_are_decoded_and_corrected_as_by_a_step(tmp_path, target, direction, periods):
+@pytest.mark.parametrize(
+    ("direction", "periods", "alone"), [(1, 1, False), (-1, 3, False), (1, 1, True)]
+)
+def test_both_channels_are_decoded_and_corrected_as_by_a_step(
+    tmp_path, target, direction, periods, alone
+):
     compiler = {"c": "gcc", "rust": "rustc"}[target]
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler}")
     model = drawn(8, 0.3, direction=direction, periods_per_turn=periods)
+    if alone:
+        model = model.replace(shafts=())
     ending = {"c": ".h", "rust": ".rs"}[target]
     made = ta.export_model(model, target, tmp_path / f"joint{ending}", bits=16)
     main = tmp_path / ("main.c" if target == "c" else "main.rs")

@@ -58,10 +58,10 @@ def motion(seed, count=COUNT):
 
 def simulated(path, into, out, moved, kind):
     names = [v.name for v in fmpy.read_model_description(str(path)).modelVariables]
-    columns = ["time", into, *(name for name in moved if name != "time" and name in names)]
+    columns = ["time", into, *(k for k in moved if k not in ("time", into) and k in names)]
     given = np.zeros(COUNT, [(name, "f8") for name in columns])
     for name in given.dtype.names:
-        given[name] = moved["angle" if name == into else name]
+        given[name] = moved["angle" if name == into and name not in moved else name]
     found = fmpy.simulate_fmu(
         str(path), stop_time=moved["time"][-1], output_interval=STEP, step_size=STEP, input=given,
         output=[out], fmi_type=kind, solver="Euler",
@@ -122,6 +122,43 @@ def test_a_sensor_says_what_the_model_does(name, fmi, tmp_path):
     worst = np.max(np.abs(found - want[: len(found)]))
     print(worst)
     assert worst <= WITHIN
+
+
+@pytest.mark.parametrize(
+    ("name", "fmi", "direction", "periods"),
+    [("channels alone", "3", 1, 1), ("harmonics alone", "2", -1, 3), ("all", "3", -1, 1)],
+)
+def test_a_correction_of_two_channels_takes_sine_and_cosine(
+    name, fmi, direction, periods, tmp_path
+):
+    """What it decodes and corrects is a step's angle; at its starts that of the phase zero."""
+    seed = int(np.random.SeedSequence().generate_state(1)[0])
+    print(f"seed {seed}")
+    channels = ta.Channels(
+        offset_sine=2100.0, offset_cosine=1980.0, amplitude=905.0, gain_ratio=1.07, phase_deg=-4.0,
+        direction=direction, periods_per_turn=periods,
+    )  # fmt: skip
+    shafts = () if name == "channels alone" else (OUTPUT,)
+    model = ta.HarmonicModel(shafts, 0.01, terms=TERMS.get(name, ()), channels=channels)
+    path = tmp_path / "joint.fmu"
+    ta.export_model(model, "fmu", path, fmi=fmi)
+    assert validate_fmu(str(path)) == []
+    moved = motion(seed)
+    sine, cosine = channels.curve(moved["angle"] * periods * direction)
+    want = model.corrector()(channels.angle(sine, cosine), **signals_of(model, moved))
+    if not model.terms:
+        step = model.compensator()
+        assert [step(*pair) for pair in zip(sine[:9], cosine[:9], strict=True)] == [*want[:9]]
+    given = {**{k: v for k, v in moved.items() if k != "angle"}, "sine": sine, "cosine": cosine}
+    for kind in ("CoSimulation", "ModelExchange"):
+        found = simulated(path, "sine", "true_angle", given, kind)
+        worst = np.max(np.abs(found - want[: len(found)]))
+        print(f"{kind}: {worst}")
+        assert worst <= WITHIN
+    names = [v.name for v in variables_of(model, False)]
+    assert names[1:3] == ["sine", "cosine"]
+    assert "indicated" not in names
+    assert ta.import_model(path, "fmu") == model
 
 
 @pytest.mark.parametrize("sensor", [False, True])

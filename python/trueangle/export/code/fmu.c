@@ -84,6 +84,15 @@ static double m_output(m_state *state, double reading, const m_signals *signals)
     return m_seen(state, reading, start - m_level(signals), signals)@late@;
 }
 
+//@ channels
+/* The angle of two channels, in turns. */
+static double m_decoded(double sine, double cosine)
+{
+    const double x = (cosine - (@offset_cosine@)) * @per_cosine@;
+    const double y = (sine - (@offset_sine@)) * @per_sine@ - x * (@slope@);
+    return x == 0.0 && y == 0.0 ? NAN : atan2(y, x) * (@factor@);
+}
+
 //@ sense
 /* What the encoder says at the next true angle, in turns. */
 static double m_output(m_state *state, double theta, const m_signals *signals)
@@ -162,7 +171,7 @@ static void step(Instance *me)
     m_signals signals;
     memset(&signals, 0, sizeof signals);
     @signals@
-    me->value[OUTPUT] = turn * m_output(&me->state, me->value[1] / turn, &signals);
+    me->value[OUTPUT] = turn * m_output(&me->state, @reading@, &signals);
     if (!isfinite(known + me->value[OUTPUT])) {
         /* As the corrector does: no number, and the next reading follows the last good one. */
         me->state = before;
