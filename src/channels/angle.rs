@@ -1,5 +1,6 @@
 //! The angle of two channels: an affine map to the unit circle, and its arc tangent.
 
+use super::faults::OFF;
 use crate::compensator::Compensator;
 use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
 use crate::{interrupt, threads};
@@ -90,6 +91,52 @@ impl Angle {
             );
             interrupt::point();
         });
+    }
+}
+
+/// How readings of a log are off the circle that constants make of their ellipse.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Off {
+    /// Readings, those that are no numbers not counted.
+    pub count: usize,
+    /// Squares of the distances, in radii, and of those with sine and cosine exchanged.
+    pub squares: [f64; 2],
+    /// Sums of sine and cosine without their offsets, of their squares and of their product.
+    pub sums: [f64; 5],
+    /// Dropouts.
+    pub far: usize,
+    /// Place of the first dropout.
+    pub first: Option<usize>,
+}
+
+impl Angle {
+    /// Distances of readings to the circle, in radii.
+    pub fn off(&self, sine: &[f64], cosine: &[f64]) -> Off {
+        let mut found = Off::default();
+        let distance = |s: f64, c: f64| {
+            let x = (c - self.offset_cosine) * self.per_cosine;
+            let y = (s - self.offset_sine) * self.per_sine - x * self.slope;
+            x.hypot(y) - 1.0
+        };
+        for (i, (&s, &c)) in sine.iter().zip(cosine).enumerate() {
+            let off = [distance(s, c), distance(c, s)];
+            if !off[0].is_finite() {
+                continue;
+            }
+            found.count += 1;
+            for (sum, off) in found.squares.iter_mut().zip(off) {
+                *sum += off * off;
+            }
+            let (y, x) = (s - self.offset_sine, c - self.offset_cosine);
+            for (sum, product) in found.sums.iter_mut().zip([y, x, y * y, x * x, y * x]) {
+                *sum += product;
+            }
+            if off[0].abs() > OFF {
+                found.far += 1;
+                found.first = found.first.or(Some(i));
+            }
+        }
+        found
     }
 }
 

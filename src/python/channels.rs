@@ -12,7 +12,7 @@ use super::number::single;
 use super::release::detached;
 use super::series::PySeries;
 use super::step::{Definition, check_arguments};
-use crate::channels::{self, Angle, Curve, Decoder, Readings};
+use crate::channels::{self, Angle, Curve, Decoder, Off, Readings};
 use crate::check::same_length;
 use crate::compensator::Compensator;
 
@@ -74,6 +74,23 @@ pub fn curve_slopes<'py>(
     columns(py, &rows, &shape)
 }
 
+/// Flags of every reading (1: the sine is at its rail, 2: the cosine, 4: off the curve), the codes
+/// after which either channel wraps, and the ellipse of the readings without a flag.
+#[pyfunction]
+pub fn channel_faults<'py>(
+    py: Python<'py>,
+    sine: PyReadonlyArray1<'_, f64>,
+    cosine: PyReadonlyArray1<'_, f64>,
+) -> PyResult<(Bound<'py, PyArray1<u8>>, [Option<f64>; 2], Option<Vec<f64>>)> {
+    let (sine, cosine) = (values(&sine), values(&cosine));
+    let (found, wraps) = detached(py, || {
+        let wraps = [&sine, &cosine].map(|channel| channels::wraps_at(channel));
+        (channels::faults(&sine, &cosine), wraps)
+    })?;
+    let (flags, curve) = found?;
+    Ok((vector(py, &flags)?, wraps, curve.map(|c| c.parameters)))
+}
+
 /// The angle of two channels and its correction.
 #[pyclass(name = "Decoder", module = "trueangle._core", frozen)]
 pub struct PyDecoder {
@@ -131,6 +148,29 @@ impl PyDecoder {
         let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&found), sine.len()) };
         detached(py, || self.inner.angle.all(&sine, &cosine, out))?;
         Ok(found)
+    }
+
+    /// How readings are off the circle of the constants: their count, squares of the distances in
+    /// radii, the same with sine and cosine exchanged, dropouts, then sums of both channels without
+    /// their offsets, of the squares and the product; and the first dropout.
+    fn off(
+        &self,
+        sine: PyReadonlyArray1<'_, f64>,
+        cosine: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<([f64; 9], Option<usize>)> {
+        let (sine, cosine) = (values(&sine), values(&cosine));
+        same_length("cosine", cosine.len(), "sine", sine.len())?;
+        let Off {
+            count,
+            squares: [off, exchanged],
+            sums: [a, b, c, d, e],
+            far,
+            first,
+        } = self.inner.angle.off(&sine, &cosine);
+        Ok((
+            [count as f64, off, exchanged, far as f64, a, b, c, d, e],
+            first,
+        ))
     }
 
     /// A bound function of two floats, cheaper to call than a method that PyO3 wraps.

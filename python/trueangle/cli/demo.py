@@ -11,6 +11,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from ..errors import ArgumentError
 from ..support.files import REPORT
 from .parser import declare
 from .paths import Output
@@ -31,10 +32,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     declare(parser, "--seed", int, "of the simulated noise (default: 0)", default=0)
     declare(parser, "--report FILE", Output.of(REPORT), "also write a report of the diagnosis")
+    told = "calibrate a sine and a cosine channel instead, without a reference"
+    declare(parser, "--channels", bool, told)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show the three parts, each a few lines."""
+    """Show the three parts, each a few lines, or the channels."""
+    if args.channels:
+        if args.report:
+            raise ArgumentError("--report is of the demo without --channels: leave one out")
+        print(_channels(args.seed))
+        return 0
     for number, part in enumerate((_corrected, _between, _diagnosed), 1):
         print(f"{number}. {part(args.seed)}\n")
     if args.report:
@@ -128,6 +136,47 @@ def _diagnosed(seed: int) -> str:
     return (
         "Where does the error come from? This joint has a backlash of +-8 arcsec that\n"
         f"   its simulation does not have. The diagnosis of its runs:\n\n{result.summary()}"
+    )
+
+
+def _channels(seed: int) -> str:
+    """Two channels of a 12-bit converter, calibrated by their curve alone."""
+    import numpy as np
+
+    from ..runs.rawchannels import Channels
+    from ..selfcalibration.calibrate import selfcal
+    from ..support.letterchart import letter_chart
+
+    true = Channels(2095.0, 2023.0, 900.0, gain_ratio=1.04, phase_deg=-1.5)
+    phase = 2.0 * np.pi * np.arange(2000) / 2000
+    noise = np.random.default_rng(seed).normal(size=(2, phase.size))
+    sine, cosine = np.rint(np.array(true.curve(phase)) + 0.9 * noise)
+    found = selfcal({"sine": sine, "cosine": cosine}, method="channels")
+    assert found.channels is not None
+    middle = Channels(offset_sine=2048.0, offset_cosine=2048.0, period=360.0)
+    read, corrected = (
+        np.degrees(np.angle(off / off.mean()))
+        for off in (
+            np.exp(1j * (np.radians(angle) - phase))
+            for angle in (middle.angle(sine, cosine), found.channels.correct(sine, cosine))
+        )
+    )
+    before, after = float(np.ptp(read)), float(np.ptp(corrected))
+    return "\n".join(
+        [
+            "A 12-bit converter reads a sine and a cosine channel over one turn. Their curve",
+            "should be a circle; offsets, gain and phase follow from it, without a reference:",
+            "",
+            *letter_chart(np.degrees(phase), {"o": read, "*": corrected}, "deg"),
+            "   o error of arctan2(sine, cosine), * error corrected, over one turn in degrees",
+            "",
+            f"   peak-to-peak  {before:5.2f} -> {after:5.2f} deg, "
+            f"{100.0 * (1.0 - after / before):.1f} % less",
+            "",
+            *found.summary().splitlines(),
+            "",
+            "The same with your file: trueangle selfcal adc.csv --method channels -o joint.json",
+        ]
     )
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ArgumentError
 from .parser import declare
 from .paths import Input
+from .values import track_periods
 
 if TYPE_CHECKING:
     from ..recording.sources import SourceOptions
@@ -58,9 +59,10 @@ def add_signals(
         add("--counts-per-turn-reference N", float, "of a reference in counts")
     if channels:
         add(
-            "--periods-per-turn P",
-            int,
-            "periods per turn of the channels sine and cosine",
+            "--periods-per-turn P[,P2]",
+            track_periods,
+            "periods per turn of the channels sine and cosine; of two tracks (sine2, cosine2) both "
+            "numbers, as 32,31",
         )
     if topic:
         add(

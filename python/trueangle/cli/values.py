@@ -40,6 +40,17 @@ def seconds(text: str) -> float:
     return value
 
 
+def track_periods(text: str) -> int | tuple[int, ...]:
+    """Periods of one track, or of two: ``7``, ``32,31``."""
+    try:
+        found = tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"a whole number, or two of them as 32,31, got {text!r}"
+        ) from None
+    return found if len(found) > 1 else found[0]
+
+
 def turns(text: str) -> float:
     """``1turn``, ``5turns`` or ``0.5``."""
     number = text.strip().removesuffix("s").removesuffix("turn").strip()

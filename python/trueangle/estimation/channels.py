@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from ..errors import NoModelError
+from ..runs.checks.channelreadings import ChannelReadings
 from ..runs.rawchannels import ChannelHarmonic, Channels
 from ..support.arrays import Array
 from ..support.distributions import normal_quantile
@@ -28,14 +29,6 @@ _HARMONICS: Final = tuple(range(2, 8))
 #: Share of the period that a harmonic needs, so that it is not one with the ellipse.
 _WHOLE: Final = 0.9
 
-#: Equal extremes from which a channel may be clipped, and how often those of a sine at rest at its
-#: top are as the next code: its density falls as the square root.
-_CLIPPED: Final = 8
-_TOP_CODE: Final = 1.0 / (math.sqrt(2.0) - 1.0)
-
-#: Spread of a channel, relative to the other, and what two channels share, that leave no ellipse.
-_DEAD: Final = 1e-3
-
 #: Standard error of the middle, in radii, from which the curvature of the arc is not known.
 _LINEAR: Final = 0.2
 
@@ -49,7 +42,7 @@ class ChannelEstimate(NamedTuple):
     ``limit`` is the standard deviation of the decoded angle by that of the constants, over the
     phases covered and without its mean; ``takes`` what the correction takes there, in radians of
     the channels' phase; ``noise`` that of one channel and ``radius_left`` the distance to the
-    curve, both relative to the radius.
+    curve, both relative to the radius. ``readings`` of those ``recorded`` are on the curve.
     """
 
     channels: Channels
@@ -60,51 +53,9 @@ class ChannelEstimate(NamedTuple):
     radius_left: float
     phases: Array
     readings: int
-    clipped: tuple[tuple[str, int], ...]
+    recorded: ChannelReadings
     rests: int
     correlated: float
-
-
-def clipped_rows(values: Array) -> NDArray[np.bool_]:
-    """Readings at a rail: the greatest or least value, more often than a sine is at its top.
-
-    Of a sine sampled evenly and rounded, the top code holds ``1 / (sqrt(2) - 1)`` times as many
-    readings as the next one.
-    """
-    codes, counts = np.unique(values, return_counts=True)
-    found = np.zeros(values.size, dtype=bool)
-    if codes.size < 3:
-        return found
-    step = float(np.median(np.diff(codes)))
-    for end in (0, -1):
-        near = np.abs(codes - codes[end]) <= 1.5 * step
-        beside = int(counts[near].sum() - counts[end])
-        # Three standard deviations of a count above what the next code explains.
-        most = _TOP_CODE * beside + 3.0 * math.sqrt(_TOP_CODE * beside)
-        if counts[end] >= _CLIPPED and counts[end] > most:
-            found |= values == codes[end]
-    return found
-
-
-def unclipped(
-    sine: Array, cosine: Array, named: str
-) -> tuple[NDArray[np.bool_], tuple[tuple[str, int], ...]]:
-    """Rows of which no channel is at a rail, and how many of each channel are.
-
-    Raises
-    ------
-    NoModelError
-        Too few are left.
-    """
-    rails = [("sine", clipped_rows(sine)), ("cosine", clipped_rows(cosine))]
-    kept = ~(rails[0][1] | rails[1][1])
-    left = int(kept.sum())
-    if left < 12:
-        raise NoModelError(
-            f"{named}: {left} of {kept.size} readings of the channels are not at a rail (clipped), "
-            "and 12 are needed: lower the gain of the amplifier"
-        )
-    return kept, tuple((name, int(rows.sum())) for name, rows in rails if rows.any())
 
 
 def estimate_channels(
@@ -118,9 +69,8 @@ def estimate_channels(
         A channel is constant, both are one, too few readings, an arc that is too short: one line
         that states which.
     """
-    check_channels(sine, cosine, named)
-    kept, clipped = unclipped(sine, cosine, named)
-    y, x = sine[kept], cosine[kept]
+    recorded = ChannelReadings.of(sine, cosine).checked(named)
+    y, x = sine[recorded.kept], cosine[recorded.kept]
     found = _Fit(y, x, named)
     share = float((found.cells > 0).mean())
     if share >= _WHOLE:
@@ -136,39 +86,12 @@ def estimate_channels(
         found.radius_left,
         found.phases,
         y.size,
-        clipped,
+        recorded,
         int((found.weights < 1.0).sum()),
         found.correlated,
     )
     _refuse_beyond_limit(result, named)
     return result
-
-
-def check_channels(sine: Array, cosine: Array, named: str) -> None:
-    """Refuse channels that draw no curve, in one line.
-
-    Raises
-    ------
-    NoModelError
-    """
-    if sine.size < 12:
-        raise NoModelError(
-            f"{named}: {sine.size} readings of the channels, and 12 are needed: record a turn"
-        )
-    most = max(float(np.std(sine)), float(np.std(cosine)))
-    for name, values in (("sine", sine), ("cosine", cosine)):
-        if float(np.std(values)) <= _DEAD * most:
-            raise NoModelError(
-                f"{named}: the {name} channel is constant ({float(np.mean(values)):.6g}): a dead "
-                "channel or a shaft at rest; check the wire and turn the shaft"
-            )
-    agreement = float(np.corrcoef(sine, cosine)[0, 1])
-    left = math.sqrt(max(1.0 - agreement**2, 0.0))
-    if left < _DEAD:
-        raise NoModelError(
-            f"{named}: sine and cosine are one signal (correlation {agreement:.5f}): the same "
-            "channel twice, or a shaft that hardly turns"
-        )
 
 
 def cell_counts(phases: Array) -> NDArray[np.intp]:

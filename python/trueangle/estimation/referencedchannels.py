@@ -10,9 +10,10 @@ import numpy as np
 
 from .. import _core
 from ..errors import NoModelError
+from ..runs.checks.channelreadings import ChannelReadings
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
-from .channels import CELLS, cell_counts, channels_of, check_channels, inflation, unclipped
+from .channels import CELLS, cell_counts, channels_of, inflation
 from .linear import least_squares
 
 #: Harmonics of the curve, where the channels went through their whole period.
@@ -40,8 +41,7 @@ def referenced_channels(
         A channel is dead, or both are one.
     """
     sine, cosine = (np.concatenate([run[i] for run in signals]) for i in (0, 1))
-    check_channels(sine, cosine, named)
-    kept, _ = unclipped(sine, cosine, named)
+    kept = ChannelReadings.of(sine, cosine).checked(named).kept
     unit = channels.direction * channels.periods_per_turn * 2.0 * math.pi / channels.period
     phases = [unit * run[2] for run in signals]
     zeros = [

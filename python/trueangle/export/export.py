@@ -106,7 +106,13 @@ def export_model(
     if "name" in given and given["name"] is None:
         given["name"] = "angle"
     pattern = TurnPattern(loaded.in_sensor_sense() if found.at_sensor else loaded)
-    decodes = found.decodes and pattern.source.channels is not None
+    channels = pattern.source.channels if found.decodes else None
+    decodes = channels is not None
+    if channels is not None and channels.second is not None:
+        raise ArgumentError(
+            f"{target} decodes one track, and the model has two: calibrate the first alone, "
+            f"`periods_per_turn={channels.periods_per_turn}`"
+        )
     holds_any = any(map(found.holds, pattern.left_out)) or decodes or found.may_be_empty(given)
     if pattern.is_empty and not holds_any:
         raise ArgumentError(

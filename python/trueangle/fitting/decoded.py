@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..errors import ArgumentError
-from ..runs.channelangle import common_channels, following
+from ..runs.channelangle import following
+from ..runs.rawchannels import TRACKS, joined
 from ..runs.run import CalibrationRun
+from ..support.arrays import Array
 
 
 def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
@@ -37,6 +39,11 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
         )
     signals = [(run.signals["sine"], run.signals["cosine"], run.reference) for run in runs]
     channels = referenced_channels(signals, first, _named(runs[0]))
+    if first.second is not None:
+        others = [(run.signals["sine2"], run.signals["cosine2"], run.reference) for run in runs]
+        named = f"{_named(runs[0])}, second track"
+        second = referenced_channels(others, first.second, named)
+        channels, _ = joined(channels, second, track_readings(runs), _named(runs[0]))
     return [
         replace(
             run,
@@ -47,24 +54,9 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
     ]
 
 
-def channel_notes(runs: Sequence[CalibrationRun]) -> Iterator[str]:
-    """What a reader must know about the channels of runs: clipped readings, a phase that falls."""
-    if (channels := common_channels(runs)) is None:
-        return
-    from ..estimation.channels import clipped_rows
-
-    for role in ("sine", "cosine"):
-        values = np.concatenate([run.signals[role] for run in runs])
-        if clipped := int(clipped_rows(values).sum()):
-            yield (
-                f"{clipped} of {values.size} readings of the {role} channel are at its rail "
-                "(clipped): its constants are of the others; lower the gain of the amplifier."
-            )
-    if channels.direction < 0:
-        yield (
-            "The phase of the channels falls as the angle rises: sine and cosine are swapped, or "
-            "the sensor is reversed; the model decodes them as they are."
-        )
+def track_readings(runs: Sequence[CalibrationRun]) -> list[Array]:
+    """Sine, cosine, sine2 and cosine2 of all runs."""
+    return [np.concatenate([run.signals[role] for run in runs]) for role in TRACKS]
 
 
 def _named(run: CalibrationRun) -> str:

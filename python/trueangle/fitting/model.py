@@ -15,12 +15,14 @@ from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
 from ..runs.channelangle import common_channels
+from ..runs.checks.channelreadings import mismatch_words
+from ..runs.checks.check import channel_faults
 from ..runs.checks.record import records_of
 from ..runs.checks.rows import duplicate_rows, duplicate_runs, missed_counts
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import student_quantile
-from .decoded import channel_notes
+from .decoded import track_readings
 from .fitdata import FitData
 from .rounding import COUNTED
 
@@ -45,7 +47,7 @@ def _build_model(fit: FittedCoefficients) -> HarmonicModel:
 
 def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
     """What not to trust and why, one sentence each."""
-    span, weighted = fit.span, fit.weighted
+    span, weighted, channels = fit.span, fit.weighted, common_channels(fit.problem.runs)
     if not span.full:
         # In degrees, like the zeros and positions reported next to it.
         turn = 360.0 / fit.problem.period
@@ -53,11 +55,15 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         yield f"Fitted on {travel.describe(360.0)} only: outside it is extrapolated."
     if fit.missing:
         rows = "row" if fit.missing == 1 else "rows"
-        yield f"{fit.missing} {rows} with an empty cell omitted."
-    yield from channel_notes(fit.problem.runs)
+        dropouts = (
+            "" if common_channels(fit.problem.runs) is None else " or off the channels' curve"
+        )
+        yield f"{fit.missing} {rows} with an empty cell{dropouts} omitted."
+    if channels is not None and channels.second is not None:
+        yield _sentence(mismatch_words(channels.mismatch(*track_readings(fit.problem.runs))))
     yield from (_sentence(remark) for remark in fit.remarks)
     records = records_of(fit.runs) if fit.moments is None else []
-    for test in (duplicate_runs, duplicate_rows, missed_counts):
+    for test in (channel_faults, duplicate_runs, duplicate_rows, missed_counts):
         yield from (_sentence(f"{fault.says}; {fault.mend}") for fault in test(records))
     if fit.ridge > 0.0:
         where = "arc" if fit.problem.is_periodic else "travel"

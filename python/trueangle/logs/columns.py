@@ -139,7 +139,7 @@ def find_channel_columns(
     joint: str | None,
     wanted: Mapping[str, tuple[str, str | None]],
 ) -> tuple[AngleColumn, dict[str, RoleColumn]]:
-    """The sine column in place of an angle's, and the cosine among the signals.
+    """The sine column in place of an angle's, and the other channels among the signals.
 
     Raises
     ------
@@ -147,13 +147,14 @@ def find_channel_columns(
         A channel is missing; a column of the result's name is there already.
     """
     found = {}
-    for role in ("sine", "cosine"):
+    assert model.channels is not None
+    for role in model.channels.roles:
         column = find_joint_signal(path, header, role, joint, wanted.get(role))
         if column is None:
             raise FileError(
                 path,
-                f"no column {role}, and the model decodes a sine and a cosine channel: name it "
-                f"with {role_code(role, unit=None)}; {listed_columns(header)}",
+                f"no column {role}, and the model decodes {', '.join(model.channels.roles)}: name "
+                f"it with {role_code(role, unit=None)}; {listed_columns(header)}",
                 line=1,
             )
         found[role] = column

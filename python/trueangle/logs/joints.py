@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import permutations
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -32,12 +30,10 @@ from .columns import (
     find_channel_columns,
     find_joint_signal,
 )
-from .statistics import CorrectionStatistics, UnitEvidence
+from .statistics import ChannelStatistics, CorrectionStatistics, UnitEvidence
 from .turns import TurnCounter, TurnState
 
 Array: TypeAlias = NDArray[np.floating[Any]]
-#: Range of a channel that goes round, over its largest value; of a constant one, over that range.
-_ROUND, _STILL = 0.5, 0.01
 
 
 @dataclass(frozen=True)
@@ -250,8 +246,7 @@ class JointChannel:
         self._threads = settings.threads
         model = joint.model
         self._scale = model.period / angle.period
-        self._channels = model.channels
-        self._ranges: dict[str, tuple[float, float]] = {}
+        self._channels = None if model.channels is None else ChannelStatistics(model.channels)
         self._corrector = model.corrector() if model.terms else None
         self._signal_columns = {s: _with_unit(c, angle.unit) for s, c in signals.items()}
         self._counts = settings.counts_per_turn
@@ -308,12 +303,10 @@ class JointChannel:
         """
         if self._channels is not None:
             signals = dict(signals or {})
-            cosine = signals.pop("cosine")
-            for name, values in ((self.angle.name, indicated), (self.signals["cosine"], cosine)):
-                low, high = self._ranges.get(name, (math.inf, -math.inf))
-                low = float(np.fmin.reduce(values, initial=low))
-                self._ranges[name] = low, float(np.fmax.reduce(values, initial=high))
-            indicated = self._channels.angle(indicated, cosine)
+            known = self._channels.channels
+            others = [signals.pop(role) for role in known.roles[1:]]
+            self._channels.update(indicated, *others)
+            indicated = known.angle(indicated, *others)
         kept = indicated.dtype if indicated.dtype == np.float32 else np.dtype(np.float64)
         if self._counter is None:
             corrected = self._apply(indicated, signals)
@@ -351,21 +344,9 @@ class JointChannel:
             "max_abs_correction_arcsec": numbers.max_abs_arcsec,
             "missing": numbers.missing,
             "outside_span": numbers.outside if self._span is not None else None,
-            "unit_note": self._dead_channel()
+            "unit_note": (self._channels and self._channels.sentence)
             or (self._evidence and self._evidence.sentence(self.angle.name, self._span)),
         }
-
-    def _dead_channel(self) -> str:
-        """A sentence on a channel that is constant while the other one goes round."""
-        for name, other in permutations(self._ranges, 2):
-            low, high = self._ranges[other]
-            goes_round = high - low > _ROUND * max(abs(low), abs(high))
-            if goes_round and np.ptp(self._ranges[name]) < _STILL * (high - low):
-                return (
-                    f"channel {name} is constant while {other} goes from {low:g} to {high:g}: it "
-                    "is dead, and the angles are wrong; is it connected?"
-                )
-        return ""
 
 
 def _with_unit(column: RoleColumn, angle_unit: str) -> RoleColumn:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runs.checks.channelreadings import dropout_words, no_curve
+from ..runs.rawchannels import Channels
 from ..support.angles import UNIT_PERIODS, arcsec, unit_name
 
 #: Readings fill a turn of another unit, and nothing beyond it, to this share ...
@@ -19,6 +21,16 @@ _STEP: Final = 0.1
 
 #: Turns from which whole numbers or angles of one turn at most are likelier another unit.
 _MANY: Final = 10.0
+
+#: Standard deviation of a channel that goes round, relative to its amplitude.
+_ROUND: Final = 0.5
+
+#: Times that exchanged channels are nearer to the curve, in squares, from which on they are.
+_NEARER: Final = 4.0
+
+#: Mismatch of two tracks, in periods, from which a reading is nearer to a wrong period than to
+#: none.
+_NEAR: Final = 0.25
 
 #: Fewest readings from which a unit is suspected.
 _FEWEST: Final = 20
@@ -88,6 +100,61 @@ def _squares(values: NDArray[np.float64]) -> float:
     """Sum of squares by one thread: that of BLAS wakes threads that fight for the cores."""
     flat = values.ravel()
     return float(np.einsum("i,i->", flat, flat))
+
+
+class ChannelStatistics:
+    """How the readings of a sine and a cosine channel are off the curve of a model's constants."""
+
+    def __init__(self, channels: Channels) -> None:
+        self.channels = channels
+        self._sums = np.zeros(9)
+        self._rows = 0
+        self._first: int | None = None
+        self.mismatch = 0.0
+        self._near = 0
+
+    def update(self, sine: NDArray[Any], cosine: NDArray[Any], *second: NDArray[Any]) -> None:
+        """Take in a batch."""
+        if second:
+            off = np.abs(self.channels.mismatch(sine, cosine, *second))
+            self.mismatch = float(np.fmax.reduce(off, initial=self.mismatch))
+            self._near += int(np.count_nonzero(off > _NEAR))
+        sums, first = self.channels.off(sine, cosine)
+        if self._first is None and first is not None:
+            self._first = self._rows + first + 1
+        self._rows += sine.size
+        self._sums += sums
+
+    @property
+    def sentence(self) -> str:
+        """The warning: in the words of `check`; empty without a fault."""
+        n, off, exchanged, far, sine, cosine, *squares, product = self._sums.tolist()
+        if not n:
+            return ""
+        known, (y, x) = self.channels, (sine / n, cosine / n)
+        moments = np.array([[squares[0] / n - y * y, product / n - x * y], [0.0, 0.0]])
+        moments[1] = moments[0, 1], squares[1] / n - x * x
+        if math.sqrt(max(moments.diagonal().max(), 0.0)) > _ROUND * known.amplitude:
+            problem = no_curve((y + known.offset_sine, x + known.offset_cosine), moments)
+            if problem:
+                return problem
+        if off > _NEARER * exchanged:
+            return (
+                "the channels are nearer to the curve of the model with sine and cosine exchanged: "
+                "they are swapped; name them anew, `signals={'sine': 'NAME', 'cosine': 'NAME'}`"
+            )
+        if 2.0 * far > n:
+            return (
+                f"{far:.0f} of {n:.0f} readings of the channels are off the curve of the model: "
+                "another sensor or gain, or a counter that wraps; check the log: trueangle check"
+            )
+        if self._near:
+            return (
+                f"the second track is off choosing the period by up to {self.mismatch:.2g} periods "
+                f"and {self._near} of {n:.0f} readings by more than {_NEAR:g}: a period is wrong "
+                "from 0.5 on; calibrate both tracks again"
+            )
+        return "; ".join(dropout_words(int(far), self._first)) if self._first else ""
 
 
 class UnitEvidence:

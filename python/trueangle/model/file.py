@@ -57,6 +57,7 @@ _KEYS = {
     "provenance": False,
 }
 _CHANNEL_KEYS = (*CONSTANTS, "direction", "periods_per_turn", "harmonics", "covariance")
+_TRACK_KEYS = (*_CHANNEL_KEYS, "second", "second_zero_deg")
 #: Lines of one term, at most.
 MAX_TERM_LINES = 4096
 #: Smallest turn in the unit of angles, and the inverse of the largest.
@@ -244,19 +245,29 @@ class _ModelReader(RecordReader):
         """Constants of a sine and a cosine channel."""
         if value is None:
             return None
-        table = self.table(value, {name: name in CONSTANTS for name in _CHANNEL_KEYS}, "channels")
+        table = self._track(value, "channels", _TRACK_KEYS)
+        if table.get("second") is not None:
+            table["second"] = self._track(table["second"], "channels.second", _CHANNEL_KEYS)
+        try:
+            return Channels.from_table(table, period)
+        except ValueError as cause:
+            raise self.error(str(cause), "channels") from None
+
+    def _track(self, value: Any, path: str, keys: tuple[str, ...]) -> dict[str, Any]:
+        """Constants of one track, by their types."""
+        table = self.table(value, {name: name in CONSTANTS for name in keys}, path)
         checked: dict[str, Any] = {
-            name: self.number(table[name], f"channels.{name}") for name in CONSTANTS
+            name: self.number(table[name], f"{path}.{name}") for name in CONSTANTS
         }
-        for name in ("direction", "periods_per_turn"):
+        for name in ("direction", "periods_per_turn", "second_zero_deg"):
             if name in table:
-                checked[name] = self.number(table[name], f"channels.{name}")
+                checked[name] = self.number(table[name], f"{path}.{name}")
         harmonics = self.items(
-            table.get("harmonics", []), "channels.harmonics", "harmonics", MAX_TERM_LINES
+            table.get("harmonics", []), f"{path}.harmonics", "harmonics", MAX_TERM_LINES
         )
         entries = []
         for i, entry in enumerate(harmonics):
-            where = f"channels.harmonics[{i}]"
+            where = f"{path}.harmonics[{i}]"
             found = self.table(entry, {"order": True, "re": True, "im": True, "std": False}, where)
             numbers = {name: self.number(v, f"{where}.{name}") for name, v in found.items()}
             if not numbers["order"].is_integer() or abs(numbers["order"]) > MAX_ORDER:
@@ -265,14 +276,13 @@ class _ModelReader(RecordReader):
         checked["harmonics"] = entries
         rows = table.get("covariance")
         if rows is not None:
-            listed = self.items(rows, "channels.covariance", "rows", len(CONSTANTS))
+            listed = self.items(rows, f"{path}.covariance", "rows", len(CONSTANTS))
             checked["covariance"] = tuple(
-                self.numbers(row, f"channels.covariance[{i}]") for i, row in enumerate(listed)
+                self.numbers(row, f"{path}.covariance[{i}]") for i, row in enumerate(listed)
             )
-        try:
-            return Channels.from_table(checked, period)
-        except ValueError as cause:
-            raise self.error(str(cause), "channels") from None
+        if "second" in table:
+            checked["second"] = table["second"]
+        return checked
 
     def covariance(self, value: Any, shafts: tuple[Shaft, ...]) -> Array | None:
         if value is None:

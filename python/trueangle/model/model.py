@@ -109,8 +109,9 @@ class HarmonicModel(ErrorModel):
         that the model does not need are ignored, as by `correct`. A step can be pickled.
 
         With `channels` it is ``step(sine, cosine)``, the arc tangent and its correction in one
-        call; the angle lies within half a period of the channels about zero. Such a step has no
-        ``swap``.
+        call; the angle lies within half a period of the channels about zero. Of two tracks it is
+        ``step(sine, cosine, sine2, cosine2)``, and the angle lies within half a turn. Such a step
+        has no ``swap``.
 
         ``step.swap(model)`` corrects by another model from the next step on, in every thread that
         holds the step: a step in another thread ends with the model it began with. Both have the
@@ -252,12 +253,13 @@ def _names(names: list[str]) -> str:
 class DecodedStep:
     """The angle of two channels, then a correction that follows signals and travel."""
 
-    def __init__(self, decode: Any, correct: Any) -> None:
-        self._decode, self._correct = decode, correct
+    def __init__(self, decode: Any, correct: Any, channels: int = 2) -> None:
+        self._decode, self._correct, self._channels = decode, correct, channels
 
-    def __call__(self, sine: float, cosine: float, /, *signals: Any, **named: Any) -> Any:
-        """The true angle of two channels."""
-        return self._correct(self._decode(sine, cosine), *signals, **named)
+    def __call__(self, *readings: Any, **named: Any) -> Any:
+        """The true angle of the channels; signals follow them."""
+        n = self._channels
+        return self._correct(self._decode(*readings[:n]), *readings[n:], **named)
 
 
 def _channel_step(model: ErrorModel) -> Any:
@@ -268,6 +270,9 @@ def _channel_step(model: ErrorModel) -> Any:
     """
     assert model.channels is not None
     constants = model.channels.constants
+    if model.channels.second is not None:
+        core = model._core_corrector() if model.terms else _core.Compensator(model._series)
+        return DecodedStep(model.channels.angle_of, core.step, len(model.channels.roles))
     if model.terms:
         step: Any = DecodedStep(_core.Decoder(constants).step, model._core_corrector().step)
     else:

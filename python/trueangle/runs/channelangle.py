@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import FileError
 from ..formats.columns import listed_columns
@@ -14,7 +15,8 @@ from ..support.angles import UNIT_PERIODS, circular_mean, wrap
 from ..support.arrays import Array
 from ..support.roles import RoleColumn, role_code
 from .angles import PERIOD
-from .rawchannels import Channels
+from .checks.channelreadings import ChannelReadings
+from .rawchannels import TRACKS, Channels
 from .readings import FileReadings
 from .run import CalibrationRun
 
@@ -28,9 +30,11 @@ _WHOLE: Final = 0.05
 
 
 def with_channel_angle(
-    table: FileReadings, periods: int | None, reference_counts: float | None
-) -> tuple[FileReadings, Channels | None]:
+    table: FileReadings, periods: tuple[int, ...] | None, reference_counts: float | None
+) -> tuple[FileReadings, Channels | None, NDArray[np.bool_] | None]:
     """The table with the angle of its channels as the indicated one, where that is wanted.
+
+    Then their constants and which rows are dropouts.
 
     It is where ``periods`` in a turn are given, where the channels are named, and where no column
     holds an indicated angle. Offsets are taken out only where the curve does not go round zero
@@ -39,10 +43,10 @@ def with_channel_angle(
     Raises
     ------
     FileError
-        A channel is missing or does not change.
+        A channel is missing, or both draw no curve.
     """
     roles = table.roles
-    pair = [roles.get("sine"), roles.get("cosine")]
+    pair = [roles.get(role) for role in TRACKS[: 2 * len(periods or (1,))]]
     asked = periods is not None or any(c is not None and c.is_asked for c in pair)
     has_angle = bool({"indicated", "error"} & roles.keys())
     named = "indicated" in roles and roles["indicated"].is_asked
@@ -54,10 +58,10 @@ def with_channel_angle(
             line=1,
         )
     if named or "reference" not in roles or (has_angle and not asked):
-        return table, None
+        return table, None, None
     if not asked and None in pair:
-        return table, None
-    for role, column in zip(("sine", "cosine"), pair, strict=True):
+        return table, None, None
+    for role, column in zip(TRACKS, pair, strict=False):
         if column is None:
             raise FileError(
                 table.path,
@@ -69,9 +73,20 @@ def with_channel_angle(
     unit = reference.unit or table.format.unit or "deg"
     period = UNIT_PERIODS.get(unit, PERIOD)
     true = table.values(reference._replace(unit=unit), period, reference_counts)
-    sine, cosine = (table.raw(roles[role]) for role in ("sine", "cosine"))
-    present = np.isfinite(true) & np.isfinite(sine) & np.isfinite(cosine)
-    channels = _plain(table, sine[present], cosine[present], periods or 1, period)
+    values = [table.raw(column) for column in pair if column is not None]
+    present = np.isfinite([true, *values]).all(axis=0)
+    dropouts = np.zeros(true.size, dtype=bool)
+    tracks = []
+    for i, count in enumerate(periods or (1,)):
+        readings = ChannelReadings.of(*(v[present] for v in values[2 * i : 2 * i + 2]))
+        if readings.problem:
+            raise FileError(table.path, f"{'second track: ' * i}{readings.problem}", line=1)
+        y, x = readings.middle
+        track = Channels(offset_sine=y, offset_cosine=x, periods_per_turn=count, period=period)
+        tracks.append(track)
+        dropouts[present] |= readings.dropouts
+    present &= ~dropouts
+    channels, (sine, cosine) = tracks[0], values[:2]
     counted = _periods(channels, sine[present], cosine[present], true[present])
     if counted != channels.periods_per_turn:
         raise table.error(
@@ -80,33 +95,12 @@ def with_channel_angle(
             roles["sine"].name,
         )
     angle, channels = following(channels, sine, cosine, true)
+    for track in tracks[1:]:
+        channels = channels.replace(second=following(track, values[2], values[3], true)[1])
     made = RoleColumn("indicated", _MADE, next(u for u, p in UNIT_PERIODS.items() if p == period))
     kept = {role: column for role, column in roles.items() if role != "error"}
-    return (
-        table._replace(roles={**kept, "indicated": made}, columns={**table.columns, _MADE: angle}),
-        channels,
-    )
-
-
-def _plain(
-    table: FileReadings, sine: Array, cosine: Array, periods: int, period: float
-) -> Channels:
-    """Channels as they are; about their middle where their curve does not go round zero."""
-    middles = {}
-    for role, values in (("sine", sine), ("cosine", cosine)):
-        low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
-        if not low < high:
-            raise table.error(
-                f"the {role} channel is constant ({low:.6g}): a dead channel or a shaft at rest",
-                table.roles[role].name,
-            )
-        middles[role] = 0.0 if low < 0.0 < high else 0.5 * (low + high)
-    return Channels(
-        offset_sine=middles["sine"],
-        offset_cosine=middles["cosine"],
-        periods_per_turn=periods,
-        period=period,
-    )
+    columns = {**table.columns, _MADE: angle}
+    return table._replace(roles={**kept, "indicated": made}, columns=columns), channels, dropouts
 
 
 def _periods(channels: Channels, sine: Array, cosine: Array, reference: Array) -> int:
@@ -114,7 +108,7 @@ def _periods(channels: Channels, sine: Array, cosine: Array, reference: Array) -
     stated = channels.periods_per_turn
     phase = stated / channels.period * channels.angle(sine, cosine)
     moved = np.diff(reference) / channels.period
-    steps = wrap(np.diff(phase), 1.0)
+    steps = np.nan_to_num(wrap(np.diff(phase), 1.0))
     travel = float(np.abs(moved).sum())
     if travel < 1.0 / stated or np.abs(steps).max(initial=0.0) > _DENSE:
         return stated

@@ -21,7 +21,7 @@ from .facets import Facets, read_facets
 from .rawchannels import Channels
 from .readings import FileReadings
 from .run import CalibrationRun, as_runs, runs_or_data
-from .source import ReadingOptions, checked_reading_options, each_table
+from .source import ReadingOptions, checked_reading_options, each_table, given_periods
 
 
 class _RunLabels(NamedTuple):
@@ -66,7 +66,8 @@ def read_runs(path: Any, **reading: Unpack[ReadingOptions]) -> list[CalibrationR
         ``indicated``. ``by``: the column that separates the runs (default: ``run``).
         ``topic``: JointState topic of a ROS bag (default: the only one). ``periods_per_turn``:
         periods in a turn of the columns ``sine`` and ``cosine``, of which the indicated angle is
-        then made, as it is where no column has it.
+        then made, as it is where no column has it; of two tracks (``sine2``, ``cosine2``) both
+        numbers.
 
     Returns
     -------
@@ -166,7 +167,7 @@ class Conversion(NamedTuple):
     counts: float | None = None
     reference_counts: float | None = None
     facets: Facets | None = None
-    periods: int | None = None
+    periods: tuple[int, ...] | None = None
 
     @classmethod
     def of(cls, reading: ReadingOptions) -> Conversion:
@@ -176,7 +177,7 @@ class Conversion(NamedTuple):
             checked_count_turn(reading["counts_per_turn"], "counts_per_turn"),
             checked_count_turn(reading["counts_per_turn_reference"], "counts_per_turn_reference"),
             facets if facets is None or isinstance(facets, Facets) else read_facets(facets),
-            reading["periods_per_turn"],
+            given_periods(reading),
         )
 
 
@@ -197,6 +198,7 @@ class _RunColumns(NamedTuple):
     source: InputFile
     indicated_sign: int
     channels: Channels | None = None
+    dropouts: NDArray[np.bool_] | None = None
 
 
 def read_columns(data: Any, reading: ReadingOptions) -> list[_RunColumns]:
@@ -211,11 +213,11 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
     # A log of an angle called indicated_deg is no table.
     if len(table.columns) == 1 and filled and table.roles.keys() <= asked & {"indicated"}:
         return _entries(table, given.counts)
-    channels = None
+    channels = dropouts = None
     if given.periods is not None or {"sine", "cosine"} & table.roles.keys():
         from .channelangle import with_channel_angle  # few files have channels
 
-        table, channels = with_channel_angle(table, given.periods, given.reference_counts)
+        table, channels, dropouts = with_channel_angle(table, given.periods, given.reference_counts)
     roles, path = table.roles, table.path
     angles = find_run_angles(
         path,
@@ -243,6 +245,10 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
     missing = np.zeros(reference.size, dtype=bool)
     for values in (reference, indicated, *signals.values()):
         missing |= np.isnan(values)
+    empty = missing if dropouts is None else missing & ~dropouts
+    _warn_of_empty(table, empty, {"reference": reference, "indicated": indicated, **signals})
+    if dropouts is not None:
+        missing |= dropouts
     groups, left_out = [], []
     for found, rows in _groups(table, reference.size):
         present = rows[~missing[rows]]
@@ -257,7 +263,6 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
             raise FileError(path, problem + two_channels(table, counts, reference, indicated))
         groups.append((found, present))
         left_out.append(rows.size - present.size)
-    _warn_of_empty(table, missing, {"reference": reference, "indicated": indicated, **signals})
     return _RunColumns(
         table,
         period,
@@ -269,6 +274,7 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
         table.source,
         angles.indicated_sign,
         channels,
+        dropouts,
     )
 
 
@@ -301,6 +307,11 @@ def _runs_of_readings(table: FileReadings, given: Conversion) -> list[Calibratio
     """Runs of the rows of a table; raises as `read_runs`."""
     found = _columns(table, given)
     signals, table = found.signals, found.table
+    if found.dropouts is not None and (off := np.flatnonzero(found.dropouts)).size:
+        from .checks.channelreadings import dropout_words
+
+        fault = "; ".join(dropout_words(int(off.size), int(off[0]) + 1))
+        warnings.warn(f"{table.path}: {fault}", EmptyCellsWarning, stacklevel=level_of_caller())
     used = {c.name for role, c in table.roles.items() if c.is_asked or role in _USED}
     others = {name: values for name, values in table.columns.items() if name not in used}
     runs = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final, NamedTuple
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..errors import ArgumentError
+from ..errors import ArgumentError, NoModelError
 from ..support.angles import check_period, checked_sign
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
@@ -33,6 +33,12 @@ _NOTHING: Final = 1e-12
 
 #: Amplitudes that are not corrected, relative to the standard error of a harmonic.
 _NEGLIGIBLE: Final = 0.1
+
+#: Roles of two tracks.
+TRACKS: Final = ("sine", "cosine", "sine2", "cosine2")
+
+#: Mean resultant of the mismatch of two tracks that agree: of 0.2 periods rms.
+_AGREE: Final = 0.45
 
 #: Periods in a turn, at most, as of order numbers.
 MOST_PERIODS: Final = 1_000_000
@@ -84,6 +90,11 @@ class Channels:
         What the closed curve holds beyond these, relative to the fundamental.
     covariance : array_like, shape (5, 5), optional
         Of offset_cosine, offset_sine, amplitude, gain_ratio, phase_deg.
+    second : Channels, optional
+        A second track, of another number of periods without a common divisor: it chooses the
+        period of the first.
+    second_zero_deg : float
+        Phase of the second track where that of the first and the angle are zero.
 
     Raises
     ------
@@ -108,13 +119,15 @@ class Channels:
     period: float = 2.0 * math.pi
     harmonics: tuple[ChannelHarmonic, ...] = ()
     covariance: tuple[tuple[float, ...], ...] | None = field(default=None, repr=False)
+    second: Channels | None = None
+    second_zero_deg: float = 0.0
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "period", check_period(self.period))
         put(self, "direction", checked_sign(self.direction))
         put(self, "periods_per_turn", checked_periods(self.periods_per_turn))
-        for name in CONSTANTS:
+        for name in (*CONSTANTS, "second_zero_deg"):
             value = float(getattr(self, name))
             if not math.isfinite(value):
                 raise ArgumentError(f"{name} must be finite, got {value!r}")
@@ -128,6 +141,10 @@ class Channels:
         for h in self.harmonics:
             if h.order in (-1, 0, 1) or not all(map(math.isfinite, h[1:])):
                 raise ArgumentError(f"a harmonic has an order from 2 or to -2, got {h!r}")
+        if self.second is not None:
+            checked_track_periods((self.periods_per_turn, self.second.periods_per_turn))
+            if self.second.period != self.period or self.second.second is not None:
+                raise ArgumentError("second must be one track of the same period of the angle")
         if self.covariance is not None:
             rows = np.asarray(self.covariance, dtype=np.float64)
             if rows.shape != (len(CONSTANTS),) * 2 or not np.isfinite(rows).all():
@@ -155,6 +172,11 @@ class Channels:
     def _decoder(self) -> _core.Decoder:
         return _core.Decoder(self.constants)
 
+    def off(self, sine: Array, cosine: Array) -> tuple[list[float], int | None]:
+        """Sums of how readings are off the curve, and the first dropout (`_core.Decoder.off`)."""
+        pair = (np.ascontiguousarray(v, dtype=np.float64) for v in (sine, cosine))
+        return self._decoder.off(*pair)
+
     @property
     def offset(self) -> complex:
         """``z_0``, relative to the fundamental."""
@@ -175,29 +197,75 @@ class Channels:
         sine = self.gain_ratio * cmath.exp(1j * math.radians(self.phase_deg) * sign)
         return 0.5 * self.amplitude * (1.0 + sign * sine)
 
-    def angle(self, sine: ArrayLike, cosine: ArrayLike) -> Array:
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles of the columns that are decoded."""
+        return ("sine", "cosine") if self.second is None else TRACKS
+
+    def angle(self, sine: ArrayLike, cosine: ArrayLike, *second: ArrayLike) -> Array:
         """The angle by offsets, gain and phase, harmonics not yet corrected.
 
-        In ``(-period / 2, period / 2] / periods_per_turn``; NaN for what is not finite.
+        In ``(-period / 2, period / 2] / periods_per_turn``, with sine and cosine of a second track
+        in a whole turn; NaN for what is not finite.
         """
-        return _elementwise(self._decoder.angles, sine, cosine)
+        plain = _elementwise(self._decoder.angles, sine, cosine)
+        if not second:
+            return plain
+        turn, periods = self.period, self.periods_per_turn
+        fine = self._corrected(plain.copy())
+        number, _ = self._chosen(fine, *second)
+        absolute = fine + number * (turn / periods)
+        # The period is that of the corrected angle: the plain one may be beyond its end.
+        angle = plain + np.rint((absolute - plain) * (periods / turn)) * (turn / periods)
+        return np.asarray(angle - turn * np.ceil(angle / turn - 0.5))
 
-    def correct(self, sine: ArrayLike, cosine: ArrayLike) -> Any:
+    def angle_of(self, *readings: float) -> float:
+        """The same of one reading."""
+        return float(self.angle(*readings))
+
+    def mismatch(
+        self, sine: ArrayLike, cosine: ArrayLike, sine2: ArrayLike, cosine2: ArrayLike
+    ) -> Array:
+        """How far two tracks are off agreeing on a period, in periods: beyond 0.5 it is wrong."""
+        plain = _elementwise(self._decoder.angles, sine, cosine)
+        return self._chosen(self._corrected(plain), sine2, cosine2)[1]
+
+    def _chosen(self, fine: Array, sine2: ArrayLike, cosine2: ArrayLike) -> tuple[Array, Array]:
+        """Number of the period by the second track, and the mismatch.
+
+        ::
+
+            (p1 (ψ2 - δ) - p2 ψ1) / 2 pi = p2 k  (mod p1)
+        """
+        assert self.second is not None
+        first, other = self.periods_per_turn, self.second.periods_per_turn
+        coarse = np.asarray(self.second.correct(sine2, cosine2)) / self.period
+        zero = self.second_zero_deg / 360.0
+        steps = first * (other * coarse - zero) - other * first * fine / self.period
+        whole = np.rint(steps)
+        return np.mod(whole * pow(other, -1, first), first), np.asarray(steps - whole)
+
+    def _corrected(self, angle: Array) -> Array:
+        series = self._series
+        return angle if series is None else np.asarray(series.correct(angle, out=angle))
+
+    def correct(self, sine: ArrayLike, cosine: ArrayLike, *second: ArrayLike) -> Any:
         """The angle by offsets, gain, phase and harmonics.
 
         Parameters
         ----------
         sine, cosine : array_like
             Readings of the channels, of one shape.
+        *second : array_like
+            Sine and cosine of the second track, where there is one.
 
         Returns
         -------
         float or ndarray
-            In the unit of ``period``, within half a period of the channels about zero.
+            In the unit of ``period``, within half a period of the channels about zero, with a
+            second track within half a turn.
         """
-        angle = self.angle(sine, cosine)
-        series = self._series
-        corrected = angle if series is None else np.asarray(series.correct(angle, out=angle))
+        corrected = self._corrected(self.angle(sine, cosine, *second))
         return float(corrected) if corrected.ndim == 0 else corrected
 
     @cached_property
@@ -268,6 +336,9 @@ class Channels:
         rows["harmonics"] = [h._asdict() for h in self.harmonics]
         rows["direction"] = {"value": self.direction, "std": 0.0}
         rows["periods_per_turn"] = {"value": self.periods_per_turn, "std": 0.0}
+        if self.second is not None:
+            rows["second"] = self.second.to_dict()
+            rows["second_zero_deg"] = self.second_zero_deg
         return rows
 
     def constant_lines(self) -> list[str]:
@@ -288,16 +359,23 @@ class Channels:
             f"harmonic {h.order:<15d} {abs(complex(h.re, h.im)):12.5f} {h.std:10.2g}"
             for h in self.harmonics
         ]
+        if self.second is not None:
+            lines += ["second track", *self.second.constant_lines()[1:]]
         return lines
 
     def to_table(self) -> dict[str, Any]:
         """The object that a model file holds."""
+        second = {}
+        if self.second is not None:
+            zero = self.second_zero_deg
+            second = {"second": self.second.to_table(), "second_zero_deg": zero}
         return {
             **{name: getattr(self, name) for name in CONSTANTS},
             "direction": self.direction,
             "periods_per_turn": self.periods_per_turn,
             "harmonics": [h._asdict() for h in self.harmonics],
             "covariance": None if self.covariance is None else [*map(list, self.covariance)],
+            **second,
         }
 
     @classmethod
@@ -305,6 +383,8 @@ class Channels:
         """From what `to_table` made."""
         entries = dict(table)
         entries["harmonics"] = tuple(ChannelHarmonic(**h) for h in entries.get("harmonics", ()))
+        if entries.get("second") is not None:
+            entries["second"] = cls.from_table(entries["second"], period)
         return cls(period=period, **entries)
 
 
@@ -324,6 +404,49 @@ def checked_periods(value: Any) -> int:
             f"periods_per_turn must be a whole number from 1 to {MOST_PERIODS}, got {value!r}"
         )
     return whole
+
+
+def checked_track_periods(value: Any) -> tuple[int, ...]:
+    """Periods in a turn of one track or of two, checked.
+
+    Raises
+    ------
+    ArgumentError
+    """
+    periods = tuple(map(checked_periods, value if isinstance(value, tuple | list) else (value,)))
+    if len(periods) not in (1, 2) or (len(periods) == 2 and math.gcd(*periods) > 1):
+        raise ArgumentError(
+            f"periods_per_turn must be one number or two without a common divisor, got {value!r}"
+        )
+    return periods
+
+
+def joined(
+    first: Channels, second: Channels, readings: Sequence[Array], named: str
+) -> tuple[Channels, Array]:
+    """Two tracks as one, in the sense and with the zero in which they agree, and their mismatch.
+
+    ``readings`` are sine, cosine, sine2 and cosine2.
+
+    Raises
+    ------
+    NoModelError
+        They do not agree.
+    """
+    tracks = []
+    for sense in (1, -1):
+        track = first.replace(second=second.replace(direction=sense), second_zero_deg=0.0)
+        off = np.exp(2j * math.pi * track.mismatch(*readings)).mean()
+        tracks.append((abs(off), cmath.phase(off), track))
+    agreement, phase, track = max(tracks, key=lambda found: found[0])
+    periods = first.periods_per_turn, second.periods_per_turn
+    if agreement < _AGREE:
+        raise NoModelError(
+            f"{named}: two tracks of {periods[0]} and {periods[1]} periods do not agree on a "
+            "period: check the columns and `periods_per_turn`"
+        )
+    found = track.replace(second_zero_deg=math.degrees(phase) / periods[0])
+    return found, found.mismatch(*readings)
 
 
 def _elementwise(angles: Any, sine: ArrayLike, cosine: ArrayLike) -> Array:

@@ -22,7 +22,7 @@ from ..support.labelled import take_apart
 from ..support.roles import RoleColumn, Wanted, wanted_columns
 from ..support.suggestions import did_you_mean
 from .paths import find_logs, unit_of_path
-from .rawchannels import checked_periods
+from .rawchannels import checked_track_periods
 from .readings import FileReadings, named_source, readings_of
 
 T = TypeVar("T")
@@ -48,7 +48,8 @@ class OtherReadingOptions(TypedDict, total=False):
     facets
         File of calibrated deviations of a polygon's facets.
     periods_per_turn
-        Periods of a sine and a cosine channel in a turn; the indicated angle is made of these.
+        Periods of a sine and a cosine channel in a turn, of two tracks a pair of numbers; the
+        indicated angle is made of these.
     """
 
     signals: Mapping[str, Any] | None
@@ -58,7 +59,7 @@ class OtherReadingOptions(TypedDict, total=False):
     topic: str | None
     unit_from: str | None
     facets: Any
-    periods_per_turn: int | None
+    periods_per_turn: int | tuple[int, ...] | None
 
 
 class ReadingOptions(OtherReadingOptions, total=False):
@@ -72,6 +73,12 @@ class ReadingOptions(OtherReadingOptions, total=False):
     """
 
     period: float | None
+
+
+def given_periods(reading: ReadingOptions) -> tuple[int, ...] | None:
+    """Periods in a turn of every track; None where they are not given."""
+    periods = reading["periods_per_turn"]
+    return None if periods is None else checked_track_periods(periods)
 
 
 def checked_reading_options(given: Mapping[str, Any]) -> ReadingOptions:
@@ -108,8 +115,7 @@ def checked_reading_options(given: Mapping[str, Any]) -> ReadingOptions:
         facets=given.get("facets"),
         periods_per_turn=given.get("periods_per_turn"),
     )
-    if found["periods_per_turn"] is not None:
-        found["periods_per_turn"] = checked_periods(found["periods_per_turn"])
+    given_periods(found)
     if found["unit_from"] is not None:
         try:
             re.compile(found["unit_from"])

@@ -15,6 +15,7 @@ from ..errors import NoModelError
 from ..estimation.channels import ChannelEstimate, estimate_channels
 from ..estimation.referencedchannels import referenced_channels
 from ..runs.channelangle import following
+from ..runs.checks.channelreadings import CENTRED
 from ..runs.rawchannels import CONSTANTS, Channels
 from ..runs.source import OtherReadingOptions
 from ..support.argumentkinds import told_kinds
@@ -40,9 +41,6 @@ _UNEQUAL: Final = 1.5
 #: Kelvin from which drift is estimated, and parts of the readings by temperature.
 _KELVIN: Final = 2.0
 _PARTS: Final = 5
-
-#: Offset in amplitudes from which the converter has no middle: a magnet's is far below it.
-CENTRED: Final = 1.0
 
 #: Displacement over distance, up to which the field of a dipole is expanded.
 _EXPANDED: Final = 0.5
@@ -304,7 +302,7 @@ def _causes(
     for k, (size, at) in z.items():
         words = f"harmonic {k} of the curve: a channel saturates or the field is no sine"
         add("channel_harmonic", abs(k - 1), size, size, words, at=at)
-    for channel, count in found.clipped:
+    for channel, count in found.recorded.clipped.items():
         share = count / (found.readings + count)
         words = f"the {channel} channel is clipped in {counted(count, 'reading')}: lower its gain"
         rows.append(ChannelCause("clipping", (4.0 * p,), share, 0.0, 0.0, words))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import NoModelError
 from ..estimation.channels import ChannelEstimate, estimate_channels
-from ..estimation.channels import check_channels as check_curve
+from ..runs.checks.channelreadings import ChannelReadings
 from ..runs.checks.fault import DataFault
 from ..runs.rawchannels import Channels
 from ..runs.source import OtherReadingOptions
@@ -18,7 +18,7 @@ from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.layout import counted, laid_out, wrapped_lines
 from ..support.plainresult import PlainResult
-from .channelcauses import CENTRED, ChannelDiagnosis, channel_diagnosis, channel_pair
+from .channelcauses import ChannelDiagnosis, channel_diagnosis, channel_pair
 from .recording import Recording, as_recordings
 
 #: Degrees of the channels' period from which it is whole.
@@ -95,8 +95,9 @@ def check_channels(logs: Any, **reading: Unpack[OtherReadingOptions]) -> Channel
     Returns
     -------
     ChannelCheck
-        Faults ``dead_channel`` and ``short_arc`` (not usable), ``partial_arc``, ``clipping``,
-        ``resting``, ``no_centre``, ``swapped_channels``; coverage and causes.
+        Faults ``dead_channel``, ``wrapped_counter`` and ``short_arc`` (not usable), ``clipping``,
+        ``dropouts``, ``no_centre``, ``swapped_channels``, ``resting``, ``partial_arc``; coverage
+        and causes.
 
     Raises
     ------
@@ -114,19 +115,18 @@ def check_channels(logs: Any, **reading: Unpack[OtherReadingOptions]) -> Channel
     sine, cosine = np.hstack([np.array(channel_pair(r)) for r in recordings])
     size, named, runs = sine.size, recordings[0].named, [r.label or "" for r in recordings]
 
-    def refused(name: str, error: NoModelError) -> ChannelCheck:
-        says, _, mend = str(error).removeprefix(f"{named}: ").rpartition(": ")
+    def refused(name: str, problem: str) -> ChannelCheck:
+        says, _, mend = problem.rpartition(": ")
         fault = DataFault.of(name, runs, [], says, mend)
         return ChannelCheck((fault,), size, len(runs), None, None)
 
-    try:
-        check_curve(sine, cosine, named)
-    except NoModelError as error:
-        return refused("dead_channel", error)
+    if problem := ChannelReadings.of(sine, cosine).problem:
+        name = "wrapped_counter" if "wraps" in problem else "dead_channel"
+        return refused(name, problem)
     try:
         found = estimate_channels(sine, cosine, named, periods=recordings[0].periods)
     except NoModelError as error:
-        return refused("short_arc", error)
+        return refused("short_arc", str(error).removeprefix(f"{named}: "))
     faults = channel_faults(found, recordings, sense(found.channels, recordings)[0])
     period = found.channels.period / found.channels.periods_per_turn
     angles = [found.channels.angle(*channel_pair(r)) for r in recordings]
@@ -140,18 +140,11 @@ def channel_faults(
 ) -> list[DataFault]:
     """Faults that do not forbid a fit; ``agreement`` is negative where the phase falls."""
     runs = [r.label or "" for r in recordings]
-    faults = []
+    faults = found.recorded.faults(runs, falls=agreement < 0.0)
 
     def add(name: str, says: str, mend: str) -> None:
         faults.append(DataFault.of(name, runs, [], says, mend))
 
-    for name, count in found.clipped:
-        add(
-            "clipping",
-            f"{counted(count, 'reading')} of the {name} channel {'is' if count == 1 else 'are'} at "
-            "its rail (clipped) and omitted",
-            "lower the gain of the amplifier",
-        )
     if found.rests:
         add(
             "resting",
@@ -159,27 +152,12 @@ def channel_faults(
             "less weight",
             "nothing: a place is known by the arc, not by the time",
         )
-    if found.coverage < _WHOLE and not found.clipped:
+    if found.coverage < _WHOLE and not found.recorded.clipped:
         add(
             "partial_arc",
             f"the readings cover {found.coverage:.0f} deg of the channels' period: outside it the "
             "correction is extrapolated, and harmonics are not estimated",
             "turn the shaft through a whole period",
-        )
-    if abs(found.channels.offset) > CENTRED:
-        x, y = found.channels.offset_cosine, found.channels.offset_sine
-        add(
-            "no_centre",
-            f"the channels do not go round zero but about {y:.6g} (sine) and {x:.6g} (cosine): "
-            "their values are not centred on zero",
-            "nothing: the offsets are estimated and subtracted",
-        )
-    if agreement < 0.0:
-        add(
-            "swapped_channels",
-            "the channels' phase falls as the recorded angle rises: sine and cosine are swapped, "
-            "or the sensor is reversed",
-            "nothing: the model keeps the direction; or name them anew, `signals={'sine': 'NAME'}`",
         )
     return faults
 

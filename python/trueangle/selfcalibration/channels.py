@@ -16,10 +16,11 @@ import numpy as np
 
 from ..errors import NoModelError, NotInvertibleError
 from ..estimation.channels import ChannelEstimate, estimate_channels
-from ..runs.rawchannels import Channels
+from ..runs.checks.channelreadings import CENTRED, mismatch_words
+from ..runs.rawchannels import TRACKS, Channels, joined
 from ..support.arrays import Array
 from ..support.layout import counted
-from .channelcauses import CENTRED, channel_diagnosis, channel_pair
+from .channelcauses import channel_diagnosis, channel_pair
 from .channelcheck import channel_faults, sense
 from .model import reference_free_model
 from .recording import Recording
@@ -44,13 +45,17 @@ def channel_patterns(
     sine, cosine = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
     found = estimate_channels(sine, cosine, first.named, periods=first.periods, period=period)
     channels, followed = _in_sense(found.channels, recordings, pairs)
+    second = _second_track(channels, recordings)
+    if second is not None:
+        channels = second[0]
     unit = abs(channels.constants[-1]) * 2.0 * math.pi / period * ARCSEC
     angles = [_unwrapped(channels, *pair) for pair in pairs]
     turns = sum(float(np.ptp(angle)) for angle in angles) / period
     diagnosis = channel_diagnosis(recordings, found)
     apart = ["the curves of the runs differ: calibrate each run alone"] if diagnosis.changes else []
     faults = channel_faults(found, recordings, 0.0)
-    notes = [followed, *(f"{fault.says}; {fault.mend}" for fault in faults), *apart]
+    notes = [] if second is None else [mismatch_words(second[1])]
+    notes += [followed, *(f"{fault.says}; {fault.mend}" for fault in faults), *apart]
     if found.correlated > 1.0:
         notes.append(
             f"residuals are autocorrelated: {found.correlated:.3g} readings carry the "
@@ -106,12 +111,32 @@ def channel_patterns(
         beside={
             "noise_relative": {"cosine": found.noise[0], "sine": found.noise[1]},
             "radius_left_relative": found.radius_left,
-            "clipped": dict(found.clipped),
+            "clipped": found.recorded.clipped,
+            **({} if second is None else {"mismatch_periods": _sizes(second[1])}),
         },
         coverage_deg=found.coverage,
         limit_arcsec=found.limit * unit,
         diagnosis=diagnosis,
     )
+
+
+def _second_track(
+    channels: Channels, recordings: Sequence[Recording]
+) -> tuple[Channels, Array] | None:
+    """The channels with their second track, where its periods are given, and the mismatch."""
+    first = recordings[0]
+    if first.periods2 is None:
+        return None
+    columns = ([getattr(recording, role) for recording in recordings] for role in TRACKS)
+    readings = [np.concatenate(column) for column in columns]
+    named = f"{first.named}, second track"
+    sine, cosine = readings[2:]
+    found = estimate_channels(sine, cosine, named, periods=first.periods2, period=channels.period)
+    return joined(channels, found.channels, readings, first.named)
+
+
+def _sizes(mismatch: Array) -> dict[str, float]:
+    return {"rms": float(np.sqrt(np.mean(mismatch**2))), "max": float(np.abs(mismatch).max())}
 
 
 def _in_sense(

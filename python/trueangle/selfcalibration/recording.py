@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError, NoModelError
+from ..runs.rawchannels import TRACKS
 from ..runs.readings import FileReadings
 from ..runs.run import CalibrationRun, runs_or_data
-from ..runs.source import ReadingOptions, checked_reading_options, each_table
+from ..runs.source import ReadingOptions, checked_reading_options, each_table, given_periods
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.files import InputFile
@@ -32,8 +33,7 @@ _CHANNELS = (
     "mount",
     "current",
     "temperature",
-    "sine",
-    "cosine",
+    *TRACKS,
 )
 
 #: Shifts that differ by less (radians) are one shift.
@@ -60,7 +60,10 @@ class Recording:
     temperature: Array | None = None
     sine: Array | None = None
     cosine: Array | None = None
+    sine2: Array | None = None
+    cosine2: Array | None = None
     periods: int = 1
+    periods2: int | None = None
     file: str = ""
     source: InputFile | None = None
     indicated_sign: int = 1
@@ -122,7 +125,12 @@ def _of_run(run: CalibrationRun) -> Recording:
         temperature=run.temperature,
         sine=run.signal("sine"),
         cosine=run.signal("cosine"),
+        sine2=run.signal("sine2"),
+        cosine2=run.signal("cosine2"),
         periods=1 if run.channels is None else run.channels.periods_per_turn,
+        periods2=None
+        if run.channels is None or run.channels.second is None
+        else run.channels.second.periods_per_turn,
         file=run.source.file if run.source else "",
         source=run.source,
         indicated_sign=run.indicated_sign,
@@ -156,8 +164,16 @@ def _of_table(table: FileReadings, reading: ReadingOptions) -> list[Recording]:
     read = (table.roles[role] for role in ("indicated", "head1") if role in table.roles)
     sign = next((column.sign for column in read), 1)
     found = _split(channels, labels, file, table.source, sign)
-    periods = reading["periods_per_turn"] or 1
-    return [replace(recording, periods=periods) for recording in found]
+    periods = given_periods(reading) or (1,)
+    if len(periods) > 1 and not {*TRACKS} <= channels.keys():
+        raise FileError(
+            table.path,
+            "two periods per turn are of two tracks, and the columns sine2 and cosine2 are not "
+            "there: name them by `signals={'sine2': 'NAME', 'cosine2': 'NAME'}`",
+            line=1,
+        )
+    second = periods[1] if len(periods) > 1 else None
+    return [replace(recording, periods=periods[0], periods2=second) for recording in found]
 
 
 def _in_radians(column: RoleColumn, table: FileReadings, reading: ReadingOptions) -> Array:

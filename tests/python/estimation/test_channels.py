@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from trueangle.errors import NoModelError
-from trueangle.estimation.channels import clipped_rows, estimate_channels
+from trueangle.estimation.channels import estimate_channels
+from trueangle.runs.checks.channelreadings import ChannelReadings
 from trueangle.runs.rawchannels import CONSTANTS, Channels
 
 TRUE = Channels(
@@ -137,7 +138,7 @@ def test_rests_do_not_draw_the_curve_to_their_place():
 def test_clipped_readings_are_left_out_and_counted():
     sine, cosine = drawn(360, 1e-3, 3)
     clipped = estimate_channels(np.minimum(sine, 0.9), cosine, "log")
-    assert dict(clipped.clipped) == {"sine": int((sine >= 0.9).sum())}
+    assert clipped.recorded.clipped == {"sine": int((sine >= 0.9).sum())}
     assert clipped.channels.gain_ratio == pytest.approx(1.03, abs=2e-3)
 
 
@@ -146,9 +147,14 @@ def test_codes_at_the_top_of_a_sine_are_not_clipped(noise):
     for seed in range(10):
         rng = np.random.default_rng(seed)
         phase = rng.uniform(0.0, 2.0 * math.pi, 3000)
-        codes = np.rint(2048.0 + 200.0 * np.sin(phase) + noise * rng.normal(size=phase.size))
-        assert not clipped_rows(codes).any()
-        assert clipped_rows(np.clip(codes, 1900.0, 2180.0)).any()
+        sine, cosine = (
+            np.rint(2048.0 + 200.0 * f(phase) + noise * rng.normal(size=phase.size))
+            for f in (np.sin, np.cos)
+        )
+        assert ChannelReadings.of(sine, cosine).clipped == {}
+        clipped = np.clip(sine, 1900.0, 2180.0)
+        rows = (clipped == 1900.0) | (clipped == 2180.0)
+        assert ChannelReadings.of(clipped, cosine).clipped == {"sine": int(rows.sum())}
 
 
 @pytest.mark.parametrize(

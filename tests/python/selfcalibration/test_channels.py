@@ -147,7 +147,7 @@ def test_the_command_writes_a_model_that_corrects_a_log_of_channels(tmp_path, ca
     assert loaded.correct(angle)[5] == step(given["sine"][5], given["cosine"][5])
     file.write_text("sine,cosine\n" + "".join(f"{s!r},0.3\n" for s in given["sine"].tolist()))
     assert main(["correct", str(file), "-m", str(model), "-o", f"{out}.csv"]) == 0
-    assert "channel cosine is constant while sine goes from" in capsys.readouterr().err
+    assert "the cosine channel is constant (0.3): a dead channel" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

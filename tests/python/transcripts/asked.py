@@ -52,6 +52,7 @@ VALUES = {
     "errors_in": "mrad", "every": "2turns", "reference": "off-null",
     "existing": "printer.cfg", "facets": "facets.csv", "head_angles": "0,119.2", "joint": "elbow",
     "into_joint": "knee", "limits": "limits.toml", "model": "other.json", "nuisance": "ramp",
+    "periods_per_turn": "3",
     "option_bits": "12", "option_entries": "64", "option_counts_per_turn": "65536",
     "option_name": "corrected", "option_number": "f32", "orders": "1,2",
     "option_joint": "elbow", "output_topic": "/corrected", "prior": "fleet.json",

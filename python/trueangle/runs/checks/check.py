@@ -17,6 +17,7 @@ from .angles import (
     swapped_channels,
     told_ratio,
 )
+from .channelreadings import ChannelReadings
 from .fault import DataFault
 from .record import Record, read_records, records_of
 from .rows import duplicate_rows, duplicate_runs, missed_counts, outliers
@@ -120,9 +121,22 @@ def unsorted_time(records: list[Record]) -> Iterator[DataFault]:
             )
 
 
+def channel_faults(records: list[Record]) -> Iterator[DataFault]:
+    """Faults of the readings of a sine and a cosine channel."""
+    given = [(record.label, record.channels) for record in records if record.channels is not None]
+    if not given:
+        return
+    parts = [channels for _, channels in given]
+    sine, cosine, rows = (np.concatenate([part[i] for part in parts]) for i in range(3))
+    labels = [record.label for record in records]
+    falls = any(part.falls for part in parts)
+    yield from ChannelReadings.of(sine, cosine).faults(labels, rows, falls=falls)
+
+
 #: Every test of the data, in the order in which they are reported.
 TESTS = (
     unsorted_time,
+    channel_faults,
     *UNUSABLE_ANGLES,
     swapped_channels,
     duplicate_runs,
@@ -137,6 +151,12 @@ def data_faults(records: list[Record]) -> list[DataFault]:
     found: list[DataFault] = []
     for test in TESTS:
         mixed = {label for fault in found if fault.fault in UNSURE for label in fault.runs}
-        angles = test not in (duplicate_runs, duplicate_rows, unsorted_time, mixed_units)
+        angles = test not in (
+            duplicate_runs,
+            duplicate_rows,
+            unsorted_time,
+            mixed_units,
+            channel_faults,
+        )
         found += test([r for r in records if not (angles and r.label in mixed)])
     return found

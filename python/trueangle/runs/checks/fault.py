@@ -13,6 +13,7 @@ UNUSABLE = (
     "wrong_gear_ratio",
     "wrapped_reference",
     "dead_channel",
+    "wrapped_counter",
     "short_arc",
 )
 
@@ -33,7 +34,8 @@ class DataFault(NamedTuple):
         Of the fixed vocabulary: duplicate_runs, duplicate_rows, stale_samples,
         unsorted_time, mixed_units, wrong_sign, swapped_channels, wrong_gear_ratio,
         saturated_travel, wrapped_reference, missed_counts, outliers; of raw channels
-        dead_channel, short_arc, partial_arc, clipping, resting, no_centre.
+        dead_channel, wrapped_counter, short_arc, partial_arc, clipping, dropouts, resting,
+        no_centre.
     runs : tuple of str
         Labels of the runs that have it.
     rows : tuple of int

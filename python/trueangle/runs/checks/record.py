@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,15 @@ from ..source import checked_reading_options
 
 #: Readings that a run must have to be compared as a whole, and a level to be more than noise.
 LEAST_READINGS = 3
+
+
+class RecordedChannels(NamedTuple):
+    """Sine and cosine of the rows in which both are numbers, and whether their phase falls."""
+
+    sine: Array
+    cosine: Array
+    rows: NDArray[np.int64]
+    falls: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +51,8 @@ class Record:
         Columns of no role that look like deviations from a nominal angle.
     clocks : tuple of str
         Columns of no role that are called like a time, where none was understood.
+    channels : RecordedChannels or None
+        Of the first run of a file: the channels of all its runs.
     """
 
     label: str
@@ -56,6 +67,7 @@ class Record:
     columns: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
     deviations: tuple[str, ...] = ()
     clocks: tuple[str, ...] = ()
+    channels: RecordedChannels | None = None
 
     def __len__(self) -> int:
         return int(self.reference.size)
@@ -83,6 +95,11 @@ def records_of(runs: Iterable[CalibrationRun]) -> list[Record]:
     found = []
     for k, run in enumerate(runs):
         scale = 360.0 / run.period
+        channels = None
+        if run.channels is not None:
+            sine, cosine = run.signals["sine"], run.signals["cosine"]
+            rows = np.arange(1, len(run) + 1)
+            channels = RecordedChannels(sine, cosine, rows, run.channels.direction < 0)
         found.append(
             Record(
                 run.label or str(k + 1),
@@ -94,6 +111,7 @@ def records_of(runs: Iterable[CalibrationRun]) -> list[Record]:
                 run.temperature,
                 run.torque,
                 None if run.mount is None else run.mount * scale,
+                channels=channels,
             )
         )
     return found
@@ -114,7 +132,13 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
             role: (f"-{c.name}" if c.is_reversed else c.name, c.unit)
             for role, c in table.table.roles.items()
         }
-        for labels, rows in table.groups:
+        channels = None
+        if table.channels is not None:
+            sine, cosine = table.signals["sine"], table.signals["cosine"]
+            known = np.flatnonzero(np.isfinite(sine) & np.isfinite(cosine))
+            falls = table.channels.direction < 0
+            channels = RecordedChannels(sine[known], cosine[known], known + 1, falls)
+        for i, (labels, rows) in enumerate(table.groups):
             signals = {name: values[rows] for name, values in table.signals.items()}
             velocity, mount = signals.get("velocity"), signals.get("mount")
             found.append(
@@ -131,6 +155,7 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
                     columns,
                     _deviations(table.table),
                     _clocks(table.table),
+                    channels if i == 0 else None,
                 )
             )
     return found
