@@ -159,11 +159,11 @@ def finding_lines(number: str, finding: Finding, unit: ErrorUnit) -> list[str]:
         if gain.reducible_share is not None and gain.interval is not None:
             text += (
                 f"; reducible share {gain.reducible_share:.2f} "
-                f"({gain.interval[0]:.2f} to {gain.interval[1]:.2f})"
+                f"(95 % interval {gain.interval[0]:.2f} to {gain.interval[1]:.2f})"
             )
         if gain.control_share is not None:
             control = _SHUFFLED.get(EFFECTS[finding.cause].factor, "runs turned to other angles")
-            text += f" (control: {gain.control_share:.2f} with {control})"
+            text += f", control with {control} {gain.control_share:.2f}"
         if gain.note:
             text += f"; {gain.note}"
         lines += wrapped_lines(text + ".", 5, first=3)

@@ -47,8 +47,8 @@ def test_a_finding_says_its_numbers_in_their_order() -> None:
     assert "thermal_drift fits as well" in text
     assert (
         "whole runs: rms 11.00 -> 21.00 arcsec, peak-to-peak 12.00 -> 22.00, max abs 13.00 -> "
-        "23.00; reducible share 0.31 (0.32 to 0.33) (control: 0.34 with speeds turned round at "
-        "random); a note."
+        "23.00; reducible share 0.31 (95 % interval 0.32 to 0.33), control with speeds turned "
+        "round at random 0.34; a note."
     ) in text
     assert (
         "Gain with each velocity held out in turn (30 deg/s): rms 61.00 -> 62.00 arcsec; "
@@ -103,7 +103,7 @@ def test_the_account_says_each_of_its_numbers_in_one_unit(result, unit, per_arcs
     assert told(rf"rms # {unit}, peak-to-peak #, max abs # \(600 readings\)") == pytest.approx(
         [81.0, 82.0, 83.0], **close
     )
-    assert told(rf"Noise of one reading: # {unit}, correlation between neighbours 0.42") == pytest.approx(
+    assert told(rf"reading: # {unit}, correlation between neighbours 0.42") == pytest.approx(
         [77.0], **close
     )
     assert told(

@@ -171,8 +171,8 @@ def selection_notes(
     independent = round(positions.span * max((row.order for row in selection.table), default=0)) + 1
     if retained and independent < orders:
         notes.append(
-            f"over {360.0 * positions.span:.0f} deg orders are collinear: of {orders} about "
-            f"{independent} are independent. The curve is valid within this travel; "
+            f"over {360.0 * positions.span:.0f} deg of travel only about {independent} of "
+            f"{orders} orders can be separated. The curve is valid within this travel; "
             "a full turn would show which orders are real"
         )
     if candidates.local:

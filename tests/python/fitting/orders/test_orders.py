@@ -331,11 +331,11 @@ def test_orders_over_part_of_a_turn_stand_for_others(travel, candidates):
     run = ta.CalibrationRun(theta, theta + error, period=360.0)
     chosen = ta.select_orders(run, range(1, candidates + 1))
     assert 2 in chosen.orders
-    said = [note for note in chosen.notes if "are collinear" in note]
+    said = [note for note in chosen.notes if "can be separated" in note]
     if travel == 360.0 or candidates == 2:
         assert not said
     else:
         # 0.61 of 40, and one.
         assert "over 220 deg" in said[0]
-        assert "of 40 about 25 are independent" in said[0]
+        assert "only about 25 of 40 orders can be separated" in said[0]
         assert said[0][:20] in chosen.summary()
