@@ -242,7 +242,7 @@ def table(columns: list[str], rows: list[tuple[str, list[float], float]]) -> Ite
         yield f"| {name} | {' | '.join(marked)} | {ratio} | {lines_of(METHODS[name])} |"
 
 
-#: A simulated joint like those of the paper: at 36 positions its gear orders look like 8, 14, 15.
+#: A simulated joint like those of the paper: at 36 positions its gear orders look like 8, 14, 16.
 SIMULATED = {("output", 1): (14.1, 243.8), ("output", 4): (6.9, 26.7), ("motor", 1): (18.0, 46.5),
              ("motor", 2): (33.0, 20.8), ("wave_generator", 2): (19.6, 247.9)}  # fmt: skip
 
