@@ -177,7 +177,8 @@ def table(found: dict[str, dict[str, float]]) -> Iterator[str]:
         (ours, least), *others = ways.items()
         for n, (name, taken) in enumerate(others):
             head = f"{job} | {ours}, {shown(least)}" if n == 0 else " | "
-            yield f"| {head} | {name} | {shown(taken)}, {taken / least:.2g} |"
+            ratio = f"{taken / least:.0f}" if taken > 10 * least else f"{taken / least:.1f}"
+            yield f"| {head} | {name} | {shown(taken)}, {ratio} |"
 
 
 def shown(taken: float) -> str:

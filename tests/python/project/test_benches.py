@@ -14,6 +14,7 @@ from conftest import ROOT
 sys.path.insert(0, str(ROOT / "benches"))
 
 import latency
+import public
 import scaling as scalingbench
 from harness import compiled, evaluation, scaling
 from harness.evaluationpeers import evaluation_peers
@@ -130,3 +131,20 @@ def test_loops_in_c_take_any_number_of_angles():
             found = compiled.compiled_peer(name)(model)(theta)
             assert np.abs(found - model.error(theta)).max(initial=0.0) < 1e-17
     assert np.array([5e-324])[0] * 1.0 > 0.0, "numbers below 2e-308 are taken for 0"
+
+
+def test_corrections_are_judged_by_runs_they_did_not_see(monkeypatch, tmp_path, capsys):
+    names = ("numpy, orders 1-12", "`ta.fit(runs)`")
+    monkeypatch.setattr(public, "METHODS", {name: public.METHODS[name] for name in names})
+    assert public.main(["--data", str(tmp_path)]) == 0
+    out, err = capsys.readouterr()
+    for source in public.SOURCES.values():  # neither is there: the reader is told from where
+        assert f"missing: {tmp_path / source.file}: `{source.path}`" in err
+        assert source.commit in out
+    table = out[out.index("| method |") :].splitlines()[2:]
+    rows = {line.split(" | ")[0].strip("| "): line.split(" | ")[1:6] for line in table if line}
+    assert list(rows) == [*names, *public.TOLD]
+    # At 36 positions gear orders pass for low ones; two mounts and the ratio tell them apart.
+    default, told = rows["`ta.fit(runs)`"], [cell.strip("*") for cell in rows[list(rows)[-1]]]
+    assert float(default[2].strip("*")) < 5 < float(default[3].strip("*"))
+    assert float(told[4]) < 5
