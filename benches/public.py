@@ -211,12 +211,8 @@ def fitted(
             predict = method(x, e, runs, np.array(orders))
         except ta.errors.NoModelError:  # a refusal, with its reason, where a correction may harm
             return np.nan, time.perf_counter() - start
-    taken = time.perf_counter() - start
-    left = []
-    for run in tested:
-        y, error = centred(run)
-        rest = error - predict(y)
-        left.append(rest.var())
+        taken = time.perf_counter() - start
+        left = [(error - predict(y)).var() for y, error in map(centred, tested)]
     return float(np.mean(left)), taken
 
 
