@@ -55,10 +55,8 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         yield f"Fitted on {travel.describe(360.0)} only: outside it is extrapolated."
     if fit.missing:
         rows = "row" if fit.missing == 1 else "rows"
-        dropouts = (
-            "" if common_channels(fit.problem.runs) is None else " or off the channels' curve"
-        )
-        yield f"{fit.missing} {rows} with an empty cell{dropouts} omitted."
+        dropouts = "" if channels is None else "off the channels' curve or "
+        yield f"{fit.missing} {rows} {dropouts}with an empty cell omitted."
     if channels is not None and channels.second is not None:
         yield _sentence(mismatch_words(channels.mismatch(*track_readings(fit.problem.runs))))
     yield from (_sentence(remark) for remark in fit.remarks)
