@@ -69,6 +69,13 @@ pub struct Gram {
     pub level: f64,
 }
 
+/// How a run is whitened, and its whitened rows, chunk by chunk, where rows are held.
+#[derive(Debug)]
+pub(super) struct Whitened<'a> {
+    pub factor: Factor<'a>,
+    pub rows: Option<Vec<Rows>>,
+}
+
 impl Gram {
     /// From the upper triangle of products of whitened rows: zero, columns, error.
     ///
@@ -98,13 +105,18 @@ impl Gram {
 impl Readings {
     /// The Gram matrices of each run under a noise, in one pass.
     pub fn grams(&self, noise: Noise) -> Vec<Gram> {
-        let work = |r: usize| self.gram(&self.runs()[r], noise);
-        threads::map_parts(self.runs().len(), self.threads(), work).collect()
+        self.whitened(noise)
+            .into_iter()
+            .map(|(own, _)| own)
+            .collect()
     }
 
     /// The Gram matrix of all runs with one zero, in one pass.
     pub fn pooled(&self, noise: Noise) -> Gram {
-        let work = |r: usize| self.products(&self.runs()[r], noise);
+        let work = |r: usize| {
+            let (products, whitened) = self.products(r, noise);
+            (products, whitened.factor.log_root)
+        };
         let (columns, stride) = (self.columns(), Rows::width(self.columns()));
         let count = self.len() as f64;
         let level = |run: &Run| run.mean() * run.len() as f64 / count;
@@ -136,25 +148,35 @@ impl Readings {
         }
     }
 
-    fn gram(&self, run: &Run, noise: Noise) -> Gram {
-        let (products, root) = self.products(run, noise);
+    /// Gram matrices of each run, and how it is whitened.
+    pub(super) fn whitened(&self, noise: Noise) -> Vec<(Gram, Whitened<'_>)> {
         let columns = self.columns();
-        Gram::of(&products, Rows::width(columns), columns, (root, run.len()))
+        let work = |r: usize| {
+            let (products, whitened) = self.products(r, noise);
+            let scale = (whitened.factor.log_root, self.runs()[r].len());
+            let gram = Gram::of(&products, Rows::width(columns), columns, scale);
+            (gram, whitened)
+        };
+        threads::map_parts(self.runs().len(), self.threads(), work).collect()
     }
 
-    /// Products of the whitened rows of a run, and the logarithm of its factor's determinant.
-    fn products(&self, run: &Run, noise: Noise) -> (Vec<f64>, f64) {
+    /// Products of the whitened rows of a run, and how it is whitened.
+    fn products(&self, r: usize, noise: Noise) -> (Vec<f64>, Whitened<'_>) {
+        let (run, columns) = (&self.runs()[r], self.columns());
         let factor = Factor::new(noise, run.decays());
-        let columns = self.columns();
-        let stride = Rows::width(columns);
         let mut state = State::new(columns);
-        let mut products = vec![0.0; columns * stride];
-        for (start, count) in run.chunks() {
+        let mut products = vec![0.0; columns * Rows::width(columns)];
+        let mut rows = self.held(r).map(<[Rows]>::to_vec);
+        for (k, (start, count)) in run.chunks().enumerate() {
             interrupt::point();
-            let mut rows = self.rows(run, start, count);
-            factor.whiten(start, &mut rows, &mut state);
-            rows.add_products(&rows, &mut products);
+            let mut made = None;
+            let own = match &mut rows {
+                Some(rows) => &mut rows[k],
+                None => made.insert(self.rows(run, start, count)),
+            };
+            factor.whiten(start, own, &mut state);
+            own.add_products(own, &mut products);
         }
-        (products, factor.log_root)
+        (products, Whitened { factor, rows })
     }
 }

@@ -12,17 +12,23 @@
 //! `1/2 v_i' V^-1 v_j` with `v_j = K_j r`: no product of it needs more than a pass over the
 //! readings. It is positive, so that Newton steps ascend.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
-use super::gram::{Gram, Sums};
+use super::gram::{Gram, Whitened};
 use super::model::{Effects, Model};
 use super::posterior::Posterior;
 use super::readings::{Readings, Run};
 use super::rows::Rows;
 use super::slopes::determinant_slopes;
 use super::whitening::{Factor, Noise, State, TERMS, Terms, VARIANCES};
-use crate::simd::{InstructionSet, Kernel, Lanes, dispatch};
+use crate::simd::{InstructionSet, Kernel, Lanes, MOST_LANES, dispatch};
 use crate::{interrupt, threads};
+
+/// Vectors of a product that are summed at once, so that sums do not wait for one another; the last
+/// of them may be beyond a row.
+const BLOCK: usize = 4;
 
 /// Of the log evidence, in the logarithms of the variances.
 #[derive(Clone, Debug)]
@@ -33,10 +39,12 @@ pub struct Information {
     pub average: DMatrix<f64>,
 }
 
-/// What a run adds: half its gradient, and sums whose right-hand sides are `v_j`.
+/// What a run adds: half its gradient, and moments and squares whose right-hand sides are `v_j`,
+/// without the effects of runs.
 struct Part {
     gradient: [f64; VARIANCES],
-    sums: Sums,
+    moments: DMatrix<f64>,
+    squares: DMatrix<f64>,
 }
 
 impl Readings {
@@ -48,29 +56,41 @@ impl Readings {
         grams: &[Gram],
         posterior: &Posterior,
     ) -> Option<Information> {
+        let plain = |run| {
+            let factor = Factor::new(noise, Run::decays(run));
+            Whitened { factor, rows: None }
+        };
+        let whitened: Vec<Whitened> = self.runs().iter().map(plain).collect();
+        self.information_of(model, grams, posterior, &whitened)
+    }
+
+    /// The same, given how each run is whitened.
+    pub(super) fn information_of(
+        &self,
+        model: &Model,
+        grams: &[Gram],
+        posterior: &Posterior,
+        whitened: &[Whitened],
+    ) -> Option<Information> {
         let covariance = posterior.covariance();
         let work = |r: usize| {
             let total = Total::of(&grams[r], model, posterior, &covariance)?;
-            Some(self.part(&self.runs()[r], noise, &grams[r], &total))
+            Some(self.part(&self.runs()[r], &whitened[r], &grams[r], &total))
         };
         let parts = threads::map_parts(self.runs().len(), self.threads(), work);
         let parts = parts.collect::<Option<Vec<_>>>()?;
         let mut gradient = DVector::zeros(VARIANCES);
+        let mut left = DMatrix::zeros(VARIANCES, VARIANCES);
+        let mut moments = DMatrix::zeros(posterior.columns.len(), VARIANCES);
         for part in &parts {
             for j in 0..VARIANCES {
                 gradient[j] += part.gradient[j];
             }
+            left += &part.squares;
+            moments += part.moments.select_rows(&posterior.columns);
         }
-        let grams: Vec<Gram> = parts
-            .into_iter()
-            .zip(grams)
-            .map(|(part, gram)| Gram {
-                sums: part.sums,
-                ..gram.clone()
-            })
-            .collect();
-        let left = model.posterior(&grams)?.residual;
-        let sizes = noise.variances();
+        left -= moments.tr_mul(&(&covariance * &moments));
+        let sizes = whitened.first()?.factor.noise().variances();
         let average = DMatrix::from_fn(VARIANCES, VARIANCES, |i, j| {
             0.5 * sizes[i] * sizes[j] * left[(i, j)]
         });
@@ -78,24 +98,31 @@ impl Readings {
     }
 
     /// The part of one run.
-    fn part(&self, run: &Run, noise: Noise, gram: &Gram, total: &Total) -> Part {
-        let (factor, columns) = (Factor::new(noise, run.decays()), self.columns());
+    fn part(&self, run: &Run, whitening: &Whitened, gram: &Gram, total: &Total) -> Part {
+        let (factor, columns) = (&whitening.factor, self.columns());
         let chunks: Vec<(usize, usize)> = run.chunks().collect();
+        let whitened = |k: usize, state: &mut State| match &whitening.rows {
+            Some(rows) => Cow::Borrowed(&rows[k]),
+            None => {
+                let (start, count) = chunks[k];
+                let mut rows = self.rows(run, start, count);
+                factor.whiten(start, &mut rows, state);
+                Cow::Owned(rows)
+            }
+        };
         // Forward: the residual, and the state at each chunk from which the backward pass starts it.
         let mut states = Vec::with_capacity(chunks.len());
         let mut state = State::new(columns);
         let mut residual = Rows::zeros(run.len(), 1);
-        for &(start, count) in &chunks {
+        for (k, &(start, count)) in chunks.iter().enumerate() {
             interrupt::point();
             states.push(state.clone());
-            let mut rows = self.rows(run, start, count);
+            let rows = whitened(k, &mut state);
             for i in 0..count {
                 let own = rows.row(i).iter().zip(&total.residual).map(|(x, c)| x * c);
                 residual.row_mut(start + i)[0] = own.sum();
             }
-            factor.whiten(start, &mut rows, &mut state);
         }
-        factor.whiten(0, &mut residual, &mut State::new(1));
         factor.back(0, &mut residual, &mut State::new(1));
         let r: Vec<f64> = (0..run.len()).map(|i| residual.row(i)[0]).collect();
         let mut v = scaled_products(&r, run.decays());
@@ -109,12 +136,12 @@ impl Readings {
         let mut moments = vec![0.0; columns * v.stride()];
         let mut traces = [0.0; VARIANCES];
         let mut after = State::new(columns);
-        for (&(start, count), mut state) in chunks.iter().zip(states).rev() {
+        for (k, mut state) in states.into_iter().enumerate().rev() {
             interrupt::point();
-            let mut rows = self.rows(run, start, count);
-            factor.whiten(start, &mut rows, &mut state);
+            let (start, count) = chunks[k];
+            let mut rows = whitened(k, &mut state).into_owned();
             let work = Traces {
-                factor: &factor,
+                factor,
                 start,
                 rows: &mut rows,
                 state: &mut after,
@@ -128,24 +155,26 @@ impl Readings {
         factor.whiten(0, &mut v, &mut State::new(VARIANCES));
         let mut squares = vec![0.0; VARIANCES * stride];
         v.add_products(&v, &mut squares);
-        let determinant = determinant_slopes(noise, run.decays());
-        let sizes = noise.variances();
+        let determinant = determinant_slopes(factor);
+        let sizes = factor.noise().variances();
         let half = |j: usize| 0.5 * (sizes[j] * (quadratic[j] + traces[j]) - determinant[j]);
         let n = gram.information;
         let zero = |j: usize| moments[j];
-        let sums = Sums {
-            products: gram.sums.products.clone(),
-            moments: DMatrix::from_fn(columns - 2, VARIANCES, |i, j| {
-                moments[(i + 1) * stride + j] - gram.means[i] * zero(j)
-            }),
-            squares: DMatrix::from_fn(VARIANCES, VARIANCES, |i, j| {
-                squares[i.min(j) * stride + i.max(j)] - zero(i) * zero(j) / n
-            }),
-            log_scale: 0.0,
-        };
+        let mut own = DMatrix::from_fn(columns - 2, VARIANCES, |i, j| {
+            moments[(i + 1) * stride + j] - gram.means[i] * zero(j)
+        });
+        let mut left = DMatrix::from_fn(VARIANCES, VARIANCES, |i, j| {
+            squares[i.min(j) * stride + i.max(j)] - zero(i) * zero(j) / n
+        });
+        if let Some(spread) = &total.effects {
+            let taken = spread * &own;
+            left -= own.tr_mul(&taken);
+            own -= &gram.sums.products * taken;
+        }
         Part {
             gradient: std::array::from_fn(half),
-            sums,
+            moments: own,
+            squares: left,
         }
     }
 }
@@ -156,6 +185,8 @@ struct Total {
     residual: Vec<f64>,
     /// Covariance, rows as far apart as those of [`Rows`], zeros at the error.
     covariance: Vec<f64>,
+    /// `E = W (I + W G W)^-1 W` where coefficients differ from run to run.
+    effects: Option<DMatrix<f64>>,
 }
 
 impl Total {
@@ -175,8 +206,9 @@ impl Total {
         }
         let omega = model.by_column(&model.omega);
         let on: Vec<usize> = (0..m).filter(|&c| omega[c] > 0.0).collect();
+        let mut given = None;
         if !on.is_empty() {
-            // With `E = W (I + W G W)^-1 W`: mean b + E (g - G b), covariance
+            // With `E` the effects: mean b + E (g - G b), covariance
             // E + (I - E G) S (I - E G)'.
             let effects = Effects::of(&gram.sums, &omega, &on)?;
             let root = effects.whitened(DMatrix::identity(on.len(), on.len()));
@@ -190,14 +222,15 @@ impl Total {
             let left = gram.sums.moments.column(0) - &gram.sums.products * &mean;
             mean += &spread * left;
             let kept = DMatrix::identity(m, m) - &spread * &gram.sums.products;
-            own = spread + &kept * own * kept.transpose();
+            own = &spread + &kept * own * kept.transpose();
+            given = Some(spread);
         }
         let stride = Rows::width(m + 2);
         let zero = gram.level - gram.means.dot(&mean);
         let mut residual = vec![0.0; m + 2];
         residual[0] = -zero;
         residual[m + 1] = 1.0;
-        let mut covariance = vec![0.0; (m + 2) * stride + Rows::SLACK];
+        let mut covariance = vec![0.0; (m + 2) * stride + BLOCK * MOST_LANES];
         let with_zero = -(&own * &gram.means);
         covariance[0] = 1.0 / gram.information - with_zero.dot(&gram.means);
         for i in 0..m {
@@ -211,6 +244,7 @@ impl Total {
         Some(Self {
             residual,
             covariance,
+            effects: given,
         })
     }
 }
@@ -263,15 +297,25 @@ impl Kernel for Traces<'_, '_> {
         let (stride, columns) = (rows.stride(), rows.columns());
         let mut plain = L::splat(0.0);
         let mut ahead = [L::splat(0.0); TERMS];
+        let mut product = vec![0.0; stride + BLOCK * MOST_LANES];
         for i in (0..rows.len()).rev() {
             let row = rows.row_mut(i);
             factor.back_row::<L>(start + i, row, state);
-            for c in (0..stride).step_by(L::N) {
-                let mut q = L::splat(0.0);
+            for c in (0..stride).step_by(BLOCK * L::N) {
+                let mut sums = [L::splat(0.0); BLOCK];
                 for k in 0..columns - 1 {
-                    let own = Rows::load::<L>(covariance, k * stride + c);
-                    q = L::splat(row[k]).mul_add(own, q);
+                    let factor = L::splat(row[k]);
+                    for v in 0..BLOCK {
+                        let own = Rows::load::<L>(covariance, k * stride + c + v * L::N);
+                        sums[v] = factor.mul_add(own, sums[v]);
+                    }
                 }
+                for v in 0..BLOCK {
+                    Rows::store(sums[v], &mut product, c + v * L::N);
+                }
+            }
+            for c in (0..stride).step_by(L::N) {
+                let q = Rows::load::<L>(&product, c);
                 plain = q.mul_add(Rows::load::<L>(row, c), plain);
                 for j in 0..TERMS {
                     let after = Rows::load::<L>(state.terms(), j * stride + c);

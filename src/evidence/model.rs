@@ -115,7 +115,11 @@ impl Model {
 impl Sums {
     /// Adds some columns of a run to `total`, without its effects of variances `omega`.
     pub(super) fn add_without_effects(&self, omega: &[f64], columns: &[usize], total: &mut Self) {
-        let picked = |rows: &[usize]| self.products.select_rows(rows).select_columns(columns);
+        let picked = |rows: &[usize]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |i, k| {
+                self.products[(rows[i], columns[k])]
+            })
+        };
         total.products += picked(columns);
         total.moments += self.moments.select_rows(columns);
         total.squares += &self.squares;

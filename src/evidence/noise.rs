@@ -5,7 +5,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::gram::Gram;
+use super::gram::{Gram, Whitened};
 use super::model::Model;
 use super::posterior::Posterior;
 use super::prior::NoisePrior;
@@ -47,24 +47,26 @@ pub struct NoiseFit {
 }
 
 /// A noise, and the evidence of a model under it.
-struct At {
+struct At<'a> {
     position: [f64; VARIANCES],
     noise: Noise,
     grams: Vec<Gram>,
+    whitened: Vec<Whitened<'a>>,
     posterior: Posterior,
     value: f64,
 }
 
 impl Readings {
-    fn at(&self, model: &Model, prior: NoisePrior, position: [f64; VARIANCES]) -> Option<At> {
+    fn at(&self, model: &Model, prior: NoisePrior, position: [f64; VARIANCES]) -> Option<At<'_>> {
         let noise = prior.noise(&position);
-        let grams = self.grams(noise);
+        let (grams, whitened): (Vec<_>, Vec<_>) = self.whitened(noise).into_iter().unzip();
         let posterior = model.posterior(&grams)?;
         let value = posterior.log_evidence + prior.log_density(&position);
         Some(At {
             position,
             noise,
             grams,
+            whitened,
             posterior,
             value,
         })
@@ -91,10 +93,11 @@ impl Readings {
         close: f64,
     ) -> Option<NoiseFit> {
         let (low, high) = prior.bounds();
-        let mut now = self.at(model, prior, start.map(|x| x.clamp(low, high)))?;
+        let held = self.holding();
+        let mut now = held.at(model, prior, start.map(|x| x.clamp(low, high)))?;
         let mut damping = 0.0;
         for step in 0.. {
-            let found = self.information(now.noise, model, &now.grams, &now.posterior)?;
+            let found = held.information_of(model, &now.grams, &now.posterior, &now.whitened)?;
             let (mut gradient, mut precision) = (found.gradient, found.average);
             let slopes = prior.slopes(&now.position);
             for j in 0..VARIANCES {
@@ -110,7 +113,7 @@ impl Readings {
                 if gain < close || step == STEPS {
                     break;
                 }
-                let next = self.at(model, prior, next);
+                let next = held.at(model, prior, next);
                 if let Some(next) = next.filter(|next| next.value > now.value) {
                     if next.value - now.value > TRUSTED * gain {
                         damping /= 8.0;

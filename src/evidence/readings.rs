@@ -9,11 +9,15 @@ use super::whitening::{Terms, decays};
 use crate::check::{finite, same_length};
 use crate::error::Error;
 use crate::memory::room;
+use crate::simd::MOST_LANES;
 use crate::spectrum::median;
 use crate::waves;
 
 /// Readings whose columns are made at once: they stay in the second cache.
 pub const CHUNK: usize = 256;
+
+/// Numbers of rows that are held at most, rather than made anew for every noise: 32 MB.
+const HELD: usize = 1 << 22;
 
 /// Bytes that a reading takes at most: its own numbers, factor, residual and products of terms.
 const BYTES: usize = 40 * size_of::<f64>();
@@ -187,6 +191,8 @@ enum Groups {
 pub struct Readings {
     runs: Arc<Vec<Run>>,
     groups: Groups,
+    /// Rows of every chunk of each run, where they are few enough to be held.
+    held: Option<Arc<Vec<Vec<Rows>>>>,
 }
 
 impl Readings {
@@ -209,6 +215,7 @@ impl Readings {
         Ok(Self {
             runs: Arc::new(runs),
             groups: Groups::of_orders(orders),
+            held: None,
         })
     }
 
@@ -231,6 +238,7 @@ impl Readings {
         Ok(Self {
             runs: Arc::new(runs),
             groups: Groups::Columns { widths, columns },
+            held: None,
         })
     }
 
@@ -239,7 +247,28 @@ impl Readings {
         Self {
             runs: Arc::clone(&self.runs),
             groups: self.groups.among(places),
+            held: None,
         }
+    }
+
+    /// The same readings with their rows made once, if they are few enough.
+    pub(super) fn holding(&self) -> Self {
+        let few = self.len() * Rows::width(self.columns()) <= HELD;
+        let rows = |run: &Run| {
+            let each = run.chunks();
+            each.map(|(start, count)| self.rows(run, start, count))
+                .collect()
+        };
+        let made = || Arc::new(self.runs.iter().map(rows).collect());
+        Self {
+            held: few.then(made),
+            ..self.clone()
+        }
+    }
+
+    /// The rows of each chunk of a run, where they are held.
+    pub(super) fn held(&self, run: usize) -> Option<&[Rows]> {
+        self.held.as_ref().map(|held| held[run].as_slice())
     }
 
     /// The runs.
@@ -290,10 +319,15 @@ impl Readings {
             (Groups::Orders { orders, whole }, Source::Angles(theta)) => {
                 let theta = &theta[start..start + count];
                 let waves = waves_of(theta, orders, whole.as_deref());
-                for i in 0..count {
-                    let row = rows.row_mut(i);
-                    for c in 0..2 * orders.len() {
-                        row[c + 1] = waves[c * count + i];
+                // A few columns at a time: all that is read and written stays in the first cache.
+                for first in (0..2 * orders.len()).step_by(MOST_LANES) {
+                    let some = MOST_LANES.min(2 * orders.len() - first);
+                    let columns = &waves[first * count..(first + some) * count];
+                    for i in 0..count {
+                        let row = &mut rows.row_mut(i)[first + 1..][..MOST_LANES];
+                        for k in 0..some {
+                            row[k] = columns[k * count + i];
+                        }
                     }
                 }
             }

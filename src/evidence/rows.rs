@@ -114,22 +114,36 @@ impl Kernel for Products<'_> {
         let is_gram = std::ptr::eq(left, right);
         for c in (0..left.columns).step_by(TILE) {
             let first = if is_gram { c - c % L::N } else { 0 };
-            for d in (first..right.columns).step_by(L::N) {
-                let mut totals = [L::splat(0.0); TILE];
+            for d in (first..right.columns).step_by(2 * L::N) {
+                // Two vectors at once, so that sums do not wait for one another. The second may be
+                // the start of the next row, and is not kept then.
+                let mut totals = [[L::splat(0.0); 2]; TILE];
                 for i in 0..rows {
                     // A tile is within a row: strides are multiples of it.
                     let own = &left.values[i * left.stride + c..][..TILE];
-                    let vector = Rows::load::<L>(&right.values, i * stride + d);
+                    let at = i * stride + d;
+                    let both = [
+                        Rows::load::<L>(&right.values, at),
+                        Rows::load::<L>(&right.values, at + L::N),
+                    ];
                     for k in 0..TILE {
-                        totals[k] = L::splat(own[k]).mul_add(vector, totals[k]);
+                        let factor = L::splat(own[k]);
+                        for v in 0..2 {
+                            totals[k][v] = factor.mul_add(both[v], totals[k][v]);
+                        }
                     }
                 }
                 for k in 0..TILE.min(left.columns - c) {
-                    let at = (c + k) * stride + d;
-                    let mut found = [0.0; MOST_LANES];
-                    totals[k].to_array(&mut found);
-                    for lane in 0..L::N {
-                        sums[at + lane] += found[lane];
+                    for v in 0..2 {
+                        let at = d + v * L::N;
+                        let mut found = [0.0; MOST_LANES];
+                        totals[k][v].to_array(&mut found);
+                        if at < stride {
+                            let sums = &mut sums[(c + k) * stride + at..];
+                            for lane in 0..L::N {
+                                sums[lane] += found[lane];
+                            }
+                        }
                     }
                 }
             }

@@ -133,6 +133,23 @@ impl<'a> Factor<'a> {
         self.scales.is_empty()
     }
 
+    /// Its noise.
+    pub(super) fn noise(&self) -> Noise {
+        self.noise
+    }
+
+    /// `sqrt(d) v` and `1 / sqrt(d)` of a reading.
+    #[inline(always)]
+    pub(super) fn step(&self, i: usize) -> (Terms, f64) {
+        (self.gains[i], self.scales[i])
+    }
+
+    /// Decay of each term from the reading before.
+    #[inline(always)]
+    pub(super) fn decay(&self, i: usize) -> Terms {
+        self.decays[i]
+    }
+
     /// Rows from reading `start` on become those of `L^-1 rows`; `state` is that of the row before.
     pub fn whiten(&self, start: usize, rows: &mut Rows, state: &mut State) {
         let factor = self;
@@ -261,6 +278,16 @@ impl Kernel for Forward<'_, '_> {
             state,
         } = self;
         let (stride, a) = (rows.stride(), factor.noise.terms);
+        if a == [0.0; TERMS] {
+            // White noise: nothing is carried on.
+            for i in 0..rows.len() {
+                let scale = factor.scales[start + i];
+                rows.row_mut(i)[..stride]
+                    .iter_mut()
+                    .for_each(|x| *x *= scale);
+            }
+            return;
+        }
         for i in 0..rows.len() {
             let reading = start + i;
             let gains = &factor.gains[reading.saturating_sub(1)];
