@@ -110,6 +110,7 @@ def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
         mount=mount,
         label=run.label,
         weights=run.weights[keep],
+        time=None if run.time is None else run.time[keep],
     )
 
 

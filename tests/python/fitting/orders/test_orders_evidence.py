@@ -79,3 +79,17 @@ def test_aliases_are_told_where_zeros_that_moved_decide(size, told):
         units.append(ZeroGroupReadings(theta / 360.0, error - error.mean(), np.ones(36), ""))
     (alike,) = find_lookalikes(units, distinct_positions(runs), [8.0], 0.01**2, 40)
     assert (28 not in alike) == told
+
+
+def test_readings_of_weight_0_leave_the_times_of_the_others() -> None:
+    """Two readings a second, then one in ten: without times the noise would be another one."""
+    rng = np.random.default_rng(7)
+    time = np.concatenate([np.arange(200) * 0.5, 100.0 + np.arange(40) * 10.0])
+    theta = np.sort(rng.uniform(0.0, 360.0, time.size))
+    drift = np.cumsum(rng.normal(0.0, 0.003 * np.sqrt(np.diff(time, prepend=-0.5))))
+    error = 0.1 * np.sin(np.radians(2 * theta)) + drift + rng.normal(0.0, 0.01, time.size)
+    keep = rng.random(time.size) > 0.2
+    whole = ta.CalibrationRun(theta, theta + error, 360.0, time=time, weights=keep.astype(float))
+    part = ta.CalibrationRun(theta[keep], (theta + error)[keep], 360.0, time=time[keep])
+    both = [ta.select_orders(run, argument="reference").estimate for run in (whole, part)]
+    np.testing.assert_allclose(both[0].noise, both[1].noise, rtol=1e-9)
