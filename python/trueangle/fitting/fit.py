@@ -234,8 +234,9 @@ def fitted_to(
         "reference_orders": (),
     }
     beside = _beside(nuisance, reference_orders)
-    given = found
+    given = calm = found
     if evidence is not None:
+        calm = _calm(found, loss)
         orders = evidence.by_shaft
     elif orders is None or isinstance(orders, str):
         if beside.wanted:
@@ -246,7 +247,8 @@ def fitted_to(
                 given, beside.kinds, likely, _angle(argument), beside.reference
             )
         sought["reference_orders"] = beside.reference
-        selection, orders = _selected(found, orders, loss, sought, summed)
+        calm = _calm(found, loss)
+        selection, orders = _selected(calm, orders, sought, summed)
         if not selection.orders:
             selection, orders = None, ()
     wanted = resolve_orders(orders, gear_ratio, fixed_member, shafts)
@@ -273,6 +275,7 @@ def fitted_to(
 
         selection, problem, weighted, known = fit_mixture(
             found,
+            calm,
             selection,
             lambda runs: _choice(runs, sought),
             lambda own: resolve_orders(own.by_shaft, gear_ratio, fixed_member, shafts),
@@ -370,18 +373,20 @@ def _angle(argument: AnyArgument) -> Argument:
     return "indicated" if argument == "indicated" else "reference"
 
 
+def _calm(runs: Sequence[CalibrationRun], loss: Loss) -> Sequence[CalibrationRun]:
+    """The runs without spikes, unless all readings are to count."""
+    return runs if loss == "linear" else [without_spikes(run) for run in runs]
+
+
 def _selected(
     runs: Sequence[CalibrationRun],
     orders: str | None,
-    loss: Loss,
     sought: dict[str, Any],
     summed: SummedReadings | None,
 ) -> tuple[OrderSelection, Mapping[str, Iterable[float]]]:
     """Orders with evidence, from readings without spikes."""
     if orders not in (None, "auto"):
         raise ArgumentError(f"orders must be whole numbers, a mapping or 'auto', got {orders!r}")
-    if loss != "linear":
-        runs = [without_spikes(run) for run in runs]
     selection = _choice(runs, {**sought, "summed": summed})
     # Constants of channels are a model of themselves: nothing need be left of the angle.
     if not selection.orders and any(run.channels is None for run in runs):

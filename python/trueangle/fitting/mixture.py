@@ -23,7 +23,7 @@ from ..support.arrays import Array
 from .orders.result import OrderSelection
 from .orders.zerogroups import some_angles
 from .problem import PlainSolution, Problem, SolvedProblem
-from .robust import FAR, RobustFit, given_weights, without_spikes
+from .robust import FAR, RobustFit, given_weights
 from .uncertainty import Uncertainty
 
 #: Rounds of setting outliers aside.
@@ -44,13 +44,14 @@ class MixtureFit(NamedTuple):
 
 def fit_mixture(
     runs: Sequence[CalibrationRun],
+    calm: Sequence[CalibrationRun],
     selection: OrderSelection,
     choose: Callable[[Sequence[CalibrationRun]], OrderSelection],
     resolve: Callable[[OrderSelection], list[ShaftOrders]],
     robust: bool,
     floor: float,
 ) -> MixtureFit:
-    """Fit the orders of a selection, which ``choose`` made of the runs without spikes.
+    """Fit the orders of a selection, which ``choose`` made of ``calm``, the runs without spikes.
 
     Deviations below ``floor`` are rounding, never outliers.
 
@@ -62,9 +63,7 @@ def fit_mixture(
         Without the outliers the readings support no order.
     """
     given = [given_weights(run.weights, len(run)) for run in runs]
-    weights = given
-    if robust:
-        weights = [given_weights(without_spikes(run).weights, len(run)) for run in runs]
+    weights = [given_weights(run.weights, len(run)) for run in calm]
     rounds, far = _ROUNDS if robust else 0, 0.0
     while True:
         problem = Problem(runs, resolve(selection), selection.argument)

@@ -32,11 +32,9 @@ if TYPE_CHECKING:
 
 def _build_model(fit: FittedCoefficients) -> HarmonicModel:
     """The fitted series with its covariance, record and provenance."""
-    covariance = fit.uncertainty.covariance
     condition = fit.fitted.solution.condition_number
     sources = dict.fromkeys(run.source for run in fit.problem.runs if run.source is not None)
-    return fit.bare_model.replace(
-        covariance=covariance if np.isfinite(covariance).all() else None,
+    return fit.model_with_covariance.replace(
         condition_number=condition if np.isfinite(condition) else None,
         fit=_record(fit),
         provenance=Provenance(tuple(sources), f"trueangle {__version__}"),
@@ -150,6 +148,14 @@ class FittedCoefficients(FitData):
         return HarmonicModel(tuple(shafts), solution.constant, problem.period, problem.argument)
 
     @cached_property
+    def model_with_covariance(self) -> HarmonicModel:
+        """The fitted coefficients with their covariance, without the record of this fit."""
+        covariance = self.uncertainty.covariance
+        return self.bare_model.replace(
+            covariance=covariance if np.isfinite(covariance).all() else None
+        )
+
+    @cached_property
     def model(self) -> HarmonicModel:
         """The fitted model, with its covariance and the record of this fit."""
         return _build_model(self)
@@ -176,16 +182,17 @@ class FittedCoefficients(FitData):
     @property
     def standard_errors(self) -> tuple[Array, Array] | None:
         """Of amplitudes and phases; None where no residual is left to take them from."""
-        return None if self.model.covariance is None else (self.amplitude_std, self.phase_std)
+        told = self.model_with_covariance.covariance is not None
+        return (self.amplitude_std, self.phase_std) if told else None
 
     @property
     def covariance(self) -> Array:
         """Of ``[constant, A, B of each order of each shaft in turn]``."""
-        if self.model.covariance is None:
+        if self.model_with_covariance.covariance is None:
             raise ArgumentError(
                 "no covariance: as many unknowns as readings leave no residual to take it from"
             )
-        return self.model.covariance
+        return self.model_with_covariance.covariance
 
     def interval(self, level: float = 0.95) -> Array:
         """Intervals that hold the true coefficients at this level.
@@ -282,8 +289,8 @@ class FittedCoefficients(FitData):
             return self._polar_std(along=False) / self.amplitudes
 
     def _polar_std(self, along: bool) -> Array:
-        a = np.concatenate([np.zeros(0), *(s.cosine for s in self.model.shafts)])
-        b = np.concatenate([np.zeros(0), *(s.sine for s in self.model.shafts)])
+        a = np.concatenate([np.zeros(0), *(s.cosine for s in self.bare_model.shafts)])
+        b = np.concatenate([np.zeros(0), *(s.sine for s in self.bare_model.shafts)])
         index = 1 + 2 * np.arange(a.size)
         cov = self.covariance
         aa, bb, ab = cov[index, index], cov[index + 1, index + 1], cov[index, index + 1]

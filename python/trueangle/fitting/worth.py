@@ -35,7 +35,8 @@ def of_worth(fit: FitResult) -> FitResult:
     NoModelError
         The fitted error is below its standard error.
     """
-    model = fit.model
+    # The notes of the whole model take longer than the fit of few readings.
+    model = fit.model_with_covariance
     if model.covariance is None or (fit.amplitudes >= fit.amplitude_std).any():
         return fit
     places = np.concatenate(fit.problem.angles)
