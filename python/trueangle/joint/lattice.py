@@ -22,6 +22,9 @@ LEAST_STEP = 1e-9
 #: search for it.
 BY_CHANCE, STEPS_TRIED = 1e-3, 200
 
+#: Moves that most steps are tried on.
+_FIRST = 8
+
 #: Cells of a turn beyond which digits that were cut off are not looked behind, steps within the
 #: travel from which on they are a lattice, and share of one that a cell may be.
 MOST_CELLS, LEAST_STEPS, WIDEST_CELL = 400_000, 20, 0.3
@@ -136,16 +139,23 @@ def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
     some = distinct(moves[:: max(1, moves.size // STEPS_TRIED)])
     tried = distinct(np.concatenate([some, np.diff(some)]))
     tried = tried[(tried > rounding) & (tried < 0.5 * below)][::-1]
-    counts = some / tried[:, None]
-    aways = np.abs(counts - np.round(counts)).max(axis=1, initial=0.0)
+    # Most of them miss one of the first moves already.
+    near = tried[_aways(some[:_FIRST], tried) < ON_LATTICE]
+    aways = _aways(some, near)
     for k in np.flatnonzero(aways < ON_LATTICE).tolist():
-        step, away = float(tried[k]), float(aways[k])
-        told = distinct(np.round(counts[k])).size - 1
+        step, away = float(near[k]), float(aways[k])
+        told = distinct(np.round(some / step)).size - 1
         # That each further move is a whole number of counts, as near as they all are.
         if tried.size * (2.0 * away) ** told < BY_CHANCE:
             off = np.abs(moves / step - np.round(moves / step)).max()
             return step if off < ON_LATTICE else 0.0
     return 0.0
+
+
+def _aways(moves: NDArray[np.float64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """By how much of each step the moves are no multiples of it at most."""
+    counts = moves / steps[:, None]
+    return np.asarray(np.abs(counts - np.round(counts)).max(axis=1, initial=0.0))
 
 
 def is_of_design(values: NDArray[np.float64], true: NDArray[np.float64], step: float) -> bool:
