@@ -219,7 +219,7 @@ class Evidence:
         list[tuple[float, list[float], list[float]]], NDArray[np.float64], NDArray[np.float64]
     ]: ...
     def estimate(
-        self, probabilities: Sequence[float]
+        self, probabilities: Sequence[float], declared: Sequence[int] = ()
     ) -> tuple[
         NDArray[np.float64],
         list[int],
