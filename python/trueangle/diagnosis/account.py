@@ -72,6 +72,8 @@ class PreparedData:
         Of those that are used, arcsec.
     rows : ndarray or None
         Places of the latter among the former; None where all are used.
+    before : float
+        Deviance of the readings as they are, where a delay is subtracted.
     """
 
     sim: Simulation
@@ -81,6 +83,7 @@ class PreparedData:
     signals: Signals
     error: Array
     rows: NDArray[np.int64] | None
+    before: float = 0.0
 
     @classmethod
     def of(
@@ -153,7 +156,8 @@ def account_of(every: Signals, error: Array, sim: Simulation) -> Account:
     )
     if delay is None or current_deadline().over:
         return account
-    other = _believed(PreparedData.of(every, error, sim, account.seen.ratio, delay))
+    then = PreparedData.of(every, error, sim, account.seen.ratio, delay)
+    other = _believed(replace(then, before=account.first.start))
     return _better(account, other, NEW_CAUSE + account.choice.chosen.log_n)
 
 
@@ -204,9 +208,13 @@ def _start(seen: PreparedData, sim: Simulation) -> Regression:
     A delay stays free in every fit: what follows the direction, for example, is tested jointly
     with it.
     """
-    beside = None if seen.delay is None else seen.delay.columns(seen.signals)
     error = seen.error - sim.predict(seen.signals)
-    return Regression.of(seen.signals, error, sim.surroundings, beside=beside)
+    if seen.delay is None:
+        return Regression.of(seen.signals, error, sim.surroundings)
+    beside = seen.delay.columns(seen.signals)
+    start = Regression.of(seen.signals, error, sim.surroundings, beside=beside)
+    # Its form leaves a share of what it explains, as that of any cause.
+    return replace(start, start=max(start.start, seen.before))
 
 
 def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:

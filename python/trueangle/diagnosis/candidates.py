@@ -14,6 +14,7 @@ from .penalty import (
     deviance_before_forms,
     deviance_of_form_errors,
     form_misfit,
+    forms_before,
     penalty_of,
     total_penalty,
 )
@@ -109,9 +110,11 @@ class CandidateScores:
         explained = deviance_before_forms(start) - start.deviance
         if not effect_or_unnamed(extension.cause).has_exact_form:
             explained += extension.deviance
-        after = penalty_of([*start.terms, extension], deviance_of_form_errors(explained, start.n))
+        before = forms_before(start)
+        left = deviance_of_form_errors(explained, start.n)
+        after = penalty_of([*start.terms, extension], left, before)
         paid: float = start.cache.of_fit(
-            "penalty", lambda: penalty_of(start.terms, form_misfit(start))
+            "penalty", lambda: penalty_of(start.terms, form_misfit(start), before)
         )
         return gain - (after - paid)
 

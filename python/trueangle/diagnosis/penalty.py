@@ -18,7 +18,14 @@ NEW_CAUSE = 6.0
 
 def total_penalty(regression: Regression) -> float:
     """BIC with the penalty of every cause: lower is better."""
-    return regression.bic + penalty_of(regression.terms, form_misfit(regression))
+    return regression.bic + penalty_of(
+        regression.terms, form_misfit(regression), forms_before(regression)
+    )
+
+
+def forms_before(regression: Regression) -> int:
+    """Causes with a form that are in the readings themselves: a delay that was subtracted."""
+    return int(regression.readings.beside is not None)
 
 
 def form_misfit(regression: Regression) -> float:
@@ -73,8 +80,11 @@ def deviance_of_form_errors(deviance: float, readings: int) -> float:
     return float(readings * np.log1p(FORM * energy))
 
 
-def penalty_of(terms: Sequence[Extension], left: float) -> float:
-    """Of causes beyond that of their parameters; their forms may leave ``left``."""
+def penalty_of(terms: Sequence[Extension], left: float, before: int = 0) -> float:
+    """Of causes beyond that of their parameters; their forms may leave ``left``.
+
+    ``before`` counts those with a form that are no terms.
+    """
     # A line of a declared shaft is expected, and its order is declared.
     declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
     effects = [effect_or_unnamed(term.cause) for term in terms]
@@ -83,7 +93,7 @@ def penalty_of(terms: Sequence[Extension], left: float) -> float:
     causes = len(separate) + len({*effects} - {*separate}) - declared
     # A cause that contains another one spends a second form on the same error.
     forms = causes + len({effect for effect in effects if effect.contains})
-    return NEW_CAUSE * causes + left * max(forms - 1, 0)
+    return NEW_CAUSE * causes + left * max(before + forms - 1, 0)
 
 
 def finding_groups(terms: Sequence[Extension]) -> list[list[int]]:
@@ -110,11 +120,13 @@ def regression_without(
 def net_deviance_lost(regression: Regression, group: Sequence[int]) -> float:
     """Deviance that dropping the terms ``group`` would cost, less the penalties it would save."""
     terms = regression.terms
-    left = form_misfit(regression)
+    left, before = form_misfit(regression), forms_before(regression)
     kept = [term for k, term in enumerate(terms) if k not in group]
     own = sum(terms[k].parameters * terms[k].log_n + 2.0 * terms[k].log_grid for k in group)
     return (
-        deviance_lost(regression, group) - own - (penalty_of(terms, left) - penalty_of(kept, left))
+        deviance_lost(regression, group)
+        - own
+        - (penalty_of(terms, left, before) - penalty_of(kept, left, before))
     )
 
 

@@ -22,6 +22,7 @@ from .penalty import (
     deviance_lost,
     finding_groups,
     form_misfit,
+    forms_before,
     net_deviance_lost,
     penalty_of,
     regression_without,
@@ -269,7 +270,7 @@ def _made_specific(regression: Regression) -> Regression:
         left = form_misfit(regression)
 
         def price(account: Regression, left: float = left) -> float:
-            return account.bic + penalty_of(account.terms, left)
+            return account.bic + penalty_of(account.terms, left, forms_before(account))
 
         rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
         tried = [

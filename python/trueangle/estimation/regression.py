@@ -119,7 +119,8 @@ class Regression(Solution):
         """
         readings = replace(self.readings, weights=weights)
         found = self.of_readings(readings, cache=self.cache.for_other_errors())
-        return replace(found, start=min(self.start, found.start))
+        before = self.start - self.deviance
+        return replace(found, start=min(self.start, found.start + before))
 
     def of_rows(self, rows: NDArray[np.bool_]) -> Self:
         """Some of the readings without terms, under the correlation found in all."""

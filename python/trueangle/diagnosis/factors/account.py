@@ -235,7 +235,7 @@ def factors_of(
             Factor(
                 factor,
                 shaft,
-                tuple(sorted({m / cycles for m in orders})) or None,
+                tuple(sorted({m / cycles for m in orders if m})) or None,
                 rms,
                 max(rms - BAND * std, 0.0),
                 rms + BAND * std,
@@ -370,15 +370,13 @@ def _curve(
     else:
         squares, slopes = np.zeros(at.size), np.zeros(at.size)
         for k in own:
-            values = account.groups[k].values
-            index = np.arange(bounds[k], bounds[k + 1])
-            pair = mean[index].reshape(-1, 2)
-            spread = covariance[np.ix_(index, index)]
-            for part in range(2):
-                f = values @ pair[:, part]
-                own_part = spread[part::2, part::2]
-                squares += f**2
-                slopes += f**2 * np.einsum("ij,jk,ik->i", values, own_part, values)
+            for _, values, columns in account.groups[k].lines():
+                for part in range(2):
+                    index = np.arange(bounds[k], bounds[k + 1])[columns][part::2]
+                    f = values @ mean[index]
+                    spread = covariance[np.ix_(index, index)]
+                    squares += f**2
+                    slopes += f**2 * np.einsum("ij,jk,ik->i", values, spread, values)
         value = np.sqrt(squares)
         variance = slopes / np.maximum(squares, 1e-24)
     apart = BAND * np.sqrt(np.maximum(variance, 0.0))

@@ -72,18 +72,21 @@ def _alone(factor: str, own: Sequence[tuple[Group, Array]]) -> Curve:
 
 
 def _product(factor: str, shaft: str, cycles: float, group: Group, mean: Array) -> list[Curve]:
-    parts, sizes, lines = np.linalg.svd(group.values @ mean.reshape(-1, 2), full_matrices=False)
     found = []
-    for part, size, (cosine, sine) in zip(parts.T, sizes, lines, strict=False):
-        if not size > _ROUNDING * sizes[0]:
+    at = plain_numbers(group.at)
+    for order, values, own in group.lines():
+        if not order:
+            alone = factor.removesuffix("_place")
+            found.append(Curve(alone, at, plain_numbers(values @ mean[own][0::2])))
             continue
-        sign = 1.0 if part[np.argmax(np.abs(part))] > 0.0 else -1.0
-        phase = float(np.degrees(np.arctan2(sign * cosine, sign * sine)) % 360.0)
-        values = plain_numbers(sign * size * part)
-        orders = tuple(m / cycles for m in group.orders)
-        found.append(
-            Curve(factor, plain_numbers(group.at), values, shaft, orders, (round(phase, 4),))
-        )
+        parts, sizes, pairs = np.linalg.svd(values @ mean[own].reshape(-1, 2), full_matrices=False)
+        for part, size, (cosine, sine) in zip(parts.T, sizes, pairs, strict=False):
+            if not size > _ROUNDING * sizes[0]:
+                continue
+            sign = 1.0 if part[np.argmax(np.abs(part))] > 0.0 else -1.0
+            phase = float(np.degrees(np.arctan2(sign * cosine, sign * sine)) % 360.0)
+            shown = plain_numbers(sign * size * part)
+            found.append(Curve(factor, at, shown, shaft, (order / cycles,), (round(phase, 4),)))
     return found
 
 

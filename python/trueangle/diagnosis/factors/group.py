@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -49,6 +49,7 @@ class Group:
         At the readings; the mean square of a row is 1.
     orders : tuple of float
         Lines of the place, in cycles of an output turn; none of a function of the factor alone.
+        In a product 0 is the function without a line.
     at : ndarray, shape (g,)
         Values of the factor.
     function : callable
@@ -91,6 +92,12 @@ class Group:
         found: Array = self.function(x)
         return found
 
+    def lines(self) -> Iterator[tuple[float, Array, slice]]:
+        """Of a product each line: its order, the functions at `at` of it, and its columns."""
+        width = self.columns.shape[1] // len(self.orders)
+        for k, order in enumerate(self.orders):
+            yield order, self.values / max(order, 1.0), slice(k * width, (k + 1) * width)
+
     @property
     def is_product(self) -> bool:
         """Functions of the factor times a line."""
@@ -122,13 +129,21 @@ class Group:
         at: Array,
         unit: str,
         theta: Array,
-        order: float,
+        orders: tuple[float, ...],
     ) -> Group:
-        """Functions of a factor's values times a line of the angle ``theta``, radians."""
-        functions, line = basis(x), line_columns(theta, order)
-        columns = (functions[:, :, None] * line[:, None, :]).reshape(len(theta), -1)
+        """Functions of a factor's values times lines of the angle ``theta``, radians.
+
+        Of several lines those of higher order are expected to be smaller: ``1/m``.
+        """
+        functions = basis(x)
+        products = [functions[:, :, None] * _line(theta, m)[:, None, :] for m in orders]
+        columns = np.hstack([product.reshape(len(theta), -1) for product in products])
         scale = _scale(columns)
-        return cls(factor, columns / scale, (order,), at, lambda x: basis(x) / scale, unit)
+        return cls(factor, columns / scale, orders, at, lambda x: basis(x) / scale, unit)
+
+
+def _line(theta: Array, order: float) -> Array:
+    return line_columns(theta, order) / max(order, 1.0)
 
 
 def _scale(columns: Array) -> float:

@@ -16,26 +16,21 @@ from ...joint.lines import line_columns
 from ...joint.signals import Signals
 from ...support.arrays import Array
 from .group import GRID, Group
+from .jumps import LOW, STANDS_OUT, jumps, less_low_orders
+from .late import late_readings
 
-#: Orders of the output, each a group; and the bands above them, a group each.
-LOW: Final = 12
+#: Bands of orders above the low ones, a group each.
 BANDS: Final = ((13, 24), (25, 48))
 
 #: Orders whose products with a factor are always tried.
 ALWAYS: Final = (1.0, 2.0)
 
-#: Lines of a spectrum that are tried in addition, and the least ratio of each to the mean power:
-#: of noise alone about one of 500 exceeds it.
+#: Lines of a spectrum that are tried in addition.
 PEAKS: Final = 5
-STANDS_OUT: Final = 8.0
 
 #: Highest order of a spectrum, and readings for each order.
 ORDERS: Final = 400
 SAMPLED: Final = 2.5
-
-#: Places of a jump that are tried at once, and jumps: a facet has two.
-JUMPS: Final = 360
-ENDS: Final = 2
 
 #: Shares of the range by which a factor must change to be one.
 SPEED_CHANGES, LOAD_CHANGES, TEMPERATURE_CHANGES = 0.1, 0.05, 0.1
@@ -87,7 +82,7 @@ class Axis:
                 self.at,
                 self.unit,
                 theta,
-                order,
+                (order,),
             )
 
 
@@ -128,9 +123,11 @@ def factor_groups(
             for column in own.T:
                 asked += spectrum.peaks(left * (column - column.mean()))
             groups += axis.times(theta, dict.fromkeys(asked), product)
+    groups += _of_one_way(signals)
     groups += _of_runs(signals, [*ALWAYS, *known[:2], *drawn])
     groups += _of_frequencies(signals, frequencies)
     groups += _of_events(signals, events)
+    groups += late_readings(signals, error)
     given = {*ALWAYS, *known, *drawn}
     low = {float(k) for k in range(1, LOW + 1)}
     for k, group in enumerate(groups):
@@ -161,46 +158,9 @@ class _PeakSpectrum:
 
 def _without_low(theta: Array, error: Array, run: NDArray[np.int64]) -> Array:
     """The error less what its mean by run and the low orders take of it."""
-    left = _less_low_orders(theta, error)
+    left = less_low_orders(theta, error)
     counts = np.maximum(np.bincount(run), 1)
     return np.asarray(left - (np.bincount(run, left) / counts)[run])
-
-
-def _less_low_orders(theta: Array, values: Array) -> Array:
-    """Columns of values less what the low orders and a constant take of them."""
-    inside = [line_columns(theta, float(k)) for k in range(1, LOW + 1)]
-    columns = np.column_stack([np.ones(theta.size), *inside])
-    return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=1e-9)[0])
-
-
-def _jumps(degrees: Array, error: Array) -> list[tuple[float, float, int]]:
-    """Pairs of neighbouring places between which ramps over the turn fall back, and of how many.
-
-    Of all gaps between places that whose ramp, less its own low orders, explains most, and then the
-    next: a sensor that does not use all of its counts jumps where they begin, a facet at both ends.
-    """
-    places = np.unique(np.round(degrees, 9) % 360.0)
-    if places.size <= 2 * LOW + 2:
-        return []
-    after = np.append(places[1:], places[0] + 360.0)
-    left = _less_low_orders(np.radians(degrees), error)
-    found: list[int] = []
-    while len(found) < ENDS:
-        tried = np.unique(np.linspace(0, places.size - 1, min(places.size, JUMPS)).astype(int))
-        while True:
-            ramps = np.mod(degrees[:, None] - 0.5 * (places + after)[tried], 360.0)
-            ramps = _less_low_orders(np.radians(degrees), ramps)
-            k = int(np.argmax((left @ ramps) ** 2 / np.maximum(np.sum(ramps**2, axis=0), 1e-12)))
-            if tried.size < 3 or tried[-1] - tried[0] == tried.size - 1:
-                break
-            tried = np.arange(tried[max(k - 1, 0)], tried[min(k + 1, tried.size - 1)] + 1)
-        ramp = ramps[:, k] / max(float(np.linalg.norm(ramps[:, k])), 1e-6)
-        size = float(ramp @ left)
-        if not size**2 > 2.0 * STANDS_OUT * float(left @ left) / left.size:
-            break  # noise makes as much of one of many gaps
-        found.append(int(tried[k]))
-        left = left - size * ramp
-    return [(float(places[k]), float(after[k]), places.size) for k in found]
 
 
 def _place(signals: Signals, error: Array, lines: Iterable[float]) -> Iterator[Group]:
@@ -211,8 +171,8 @@ def _place(signals: Signals, error: Array, lines: Iterable[float]) -> Iterator[G
     whole = turns >= ARC
     at = np.linspace(0.0, 360.0, 73) if whole else np.degrees(np.linspace(start, start + span, 49))
     degrees = signals.degrees
-    jumps = _jumps(degrees, error) if whole else []
-    at = np.union1d(at, [place % 360.0 for jump in jumps for place in jump[:2]])
+    ramps = jumps(degrees, less_low_orders(theta, error)) if whole else []
+    at = np.union1d(at, [end % 360.0 for ramp in ramps for end in (ramp.before, ramp.after)])
 
     def waves(orders: Sequence[float]) -> Basis:
         return lambda x: np.hstack([line_columns(np.radians(x), m) for m in orders])
@@ -228,11 +188,10 @@ def _place(signals: Signals, error: Array, lines: Iterable[float]) -> Iterator[G
             group = Group.of_function("place", degrees, waves(band), at, "deg", band)
             if group is not None:
                 yield group
-    for before, after, count in jumps:
-        where = (0.5 * (before + after)) % 360.0
-        group = Group.of_function("place", degrees, partial(_falls_back, where), at, "deg")
+    for ramp in ramps:
+        group = Group.of_function("place", degrees, ramp.values, at, "deg")
         if group is not None:
-            yield replace(group, alternatives=count, jump=where)
+            yield replace(group, alternatives=ramp.count, jump=ramp.where)
     middle = np.degrees(start + 0.5 * span)
 
     def smooth(x: Array) -> Array:
@@ -244,11 +203,6 @@ def _place(signals: Signals, error: Array, lines: Iterable[float]) -> Iterator[G
     group = Group.of_function("place", degrees, smooth, travel, "deg")
     if group is not None:
         yield group
-
-
-def _falls_back(where: float, x: Array) -> Array:
-    """A ramp over a turn, degrees."""
-    return np.mod(x - where, 360.0)[:, None]
 
 
 def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:
@@ -395,6 +349,24 @@ def _clock(signals: Signals) -> Iterator[Axis]:
 
     unit = "s" if signals.time is not None else "reading"
     yield Axis("run_time", signals.clock, path, np.linspace(0.0, whole, GRID), unit)
+
+
+def _of_one_way(signals: Signals) -> Iterator[Group]:
+    """A function of the place that is met in one direction only."""
+    d = signals.direction
+    if (d > 0.0).all() or not (d > 0.0).any():
+        return
+    orders = tuple(float(k) for k in range(LOW + 1) if 2 * k <= signals.places)
+    for way in (-1.0, 1.0):
+        yield Group.of_product(
+            "direction_place",
+            d,
+            lambda x, way=way: np.asarray(x[:, None] * way > 0.0, dtype=np.float64),  # type: ignore[misc]
+            np.array([-1.0, 1.0]),
+            "sign",
+            signals.theta,
+            orders,
+        )
 
 
 def _of_runs(signals: Signals, lines: Sequence[float]) -> Iterator[Group]:

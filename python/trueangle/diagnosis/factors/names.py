@@ -28,8 +28,10 @@ SIZES: Final = 7
 #: Share of what its factors take that a name must take.
 TAKES: Final = 0.95
 
-#: Factors that hold each other's functions: speeds have a direction, loads a sign.
+#: Factors that hold each other's functions: speeds have a direction, loads a sign, and a place in
+#: one direction is half of the place and half of the direction times the place.
 FAMILIES: Final = (
+    {"direction", "direction_place", "place"},
     {"direction", "reversal_time", "speed"},
     {"load", "load_sign"},
     {"run", "run_time", "temperature"},

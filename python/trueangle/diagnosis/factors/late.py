@@ -1,0 +1,65 @@
+"""A segment of a run whose readings are late: its error is the speed times one delay."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...joint.signals import Signals
+from ...support.arrays import Array
+from .group import GRID, Group
+
+#: Ends that are tried at once in a run.
+ENDS: Final = 120
+
+
+def late_readings(signals: Signals, error: Array) -> Iterator[Group]:
+    """The segment of a run in which the speed explains most as a group; none without a speed.
+
+    ::
+
+        v 1(a <= t < b)
+
+    jointly with a zero and a delay of the whole run.
+    """
+    v = signals.velocity
+    if v is None or not np.ptp(v) > 0.0:
+        return
+    found = [(*_segment(v[a:b], error[a:b]), a) for a, b in signals.run_bounds() if b - a > GRID]
+    gain, first, last, start = max(found, default=(0.0, 0, 0, 0))
+    column = np.zeros((v.size, 1))
+    column[start + first : start + last, 0] = v[start + first : start + last]
+    scale = float(np.std(column))
+    if gain > 0.0 and scale > 0.0:
+        at = np.linspace(0.0, float(last - first), GRID)
+        event = int(signals.run[start]), int(signals.row[start + first])
+        count = float(sum(n * n for n in np.bincount(signals.run)))
+        yield Group("run_time", column / scale, (), at, None, "reading", count, event)
+
+
+def _segment(v: Array, error: Array) -> tuple[float, int, int]:
+    """Sum of squares that the best segment of a run explains, its first reading and its end."""
+    known = np.column_stack([np.ones(v.size), v])
+    basis, sizes, _ = np.linalg.svd(known, full_matrices=False)
+    basis = basis[:, sizes > 1e-9 * sizes[0]]
+    left = error - basis @ (basis.T @ error)
+    terms = np.column_stack([v * left, v * v, basis * v[:, None]])
+    sums = np.vstack([np.zeros(terms.shape[1]), np.cumsum(terms, axis=0)])
+
+    def best(firsts: NDArray[np.int64], lasts: NDArray[np.int64]) -> tuple[float, int, int]:
+        inside = sums[lasts][None, :, :] - sums[firsts][:, None, :]
+        power = inside[..., 1] - np.sum(inside[..., 2:] ** 2, axis=-1)
+        enough = power > 1e-6 * sums[-1, 1]
+        gain = np.where(enough, inside[..., 0] ** 2 / np.where(enough, power, 1.0), 0.0)
+        gain[firsts[:, None] >= lasts[None, :]] = 0.0
+        i, j = np.unravel_index(np.argmax(gain), gain.shape)
+        return float(gain[i, j]), int(firsts[i]), int(lasts[j])
+
+    ends = np.unique(np.linspace(0, v.size, ENDS).astype(np.int64))
+    _, first, last = best(ends, ends)
+    step = -(-v.size // (ENDS - 1))
+    near = [np.arange(max(k - step, 0), min(k + step, v.size) + 1) for k in (first, last)]
+    return best(near[0], near[1])
