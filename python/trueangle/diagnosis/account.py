@@ -23,11 +23,9 @@ from .gearratio import find_ratio, near_ratio, signals_at_ratio
 from .identifiability import blind_spots, in_common_form
 from .judgedbeliefs import effects_as_measured
 from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
-from .remainder import unexplained_remainder
 from .rounding import account_beyond_rounding, is_rounding_only, unrounded
 from .selection import select_causes
 from .unevennoise import uneven_noise
-from .unnamed import is_named
 
 #: Readings used at most: beyond, one of every n in a row is taken at random.
 MOST_READINGS = 40_000
@@ -234,8 +232,6 @@ def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:
         scatter += uneven
         start = start.weighted(uneven[0].weights)
         chosen = select_causes(start, chosen.terms)
-    if not all(map(is_named, chosen.terms)) and not unexplained_remainder(chosen).found:
-        chosen = select_causes(start, unnamed=False)
     chosen = account_beyond_rounding(start, in_common_form(exchanged_causes(chosen), spots))
     scatter += [i for i in _unweighing(chosen) if i.bic_gain > NEW_CAUSE]
     return CauseSelection(start, chosen, scatter, spots)

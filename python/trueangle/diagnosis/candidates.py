@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
-from ..effects import Effect
+from ..effects import EFFECTS, Effect
 from ..estimation.cache import CachedProposal
 from ..estimation.regression import Extension, Regression
 from ..support.deadline import current_deadline
@@ -18,7 +18,6 @@ from .penalty import (
     penalty_of,
     total_penalty,
 )
-from .unnamed import effect_or_unnamed
 
 #: An extension, what it extends, and its net BIC gain.
 Candidate: TypeAlias = tuple[Extension, Regression, float]
@@ -29,7 +28,7 @@ AFTER_CHOICE = 0.7
 
 def propose_candidates(effect: type[Effect], regression: Regression) -> Extension | None:
     """What a cause proposes; nothing where a wider one that contains it is chosen already."""
-    if any(effect in effect_or_unnamed(term.cause).contains for term in regression.terms):
+    if any(effect in EFFECTS[term.cause].contains for term in regression.terms):
         return None
     return effect.propose(regression)
 
@@ -57,7 +56,7 @@ def candidate_extensions(
         at.at(f"trying causes{beside}", tried, len(causes), then)
         if at.over:
             break
-        contained = {special.kind for special in effect_or_unnamed(cause).contains}
+        contained = {special.kind for special in EFFECTS[cause].contains}
         if any(term.cause in contained for term in regression.terms):
             start = regression.with_terms(t for t in regression.terms if t.cause not in contained)
             penalty = total_penalty(start) - total_penalty(regression)
@@ -89,7 +88,7 @@ def candidates_above(regression: Regression, cause: str, least: float = 0.0) -> 
         return None
     if kept is None:
         kept = CachedProposal(
-            propose_candidates(effect_or_unnamed(cause), regression.with_least(least)), least
+            propose_candidates(EFFECTS[cause], regression.with_least(least)), least
         )
         if not current_deadline().over:
             regression.cache.propose(key, kept)
@@ -108,7 +107,7 @@ class CandidateScores:
         """Net gain less what a cause costs beyond its parameters."""
         extension, start, gain = candidate
         explained = deviance_before_forms(start) - start.deviance
-        if not effect_or_unnamed(extension.cause).has_exact_form:
+        if not EFFECTS[extension.cause].has_exact_form:
             explained += extension.deviance
         before = forms_before(start)
         left = deviance_of_form_errors(explained, start.n)

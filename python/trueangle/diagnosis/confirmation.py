@@ -9,7 +9,8 @@ import numpy as np
 from ..effects import EFFECTS
 from ..effects.drift_within_run import DriftWithinRun
 from ..effects.non_integer_order import NonIntegerOrder
-from ..estimation.regression import Regression
+from ..effects.time_periodic import FREQUENCY_DRIFT, TimePeriodic
+from ..estimation.regression import Extension, Regression
 from ..joint.lines import line_columns
 from ..support.arrays import Array
 from ..support.display_units import brief_number
@@ -21,7 +22,6 @@ from .penalty import NEW_CAUSE, regression_without
 from .remainder import free_paths, remainder_of
 from .runzeros import CHANCE, chance_between_runs, zeros_scatter
 from .selection import is_flexible
-from .unnamed import is_line_in_time, is_line_of
 
 CONFIRMED, NOT_CONFIRMED = "confirmed", "not_confirmed"
 
@@ -129,7 +129,8 @@ def _is_seen_without_a_name(regression: Regression | None, group: Sequence[int])
     """Whether the residual without it has a line in time at its frequency, and none surer."""
     if regression is None or not group or regression.signals.runs < 2:
         return False
-    if not is_line_in_time(regression.terms[group[0]]):
+    term = regression.terms[group[0]]
+    if term.cause != TimePeriodic.kind:
         return False
     left = remainder_of(regression, without=group)
     rho = regression.whiten.rho
@@ -139,7 +140,14 @@ def _is_seen_without_a_name(regression: Regression | None, group: Sequence[int])
     other = order_test(left, float(regression.lines.orders.max()), rho)
     if other is not None and other.p < SEEN and other.statistic > line.statistic:
         return False
-    return is_line_of(regression.terms[group[0]], line.at)
+    return is_line_of(term, line.at)
+
+
+def is_line_of(term: Extension, frequency: float) -> bool:
+    """The term is a line in time whose frequencies drift about as far as this one."""
+    own = np.asarray(term.shape["frequency_hz"], dtype=np.float64)
+    low, high = own.min() * (1.0 - FREQUENCY_DRIFT), own.max() * (1.0 + FREQUENCY_DRIFT)
+    return bool(low <= frequency <= high)
 
 
 def _is_whole(regression: Regression, group: Sequence[int], order: float) -> bool:

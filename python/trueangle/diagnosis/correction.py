@@ -15,6 +15,7 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..runs.run import CalibrationRun, as_runs
 from ..simulation.simulation import EFFECT
+from ..support.angles import unwrapped
 from ..support.argumentkinds import of_type
 from ..support.signals import coupled_joint
 
@@ -110,7 +111,7 @@ def without_terms(
 def _coupled(run: CalibrationRun) -> dict[str, Any]:
     """Angles of other joints as signals of a correction, unwrapped."""
     return {
-        name: np.unwrap(values, period=run.period)
+        name: unwrapped(values, run.period)
         for name, values in run.signals.items()
         if coupled_joint(name)
     }

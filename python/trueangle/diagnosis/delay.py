@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..effects import EFFECTS
 from ..effects.latency import Latency
 from ..estimation.extension import Extension
 from ..estimation.factor import least_squares, orthonormal_basis
@@ -38,7 +39,6 @@ from .finding import Finding
 from .gain import measure_delay_gain
 from .goodness import Unexplained
 from .penalty import NEW_CAUSE
-from .unnamed import effect_or_unnamed
 
 #: Orders of the output that are fitted jointly with the delay, where the travel resolves them.
 ORDERS = 32
@@ -155,7 +155,7 @@ def _newton(
 def _at_the_time(regression: Regression, plain: Regression) -> Iterator[Extension]:
     """The terms of a delayed account as they are without the delay."""
     for term, coefficients in regression.fitted():
-        effect = effect_or_unnamed(term.cause)
+        effect = EFFECTS[term.cause]
         if coefficients.size and effect.transfers:
             columns = effect.columns(plain.signals, regression.around, term.shape)
             yield replace(term, columns=columns)

@@ -14,7 +14,6 @@ from .candidates import CandidateScores, candidate_extensions, propose_candidate
 from .overlap import finding_overlaps
 from .penalty import finding_groups, regression_without, total_penalty
 from .selection import is_flexible, select_again
-from .unnamed import is_named
 
 #: Exchanges at most, and findings up to which others are tried in the place of each: of more, which
 #: are implausible together, that would take as long as the whole choice.
@@ -57,7 +56,7 @@ def exchanged_causes(regression: Regression) -> Regression:
 def _better_pair(regression: Regression) -> Regression | None:
     """With others in the place of two causes that overlap, those that do so most first."""
     limit = total_penalty(regression) - BETTER
-    groups = [g for g in finding_groups(regression.terms) if is_named(regression.terms[g[0]])]
+    groups = finding_groups(regression.terms)
     pairs = [pair for pair in finding_overlaps(regression, groups) if pair[2] > OVERLAP]
     specific = [name for name, effect in EFFECTS.items() if not is_flexible(effect)]
     for i, j, _ in sorted(pairs, key=lambda pair: -pair[2]):
@@ -74,7 +73,7 @@ def _better(regression: Regression) -> Regression | None:
     reshaped = _reshaped(regression)
     if total_penalty(reshaped) < limit:
         return reshaped
-    groups = [g for g in finding_groups(regression.terms) if is_named(regression.terms[g[0]])]
+    groups = finding_groups(regression.terms)
     groups.sort(key=lambda group: sum(regression.terms[k].bic_gain for k in group))
     for group in groups:
         rest = regression_without(regression, group)
@@ -108,7 +107,7 @@ def _reshaped(regression: Regression) -> Regression:
     part of channels that are read one after the other, and their line then has another sign.
     """
     for term in regression.terms:
-        if current_deadline().over or not (is_named(term) and EFFECTS[term.cause].form_follows):
+        if current_deadline().over or not EFFECTS[term.cause].form_follows:
             continue
         rest = regression.with_terms(other for other in regression.terms if other is not term)
         again = propose_candidates(EFFECTS[term.cause], rest)

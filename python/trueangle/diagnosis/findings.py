@@ -23,7 +23,6 @@ from .goodness import Unexplained
 from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE, finding_groups
 from .rivals import alike_causes, ambiguity_in_doubt, dependence, equal_causes, rivals_of
-from .unnamed import is_named
 
 #: Findings, in the order found, for which rivals are tried.
 RIVALLED = 4
@@ -45,8 +44,6 @@ def findings_of(
     named = []
     origins: dict[int, list[Ambiguity]] = {}
     for group in groups:
-        if not is_named(regression.terms[group[0]]):
-            continue
         doubt = ambiguity_of_cause(regression.terms[group[0]], regression, spots)
         evidence = sum(regression.terms[k].bic_gain for k in group)
         if doubt is None:

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..effects import EFFECTS
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..support.arrays import Array
-from .unnamed import effect_or_unnamed, is_named
 from .unseenorders import unseen_order_columns
 
 #: Share of a cause's energy that its form may leave: one known to 3 %.
@@ -34,12 +34,12 @@ def form_error_columns(regression: Regression, exempt: Collection[str] = ()) -> 
     """
     causes: dict[str, list[tuple[Extension, Array]]] = {}
     for term, coefficients in regression.fitted():
-        if coefficients.size and is_named(term) and term.cause not in exempt:
+        if coefficients.size and term.cause not in exempt:
             causes.setdefault(term.cause, []).append((term, coefficients))
     columns = [np.zeros((regression.n, 0))]
     for cause, terms in causes.items():
         size = float(np.std(sum(t.columns @ c for t, c in terms)))
-        found = effect_or_unnamed(cause).bends(regression.signals, terms)
+        found = EFFECTS[cause].bends(regression.signals, terms)
         spread = np.std(found, axis=0)
         kept = spread > 1e-9 * size
         if np.sqrt(FORM) * size > SLIGHT * np.sqrt(regression.variance):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import EFFECTS
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array
@@ -23,7 +24,6 @@ from .holdout import (
     residual_at_held_out,
 )
 from .levels import LEAST_SHARE, LevelGain, gains_by_level
-from .unnamed import effect_or_unnamed
 
 Rows = NDArray[np.bool_]
 
@@ -121,7 +121,7 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
     unit, what = _units(regression)
     count = int(unit.max()) + 1
     folds = rng.permutation(count) % min(FOLDS, count)
-    own_zero = any(effect_or_unnamed(term.cause).draws_zeros for term in regression.terms)
+    own_zero = any(EFFECTS[term.cause].draws_zeros for term in regression.terms)
     left = np.zeros((len(groups) + 1, regression.n))
     parts = int(folds.max()) + 1
     at = current_deadline()
@@ -144,7 +144,7 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
         if within and not own_zero:
             both = _about_zeros(regression, both[0]), _about_zeros(regression, both[1])
         before, after = both[0][clean], both[1][clean]
-        transfers = effect_or_unnamed(cause).transfers
+        transfers = EFFECTS[cause].transfers
         share = interval = control = None
         if transfers:
             share, interval = reducible_share(before, after, unit[clean], regression.variance, rng)
@@ -175,7 +175,7 @@ def measure_delay_gain(without: Regression, delayed: Regression) -> Gain:
     unit, what = _units(delayed)
     folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
     parts = int(folds.max()) + 1
-    own_zero = any(effect_or_unnamed(term.cause).draws_zeros for term in delayed.terms)
+    own_zero = any(EFFECTS[term.cause].draws_zeros for term in delayed.terms)
     before, after = np.zeros(delayed.n), np.zeros(delayed.n)
     for fold in range(parts):
         test = folds[unit] == fold
@@ -204,7 +204,7 @@ def measure_belief_gains(
     rng = np.random.default_rng(_SEED)
     unit, what = _units(regression)
     folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
-    own_zero = any(effect_or_unnamed(term.cause).draws_zeros for term in regression.terms)
+    own_zero = any(EFFECTS[term.cause].draws_zeros for term in regression.terms)
     count = len(columns) + len(changes)
     before, after = np.zeros((count, regression.n)), np.zeros((count, regression.n))
     for fold in range(int(folds.max()) + 1):
@@ -283,12 +283,10 @@ def _control(
     least = 1e-3 * regression.variance
     shares = []
     for _ in range(SHUFFLES):
-        signals = _shuffled(regression.signals, effect_or_unnamed(cause).factor, unit, rng)
+        signals = _shuffled(regression.signals, EFFECTS[cause].factor, unit, rng)
         columns = np.hstack(
             [
-                effect_or_unnamed(cause).columns(
-                    signals, regression.around, regression.terms[k].shape
-                )
+                EFFECTS[cause].columns(signals, regression.around, regression.terms[k].shape)
                 for k in group
             ]
         )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import EFFECTS
 from ..estimation.regression import Extension, Regression
 from ..estimation.whitening import RunEffect
 from ..joint.pattern import JointPattern
@@ -15,7 +16,6 @@ from ..joint.signals import Signals
 from ..support.arrays import Array
 from ..support.deadline import current_deadline
 from ..support.quantiles import quantile
-from .unnamed import effect_or_unnamed
 
 Rows = NDArray[np.bool_]
 
@@ -47,7 +47,7 @@ def held_out_residuals(
         if current_deadline().over:
             break
         cause = regression.terms[group[0]].cause
-        if effect_or_unnamed(cause).located and effect_or_unnamed(cause).transfers:
+        if EFFECTS[cause].located and EFFECTS[cause].transfers:
             full = _searched_again(full, group)
     signals, residual = regression.signals.take(test), regression.residual[test]
     laws = [HoldOutModel.of(full), *(_law_without(full, group) for group in groups)]
@@ -109,12 +109,12 @@ def _searched_again(full: Regression, group: Sequence[int]) -> Regression:
     cause = terms[group[0]].cause
     found: list[Extension] = []
     for _ in group:
-        extension = effect_or_unnamed(cause).propose(full.with_terms([*kept, *found]))
+        extension = EFFECTS[cause].propose(full.with_terms([*kept, *found]))
         if extension is None or extension.cause != cause:
             return full
         found.append(extension)
     pairs = zip(group, found, strict=True)
-    if effect_or_unnamed(cause).of_motion and all(terms[k].shape == one.shape for k, one in pairs):
+    if EFFECTS[cause].of_motion and all(terms[k].shape == one.shape for k, one in pairs):
         return full  # the same columns again
     for k, extension in zip(group, found, strict=True):
         terms[k] = extension
@@ -137,7 +137,7 @@ def residual_at_held_out(
     columns = {} if columns is None else columns
     left = residual - base @ law.base
     for term, coefficients in law.terms:
-        effect = effect_or_unnamed(term.cause)
+        effect = EFFECTS[term.cause]
         if not (coefficients.size and effect.transfers):
             continue
         if term not in columns or not effect.of_motion:

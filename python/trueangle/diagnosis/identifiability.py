@@ -11,7 +11,6 @@ from ..effects.blindspots import blind_spot_place, blind_spots
 from ..estimation.regression import Extension, Regression
 from .candidates import propose_candidates
 from .penalty import finding_groups, regression_without
-from .unnamed import effect_or_unnamed
 
 __all__ = [
     "Ambiguity",
@@ -35,12 +34,12 @@ def ambiguity_of_cause(
     (`open_origins`): what is detected has a size, and is named.
     """
     cause = extension.cause
-    if effect_or_unnamed(cause).is_doubted:
+    if EFFECTS[cause].is_doubted:
         for spot in spots:
             # A detected crossing is not that of a delay.
             may_be_told = spot.common or "turns_first" in extension.shape
             if spot.hides(cause) and not (
-                may_be_told and effect_or_unnamed(cause).told(extension, regression)
+                may_be_told and EFFECTS[cause].told(extension, regression)
             ):
                 return spot
     found = [doubt for doubt in _doubts(extension, regression, spots) if doubt.common != cause]

@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import Effect
+from ..effects import EFFECTS, Effect
 from ..effects.ambiguity import Ambiguity
 from ..effects.missing_order import MissingOrder
 from ..estimation.extension import Extension
@@ -23,7 +23,6 @@ from .formerrors import with_unseen_orders
 from .gain import measure_belief_gains
 from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
-from .unnamed import effect_or_unnamed
 from .unseenorders import is_low_over_arc
 
 #: Fields of effects, in addition to those in arcsec, that their signal is proportional to.
@@ -187,9 +186,7 @@ def _lines(
     regression: Regression, sim: Simulation, spots: list[Ambiguity], with_gain: bool
 ) -> tuple[list[Belief], tuple[Harmonic, ...]]:
     pattern, joint = regression.belief.pattern, regression.belief.joint
-    if pattern.orders.size == 0 or any(
-        effect_or_unnamed(t.cause).changes_lines for t in regression.terms
-    ):
+    if pattern.orders.size == 0 or any(EFFECTS[t.cause].changes_lines for t in regression.terms):
         return [], sim.harmonics
     modulated = {term.shape["carrier"] for term in regression.terms if "carrier" in term.shape}
     found: list[Belief] = []

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import EFFECTS
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array, distinct
 from ..support.deadline import current_deadline
 from .holdout import error_numbers, held_out_residuals, rebuilt_term, reducible_share
-from .unnamed import effect_or_unnamed
 
 Rows = NDArray[np.bool_]
 
@@ -168,7 +168,7 @@ def gains_by_level(
         concerned = [
             k
             for k, cause in enumerate(causes)
-            if effect_or_unnamed(cause).factor == factor and effect_or_unnamed(cause).transfers
+            if EFFECTS[cause].factor == factor and EFFECTS[cause].transfers
         ]
         split = levels_of_runs(regression.signals, factor) if concerned else None
         if split is None:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..effects import EFFECTS
 from ..effects.missing_order import MissingOrder
 from ..estimation.regression import Extension, Regression
 from .formerrors import FORM
-from .unnamed import effect_or_unnamed
 
 #: Evidence (in units of BIC) that a new cause must bring beyond its penalty: 6 is what
 #: Kass and Raftery call strong, odds of 20 to 1.
@@ -41,7 +41,7 @@ def form_misfit(regression: Regression) -> float:
 
 def deviance_before_forms(regression: Regression) -> float:
     """Deviance before any cause with a form was added."""
-    effects = [(term, effect_or_unnamed(term.cause)) for term in regression.terms]
+    effects = [(term, EFFECTS[term.cause]) for term in regression.terms]
     formless = [term for term, e in effects if e.draws_zeros or e.has_exact_form]
     if not formless:
         return float(regression.start)
@@ -53,7 +53,7 @@ def deviance_before_forms(regression: Regression) -> float:
 
 def _exact_terms(regression: Regression) -> list[Extension]:
     """Terms whose forms leave nothing of them."""
-    return [term for term in regression.terms if effect_or_unnamed(term.cause).has_exact_form]
+    return [term for term in regression.terms if EFFECTS[term.cause].has_exact_form]
 
 
 def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
@@ -87,7 +87,7 @@ def penalty_of(terms: Sequence[Extension], left: float, before: int = 0) -> floa
     """
     # A line of a declared shaft is expected, and its order is declared.
     declared = sum(term.cause == MissingOrder.kind and not term.log_grid for term in terms)
-    effects = [effect_or_unnamed(term.cause) for term in terms]
+    effects = [EFFECTS[term.cause] for term in terms]
     separate = [effect for effect in effects if effect.is_separate]
     # As many findings as `finding_groups` makes.
     causes = len(separate) + len({*effects} - {*separate}) - declared
@@ -101,7 +101,7 @@ def finding_groups(terms: Sequence[Extension]) -> list[list[int]]:
     groups: list[list[int]] = []
     place: dict[str, int] = {}
     for k, term in enumerate(terms):
-        if effect_or_unnamed(term.cause).is_separate or term.cause not in place:
+        if EFFECTS[term.cause].is_separate or term.cause not in place:
             place[term.cause] = len(groups)
             groups.append([k])
         else:

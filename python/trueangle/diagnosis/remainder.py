@@ -6,6 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
+from ..effects import EFFECTS
 from ..estimation.cache import Cache
 from ..estimation.regression import Regression
 from ..estimation.segments import (
@@ -22,7 +23,6 @@ from ..support.display_units import brief_number
 from ..support.distributions import chi_squared_tail
 from .goodness import FREE_PATH, Evidence, Leftover, Unexplained, goodness_of_fit
 from .rounding import unrounded
-from .unnamed import effect_or_unnamed, is_named
 
 #: Share of a reading's noise that is left when it is forgotten.
 FORGOTTEN = 0.05
@@ -47,7 +47,7 @@ def leftover_of(signals: Signals, residual: Array, cache: Cache) -> Leftover:
         signals.clock,
         signals.time is not None,
         factors,
-        cache.of_motion("left over", None, dict),
+        cache.of_motion("left over", None, lambda: {"places": signals.places}),
     )
 
 
@@ -63,9 +63,7 @@ def share_of_run(signals: Signals) -> Array:
 def free_paths(regression: Regression) -> list[int]:
     """Terms that are a free path in time: they describe noise and are no cause."""
     return [
-        k
-        for k, term in enumerate(regression.terms)
-        if is_named(term) and effect_or_unnamed(term.cause).describes_noise(term)
+        k for k, term in enumerate(regression.terms) if EFFECTS[term.cause].describes_noise(term)
     ]
 
 
@@ -124,12 +122,11 @@ def remainder_of(
 
     Outliers that last are clipped to the range of the other readings.
 
-    Structure without a name is left in it, and so are the terms ``without``; ``loose`` leaves free
-    paths in time in it, too.
+    The terms ``without`` are left in it; ``loose`` leaves free paths in time in it, too.
     """
     if loose:
         without = {*without, *free_paths(regression)}
-    kept_in = [is_named(t) and k not in without for k, t in enumerate(regression.terms)]
+    kept_in = [k not in without for k in range(len(regression.terms))]
     left = regression.left
     for (term, coefficients), taken in zip(regression.fitted(), kept_in, strict=True):
         if not taken and coefficients.size:

@@ -13,13 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import EFFECTS
 from ..estimation.factor import orthonormal_basis
 from ..estimation.regression import Extension, Regression
 from ..estimation.rounded import Rounded, fit_rounded, is_rounding_visible
 from ..estimation.whitening import RunEffect
 from ..support.arrays import Array
 from .penalty import NEW_CAUSE, finding_groups
-from .unnamed import effect_or_unnamed, is_named
 
 
 def rounding_of(regression: Regression) -> float:
@@ -69,7 +69,7 @@ def account_beyond_rounding(start: Regression, chosen: Regression) -> Regression
 
 
 def _is_path(term: Extension) -> bool:
-    return is_named(term) and effect_or_unnamed(term.cause).describes_noise(term)
+    return EFFECTS[term.cause].describes_noise(term)
 
 
 def _gain_of_path(regression: Regression, path: Extension, drawn: RunEffect) -> float:

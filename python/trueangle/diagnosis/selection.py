@@ -29,16 +29,9 @@ from .penalty import (
     total_penalty,
 )
 from .remainder import remainder_of
-from .unnamed import UNNAMED, effect_or_unnamed, is_named
 
 #: Terms at most.
 MOST_TERMS = 14
-
-#: Findings from which on an account is suspected of taking up what has no name.
-MANY = 3
-
-#: Evidence by which structure without a name must win for other paths not to be tried.
-DECISIVE = 100.0
 
 #: Correlations of the noise that are one.
 SAME_CORRELATION = 0.02
@@ -62,14 +55,11 @@ def is_flexible(effect: type[Effect]) -> bool:
     return effect.flexible_below == ALWAYS
 
 
-def select_causes(
-    regression: Regression, known: Sequence[Extension] = (), unnamed: bool = True
-) -> Regression:
+def select_causes(regression: Regression, known: Sequence[Extension] = ()) -> Regression:
     """The regression with the causes that its readings support, priced by the noise found.
 
-    Where flexible causes were taken, or many, structure without a name competes with all
-    (`trueangle.diagnosis.unnamed`): what it explains better has no name. Terms ``known`` from
-    the same readings with other weights are a start that needs no further path.
+    Terms ``known`` from the same readings with other weights are a start that needs no further
+    path.
     """
     if known:
         known_too = _pruned(_forward(regression.with_terms(known), list(EFFECTS)))
@@ -86,21 +76,7 @@ def select_causes(
         direct = min(noisy, _pruned(_forward(regression, list(EFFECTS))), key=total_penalty)
     if current_deadline().over:
         return direct
-    direct = _with_lines_for_bumps(direct)
-    if not (unnamed and _doubtful(direct)):
-        return _priced_with_noise(_by_other_paths(regression, direct))
-    opened = _with_lines_for_bumps(_pruned(_forward(regression, [*EFFECTS, *UNNAMED])))
-    if all(map(is_named, opened.terms)):
-        return _priced_with_noise(_by_other_paths(regression, direct))
-    # The other paths take long: the first of them shows whether they may be better.
-    chosen = direct
-    if not ahead:
-        settled = _forward(regression, acts_on_runs(), total_penalty(direct))
-        specific_first = _pruned(_forward(settled, list(EFFECTS)))
-        chosen = min(direct, specific_first, key=total_penalty)
-    if total_penalty(opened) > total_penalty(chosen) - DECISIVE:
-        chosen = _by_other_paths(regression, chosen)
-    return _priced_with_noise(min(chosen, opened, key=total_penalty))
+    return _priced_with_noise(_by_other_paths(regression, _with_lines_for_bumps(direct)))
 
 
 def select_again(regression: Regression, causes: Sequence[str]) -> Regression:
@@ -125,7 +101,7 @@ def _specific_first(regression: Regression) -> list[Regression]:
 def _in_form(regression: Regression) -> Regression:
     """With the forms that causes of whole runs have given all that was chosen since."""
     for term in regression.terms:
-        effect = effect_or_unnamed(term.cause)
+        effect = EFFECTS[term.cause]
         alone = sum(other.cause == term.cause for other in regression.terms) == 1
         if not (effect.acts_on_runs and alone):
             continue
@@ -144,13 +120,6 @@ def _beside_repeats(regression: Regression) -> Regression:
         return regression
     settled = _forward(_forward(beyond, acts_on_runs()), (ZeroSlip.kind,))
     return regression.with_terms(settled.terms)
-
-
-def _doubtful(regression: Regression) -> bool:
-    """Flexible causes, or many: what an effect without a name is confused with."""
-    terms = regression.terms
-    flexible = any(is_flexible(effect_or_unnamed(term.cause)) for term in terms)
-    return flexible or len(finding_groups(terms)) >= MANY
 
 
 def _priced_with_noise(regression: Regression) -> Regression:
@@ -173,7 +142,7 @@ def _under_its_noise(regression: Regression) -> Regression:
     tried = [regression]
     if noise.correlation > regression.whiten.rho + SAME_CORRELATION:
         tried.append(_pruned(regression.with_terms(regression.terms, noise.correlation)))
-    plain = [t for t in regression.terms if not is_named(t) or not _takes_up(t)]
+    plain = [t for t in regression.terms if not _takes_up(t)]
     if len(plain) < len(regression.terms):
         rest = regression.with_terms(plain)
         noise = estimate_noise(remainder_of(rest))
@@ -187,7 +156,7 @@ def _under_its_noise(regression: Regression) -> Regression:
 
 def _takes_up(term: Extension) -> bool:
     """Whether it can follow correlated noise: random in every run, or flexible."""
-    return term.run_effect is not None or is_flexible(effect_or_unnamed(term.cause))
+    return term.run_effect is not None or is_flexible(EFFECTS[term.cause])
 
 
 def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
@@ -207,7 +176,7 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     found = {term.cause for term in (*direct.terms, *grown.terms)}
     # Over a part of a turn a bump, too, can imitate several lines at once: lines first.
     travel = regression.signals.run_turns().max()
-    if not any(travel < effect_or_unnamed(cause).flexible_below for cause in found):
+    if not any(travel < EFFECTS[cause].flexible_below for cause in found):
         return direct
     specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
     goal = total_penalty(direct)
@@ -215,7 +184,7 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     settled = _beside_repeats(regression)
     if settled is not regression:
         starts.append(settled)
-    elif any(is_flexible(effect_or_unnamed(cause)) for cause in found):
+    elif any(is_flexible(EFFECTS[cause]) for cause in found):
         slip = ZeroSlip.propose(regression)
         if slip is not None and slip.bic_gain > NEW_CAUSE:
             starts.append(regression.with_terms([slip]))
@@ -266,7 +235,7 @@ def _made_specific(regression: Regression) -> Regression:
     What the form of a law leaves, the flexible one explains in its place: this counts in the
     evidence, and no additional allowance for it is charged.
     """
-    for term in [t for t in regression.terms if is_flexible(effect_or_unnamed(t.cause))]:
+    for term in [t for t in regression.terms if is_flexible(EFFECTS[t.cause])]:
         left = form_misfit(regression)
 
         def price(account: Regression, left: float = left) -> float:
@@ -375,11 +344,9 @@ def _plainest(regression: Regression) -> Regression:
 
     What was chosen since may have explained what once spoke for the wider one.
     """
-    for cause in {
-        term.cause for term in regression.terms if effect_or_unnamed(term.cause).contains
-    }:
+    for cause in {term.cause for term in regression.terms if EFFECTS[term.cause].contains}:
         rest = regression.with_terms(term for term in regression.terms if term.cause != cause)
-        plain = _forward(rest, [special.kind for special in effect_or_unnamed(cause).contains])
+        plain = _forward(rest, [special.kind for special in EFFECTS[cause].contains])
         if total_penalty(plain) < total_penalty(regression):
             regression = plain
     return regression

@@ -95,9 +95,9 @@ class MissingOrder(Effect):
         # At few places, however they lie, lower orders make up any pattern: a higher one is there
         # for what is known of the gear alone.
         signals = regression.signals
-        hidden = 2.0 * lines.orders > signals.places
         if signals.grid is None:
             known = np.array(known_orders(regression.belief))
+            hidden = 2.0 * lines.orders > signals.places
             hidden &= np.abs(lines.orders[:, None] - known).min(axis=1, initial=np.inf) > 1e-9
         else:
             hidden = 2.0 * lines.orders > signals.grid.positions

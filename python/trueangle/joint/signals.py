@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..runs.aliasing import count_positions
 from ..runs.run import CalibrationRun
+from ..support.angles import unwrapped
 from ..support.arrays import Array
 from ..support.quantiles import median
 from ..support.signals import coupled_joint
@@ -286,7 +287,7 @@ def _coupled(runs: Sequence[CalibrationRun]) -> dict[str, Array]:
     """Angles of the other joints that every run recorded, in degrees."""
     return {
         joint: _joined(
-            [np.unwrap(run.signals[name], period=run.period) * (360.0 / run.period) for run in runs]
+            [unwrapped(run.signals[name], run.period) * (360.0 / run.period) for run in runs]
         )
         for name in runs[0].signals
         if (joint := coupled_joint(name)) and all(name in run.signals for run in runs)

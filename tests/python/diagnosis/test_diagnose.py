@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.diagnosis.confirmation import _by_run, _size
+from trueangle.diagnosis.confirmation import _by_run, _size, is_line_of
 from trueangle.diagnosis.delay import error_before_delay, find_delay
 from trueangle.diagnosis.diagnose import _noise, _overall, _ratio_finding, _structure
 from trueangle.diagnosis.formerrors import share_beside_form_errors
-from trueangle.diagnosis.unnamed import CHANNELS, UnnamedPattern, is_line_of, modulator, modulators
 from trueangle.effects import EFFECTS
 from trueangle.effects.time_periodic import FREQUENCY_DRIFT
 from trueangle.estimation.regression import Regression
@@ -176,42 +174,6 @@ def test_an_error_at_the_angle_of_before_says_the_same_indication() -> None:
         np.testing.assert_allclose(then.theta[inside], wanted[inside], atol=1e-3)
 
 
-def test_modulators_are_in_units_of_their_spread(signals: Signals) -> None:
-    given = replace(
-        signals,
-        temperature=20.0 + 3.0 * np.cos(signals.theta),
-        torque=5.0 * np.sin(3.0 * signals.theta) + 1.0,
-    )
-    found = modulators(given)
-    assert list(found) == ["direction", *(
-        name for channel in CHANNELS for name in (channel, f"direction {channel}")
-    )]  # fmt: skip
-    raw = {
-        "speed": np.abs(given.velocity),
-        "temperature": given.temperature,
-        "torque": given.torque,
-        "load": np.abs(given.torque),
-    }
-    np.testing.assert_array_equal(modulator(given, "direction", 0.0, 1.0), given.direction)
-    for name, values in raw.items():
-        g = (values - values.mean()) / values.std()
-        np.testing.assert_allclose(modulator(given, name, *found[name]), g, atol=1e-12)
-        both = f"direction {name}"
-        np.testing.assert_allclose(
-            modulator(given, both, *found[both]), g * given.direction, atol=1e-12
-        )
-        shape = {"by": both, "mean": found[name][0], "spread": found[name][1], "orders": [2.0, 3.0]}
-        columns = UnnamedPattern.columns(given, SIM.surroundings, shape)
-        lines = [f(m * given.theta) for m in (2.0, 3.0) for f in (np.cos, np.sin)]
-        wanted = np.column_stack(lines) * (g * given.direction)[:, None]
-        np.testing.assert_allclose(columns, wanted, atol=1e-9)
-    # One way only there is no direction; what hardly changes is no modulator.
-    one_way = given.take(given.direction > 0.0)
-    assert not any(name.startswith("direction") for name in modulators(one_way))
-    steady = replace(given, temperature=20.0 + 0.1 * np.cos(given.theta))
-    assert "temperature" not in modulators(steady)
-
-
 def test_a_line_is_another_s_within_what_that_wanders() -> None:
     term = SimpleNamespace(cause="time_periodic", shape={"frequency_hz": [3.0, 3.1]})
     for frequency, same in ((3.0, True), (3.0 * (1.0 - 0.99 * FREQUENCY_DRIFT), True), (3.1, True),
@@ -219,7 +181,6 @@ def test_a_line_is_another_s_within_what_that_wanders() -> None:
                             (3.1 * (1.0 + 0.99 * FREQUENCY_DRIFT), True),
                             (3.1 * (1.0 + 1.01 * FREQUENCY_DRIFT), False)):  # fmt: skip
         assert is_line_of(term, frequency) == same
-    assert not is_line_of(SimpleNamespace(cause="latency", shape={}), 3.0)
 
 
 def test_the_share_beside_bends_is_that_of_what_they_leave(signals: Signals) -> None:

@@ -20,7 +20,6 @@ from trueangle.diagnosis.penalty import (
     regression_without,
     total_penalty,
 )
-from trueangle.diagnosis.unnamed import UnnamedPattern
 from trueangle.effects import EFFECTS
 from trueangle.effects.missing_order import MissingOrder
 from trueangle.estimation.regression import Regression
@@ -66,7 +65,6 @@ LINE, LOAD, STIFF = "missing_order", "torsional_compliance", "stiffening_complia
         (["missed_counts", LINE, "missed_counts"], [[0, 2], [1]], 0),
         (["local_defect", "backlash", "local_defect", "backlash"], [[0], [1, 3], [2]], 0),
         (["joint_coupling", "joint_coupling", LOAD], [[0], [1], [2]], 0),
-        ([UnnamedPattern.kind, UnnamedPattern.kind], [[0], [1]], 0),
         ([STIFF, STIFF, LINE], [[0, 1], [2]], 1),  # its own form, and that of the spring it holds
     ],
 )

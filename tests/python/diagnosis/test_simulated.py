@@ -227,6 +227,15 @@ def test_a_servo_against_its_own_log(data_dir, tmp_path):
     assert sizes[0]["half_width_arcsec"].value == pytest.approx(6.0, abs=0.3)
 
 
+def test_a_servo_without_its_log_lags_by_its_velocity_gain(data_dir):
+    """kv / kp = 30 ms, found to the end: what a delay leaves by its form needs no further cause."""
+    result = ta.diagnose(data_dir / "servo_loop_simulated.csv", ta.Simulation())
+    assert result.complete
+    (late,) = [finding for finding in result.findings if finding.confirmed]
+    assert late.cause == "latency"
+    assert late.parameters["delay_s"].value == pytest.approx(-0.030, abs=1e-4)
+
+
 def test_mujoco_servo_lacks_play_and_an_order(tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.syspath_prepend(str(ROOT / "examples"))

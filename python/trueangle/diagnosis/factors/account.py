@@ -137,7 +137,26 @@ class FactorAccount:
             if given[k] == 0.0:
                 probabilities[k] = self.prior[k]
         begin = [0.0] * len(self.groups) if start is None else list(start)
-        return self.sums.search(list(given), probabilities, begin)
+        return _searched(self.sums, self.groups, given, probabilities, begin)
+
+
+def _searched(
+    sums: GroupSums,
+    groups: Sequence[Group],
+    given: Sequence[float],
+    probabilities: Sequence[float],
+    start: Sequence[float],
+) -> tuple[float, list[float]]:
+    """Score and model of the better of two searches, from a start and from narrow groups alone.
+
+    One move exchanges one group: several narrow ones do not come for a wide one at once.
+    """
+    narrow = [
+        p if group.columns.shape[1] <= FEW else 0.0
+        for p, group in zip(probabilities, groups, strict=True)
+    ]
+    few = sums.search(list(given), narrow, list(start))[1]
+    return max(sums.search(list(given), list(probabilities), list(own)) for own in (start, few))
 
 
 def factor_account(signals: Signals, error: Array, groups: Sequence[Group]) -> FactorAccount | None:
@@ -175,7 +194,7 @@ def factor_account(signals: Signals, error: Array, groups: Sequence[Group]) -> F
     sums = core.sums(_above_rounding(noise, total), total)
     tau = [0.0] * len(groups)
     for _ in range(ROUNDS):
-        _, found = sums.search([0.0] * len(groups), _prior(groups), tau)
+        _, found = _searched(sums, groups, [0.0] * len(groups), _prior(groups), tau)
         is_same = [t > 0.0 for t in found] == [t > 0.0 for t in tau]
         tau = found
         if is_same:

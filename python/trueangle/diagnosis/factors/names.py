@@ -200,13 +200,15 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
         return {}
     score, tau = max(names.beside(sure, start) for start in (None, names.account.tau))
     worst: tuple[float, Sequence[int], Sequence[float]] | None = None
-    for asked in [*([k] for k in sure), *_related(found, sure)]:
+    for asked in [*([k] for k in sure), *sorted(_related(found, sure), key=len)]:
         rest = [j for j in sure if j not in asked]
         freed, free = max(names.beside(rest, start) for start in (tau, names.account.tau))
         if freed > score:
             # What the search has met without them is tried with them, too.
             score, tau = max((score, tau), names.beside(sure, free))
-        if freed - score > max(ALIKE, worst[0] if worst else 0.0):
+        least = worst[0] if worst else 0.0
+        # More names are in question only where fewer do not explain it.
+        if freed - score > max(ALIKE, least + ALIKE * (len(asked) > 1)):
             worst = (freed - score, asked, free)
     if worst is not None:
         better, group, other = worst

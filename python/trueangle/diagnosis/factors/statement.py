@@ -16,7 +16,6 @@ from ...joint.signals import Signals
 from ...support.arrays import Array
 from ..finding import Finding
 from ..rounding import unrounded
-from ..unnamed import is_named
 from .account import MOST_READINGS, factor_account, factors_of
 from .factor import Factor
 from .group import Group
@@ -106,7 +105,7 @@ def _less_what_no_factor_is(regression: Regression) -> Array:
     """The error less causes that are forms of no factor: another joint's motion."""
     error = regression.readings.residual
     for term, coefficients in regression.fitted():
-        if is_named(term) and not EFFECTS[term.cause].form_of and term.run_effect is None:
+        if not EFFECTS[term.cause].form_of and term.run_effect is None:
             error = error - term.columns @ coefficients
     return error
 

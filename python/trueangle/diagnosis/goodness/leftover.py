@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...runs.aliasing import count_positions
 from ...support.arrays import Array
 
 Index = NDArray[np.int64]
@@ -62,6 +63,14 @@ class Leftover:
         """First and one-past-last reading of every run."""
         cuts = np.flatnonzero(np.diff(self.run)) + 1
         return list(itertools.pairwise([0, *cuts.tolist(), len(self)]))
+
+    @property
+    def places(self) -> int:
+        """Distinct places of a turn."""
+        if "places" not in self.kept:
+            self.kept["places"] = count_positions(self.theta / (2.0 * np.pi))
+        found: int = self.kept["places"]
+        return found
 
     @property
     def turns(self) -> float:

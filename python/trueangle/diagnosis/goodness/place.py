@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ...runs.aliasing import count_positions
 from ...support.arrays import Array
 from ...support.display_units import brief_number
 from ...support.distributions import incomplete_gamma_tail, student_tail
@@ -88,7 +87,7 @@ def place_tests(left: Leftover, top: float = LEAST_ORDERS) -> list[Evidence]:
     if len(units) < 2 or not np.any(left.residual):
         return []
     step = _step(left)
-    most = 0.5 * count_positions(left.theta / (2.0 * np.pi))  # of more orders no place shows any
+    most = 0.5 * left.places  # of more orders no place shows any
     count = int(max(min(max(min(top, 1024.0) / step, 8.0), most / step), 1.0))
     modulators = _modulators(left)
     values = left.centred(units)

@@ -100,6 +100,49 @@ def test_a_flat_facet_is_a_function_of_the_place_and_no_row_of_bumps(rng):
     assert all(0.0 <= factor.share <= 1.0 for factor in found.factors)
 
 
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_dent_that_is_met_in_one_direction_is_no_play(rng, way):
+    """Half of it is a bump, half a pattern of the direction, and its mean a play: one function."""
+
+    def error(theta, d, *_):
+        away = (theta - 20.0) % 360.0 - 180.0
+        return 9.0 * (d == way) * np.exp(-0.5 * (away / 14.0) ** 2)
+
+    found = ta.diagnose(measured(rng, error), EMPTY)
+    assert not {"backlash", "local_defect", "direction_dependent_pattern"} & {*confirmed(found)}
+    (only,) = found.factors
+    assert only.factor == "direction_place"
+    theta = np.linspace(0.0, 360.0, 1500)
+    for d in (-1.0, 1.0):
+        fresh = ta.CalibrationRun(d * theta, d * theta, period=360.0, time=theta / 20.0)
+        left = error(d * theta, np.full(1500, d)) - found.extended.predict(fresh)
+        assert np.std(left) < 0.15 * 9.0
+
+
+def test_a_bump_beside_a_play_keeps_its_name(rng):
+    def error(theta, d, *_):
+        away = (theta - 20.0) % 360.0 - 180.0
+        return 4.0 * d + 12.0 * np.exp(-0.5 * (away / 14.0) ** 2)
+
+    assert {"backlash", "local_defect"} <= {*confirmed(ta.diagnose(measured(rng, error), EMPTY))}
+
+
+def test_late_readings_of_one_segment_are_an_event_and_no_lost_counts(rng):
+    """There and back at other speeds: the error is a step only where the speed is one."""
+
+    def error(theta, d, v, t, r):
+        late = (r == 2) & (t > 0.4 * t[-1]) & (t < 0.7 * t[-1])
+        return 12.0 * late * d * (v / max(SPEEDS))
+
+    found = ta.diagnose(measured(rng, error), EMPTY)
+    assert "missed_counts" not in confirmed(found)
+    (event,) = (factor for factor in found.factors if factor.events)
+    assert event.factor == "run_time"
+    ((run, row),) = event.events
+    assert run == 2
+    assert row == pytest.approx(0.4 * 300, abs=12)
+
+
 def test_what_one_speed_cannot_tell_is_stated_together(rng):
     runs = measured(rng, lambda theta, d, *_: 4.0 * d, speeds=(20.0,), repeats=4)
     found = ta.diagnose(runs, EMPTY)
