@@ -147,16 +147,17 @@ def _searched(
     probabilities: Sequence[float],
     start: Sequence[float],
 ) -> tuple[float, list[float]]:
-    """Score and model of the better of two searches, from a start and from narrow groups alone.
+    """Score and model of a search, from narrow groups alone where these are better.
 
     One move exchanges one group: several narrow ones do not come for a wide one at once.
     """
-    narrow = [
-        p if group.columns.shape[1] <= FEW else 0.0
-        for p, group in zip(probabilities, groups, strict=True)
-    ]
-    few = sums.search(list(given), narrow, list(start))[1]
-    return max(sums.search(list(given), list(probabilities), list(own)) for own in (start, few))
+    found = sums.search(list(given), list(probabilities), list(start))
+    is_wide = [group.columns.shape[1] > FEW for group in groups]
+    if not any(wide and tau > 0.0 for wide, tau in zip(is_wide, found[1], strict=True)):
+        return found
+    narrow = [0.0 if wide else p for p, wide in zip(probabilities, is_wide, strict=True)]
+    few = sums.search(list(given), narrow, list(start))
+    return sums.search(list(given), list(probabilities), few[1]) if few > found else found
 
 
 def factor_account(signals: Signals, error: Array, groups: Sequence[Group]) -> FactorAccount | None:

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...estimation.factor import orthonormal_basis
 from ...joint.signals import Signals
 from ...support.arrays import Array
 from .group import GRID, Group
@@ -43,8 +44,7 @@ def late_readings(signals: Signals, error: Array) -> Iterator[Group]:
 def _segment(v: Array, error: Array) -> tuple[float, int, int]:
     """Sum of squares that the best segment of a run explains, its first reading and its end."""
     known = np.column_stack([np.ones(v.size), v])
-    basis, sizes, _ = np.linalg.svd(known, full_matrices=False)
-    basis = basis[:, sizes > 1e-9 * sizes[0]]
+    basis = orthonormal_basis(known)
     left = error - basis @ (basis.T @ error)
     terms = np.column_stack([v * left, v * v, basis * v[:, None]])
     sums = np.vstack([np.zeros(terms.shape[1]), np.cumsum(terms, axis=0)])
