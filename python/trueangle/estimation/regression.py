@@ -119,8 +119,7 @@ class Regression(Solution):
         """
         readings = replace(self.readings, weights=weights)
         found = self.of_readings(readings, cache=self.cache.for_other_errors())
-        before = self.start - self.deviance
-        return replace(found, start=min(self.start, found.start + before))
+        return replace(found, start=min(self.start, found.start + self.start - self.deviance))
 
     def of_rows(self, rows: NDArray[np.bool_]) -> Self:
         """Some of the readings without terms, under the correlation found in all."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,9 @@ from ...effects.orderspectrum import OrderSpectrum
 from ...joint.lines import line_columns
 from ...joint.signals import Signals
 from ...support.arrays import Array
+from .events import late_readings, step_events
 from .group import GRID, Group
 from .jumps import LOW, STANDS_OUT, jumps, less_low_orders
-from .late import late_readings
 
 #: Bands of orders above the low ones, a group each.
 BANDS: Final = ((13, 24), (25, 48))
@@ -43,9 +42,6 @@ ARC: Final = 0.98
 
 #: Lengths of transitions after a reversal, in shares of the median segment of one direction.
 LENGTHS: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
-
-#: Lengths of what rises before an event and settles after it, in shares of the longest run.
-SETTLES: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
 
 #: Shares of the range within which values are one level, and knots one; and hats at most.
 LEVEL: Final = 0.1
@@ -126,7 +122,7 @@ def factor_groups(
     groups += _of_one_way(signals)
     groups += _of_runs(signals, [*ALWAYS, *known[:2], *drawn])
     groups += _of_frequencies(signals, frequencies)
-    groups += _of_events(signals, events)
+    groups += step_events(signals, events)
     groups += late_readings(signals, error)
     given = {*ALWAYS, *known, *drawn}
     low = {float(k) for k in range(1, LOW + 1)}
@@ -417,28 +413,3 @@ def _of_frequencies(signals: Signals, frequencies: Sequence[float]) -> Iterator[
         scale = float(np.sqrt(np.mean(np.sum(columns**2, axis=1))))
         at = np.array([hertz])
         yield Group("frequency", columns / scale, (), at, None, "Hz", 0.5 * len(signals))
-
-
-def _of_events(signals: Signals, events: Sequence[tuple[int, int]]) -> Iterator[Group]:
-    """What rises before an event of one run and settles after it, and the step that it leaves.
-
-    That lasts to the end of the run, or through those after it.
-    """
-    longest = int(signals.row.max(initial=0)) + 1
-    at = np.linspace(-0.3, 0.3, GRID) * longest
-    lengths = np.array(SETTLES) * longest
-
-    def both(x: NDArray[Any], scale: float = 1.0) -> Array:
-        decays = np.exp(-np.abs(x)[:, None] / lengths)
-        before, after = x[:, None] < 0.0, x[:, None] > 0.0
-        return np.hstack([decays * before, decays * after, after, after]) / scale
-
-    for run, row in events:
-        inside, later = signals.run == run, signals.run > run
-        away = signals.row - (row - 0.5)
-        columns = both(away) * inside[:, None]
-        columns[:, -1] += later
-        scale = float(np.sqrt(np.sum(np.var(columns, axis=0))))
-        if scale > 0.0:
-            own, count = partial(both, scale=scale), len(signals)
-            yield Group("run_time", columns / scale, (), at, own, "reading", count, (run, row))

@@ -1,9 +1,10 @@
-"""A segment of a run whose readings are late: its error is the speed times one delay."""
+"""What happened once in a run: a step that settles, and a segment whose readings are late."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,36 @@ from ...joint.signals import Signals
 from ...support.arrays import Array
 from .group import GRID, Group
 
-#: Ends that are tried at once in a run.
+#: Lengths of what rises before an event and settles after it, in shares of the longest run.
+SETTLES: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
+
+#: Ends of a segment that are tried at once in a run.
 ENDS: Final = 120
+
+
+def step_events(signals: Signals, events: Sequence[tuple[int, int]]) -> Iterator[Group]:
+    """What rises before an event of one run and settles after it, and the step that it leaves.
+
+    That lasts to the end of the run, or through those after it.
+    """
+    longest = int(signals.row.max(initial=0)) + 1
+    at = np.linspace(-0.3, 0.3, GRID) * longest
+    lengths = np.array(SETTLES) * longest
+
+    def both(x: NDArray[Any], scale: float = 1.0) -> Array:
+        decays = np.exp(-np.abs(x)[:, None] / lengths)
+        before, after = x[:, None] < 0.0, x[:, None] > 0.0
+        return np.hstack([decays * before, decays * after, after, after]) / scale
+
+    for run, row in events:
+        inside, later = signals.run == run, signals.run > run
+        away = signals.row - (row - 0.5)
+        columns = both(away) * inside[:, None]
+        columns[:, -1] += later
+        scale = float(np.sqrt(np.sum(np.var(columns, axis=0))))
+        if scale > 0.0:
+            own, count = partial(both, scale=scale), len(signals)
+            yield Group("run_time", columns / scale, (), at, own, "reading", count, (run, row))
 
 
 def late_readings(signals: Signals, error: Array) -> Iterator[Group]:
