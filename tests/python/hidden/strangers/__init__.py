@@ -6,5 +6,7 @@ Forms, designs, noise and the judge's rules are the stranger's and stay as they 
 correction of a truth is `causes.SAME_FUNCTION`.
 
 First results: before a diagnosis stated factors, 29 % of the forms got a false confirmed name. With
-factors 14 % did, before anything was tuned, and 0 to 2 % since.
+factors 14 % did, before anything was tuned. First result of a new seed, 23, once a dent in one
+direction and late readings were functions of the account: 58 of 59 forms truthful, one with a false
+confirmed name, and none among the other 83 cases.
 """
