@@ -13,7 +13,6 @@ from trueangle.diagnosis.goodness import estimate_noise
 from trueangle.diagnosis.penalty import finding_groups, regression_without, total_penalty
 from trueangle.diagnosis.remainder import remainder_of
 from trueangle.diagnosis.selection import (
-    _doubtful,
     _droppable,
     _is_beyond_shown,
     _plainest,
@@ -156,25 +155,6 @@ def test_a_term_that_is_larger_than_what_the_readings_show_is_dropped(
         effect = replace(drawn, run_effect=RunEffect(drawn.run_effect.columns, share))
         at = replace(start, terms=(effect,))
         assert _is_beyond_shown(at, 0) == (ratio > 0.0 and beyond > 3.0)
-
-
-@pytest.mark.parametrize(
-    ("causes", "doubtful"),
-    [
-        (["backlash", "missing_order"], False),
-        (["backlash", "missing_order", "missing_order"], True),
-        (["backlash", "direction_dependent_pattern", "direction_dependent_pattern"], False),
-        (["varying_line"], True),
-        (["drift_within_run"], True),
-        (["local_defect"], False),
-    ],
-)
-def test_flexible_causes_and_many_are_suspected_of_what_has_no_name(
-    causes: list[str], doubtful: bool, signals: Signals
-) -> None:
-    """Three findings or more; what makes one finding counts once."""
-    chosen = with_causes(started(signals, 3.0 * signals.direction), causes)
-    assert _doubtful(chosen) == doubtful
 
 
 def test_a_special_case_takes_the_place_of_what_contains_it(signals: Signals) -> None:
