@@ -67,7 +67,7 @@ class NamedCauses:
             # A path in time that only followed what the factors explain.
             other = regression_without(less, [k], settled=True)
             less = min(less, other, key=total_penalty)
-        return unexplained_remainder(less, sigma)
+        return unexplained_remainder(less, sigma, chosen)
 
     @property
     def unnamed(self) -> float:

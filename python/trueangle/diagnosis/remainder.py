@@ -147,8 +147,13 @@ def remainder_of(
     return leftover_of(regression.signals, left * regression.root_weights, regression.cache)
 
 
-def unexplained_remainder(regression: Regression, sigma: float | None = None) -> Unexplained:
-    """Goodness of fit of what a regression leaves, up to the orders that it looks for."""
+def unexplained_remainder(
+    regression: Regression, sigma: float | None = None, whole: Regression | None = None
+) -> Unexplained:
+    """Goodness of fit of what a regression leaves, up to the orders that it looks for.
+
+    Of one of readings without outliers, ``whole`` is that with them.
+    """
     regression = unrounded(regression)
     path = path_evidence(regression)
     return goodness_of_fit(
@@ -157,5 +162,5 @@ def unexplained_remainder(regression: Regression, sigma: float | None = None) ->
         sigma,
         None if path is None else remainder_of(regression, loose=True),
         path,
-        aside_evidence(regression),
+        aside_evidence(regression if whole is None else whole),
     )
