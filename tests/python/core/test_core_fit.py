@@ -275,7 +275,7 @@ def test_standard_errors_agree_with_monte_carlo():
     ("positions", "orders", "at_fault", "words"),
     [
         (36, [1, 18], [(0, 18)], "the sine of order 18 is zero"),
-        (36, [16, 20], [(0, 16), (0, 20)], "order 20 cannot be told from order 16"),
+        (36, [16, 20], [(0, 16), (0, 20)], "order 20 cannot be distinguished from order 16"),
         (36, [1, 36], [(0, 36)], "cosine of order 36 is the same"),
         (10, list(range(1, 8)), [(0, 5), (0, 6), (0, 7)], "10 distinct angles"),
     ],
