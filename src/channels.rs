@@ -8,9 +8,11 @@ mod angle;
 mod curve;
 mod faults;
 mod likelihood;
+mod resolver;
 mod start;
 
 pub use angle::{Angle, Decoder, Off};
 pub use curve::{Curve, angle_slopes};
 pub use faults::{faults, wraps_at};
 pub use likelihood::{CurveFit, Readings, fit};
+pub use resolver::{Demodulated, demodulate};

@@ -56,7 +56,7 @@ mod _core {
     use super::beside::PyBeside;
 
     #[pymodule_export]
-    use super::channels::{PyDecoder, channel_faults, curve_slopes, fit_curve};
+    use super::channels::{PyDecoder, channel_faults, curve_slopes, demodulate, fit_curve};
 
     #[pymodule_export]
     use super::circle::{covered_span, following, residuals, resultant};

@@ -306,6 +306,9 @@ class Decoder:
 def channel_faults(
     sine: _Array, cosine: _Array
 ) -> tuple[NDArray[np.uint8], list[float | None], list[float] | None]: ...
+def demodulate(
+    excitation: _Array, sine: _Array, cosine: _Array, phase: float | None = None
+) -> tuple[NDArray[np.uint64], _Array, _Array, float, float] | None: ...
 def fit_curve(
     sine: _Array,
     cosine: _Array,

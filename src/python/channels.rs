@@ -91,6 +91,34 @@ pub fn channel_faults<'py>(
     Ok((vector(py, &flags)?, wraps, curve.map(|c| c.parameters)))
 }
 
+/// First readings of the periods of an excitation and their number, sine and cosine over it, their
+/// phase against it in radians and the share of both at right angles to that; None without periods.
+#[pyfunction]
+#[pyo3(signature = (excitation, sine, cosine, phase=None))]
+pub fn demodulate<'py>(
+    py: Python<'py>,
+    excitation: PyReadonlyArray1<'_, f64>,
+    sine: PyReadonlyArray1<'_, f64>,
+    cosine: PyReadonlyArray1<'_, f64>,
+    phase: Option<f64>,
+) -> PyResult<Option<Periods<'py>>> {
+    let (carrier, sine, cosine) = (values(&excitation), values(&sine), values(&cosine));
+    let found = detached(py, || channels::demodulate(&carrier, &sine, &cosine, phase))??;
+    let Some(found) = found else { return Ok(None) };
+    let (sine, cosine) = (vector(py, &found.sine)?, vector(py, &found.cosine)?);
+    let starts = vector(py, &found.starts)?;
+    Ok(Some((starts, sine, cosine, found.phase, found.quadrature)))
+}
+
+/// Starts, sine, cosine, phase and quadrature.
+type Periods<'py> = (
+    Bound<'py, PyArray1<usize>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    f64,
+    f64,
+);
+
 /// The angle of two channels and its correction.
 #[pyclass(name = "Decoder", module = "trueangle._core", frozen)]
 pub struct PyDecoder {

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 ROLES = (
     "reference, indicated, error, reference_offset, time, velocity, direction, temperature, "
     "torque, current, mount, run, unit, when, motor, head1, head2 ..., shift, sine, cosine, "
-    "sine2, cosine2, coupled_JOINT"
+    "sine2, cosine2, excitation, coupled_JOINT"
 )
 
 #: What a source may be, as every help names it.

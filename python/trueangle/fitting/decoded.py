@@ -39,6 +39,7 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
         )
     signals = [(run.signals["sine"], run.signals["cosine"], run.reference) for run in runs]
     channels = referenced_channels(signals, first, _named(runs[0]))
+    channels = channels.replace(excitation_deg=first.excitation_deg)
     if first.second is not None:
         others = [(run.signals["sine2"], run.signals["cosine2"], run.reference) for run in runs]
         named = f"{_named(runs[0])}, second track"

@@ -305,6 +305,8 @@ class JointChannel:
             signals = dict(signals or {})
             known = self._channels.channels
             others = [signals.pop(role) for role in known.roles[1:]]
+            if known.excitation_deg is not None:
+                indicated, *others = known.demodulated(indicated, *others)
             self._channels.update(indicated, *others)
             indicated = known.angle(indicated, *others)
         kept = indicated.dtype if indicated.dtype == np.float32 else np.dtype(np.float64)

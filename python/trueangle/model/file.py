@@ -57,7 +57,7 @@ _KEYS = {
     "provenance": False,
 }
 _CHANNEL_KEYS = (*CONSTANTS, "direction", "periods_per_turn", "harmonics", "covariance")
-_TRACK_KEYS = (*_CHANNEL_KEYS, "second", "second_zero_deg")
+_TRACK_KEYS = (*_CHANNEL_KEYS, "second", "second_zero_deg", "excitation_deg")
 #: Lines of one term, at most.
 MAX_TERM_LINES = 4096
 #: Smallest turn in the unit of angles, and the inverse of the largest.
@@ -259,7 +259,7 @@ class _ModelReader(RecordReader):
         checked: dict[str, Any] = {
             name: self.number(table[name], f"{path}.{name}") for name in CONSTANTS
         }
-        for name in ("direction", "periods_per_turn", "second_zero_deg"):
+        for name in ("direction", "periods_per_turn", "second_zero_deg", "excitation_deg"):
             if name in table:
                 checked[name] = self.number(table[name], f"{path}.{name}")
         harmonics = self.items(

@@ -216,8 +216,12 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
     channels = dropouts = None
     if given.periods is not None or {"sine", "cosine"} & table.roles.keys():
         from .channelangle import with_channel_angle  # few files have channels
+        from .excitation import demodulated
 
+        table, excitation = demodulated(table)
         table, channels, dropouts = with_channel_angle(table, given.periods, given.reference_counts)
+        if channels is not None and excitation is not None:
+            channels = channels.replace(excitation_deg=excitation)
     roles, path = table.roles, table.path
     angles = find_run_angles(
         path,

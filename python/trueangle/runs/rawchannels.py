@@ -95,6 +95,9 @@ class Channels:
         period of the first.
     second_zero_deg : float
         Phase of the second track where that of the first and the angle are zero.
+    excitation_deg : float, optional
+        Of a resolver: phase of the channels against the excitation; sine and cosine are relative to
+        it.
 
     Raises
     ------
@@ -121,6 +124,7 @@ class Channels:
     covariance: tuple[tuple[float, ...], ...] | None = field(default=None, repr=False)
     second: Channels | None = None
     second_zero_deg: float = 0.0
+    excitation_deg: float | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -142,6 +146,8 @@ class Channels:
             if h.order in (-1, 0, 1) or not all(map(math.isfinite, h[1:])):
                 raise ArgumentError(f"a harmonic has an order from 2 or to -2, got {h!r}")
         if self.second is not None:
+            if self.excitation_deg is not None:
+                raise ArgumentError("two tracks with an excitation are not known: leave one out")
             checked_track_periods((self.periods_per_turn, self.second.periods_per_turn))
             if self.second.period != self.period or self.second.second is not None:
                 raise ArgumentError("second must be one track of the same period of the angle")
@@ -200,7 +206,24 @@ class Channels:
     @property
     def roles(self) -> tuple[str, ...]:
         """Roles of the columns that are decoded."""
+        if self.excitation_deg is not None:
+            return ("sine", "cosine", "excitation")
         return ("sine", "cosine") if self.second is None else TRACKS
+
+    def demodulated(self, sine: Array, cosine: Array, excitation: Array) -> tuple[Array, Array]:
+        """Sine and cosine over the excitation, for every reading those of its period.
+
+        Raises
+        ------
+        ArgumentError
+            No periods of four readings and more.
+        """
+        e, y, x = (np.ascontiguousarray(v, dtype=np.float64) for v in (excitation, sine, cosine))
+        found = _core.demodulate(e, y, x, math.radians(self.excitation_deg or 0.0))
+        if found is None:
+            raise ArgumentError("the excitation has no periods of 4 readings and more")
+        counts = np.diff(found[0]).astype(np.intp)
+        return np.repeat(found[1], counts), np.repeat(found[2], counts)
 
     def angle(self, sine: ArrayLike, cosine: ArrayLike, *second: ArrayLike) -> Array:
         """The angle by offsets, gain and phase, harmonics not yet corrected.
@@ -339,6 +362,8 @@ class Channels:
         if self.second is not None:
             rows["second"] = self.second.to_dict()
             rows["second_zero_deg"] = self.second_zero_deg
+        if self.excitation_deg is not None:
+            rows["excitation_deg"] = self.excitation_deg
         return rows
 
     def constant_lines(self) -> list[str]:
@@ -359,6 +384,8 @@ class Channels:
             f"harmonic {h.order:<15d} {abs(complex(h.re, h.im)):12.5f} {h.std:10.2g}"
             for h in self.harmonics
         ]
+        if self.excitation_deg is not None:
+            lines.append(f"{'phase to the excitation, deg':24s} {self.excitation_deg:8.3f}")
         if self.second is not None:
             lines += ["second track", *self.second.constant_lines()[1:]]
         return lines
@@ -369,6 +396,8 @@ class Channels:
         if self.second is not None:
             zero = self.second_zero_deg
             second = {"second": self.second.to_table(), "second_zero_deg": zero}
+        if self.excitation_deg is not None:
+            second["excitation_deg"] = self.excitation_deg
         return {
             **{name: getattr(self, name) for name in CONSTANTS},
             "direction": self.direction,

@@ -48,6 +48,8 @@ def channel_patterns(
     second = _second_track(channels, recordings)
     if second is not None:
         channels = second[0]
+    if first.excitation_deg is not None:
+        channels = channels.replace(excitation_deg=first.excitation_deg)
     unit = abs(channels.constants[-1]) * 2.0 * math.pi / period * ARCSEC
     angles = [_unwrapped(channels, *pair) for pair in pairs]
     turns = sum(float(np.ptp(angle)) for angle in angles) / period

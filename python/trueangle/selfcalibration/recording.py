@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError, NoModelError
+from ..runs.excitation import demodulated
 from ..runs.rawchannels import TRACKS
 from ..runs.readings import FileReadings
 from ..runs.run import CalibrationRun, runs_or_data
@@ -64,6 +65,7 @@ class Recording:
     cosine2: Array | None = None
     periods: int = 1
     periods2: int | None = None
+    excitation_deg: float | None = None
     file: str = ""
     source: InputFile | None = None
     indicated_sign: int = 1
@@ -138,6 +140,7 @@ def _of_run(run: CalibrationRun) -> Recording:
 
 
 def _of_table(table: FileReadings, reading: ReadingOptions) -> list[Recording]:
+    table, excitation = demodulated(table)
     channels = {
         role: _in_radians(
             column._replace(unit=column.unit or table.format.unit)
@@ -173,7 +176,10 @@ def _of_table(table: FileReadings, reading: ReadingOptions) -> list[Recording]:
             line=1,
         )
     second = periods[1] if len(periods) > 1 else None
-    return [replace(recording, periods=periods[0], periods2=second) for recording in found]
+    return [
+        replace(recording, periods=periods[0], periods2=second, excitation_deg=excitation)
+        for recording in found
+    ]
 
 
 def _in_radians(column: RoleColumn, table: FileReadings, reading: ReadingOptions) -> Array:

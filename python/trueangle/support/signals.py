@@ -123,6 +123,7 @@ SIGNALS: Mapping[str, Signal] = {
         Signal("cosine", "plain", "cosine", "channel of a sensor that follows the cosine"),
         Signal("sine2", "plain", "sine2", "sine of the second track of a sensor"),
         Signal("cosine2", "plain", "cosine2", "cosine of the second track of a sensor"),
+        Signal("excitation", "plain", "excitation", "of a resolver, sampled with sine and cosine"),
     )
 }
 
