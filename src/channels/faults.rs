@@ -156,7 +156,7 @@ pub fn wraps_at(values: &[f64]) -> Option<f64> {
     let codes = 2.0_f64.powf(bits.max(f64::from(NARROWEST)));
     let steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let (small, large): (Vec<f64>, Vec<f64>) = steps.iter().partition(|s| **s < 0.25 * codes);
-    let most = 2.0 * small.iter().copied().fold(0.0, f64::max);
+    let most = (2.0 * small.iter().copied().fold(0.0, f64::max)).min(0.25 * codes);
     let jumps = large
         .iter()
         .filter(|jump| (codes - *jump).abs() <= most)
