@@ -250,7 +250,6 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
     for values in (reference, indicated, *signals.values()):
         missing |= np.isnan(values)
     empty = missing if dropouts is None else missing & ~dropouts
-    _warn_of_empty(table, empty, {"reference": reference, "indicated": indicated, **signals})
     if dropouts is not None:
         missing |= dropouts
     groups, left_out = [], []
@@ -267,6 +266,7 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
             raise FileError(path, problem + two_channels(table, counts, reference, indicated))
         groups.append((found, present))
         left_out.append(rows.size - present.size)
+    _warn_of_empty(table, empty, {"reference": reference, "indicated": indicated, **signals})
     return _RunColumns(
         table,
         period,

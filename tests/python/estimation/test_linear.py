@@ -193,5 +193,5 @@ def test_sizes_that_do_not_fit_are_refused():
 def test_clusters_that_share_a_direction_nobody_shows_have_no_covariance():
     x = np.outer(np.arange(1.0, 9.0), [1.0, 2.0])
     clusters = [NormalEquations.of_rows(part, part[:, 0]) for part in (x[:4], x[4:])]
-    with pytest.raises(np.linalg.LinAlgError, match="do not tell"):
+    with pytest.raises(np.linalg.LinAlgError, match="do not determine"):
         cluster_covariance(clusters)

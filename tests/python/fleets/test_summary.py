@@ -53,8 +53,8 @@ def test_the_tables_hold_the_numbers_of_the_object(fleet, errors_in, per):
         assert [float(x) for x in row[1].split()] == pytest.approx(per * np.array(wanted), rel=FOUR)
     flat, bound = " ".join(text.split()), plain["tolerance"]
     told = re.search(
-        rf"(\S+) % of units stay below (\S+) {errors_in} peak-to-peak and (\S+) {errors_in} left "
-        r".* with (\S+) % confidence \(.*factor (\S+)\)",
+        rf"(\S+) % of units stay below (\S+) {errors_in} peak-to-peak and (\S+) {errors_in} "
+        r"residual .* with (\S+) % confidence \(.*factor (\S+)\)",
         flat,
     )
     wanted = [100 * bound["share"], per * bound["peak_to_peak_arcsec"], per * bound["left_arcsec"],

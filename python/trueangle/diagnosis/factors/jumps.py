@@ -22,8 +22,8 @@ ENDS: Final = 2
 
 
 @dataclass(frozen=True)
-class Ramp:
-    """A ramp over a turn.
+class Sawtooth:
+    """A ramp over a turn that falls back at one place.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ def less_low_orders(theta: Array, values: Array) -> Array:
     return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=1e-9)[0])
 
 
-def jumps(degrees: Array, left: Array) -> list[Ramp]:
+def jumps(degrees: Array, left: Array) -> list[Sawtooth]:
     """Ramps that explain most of values less low orders.
 
     Of all gaps between places that whose ramp, less its own low orders, explains most, and then the
@@ -64,12 +64,12 @@ def jumps(degrees: Array, left: Array) -> list[Ramp]:
     if places.size <= 2 * LOW + 2:
         return []
     gaps = [
-        Ramp(float(a), float(b), places.size)
+        Sawtooth(float(a), float(b), places.size)
         for a, b in zip(places, np.append(places[1:], places[0] + 360.0), strict=True)
     ]
     coarse = np.unique(np.linspace(0, places.size - 1, min(places.size, TRIED)).astype(int))
     known = _unit_ramps(degrees, [gaps[k] for k in coarse])
-    found: list[Ramp] = []
+    found: list[Sawtooth] = []
     while len(found) < ENDS:
         tried, ramps = coarse, known
         while True:
@@ -86,7 +86,7 @@ def jumps(degrees: Array, left: Array) -> list[Ramp]:
     return found
 
 
-def _unit_ramps(degrees: Array, gaps: list[Ramp]) -> Array:
+def _unit_ramps(degrees: Array, gaps: list[Sawtooth]) -> Array:
     """Ramps less their own low orders, of length 1."""
     ramps = np.hstack([gap.values(degrees) for gap in gaps])
     ramps = less_low_orders(np.radians(degrees), ramps)
