@@ -219,7 +219,7 @@ class Evidence:
         list[tuple[float, list[float], list[float]]], NDArray[np.float64], NDArray[np.float64]
     ]: ...
     def estimate(
-        self, probabilities: Sequence[float], declared: Sequence[int] = ()
+        self, probabilities: Sequence[float]
     ) -> tuple[
         NDArray[np.float64],
         list[int],

@@ -5,8 +5,6 @@
 //! over the noise on a few points of its posterior, and over the models within Occam's window
 //! (Madigan and Raftery 1994).
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 
 use super::candidates::Inside;
@@ -42,9 +40,6 @@ const MORE: usize = 12;
 
 /// Weight over the greatest below which a model under a noise does not count.
 const LIGHT: f64 = 1e-4;
-
-/// Variance of coefficients over that of the errors that leaves them as the readings have them.
-const FLAT: f64 = 1e6;
 
 /// Smallest variance of residuals over that of errors: sums of squares hold no less.
 const EXACT: f64 = 1e-12;
@@ -99,10 +94,9 @@ impl Readings {
     /// Noise and orders are sought from all sides: with the strongest orders in, so that none passes
     /// for slow noise, with none, so that slow noise passes for no order, and with orders that differ
     /// from run to run, so that no difference passes for slow noise. Where these end apart, the
-    /// mixture has all. Coefficients of orders that are `declared` have a flat prior; the noise, the
-    /// other orders and what differs from run to run remain those of the search. None where no
-    /// evidence can be computed: a covariance is not positive by rounding.
-    pub fn estimate(&self, probabilities: &[f64], declared: &[usize]) -> Option<Estimate> {
+    /// mixture has all. None where no evidence can be computed: a covariance is not positive by
+    /// rounding.
+    pub fn estimate(&self, probabilities: &[f64]) -> Option<Estimate> {
         let total = self.variance();
         let prior = Prior::of(probabilities.to_vec(), total, self.runs().len());
         let looked = self.first(&prior, total);
@@ -127,7 +121,7 @@ impl Readings {
             let mode = self.settled(&prior, noise_prior, (&looked, total), start, &modes)?;
             modes.extend(mode);
         }
-        self.mixture(&modes, &prior, noise_prior, (declared, FLAT * total))
+        self.mixture(&modes, &prior, noise_prior)
     }
 
     /// The mixture over models under a known noise, sought from a model and from none: weights and
@@ -277,7 +271,7 @@ impl Readings {
     /// Variance of what all orders leave of the errors.
     fn left(&self, total: f64) -> Option<f64> {
         let grams = self.grams(Noise::of([total, 0.0, 0.0, 0.0, 0.0, 0.0]));
-        let wide = FLAT * total;
+        let wide = 1e6 * total;
         let found = Model::of_orders(self.orders().len(), wide).posterior(&grams)?;
         let unknowns: f64 = found
             .covariance()
@@ -307,15 +301,8 @@ impl Readings {
         model
     }
 
-    /// Over models and points of the noise's posterior; orders declared have coefficients of variance
-    /// `wide` in every model.
-    fn mixture(
-        &self,
-        modes: &[Mode],
-        prior: &Prior,
-        noise_prior: NoisePrior,
-        (declared, wide): (&[usize], f64),
-    ) -> Option<Estimate> {
+    /// Over models and points of the noise's posterior.
+    fn mixture(&self, modes: &[Mode], prior: &Prior, noise_prior: NoisePrior) -> Option<Estimate> {
         let has = |mode: &Mode, k: usize| {
             let mut counted = mode.models.iter().take(MODELS);
             counted.any(|found| found.model.has(k))
@@ -325,14 +312,10 @@ impl Readings {
             kept.map(|k| mode.looked[k]).collect()
         };
         let mut places: Vec<usize> = modes.iter().flat_map(own).collect();
-        places.extend(declared);
         places.sort_unstable();
         places.dedup();
         let readings = self.among(&places);
         let some = prior.among(&places);
-        let fixed: Vec<usize> = (0..places.len())
-            .filter(|&k| declared.contains(&places[k]))
-            .collect();
         let mut parts = Vec::new();
         for (m, mode) in modes.iter().enumerate() {
             let points = mode.fit.points();
@@ -346,10 +329,11 @@ impl Readings {
             let part = |i: usize| {
                 let at = noise_prior.log_density(&points[i]) + volume;
                 let grams = readings.grams(noise_prior.noise(&points[i]));
-                let found = posteriors(&models, &grams, &some, (&fixed, wide)).into_iter();
-                found
-                    .map(|own| own.map(|(score, own)| (score + at, own)))
-                    .collect::<Vec<_>>()
+                let own = |model: &Model| {
+                    let found = model.posterior(&grams)?;
+                    Some((found.log_evidence + some.log_odds(model) + at, found))
+                };
+                models.iter().map(own).collect::<Vec<_>>()
             };
             let each: Vec<_> = threads::map_parts(points.len(), self.threads(), part).collect();
             for (k, model) in models.iter().enumerate() {
@@ -371,7 +355,7 @@ impl Readings {
                 let relative = (score - best).exp();
                 weight += relative / whole;
                 if relative > LIGHT {
-                    heavy.push((relative, posterior.as_ref()));
+                    heavy.push((relative, posterior));
                 }
             }
             of_modes[*m] += weight;
@@ -398,35 +382,6 @@ impl Readings {
             places,
         })
     }
-}
-
-/// Score of each model, and its posterior; with coefficients of variance `wide` of the groups that
-/// are `fixed`, once for all models that differ in these alone.
-fn posteriors(
-    models: &[Model],
-    grams: &[Gram],
-    prior: &Prior,
-    (fixed, wide): (&[usize], f64),
-) -> Vec<Option<(f64, Arc<Posterior>)>> {
-    let mut known: Vec<(Model, Arc<Posterior>)> = Vec::new();
-    let own = |model: &Model| {
-        let found = model.posterior(grams)?;
-        let score = found.log_evidence + prior.log_odds(model);
-        if fixed.is_empty() {
-            return Some((score, Arc::new(found)));
-        }
-        let mut model = model.clone();
-        for &k in fixed {
-            model.tau[k] = wide;
-        }
-        if let Some((_, found)) = known.iter().find(|(other, _)| *other == model) {
-            return Some((score, Arc::clone(found)));
-        }
-        let found = Arc::new(model.posterior(grams)?);
-        known.push((model, Arc::clone(&found)));
-        Some((score, found))
-    };
-    models.iter().map(own).collect()
 }
 
 /// Mean and covariance of a mixture of normal distributions, the coefficients of groups that are out

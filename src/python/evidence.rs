@@ -151,21 +151,10 @@ impl PyEvidence {
         ))
     }
 
-    /// The mixture over models and noises, from prior probabilities of the orders; coefficients of
-    /// those at the places `declared` have a flat prior.
-    #[pyo3(signature = (probabilities, declared=Vec::new()))]
-    fn estimate<'py>(
-        &self,
-        py: Python<'py>,
-        probabilities: Vec<f64>,
-        declared: Vec<usize>,
-    ) -> PyResult<Estimated<'py>> {
+    /// The mixture over models and noises, from prior probabilities of the orders.
+    fn estimate<'py>(&self, py: Python<'py>, probabilities: Vec<f64>) -> PyResult<Estimated<'py>> {
         self.check_probabilities(py, &probabilities)?;
-        if let Some(place) = declared.iter().find(|&&k| k >= probabilities.len()) {
-            let problem = format!("declared must be places of orders, got {place}");
-            return Err(argument_error(py, problem));
-        }
-        let found = detached(py, || self.0.estimate(&probabilities, &declared))?;
+        let found = detached(py, || self.0.estimate(&probabilities))?;
         let found = found.ok_or_else(|| argument_error(py, LOST.into()))?;
         let n = found.mean.len();
         let alone = found.alone.iter().map(|own| {

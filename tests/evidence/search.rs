@@ -221,7 +221,7 @@ fn scaled(cases: &[Case], factor: f64) -> Vec<Case> {
 fn an_estimate_is_the_same_in_any_unit_and_every_time() {
     let cases = cases(&[200, 150]);
     let chance = [0.25; 4];
-    let found = readings(&cases, &ORDERS).estimate(&chance, &[]).unwrap();
+    let found = readings(&cases, &ORDERS).estimate(&chance).unwrap();
     assert!(found.probabilities[0] > 0.99 && found.probabilities[2] > 0.99);
     assert!(found.probabilities[1] < 0.3 && found.probabilities[3] < 0.3);
     for (c, wanted) in [5.0 * 0.3_f64.cos(), -5.0 * 0.3_f64.sin()]
@@ -233,13 +233,13 @@ fn an_estimate_is_the_same_in_any_unit_and_every_time() {
     }
     let total: f64 = found.models.iter().map(|(weight, _)| weight).sum();
     assert!((total - 1.0).abs() < SAME);
-    let again = readings(&cases, &ORDERS).estimate(&chance, &[]).unwrap();
+    let again = readings(&cases, &ORDERS).estimate(&chance).unwrap();
     assert_eq!(again.mean, found.mean);
     assert_eq!(again.covariance, found.covariance);
     // By a power of two, no rounding differs; logarithms do.
     for factor in [2.0_f64.powi(-40), 2.0_f64.powi(60)] {
         let other = readings(&scaled(&cases, factor), &ORDERS)
-            .estimate(&chance, &[])
+            .estimate(&chance)
             .unwrap();
         assert!((other.mean / factor - &found.mean).amax() < 1e-5);
         assert!((other.covariance / (factor * factor) - &found.covariance).amax() < 1e-5);
@@ -257,7 +257,7 @@ fn readings_that_tell_nothing_leave_the_prior() {
     ] {
         let found = Readings::new(runs, vec![1.0, 2.0])
             .unwrap()
-            .estimate(&[0.1, 0.6], &[])
+            .estimate(&[0.1, 0.6])
             .unwrap();
         assert!(found.mean.amax() < 1e-90);
         assert!(found.probabilities.iter().all(|p| (0.0..=1.0).contains(p)));
@@ -265,7 +265,7 @@ fn readings_that_tell_nothing_leave_the_prior() {
     }
     // Without orders there is the noise alone.
     let readings = readings(&cases(&[60, 50]), &[]);
-    assert_eq!(readings.estimate(&[], &[]).unwrap().models.len(), 1);
+    assert_eq!(readings.estimate(&[]).unwrap().models.len(), 1);
 }
 
 /// The error is a sum of orders to the last digit: they are found, and the noise is next to nothing.
@@ -277,7 +277,7 @@ fn readings_without_noise() {
             *error = 3.0 * x.cos() + (2.0 * x).sin();
         }
     }
-    let found = readings(&cases, &ORDERS).estimate(&[0.25; 4], &[]).unwrap();
+    let found = readings(&cases, &ORDERS).estimate(&[0.25; 4]).unwrap();
     assert_eq!(found.places, [0, 1]);
     let wanted = [3.0, 0.0, 0.0, 1.0];
     let apart = found.mean - DVector::from_column_slice(&wanted);
@@ -289,8 +289,7 @@ fn readings_without_noise() {
 fn an_estimate_can_be_called_off() {
     let readings = readings(&cases(&[60_000, 50_000]), &ORDERS);
     let start = std::time::Instant::now();
-    let done =
-        trueangle::interrupt::within(|| true, || readings.estimate(&[0.25; 4], &[]).is_some());
+    let done = trueangle::interrupt::within(|| true, || readings.estimate(&[0.25; 4]).is_some());
     assert_eq!(done, Err(trueangle::interrupt::Interrupted));
     assert!(start.elapsed().as_secs_f64() < 2.0);
 }

@@ -144,19 +144,6 @@ class EvidenceEstimate:
             runs=runs,
         )
 
-    def with_constant(self, covariance: Array, columns: Sequence[Array]) -> Array:
-        """Covariance of the mean zero of the runs and of coefficients with this covariance.
-
-        ``columns``: means of the coefficients' columns in each run.
-        """
-        zeros = np.mean([1.0 / zero.information for zero in self.zeros])
-        common = np.mean(columns, axis=0)
-        whole = np.empty((len(covariance) + 1, len(covariance) + 1))
-        whole[1:, 1:] = covariance
-        whole[0, 1:] = whole[1:, 0] = -covariance @ common
-        whole[0, 0] = zeros / len(columns) + common @ covariance @ common
-        return whole
-
     def curve(self, theta: Array) -> tuple[Array, Array]:
         """Error curve at angles in radians, less its mean over them, and its standard deviation."""
         return self._curve(theta, ())
@@ -275,7 +262,6 @@ def estimate_by_evidence(
     runs: Sequence[RunReadings],
     orders: Sequence[float],
     probability: Sequence[float] | None = None,
-    declared: Collection[float] = (),
 ) -> EvidenceEstimate:
     """Estimate orders, their coefficients and the noise of runs together.
 
@@ -297,10 +283,6 @@ def estimate_by_evidence(
         Positive, increasing; as many as one likes, for those that are not significant cost a pass.
     probability : sequence of float, optional
         Prior probability of each order, above 0 and below 1; 1/K of each by default, or 1/2 of one.
-    declared : collection of float
-        Orders whose coefficients have a flat prior. Noise, the other orders and what differs from
-        run to run are those of the models, so that they do not depend on how many orders without
-        an amplitude are declared.
 
     Raises
     ------
@@ -320,7 +302,7 @@ def estimate_by_evidence(
         probability = [1.0 / max(len(orders), 2)] * len(orders)
     given = [tuple(map(_column, run)) for run in runs]
     own, places, mean, covariance, noise, models, zeros, alone = Evidence(given, orders).estimate(
-        probability, [k for k, order in enumerate(orders) if order in declared]
+        probability
     )
     return EvidenceEstimate(
         tuple(orders),

@@ -97,11 +97,9 @@ def fit(
     covariance : {"auto", "white", "cluster", "hac"}
         ``"white"``: independent readings; ``"cluster"``: by the scatter between whole runs,
         right for any correlation within them; ``"hac"``: by segments of readings, right
-        where the correlation dies out. ``"auto"``: by the evidence of noise of any correlation and
-        of what differs between three runs and more (8000 readings at most); else white unless the
-        residuals correlate in time or the runs scatter by more, then clusters (three runs and more)
-        or segments. Eight runs and more that scatter by less give the noise by that scatter; see
-        the notes. Intervals:
+        where the correlation dies out. ``"auto"``: white unless the residuals correlate in
+        time or the runs scatter by more, then clusters (three runs and more) or segments; eight
+        runs and more that scatter by less give the noise by that scatter; see the notes. Intervals:
         `FitResult.interval`.
     nuisance : {"none", "auto"} or iterable of str
         What is fitted jointly with the pattern and kept out of the model (`FitResult.nuisance`):

@@ -144,7 +144,11 @@ def _fitted(
     freedom = max(float(used - len(offsets) - mean.size), 1.0)
     zeros = float(np.mean([1.0 / zero.information for zero in estimate.zeros]))
     parts = np.array(means)
-    whole = estimate.with_constant(covariance, means)
+    common = parts.mean(axis=0)
+    whole = np.empty((mean.size + 1, mean.size + 1))
+    whole[1:, 1:] = covariance
+    whole[0, 1:] = whole[1:, 0] = -covariance @ common
+    whole[0, 0] = zeros / len(offsets) + common @ covariance @ common
     pairs = np.split(
         mean.reshape(-1, 2), np.cumsum([len(shaft.orders) for shaft in problem.shafts])[:-1]
     )

@@ -240,11 +240,9 @@ def _moved(sums: _Repeats, basis: Array, sizes: tuple[float, float], kind: str) 
     found = _spread(sums.scores, basis, sizes)
     if kind == "white":
         found *= 1.0 - len(basis) / sums.readings
-    elif kind in ("cluster", "evidence") and runs.size > 1:
+    elif kind == "cluster" and runs.size > 1:
         own = [_spread(sums.pairs[run == one], basis[place[run == one]], sizes) for one in runs]
-        found = found - np.sum(own, axis=0)
-        # About the mean of the runs their scatter holds less of what they have in common.
-        found *= runs.size / (runs.size - 1.0) if kind == "cluster" else 1.0
+        found = (found - np.sum(own, axis=0)) * (runs.size / (runs.size - 1.0))
         # Where leaks of runs at other positions cancel, their scatter is too wide, and stays.
         values, vectors = np.linalg.eigh(found)
         found = (vectors * np.maximum(values, 0.0)) @ vectors.T

@@ -82,13 +82,12 @@ def _intervals(fit: FittedCoefficients) -> str:
     near, far = (student_quantile(0.975, v) for v in (most, least))
     times = f"{far:.3g}" if far < near + 0.05 else f"{near:.3g} to {far:.3g}"
     held = ", with the bias of the ridge" if fit.ridge > 0.0 else ""
-    allowed = "differences between runs" if fit.evidence is None else "the choice of orders"
-    return f"95 % within {times} standard errors, {_KINDS[found.kind].format(allowed)}{held}"
+    return f"95 % within {times} standard errors, {_KINDS[found.kind]}{held}"
 
 
 _KINDS = {
     "white": "for white noise",
-    "evidence": "with correlated noise and {} allowed for",
+    "evidence": "with correlated noise and the choice of orders allowed for",
     "cluster": "by the scatter between runs",
     "hac": "by the scatter of segments of the readings",
 }

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.evidence import estimate_by_evidence
 from ..estimation.linear import NormalEquations, cluster_covariance, total
 from ..support.arrays import Array
 from ..support.quantiles import median
@@ -20,7 +19,6 @@ from .correlation import (
     FEWEST_RUNS,
     FEWEST_STRETCHES,
     clusters_of,
-    coefficients_of,
     correlation_found,
     residual_memory,
     runs_together,
@@ -28,9 +26,7 @@ from .correlation import (
     weight_sum,
     white_variance_share,
 )
-from .orders.zerogroups import MOST_READINGS, ZeroGroupReadings
 from .problem import Problem, SolvedProblem
-from .robust import given_weights
 from .sandwich import Sandwich, sandwich
 
 if TYPE_CHECKING:
@@ -41,10 +37,6 @@ COVARIANCES: tuple[CovarianceKind, ...] = ("auto", "white", "cluster", "hac")
 
 #: Readings of one or two runs from which a correlation of 0.2 would be found.
 _TELLING: Final = 300
-
-
-#: Probability of an order that is declared, where the noise is estimated beside it.
-_DECLARED: Final = 0.5
 
 
 class Uncertainty(NamedTuple):
@@ -115,18 +107,15 @@ def coefficient_uncertainty(
     nuisance: Nuisance | None = None,
     loss: str = "linear",
 ) -> Uncertainty:
-    """Covariance of this kind; ``"auto"``: by the evidence where three runs and more are kept.
+    """Covariance of this kind; ``"auto"``: white unless correlation is found.
 
     A ``nuisance`` that was taken out of the runs is fitted jointly with the pattern
     (`trueangle.fitting.beside`). A robust ``loss`` gives readings less weight,
     which does not make them less precise (`trueangle.fitting.sandwich`).
 
     If eight runs or more repeat better than the residual as white noise suggests, their scatter,
-    pooled over the coefficients, is the noise. Else the evidence of three runs or more shows noise
-    of any correlation and what differs from run to run. Where it is not known (one or two runs, a
-    nuisance, more readings than are looked at) the noise is white unless correlation is found:
-    then whole runs are the clusters where there are three or more. With fewer, the clusters are
-    segments eight correlation times of the residuals
+    pooled over the coefficients, is the noise. Whole runs are the clusters where there are
+    three or more. With fewer, the clusters are segments eight correlation times of the residuals
     long: right where the correlation decays within a run, which one run cannot prove, so that a
     note states it. The bias of a penalty is added to either
     (`trueangle.fitting.ridge`).
@@ -160,22 +149,19 @@ def _noise(
     freedom = np.full(len(white), solution.degrees_of_freedom)
     if kind == "white" or not np.isfinite(white).all() or len(white) == 1:
         return Uncertainty("white", white, freedom)
-    used = _used(problem, fitted)
+    used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
     if kind == "auto":
         between = scatter_between(problem, fitted, weights, used)
         if between is not None:
             between = between[0] / bent.scores, between[1]
         found = correlation_found(problem, fitted, weights, used, between)
-        share = 1.0 if found else white_variance_share(between, len(used))
-        if between is not None and share < 1.0:
+        if not found:
+            share = white_variance_share(between, len(used))
+            if between is None or share == 1.0:
+                return Uncertainty("white", white, freedom, _untold(problem, used))
             told = np.full(len(white) - 1, between[1])
             pooled = _with_constant(white, share * white[1:, 1:], told)
             return Uncertainty("cluster", *pooled, _repeated(share, len(used)))
-        is_kept = problem.readings <= MOST_READINGS and not isinstance(problem, BesideProblem)
-        if between is not None and is_kept:
-            return _by_evidence(problem, fitted, weights, penalty, bent)
-        if not found:
-            return Uncertainty("white", white, freedom, _untold(problem, used))
         kind = "cluster" if len(used) >= FEWEST_RUNS else "hac"
         said = _said(found)
     else:
@@ -210,65 +196,6 @@ def _noise(
     return Uncertainty(kind, *_with_constant(white, bent.bread * covariance, freedom), note)
 
 
-def _by_evidence(
-    problem: Problem,
-    fitted: SolvedProblem,
-    weights: Sequence[Array | None],
-    penalty: float,
-    bent: Sandwich,
-) -> Uncertainty:
-    """Second moments of the coefficients about those fitted, under the one model of the readings.
-
-    ::
-
-        M S M' + (b - M m)(b - M m)',    M = (G + λ)⁻¹ G
-
-    with the mean m and the covariance S of the posterior under a flat prior
-    (`trueangle.estimation.evidence`), which integrates over the noise and what differs from run to
-    run, and the normal matrix G of a fit with the penalty λ. Under white noise M m is b.
-    """
-    units, means = [], []
-    for i in _used(problem, fitted):
-        run, weight = problem.runs[i], given_weights(weights[i], len(problem.runs[i]))
-        means.append(weight @ problem.columns(i) / weight.sum())
-        turns = problem.angles[i] / problem.period
-        readings = ZeroGroupReadings(turns, run.centred_error, weight, "", run.time)
-        units.append(readings.part(weight > 0.0, "").given())
-    orders = [k * shaft.cycles_per_turn for shaft in problem.shafts for k in shaft.orders]
-    found = estimate_by_evidence(units, sorted(orders), [_DECLARED] * len(orders), orders)
-    at = np.ravel([(2 * found.told.index(k) + np.arange(2)) for k in orders])
-    mean, covariance = found.mean[at], bent.white * found.covariance[np.ix_(at, at)]
-    if penalty > 0.0:
-        sums, _ = _sums(problem, fitted, weights)
-        shrunk = np.linalg.solve(
-            sums.gram + penalty * sums.readings * np.eye(len(sums.gram)), sums.gram
-        )
-        mean, covariance = shrunk @ mean, shrunk @ covariance @ shrunk.T
-    apart = coefficients_of(fitted) - mean
-    covariance = covariance + np.outer(apart, apart)
-    freedom = fitted.solution.degrees_of_freedom
-    told = found.freedom_of_runs(orders, np.diag(covariance), freedom)
-    return Uncertainty(
-        "evidence",
-        found.with_constant(covariance, means),
-        np.concatenate([[told.min(initial=freedom)], told]),
-    )
-
-
-def _used(problem: Problem, fitted: SolvedProblem) -> list[int]:
-    """Runs with weight."""
-    return [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
-
-
-def _sums(
-    problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None]
-) -> tuple[NormalEquations, Array]:
-    """Normal equations about the zeros of the runs, and mean of every column over the runs."""
-    parts = [problem.products(weights, i, 1)[0] for i in _used(problem, fitted)]
-    means = np.mean([part[0] / part[0, 0] for part in parts], axis=0)
-    return total([NormalEquations.of_products(part) for part in parts]), means[1:-1]
-
-
 _SHORT: Final = "The runs are too short for their correlation time"
 _SUMMED: Final = "One pass keeps no segments"
 
@@ -299,7 +226,10 @@ def _bias(
     """What a penalty may have taken from the coefficients, as a covariance (see `penalty`)."""
     from .ridge import REACH, bias_covariance, error_range, pattern_variances
 
-    sums, means = _sums(problem, fitted, weights)
+    used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
+    parts = [problem.products(weights, i, 1)[0] for i in used]
+    means = [part[0] / part[0, 0] for part in parts]
+    sums = total([NormalEquations.of_products(part) for part in parts])
     lowest = [min(shaft.orders, default=1.0) for shaft in problem.shafts]
     steps = [
         order / low
@@ -314,7 +244,7 @@ def _bias(
         REACH * error_range(problem, weights),
     )
     full = penalty * sums.readings
-    return bias_covariance(sums.gram, means, full, variances)
+    return bias_covariance(sums.gram, np.mean(means, axis=0)[1:-1], full, variances)
 
 
 def _untold(problem: Problem, used: Sequence[int]) -> str:

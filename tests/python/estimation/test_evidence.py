@@ -117,49 +117,6 @@ def test_effects_of_runs_are_those_of_statsmodels() -> None:
         assert at(w * white, o * omega)[0] < best
 
 
-def test_declared_orders_have_the_errors_of_statsmodels() -> None:
-    """Order 2 differs from run to run, order 1 does not."""
-    rng, apart = np.random.default_rng(71), []
-    for _ in range(4):
-        runs, n = [], 60
-        for _ in range(16):
-            theta = rng.uniform(0.0, 2.0 * np.pi, n)
-            own = np.array([20.0, -12.0]) + 2.0 * rng.normal(size=2)
-            runs.append(RunReadings(theta, harmonics(theta, [2]) @ own + rng.normal(size=n)))
-        x = np.concatenate([harmonics(run.theta, [1, 2]) for run in runs])
-        table = pd.DataFrame(x, columns=["c", "s", "cosine", "sine"])
-        table["error"] = np.concatenate([run.error for run in runs])
-        table["unit"] = np.repeat(np.arange(16), n)
-        fitted = MixedLM.from_formula(
-            "error ~ 0 + c + s + cosine + sine + C(unit)",
-            groups="unit",
-            re_formula="0",
-            vc_formula={"order": "0 + cosine + sine"},
-            data=table,
-        ).fit(reml=True)
-        found = estimate_by_evidence(runs, [1, 2, 3, 4], [0.5] * 4, [1, 2])
-        std = np.sqrt(np.diag(found.covariance))[:4]
-        assert found.told[:2] == (1, 2)
-        apart.append(std / fitted.bse_fe[["c", "s", "cosine", "sine"]])
-    print(np.mean(apart, axis=0))
-    np.testing.assert_allclose(np.mean(apart, axis=0), 1.0, atol=0.1)
-
-
-def test_declared_orders_without_an_amplitude_are_noise_to_the_others() -> None:
-    """Sixty orders of one even turn hold all slow noise: the errors stay those of few orders."""
-    rng = np.random.default_rng(72)
-    theta = np.linspace(0.0, 2.0 * np.pi, 600, endpoint=False)
-    run = RunReadings(theta, 9.0 * np.cos(theta) + rng.normal(size=600))
-    few, many = (
-        estimate_by_evidence([run], range(1, count + 1), [0.5] * count, range(1, count + 1))
-        for count in (3, 60)
-    )
-    first = [np.sqrt(np.diag(found.covariance))[:6] for found in (few, many)]
-    assert (first[1] < 1.3 * first[0]).all()
-    best = np.linalg.lstsq(harmonics(theta, range(1, 61)), run.error, rcond=None)[0]
-    assert np.abs(many.mean - best).max() < 0.2 * first[1].max()
-
-
 def test_without_a_run_the_mixture_is_that_of_the_others_under_the_same_noise() -> None:
     rng, runs = np.random.default_rng(66), []
     for size in (3.0, 3.5, 2.0, 4.0):

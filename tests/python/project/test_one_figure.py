@@ -136,7 +136,7 @@ def test_eight_runs_that_repeat_tell_the_noise() -> None:
     assert told == pytest.approx(scatter, rel=0.6)
     assert white > 1.8 * told
     # Of few runs and of copies the residual stays the noise.
-    for given in (runs[:4], runs[:1] * 8):
-        auto, plain = (ta.fit(given, orders=[1], covariance=kind) for kind in ("auto", "white"))
-        assert auto.uncertainty.kind == "evidence"
-        assert auto.amplitude_std[0] == pytest.approx(plain.amplitude_std[0], rel=0.1)
+    few = ta.fit(runs[:4], orders=[1])
+    copies = ta.fit(runs[:1] * 8, orders=[1])
+    for found in (few, copies):
+        assert found.uncertainty.kind == "white"
