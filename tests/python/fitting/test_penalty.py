@@ -185,7 +185,7 @@ def test_a_ridge_is_told_with_the_intervals(tmp_path, capsys):
     runs, orders, _, _ = drawn(_disc, 3)
     found = ta.fit(runs, orders=orders)
     assert found.ridge > 0.0
-    assert "and what the ridge may have taken" in " ".join(found.summary().split())
+    assert "with the bias of the ridge" in " ".join(found.summary().split())
     assert any("include the bias of the ridge" in note for note in found.notes)
     lines = ["run,reference_deg,indicated_deg"]
     for number, run in enumerate(runs):

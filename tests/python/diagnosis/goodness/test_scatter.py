@@ -90,7 +90,7 @@ def test_tails_are_called_what_they_are(kind: str, word: str) -> None:
     found = {e.test: e for e in scatter_tests(left, estimate_noise(left), np.sqrt(7.0))}
     assert word in found["tails"].says
     said = found["noise against the simulation's"].says
-    assert re.search(r"states 2\.65$", said), said
+    assert re.search(r"states 2\.65 arcsec$", said), said
     assert found["noise against the simulation's"].statistic == pytest.approx(
         1.0 / np.sqrt(7.0), rel=0.03
     )
