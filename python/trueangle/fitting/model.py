@@ -15,6 +15,7 @@ from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
 from ..runs.channelangle import common_channels
+from ..runs.checks.check import channel_faults
 from ..runs.checks.record import records_of
 from ..runs.checks.rows import duplicate_rows, duplicate_runs, missed_counts
 from ..support.angles import wrap
@@ -53,17 +54,13 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         rows = "row" if fit.missing == 1 else "rows"
         dropouts = "" if channels is None else "off the channels' curve or "
         yield f"{fit.missing} {rows} {dropouts}with an empty cell omitted."
-    tests = [duplicate_runs, duplicate_rows, missed_counts]
-    if channels is not None:
-        from ..runs.checks.channelreadings import mismatch_words  # few runs have channels
-        from ..runs.checks.check import channel_faults
+    if channels is not None and channels.second is not None:
+        from ..runs.checks.channelreadings import mismatch_words  # few runs have two tracks
 
-        tests.insert(0, channel_faults)
-        if channels.second is not None:
-            yield _sentence(mismatch_words(channels.mismatch(*track_readings(fit.problem.runs))))
+        yield _sentence(mismatch_words(channels.mismatch(*track_readings(fit.problem.runs))))
     yield from (_sentence(remark) for remark in fit.remarks)
     records = records_of(fit.runs) if fit.moments is None else []
-    for test in tests:
+    for test in (channel_faults, duplicate_runs, duplicate_rows, missed_counts):
         yield from (_sentence(f"{fault.says}; {fault.mend}") for fault in test(records))
     if fit.ridge > 0.0:
         where = "arc" if fit.problem.is_periodic else "travel"
