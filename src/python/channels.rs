@@ -74,6 +74,9 @@ pub fn curve_slopes<'py>(
     columns(py, &rows, &shape)
 }
 
+/// Flags of the readings, the codes after which either channel wraps, and the ellipse.
+type Faults<'py> = (Bound<'py, PyArray1<u8>>, [Option<f64>; 2], Option<Vec<f64>>);
+
 /// Flags of every reading (1: the sine is at its rail, 2: the cosine, 4: off the curve), the codes
 /// after which either channel wraps, and the ellipse of the readings without a flag.
 #[pyfunction]
@@ -81,7 +84,7 @@ pub fn channel_faults<'py>(
     py: Python<'py>,
     sine: PyReadonlyArray1<'_, f64>,
     cosine: PyReadonlyArray1<'_, f64>,
-) -> PyResult<(Bound<'py, PyArray1<u8>>, [Option<f64>; 2], Option<Vec<f64>>)> {
+) -> PyResult<Faults<'py>> {
     let (sine, cosine) = (values(&sine), values(&cosine));
     let (found, wraps) = detached(py, || {
         let wraps = [&sine, &cosine].map(|channel| channels::wraps_at(channel));
