@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from .. import _core
 from ..errors import NoModelError
 from ..runs.checks.channelreadings import ChannelReadings
-from ..runs.rawchannels import ChannelHarmonic, Channels
+from ..runs.rawchannels import CONSTANTS, ChannelHarmonic, Channels
 from ..support.arrays import Array
 from ..support.distributions import normal_quantile
 from .linear import least_squares
@@ -27,35 +28,13 @@ _MOST_IN_CELL: Final = 4.0
 _HARMONICS: Final = tuple(range(2, 8))
 
 #: Share of the period that a harmonic needs, so that it is not one with the ellipse.
-_WHOLE: Final = 0.9
+WHOLE: Final = 0.9
 
 #: Standard error of the middle, in radii, from which the curvature of the arc is not known.
 _LINEAR: Final = 0.2
 
 #: Confidence that a correction takes more than it adds.
 _CONFIDENCE: Final = 0.99
-
-
-class ChannelEstimate(NamedTuple):
-    """Constants with what is known about them.
-
-    ``limit`` is the standard deviation of the decoded angle by that of the constants, over the
-    phases covered and without its mean; ``takes`` what the correction takes there, in radians of
-    the channels' phase; ``noise`` that of one channel and ``radius_left`` the distance to the
-    curve, both relative to the radius. ``readings`` of those ``recorded`` are on the curve.
-    """
-
-    channels: Channels
-    limit: float
-    takes: float
-    coverage: float
-    noise: tuple[float, float]
-    radius_left: float
-    phases: Array
-    readings: int
-    recorded: ChannelReadings
-    rests: int
-    correlated: float
 
 
 def estimate_channels(
@@ -70,28 +49,9 @@ def estimate_channels(
         that states which.
     """
     recorded = ChannelReadings.of(sine, cosine).checked(named)
-    y, x = sine[recorded.kept], cosine[recorded.kept]
-    found = _Fit(y, x, named)
-    share = float((found.cells > 0).mean())
-    if share >= _WHOLE:
-        found.add_harmonics()
-    channels = found.channels(periods, period)
-    limit, takes = found.limit()
-    result = ChannelEstimate(
-        channels,
-        limit,
-        takes,
-        360.0 * share,
-        found.noise,
-        found.radius_left,
-        found.phases,
-        y.size,
-        recorded,
-        int((found.weights < 1.0).sum()),
-        found.correlated,
-    )
-    _refuse_beyond_limit(result, named)
-    return result
+    found = ChannelEstimate(recorded, named, periods, period)
+    _refuse_beyond_limit(found, named)
+    return found
 
 
 def cell_counts(phases: Array) -> NDArray[np.intp]:
@@ -137,7 +97,7 @@ def _refuse_beyond_limit(found: ChannelEstimate, named: str) -> None:
         )
     if found.takes > (1.0 + normal_quantile(_CONFIDENCE)) * found.limit:
         return
-    if found.coverage >= 360.0 * _WHOLE:
+    if found.coverage >= 360.0 * WHOLE:
         return  # a sound sensor: the limit is small, and so is what is taken
     unit = math.degrees(1.0) / found.channels.periods_per_turn
     raise NoModelError(
@@ -148,31 +108,55 @@ def _refuse_beyond_limit(found: ChannelEstimate, named: str) -> None:
     )
 
 
-class _Fit:
-    """The curve of kept readings, with its harmonics and the ratio of the channels' noise."""
+class ChannelEstimate:
+    """The curve of readings, its constants, and what is known about them.
 
-    def __init__(self, sine: Array, cosine: Array, named: str) -> None:
-        self.sine, self.cosine, self.named = sine, cosine, named
-        self.weights = np.ones(sine.size)
+    Attributes
+    ----------
+    recorded : ChannelReadings
+        Of which those without a flag are on the curve.
+    channels : Channels
+    coverage : float
+        Degrees of the channels' period.
+    limit, takes : float
+        Standard deviation of the decoded angle by that of the constants, over the phases covered
+        and without its mean, and what the correction takes there: radians of the channels' phase.
+    """
+
+    def __init__(
+        self, recorded: ChannelReadings, named: str, periods: int = 1, period: float = 360.0
+    ) -> None:
+        self.recorded, self.named = recorded, named
+        self.sine, self.cosine = (v[recorded.kept] for v in (recorded.sine, recorded.cosine))
+        self.weights = np.ones(self.sine.size)
         self.variances = (1.0, 1.0)
-        self.orders: tuple[int, ...] = ()
+        self.orders: Sequence[int] = []
         self.start: tuple[list[int], list[float]] | None = None
         self._solve()
-        self.cells = cell_counts(self.phases)
-        weights = rest_weights(self.phases, self.cells)
+        cells = cell_counts(self.phases)
+        weights = rest_weights(self.phases, cells)
         if (weights < 1.0).any():
             self.weights = weights
             self._solve()
+        share = float((cells > 0).mean())
+        if share >= WHOLE:
+            self._choose_harmonics()
         self._fit_noise_ratio()
+        self.coverage = 360.0 * share
+        # The cosine's top is at zero: C is real.
+        real = np.delete(np.eye(self.parameters.size + 1), 3, axis=1)
+        self.channels = channels_of(
+            real @ self.parameters,
+            real @ self.covariance @ real.T,
+            [-order for order in self.orders],
+            periods_per_turn=periods,
+            period=period,
+        )
+        self.limit, self.takes = self._limit(cells)
 
     def _solve(self) -> None:
         found = _core.fit_curve(
-            np.ascontiguousarray(self.sine),
-            np.ascontiguousarray(self.cosine),
-            self.weights,
-            self.variances,
-            list(self.orders),
-            self.start,
+            self.sine, self.cosine, self.weights, self.variances, list(self.orders), self.start
         )
         if found is None:
             raise NoModelError(
@@ -181,6 +165,16 @@ class _Fit:
             )
         self.parameters, self.unit_covariance, self.phases, self.residuals, self.shares = found
         self.start = (list(self.orders), self.parameters.tolist())
+
+    @property
+    def readings(self) -> int:
+        """How many are on the curve."""
+        return self.sine.size
+
+    @property
+    def rests(self) -> int:
+        """Readings of less weight."""
+        return int((self.weights < 1.0).sum())
 
     @property
     def variance(self) -> float:
@@ -193,6 +187,27 @@ class _Fit:
     def correlated(self) -> float:
         """How many readings carry the information of one: neighbours' residuals are correlated."""
         return inflation(self.residuals)
+
+    @property
+    def covariance(self) -> Array:
+        """Of the parameters, for the noise that the residuals show."""
+        return np.asarray(self.unit_covariance * (self.variance * self.correlated))
+
+    def _choose_harmonics(self) -> None:
+        """Keep those harmonics that the readings support (BIC), each tested next to all others."""
+        n, first = self.readings, len(CONSTANTS)
+        # Two readings a parameter, else the residuals are not those of the noise.
+        tried = _HARMONICS[: max(n - 2 * first, 0) // 4]
+        self.orders = tried
+        self._solve()
+        kept = []
+        for i, order in enumerate(tried):
+            pair = slice(first + 2 * i, first + 2 * i + 2)
+            both, covariance = self.parameters[pair], self.covariance[pair, pair]
+            if both @ np.linalg.solve(covariance, both) > 2.0 * math.log(n):
+                kept.append(order)
+        self.orders = kept
+        self._solve()
 
     def _fit_noise_ratio(self) -> None:
         """Variance of each channel's noise from distances where the curve is across it."""
@@ -212,24 +227,6 @@ class _Fit:
         if gain / self.correlated > math.log(squares.size):
             self.variances = (1.0, float(found[1] / found[0]))
             self._solve()
-
-    def add_harmonics(self) -> None:
-        """Add harmonics one after the other, each where the likelihood pays for it (BIC)."""
-        for order in _HARMONICS:
-            before = self.__dict__.copy()
-            old = float(self.weights @ self.residuals**2)
-            self.orders = (*self.orders, order)
-            self._solve()
-            new = float(self.weights @ self.residuals**2)
-            n = self.weights.size
-            gain = n * math.log(old / new) if 0.0 < new < old else 0.0
-            if gain / self.correlated <= 2.0 * math.log(n):
-                self.__dict__.update(before)
-
-    @property
-    def covariance(self) -> Array:
-        """Of the parameters, for the noise that the residuals show."""
-        return np.asarray(self.unit_covariance * (self.variance * self.correlated))
 
     @property
     def size(self) -> float:
@@ -253,63 +250,56 @@ class _Fit:
         squares = self.residuals**2 * (normal * first + (1.0 - normal) * second)
         return math.sqrt(float(np.average(squares, weights=self.weights))) / self.size
 
-    def limit(self) -> tuple[float, float]:
+    def _limit(self, cells: NDArray[np.intp]) -> tuple[float, float]:
         """Standard deviation of the angle by that of the curve, and what the correction takes."""
         middles = (np.arange(CELLS * 4) + 0.5) * (2.0 * math.pi / (CELLS * 4))
-        phases: Array = middles[np.repeat(self.cells > 0, 4)].astype(np.float64)
+        phases: Array = middles[np.repeat(cells > 0, 4)].astype(np.float64)
         rows = _core.curve_slopes(list(self.orders), self.parameters.tolist(), phases).T
         rows = rows - rows.mean(axis=0)
         spread = np.einsum("ij,jk,ik->i", rows, self.covariance, rows)
-        sine, cosine = self.channels(1, 2.0 * math.pi).curve(phases)
+        sine, cosine = self.channels.curve(phases)
         raw = np.arctan2(sine, cosine) - phases
         unit = np.exp(1j * raw)
         off = np.angle(unit / unit.mean())
         return math.sqrt(float(spread.mean())), float(np.std(off))
 
-    def channels(self, periods: int, period: float) -> Channels:
-        """The constants, with the covariance of their curve."""
-        return channels_of(
-            self.parameters,
-            self.covariance,
-            [-m for m in self.orders],
-            periods_per_turn=periods,
-            period=period,
-        )
-
 
 def channels_of(
     parameters: Array, covariance: Array, orders: Sequence[int], **fields: Any
 ) -> Channels:
-    """Constants of a curve whose cosine channel has its top at phase zero.
+    """Constants of a curve.
 
     ::
 
-        cosine = p0 + p2 cos φ,    sine = p1 + p3 sin φ + p4 cos φ
+        cosine = p0 + Re(C exp(i φ)),    sine = p1 + Im(S exp(i φ)),
+        C = p2 + i p3,  S = p4 + i p5
 
-    then real and imaginary part of ``z_k`` of every harmonic; ``covariance`` is that of all.
+    then real and imaginary part of ``z_k`` of every harmonic; ``covariance`` is that of all. The
+    zero of the phase is that of ``C``.
     """
-    offset_cosine, offset_sine, a, b, d = (float(v) for v in parameters[:5])
-    size = math.hypot(b, d)
-    # Derivatives of amplitude, ratio and phase by a, b and d.
-    slopes = np.zeros((5, 5))
-    slopes[0, 0] = slopes[1, 1] = slopes[2, 2] = 1.0
-    slopes[3, 2:] = (-size / a**2, b / size / a, d / size / a)
-    slopes[4, 3:] = np.degrees([-d / size**2, b / size**2])
-    z1 = complex(a + b, d) / 2.0
-    turn, radius = z1 / abs(z1), abs(z1)
+    offset_cosine, offset_sine = (float(v) for v in parameters[:2])
+    c, s = complex(*parameters[2:4]), complex(*parameters[4:6])
+    ratio, z1 = abs(s) / abs(c), 0.5 * (c + s)
+    # By the parameters: offsets, then the logarithm of C and that of S over C.
+    offsets = np.eye(2, 6)
+    log_c = np.array([0.0, 0.0, 1.0, 1j, 0.0, 0.0]) / c
+    log_ratio = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1j]) / s - log_c
+    slopes = np.vstack(
+        [offsets, abs(c) * log_c.real, ratio * log_ratio.real, np.degrees(log_ratio.imag)]
+    )
     harmonics = []
     for i, k in enumerate(orders):
-        pair = slice(5 + 2 * i, 7 + 2 * i)
-        z = complex(*parameters[pair]) * turn ** (-k) / radius
-        std = math.sqrt(0.5 * float(np.trace(covariance[pair, pair]))) / radius
+        pair = slice(6 + 2 * i, 8 + 2 * i)
+        z = complex(*parameters[pair]) * (z1 / abs(z1)) ** (-k) / abs(z1)
+        std = math.sqrt(0.5 * float(np.trace(covariance[pair, pair]))) / abs(z1)
         harmonics.append(ChannelHarmonic(k, z.real, z.imag, std))
     return Channels(
         offset_sine=offset_sine,
         offset_cosine=offset_cosine,
-        amplitude=a,
-        gain_ratio=size / a,
-        phase_deg=math.degrees(math.atan2(d, b)),
+        amplitude=abs(c),
+        gain_ratio=ratio,
+        phase_deg=math.degrees(cmath.phase(s / c)),
         harmonics=tuple(harmonics),
-        covariance=tuple(map(tuple, (slopes @ covariance[:5, :5] @ slopes.T).tolist())),
+        covariance=tuple(map(tuple, (slopes @ covariance[:6, :6] @ slopes.T).tolist())),
         **fields,
     )

@@ -13,14 +13,14 @@ from ..errors import NoModelError
 from ..runs.checks.channelreadings import ChannelReadings
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
-from .channels import CELLS, cell_counts, channels_of, inflation
+from .channels import WHOLE, cell_counts, channels_of, inflation
 from .linear import least_squares
 
 #: Harmonics of the curve, where the channels went through their whole period.
 _HARMONICS: Final = (-3, -2, 2, 3)
 
-#: Share of the cells of a period that is a whole one.
-_WHOLE: Final = 0.9
+#: Steps to the zeros of several runs, each about squares the distance left.
+_STEPS: Final = 6
 
 
 def referenced_channels(
@@ -40,35 +40,40 @@ def referenced_channels(
     NoModelError
         A channel is dead, or both are one.
     """
-    sine, cosine = (np.concatenate([run[i] for run in signals]) for i in (0, 1))
+    sine, cosine, reference = (np.concatenate([run[i] for run in signals]) for i in range(3))
     kept = ChannelReadings.of(sine, cosine).checked(named).kept
-    unit = channels.direction * channels.periods_per_turn * 2.0 * math.pi / channels.period
-    phases = [unit * run[2] for run in signals]
-    zeros = [
-        float(np.angle(_curve(y, x, phase, (-1, 0, 1))[2]))
-        for (y, x, _), phase in zip(signals, phases, strict=True)
-    ]
-    phase = np.concatenate([p + zero for p, zero in zip(phases, zeros, strict=True)])[kept]
+    run = np.repeat(np.arange(len(signals)), [run[0].size for run in signals])[kept]
     sine, cosine = sine[kept], cosine[kept]
-    whole = float((cell_counts(phase) > 0).sum()) >= _WHOLE * CELLS
-    harmonics = _HARMONICS if whole else ()
-    z = _curve(sine, cosine, phase, (-1, 0, 1, *harmonics))
-    # From where the cosine is at its top.
-    phase = phase + float(np.angle(z[2] + np.conj(z[0])))
-    design = _real_design(phase, harmonics)
+    unit = channels.direction * channels.periods_per_turn * 2.0 * math.pi / channels.period
+    phase = unit * reference[kept]
+    # Every run from where its cosine is at the top; what several runs then differ is estimated.
+    for i in range(len(signals)):
+        own = run == i
+        design = np.column_stack([np.ones(own.sum()), np.cos(phase[own]), -np.sin(phase[own])])
+        _, re, im = least_squares(design, cosine[own])
+        phase[own] += math.atan2(im, re)
+    harmonics = _HARMONICS if (cell_counts(phase) > 0).mean() >= WHOLE else ()
     target = np.concatenate([cosine, sine])
-    found = _core.LinearModel.of_rows(design, target.reshape(-1, 1), None)
-    parameters = np.asarray(found.coefficients).ravel()
-    residuals = target - design @ parameters
-    freedom = target.size - parameters.size
+    others = (run == np.arange(1, len(signals))[:, None]).T
+    design = _design(phase, harmonics)
+    found = least_squares(design, target)
+    width = found.size
+    for _ in range(_STEPS if len(signals) > 1 else 1):
+        slope = (_design(phase, harmonics, derivative=True) @ found[:width]).reshape(2, -1, 1)
+        zeros = (slope * others).reshape(target.size, -1)
+        design = np.column_stack([_design(phase, harmonics), zeros])
+        model = _core.LinearModel.of_rows(design, target.reshape(-1, 1), None)
+        found = np.asarray(model.coefficients).ravel()
+        phase = phase + others @ found[width:]
+    freedom = target.size - found.size
     if freedom < 1:
         raise NoModelError(f"{named}: {sine.size} readings are too few for the channels")
+    residuals = target - design @ found
     variance = float(residuals @ residuals) / freedom
     correlated = max(inflation(residuals[: sine.size]), inflation(residuals[sine.size :]))
-    covariance = np.asarray(found.inverse) * variance * correlated
     return channels_of(
-        parameters,
-        covariance,
+        found[:width],
+        np.asarray(model.inverse)[:width, :width] * variance * correlated,
         harmonics,
         direction=channels.direction,
         periods_per_turn=channels.periods_per_turn,
@@ -76,23 +81,13 @@ def referenced_channels(
     )
 
 
-def _curve(sine: Array, cosine: Array, phase: Array, orders: Sequence[int]) -> Array:
-    """Complex coefficients of the orders of ``cosine + i sine``."""
-    columns = [np.cos(k * phase) for k in orders] + [-np.sin(k * phase) for k in orders]
-    first = np.column_stack(columns)
-    columns = [np.sin(k * phase) for k in orders] + [np.cos(k * phase) for k in orders]
-    design = np.concatenate([first, np.column_stack(columns)])
-    found = least_squares(design, np.concatenate([cosine, sine]))
-    return np.asarray(found[: len(orders)] + 1j * found[len(orders) :])
-
-
-def _real_design(phase: Array, harmonics: Sequence[int]) -> Array:
-    """Rows of the cosine, then of the sine, by the parameters of `channels_of`."""
-    zero, one = np.zeros_like(phase), np.ones_like(phase)
-    cosine = [one, zero, np.cos(phase), zero, zero]
-    sine = [zero, one, zero, np.sin(phase), np.cos(phase)]
-    for k in harmonics:
-        c, s = np.cos(k * phase), np.sin(k * phase)
-        cosine += [c, -s]
-        sine += [s, c]
-    return np.concatenate([np.column_stack(cosine), np.column_stack(sine)])
+def _design(phase: Array, harmonics: Sequence[int], *, derivative: bool = False) -> Array:
+    """Rows of the cosine, then of the sine, by the parameters of `channels_of`; or their slopes."""
+    none = np.zeros_like(phase)
+    one = none if derivative else np.ones_like(phase)
+    columns = [(one, none), (none, one)]
+    for k in (1, *harmonics):
+        wave = (1j * k if derivative else 1.0) * np.exp(1j * k * phase)
+        x, y = wave.real, wave.imag
+        columns += [(x, none), (-y, none), (none, y), (none, x)] if k == 1 else [(x, y), (-y, x)]
+    return np.column_stack([np.concatenate(pair) for pair in columns])

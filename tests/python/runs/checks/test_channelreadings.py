@@ -60,6 +60,9 @@ CASES = {
         "the cosine channel is constant",
     ),
     "one channel twice": (lambda: (codes()[0], codes()[0] - 3.0), "sine and cosine are one signal"),
+    "one channel at its rails": (
+        lambda: (np.clip(codes()[0], 2100.0, 2100.1), codes()[1]), "channel is constant"
+    ),
     "no middle": (codes, "the channels do not go round zero but about 2"),
 }  # fmt: skip
 
