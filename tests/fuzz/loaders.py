@@ -133,11 +133,13 @@ def loaders() -> dict[str, Loader]:
         written_loader("runs-npz", ".npz", npz, 2, use_runs),
         written_loader("log-npz", ".npz", npz, 2, use_log),
         written_loader("log-npy", ".npy", npy, 3, use_both),
-        written_loader("log-matlab4", ".mat", matlab4, 2, use_both),
         written_loader("log-wpilog", ".wpilog", wpilog, 2, use_both),
     ]
     if _has("scipy"):
-        found += [written_loader("log-matlab", ".mat", matlab5, 4, use_both)]
+        found += [
+            written_loader("log-matlab4", ".mat", matlab4, 2, use_both),
+            written_loader("log-matlab", ".mat", matlab5, 4, use_both),
+        ]
     if _has("asammdf"):
         found += [written_loader("log-mdf", ".mf4", mdf4, 6, use_both)]
     if _has("rosbags"):

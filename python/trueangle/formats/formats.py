@@ -46,8 +46,7 @@ FORMATS = (
         magics=(b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"),
         pattern=_HDF5,
     ),
-    Format("matlab", {"MATLAB": (".mat",)}, "matlab", magics=(b"MATLAB 5.0",)),
-    Format("matlab4", {"MATLAB": (".mat",)}, pattern=_MATLAB4),
+    Format("matlab", {"MATLAB": (".mat",)}, "matlab", None, (b"MATLAB 5.0",), _MATLAB4),
     Format(
         "rosbag",
         {"a ROS bag": (".bag",), "a ROS 2 bag": (".db3",), "MCAP": (".mcap",)},

@@ -1,10 +1,11 @@
-"""MATLAB files up to v7: variables that are vectors; copies get further variables at the end."""
+"""MATLAB files from version 4 to v7: variables that are vectors; copies get more at the end."""
 
 from __future__ import annotations
 
 import io
+import json
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,10 @@ from ..errors import FileError
 from .budget import FileExtent
 from .damage import damage_told
 from .format import Batch, Contents, CopyTask, Selection, check_lengths, note, row_labels
-from .matlab4 import NOTE, count_of_added, note_name
-from .matlabelements import HEADER, array_places, check_elements
+from .matlabelements import HEADER, array_places, check_elements, is_version4, matrix_places
+
+#: Variable of a copy that records how its corrected ones were made.
+NOTE = "trueangle_note"
 
 
 def columns(path: Path, topic: str | None = None) -> list[str]:
@@ -52,13 +55,14 @@ def copy(task: CopyTask) -> Contents:
     The bytes of the source stay as they are.
     """
     data = task.source.read_bytes()
-    if data[HEADER - 2 : HEADER] != b"IM":
+    old = is_version4(data)
+    if data[2:4] != b"\0\0" if old else data[HEADER - 2 : HEADER] != b"IM":
         raise FileError(
             task.source,
             "has a damaged header or its bytes the other way round; save it with -v7 or -v7.3",
         )
     found = _vectors(task.source)
-    additions = task.choose(list(found))
+    additions = task.choose([name for name in found if found[name].dtype.kind in "fiu"])
     there = {name for name, _shape, _kind in whosmat(task.source)}
     made: dict[str, Any] = {}
     rows = 0
@@ -73,11 +77,11 @@ def copy(task: CopyTask) -> Contents:
         rows = max(rows, len(column))
         task.watch(len(column), 1.0)
     extra = io.BytesIO()
-    made_note = {note_name(there): note(additions)}
-    savemat(extra, {**made, **made_note}, do_compression=False, long_field_names=True)
+    made_note = {_note_name(there): note(additions)}
+    savemat(extra, {**made, **made_note}, format="4" if old else "5", long_field_names=not old)
     with task.target.open("wb") as file:
         file.write(data)
-        file.write(extra.getvalue()[HEADER:])
+        file.write(extra.getvalue()[0 if old else HEADER :])
     sums = {"source": f"{zlib.crc32(data):08x}:{len(data)}"}
     return Contents(rows, sums | {name: _sum(values) for name, values in made.items()})
 
@@ -91,16 +95,32 @@ def _variable(name: str) -> str:
 def contents(path: Path, topic: str | None = None) -> Contents:
     """Checksums of the corrected variables and of all bytes before them."""
     data = path.read_bytes()
-    places = array_places(data)
+    places = matrix_places(data) if is_version4(data) else array_places(data)
     notes = [i for i, (name, _) in enumerate(places) if name.startswith(NOTE)]
     last = notes[-1] if notes else len(places)
     told = _loaded(path, [places[last][0]]) if notes else {}
-    first = last - count_of_added(next((str(text[0]) for text in told.values()), ""))
+    first = last - _count_of_added(next((str(text[0]) for text in told.values()), ""))
     kept = _loaded(path, [name for name, _ in places[first:last]])
     end = places[first][1] if first < len(places) else len(data)
     sums = {"source": f"{zlib.crc32(data[:end]):08x}:{end}"}
     rows = max((len(values) for values in kept.values()), default=0)
     return Contents(rows, sums | {name: _sum(values) for name, values in kept.items()})
+
+
+def _note_name(names: Collection[str]) -> str:
+    """The name of a further note: readers of such files keep one variable of a name."""
+    count = sum(name.startswith(NOTE) for name in names)
+    return f"{NOTE}_{count + 1}" if count else NOTE
+
+
+def _count_of_added(note: str) -> int:
+    """Variables that a copy put before its note; none where that is damaged."""
+    try:
+        told = json.loads(note)
+    except (ValueError, RecursionError):
+        return 0
+    entries = told.get("corrected") if isinstance(told, dict) else None
+    return len(entries) if isinstance(entries, list) else 0
 
 
 def _loaded(path: Path, names: list[str]) -> dict[str, NDArray[Any]]:

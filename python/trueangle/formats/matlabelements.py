@@ -1,4 +1,4 @@
-"""The elements of a MATLAB file of level 5, checked before a library reads them.
+"""Places of variables in MATLAB files; elements of level 5 checked before a library reads them.
 
 scipy's compiled reader trusts the sizes in a file: where they are damaged it may end the whole
 process. So every element is held to the bytes that are there and to what its array needs. The
@@ -20,6 +20,8 @@ from . import budget
 HEADER: Final = 128
 #: Bytes of a value by the type of an element.
 _SIZES: Final = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
+#: Bytes of a number of level 4 by the tens of a matrix's type.
+_LEVEL4: Final = {0: 8, 1: 4, 2: 4, 3: 2, 4: 2, 5: 1}
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED = 1, 5, 6, 14, 15
 #: Classes of arrays.
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE = 1, 2, 3, 4, 5
@@ -40,7 +42,7 @@ class _Element(NamedTuple):
 def check_elements(data: bytes) -> None:
     """Hold every element to the bytes that are there.
 
-    Files without the header of level 5 pass: they are read by other means.
+    Of files of level 4 the matrices are held to them; what has neither header passes.
 
     Raises
     ------
@@ -49,7 +51,9 @@ def check_elements(data: bytes) -> None:
         the byte where it begins.
     """
     order = {b"IM": "<", b"MI": ">"}.get(data[HEADER - 2 : HEADER])
-    if order is None or data[:4].find(b"\0") >= 0:
+    if is_version4(data):
+        matrix_places(data)
+    if order is None or is_version4(data):
         return
     left = budget.DECODED_BYTES
     for element in _elements(data, HEADER, len(data), order):
@@ -73,6 +77,27 @@ def array_places(data: bytes) -> list[tuple[str, int]]:
                 name = data[parts[2].start : parts[2].stop].decode("latin-1")
         found.append((name, start))
         start = element.after
+    return found
+
+
+def is_version4(data: bytes) -> bool:
+    """Whether a file has no header, as those of level 4, which begin with a matrix."""
+    return b"\0" in data[:4]
+
+
+def matrix_places(data: bytes) -> list[tuple[str, int]]:
+    """Name and first byte of every matrix of a whole file of level 4."""
+    order, found, start = "<" if data[2:4] == b"\0\0" else ">", [], 0
+    while start < len(data):
+        head = data[start : start + 20].ljust(20, b"\xff")  # one that is cut off: sizes below zero
+        kind, rows, width, imaginary, length = struct.unpack(f"{order}5i", head)
+        begin = start + 20 + length
+        name = data[start + 20 : begin].rstrip(b"\0").decode("latin-1")
+        found.append((name, start))
+        values = rows * width * (2 if imaginary == 1 else 1)
+        start = begin + values * _LEVEL4.get(kind // 10 % 10, 8)
+        if min(rows, width, length) < 0 or start > len(data):
+            raise ValueError(f"the matrix {name!r} ends beyond the file")
     return found
 
 

@@ -137,7 +137,7 @@ FILES = {
     "a.parquet": ("parquet", write_arrow, True), "a.arrow": ("arrow", write_arrow, True),
     "a.arrows": ("arrow", write_arrow, True), "a.h5": ("hdf5", write_hdf5, True),
     "five.mat": ("matlab", write_matlab("5"), True),
-    "four.mat": ("matlab4", write_matlab("4"), True),
+    "four.mat": ("matlab", write_matlab("4"), True),
     "a.npz": ("npz", write_npz, True), "a.npy": ("npy", write_npy, False),
     "a.wpilog": ("wpilog", write_wpilog, True), "a.mf4": ("mdf", write_mdf, True),
     "a.csv": ("csvfile", write_text(","), False), "a.tsv": ("csvfile", write_text("\t"), False),
@@ -150,7 +150,7 @@ FILES = {
 #: Formats that hold the time apart from the columns that are listed.
 TIME_APART = {"mdf"}
 #: A variable of one number is none of MATLAB's vectors, and one line no serial log.
-VECTORS = {"matlab", "matlab4", "seriallog"}
+VECTORS = {"matlab", "seriallog"}
 #: Names of one letter less, in the order of names.
 SORTED = {"hdf5"}
 

@@ -49,36 +49,34 @@ def test_vectors_are_read_and_corrected(other_order, tmp_path):
     path = written(tmp_path / "rig.mat", **more)
     if other_order:
         swapped(path)
-    assert find_format(path).module_name == "matlab4"
+    assert find_format(path).module_name == "matlab"
     (run,) = ta.read_runs(path)
     np.testing.assert_array_equal(run.indicated, READ)
     np.testing.assert_array_equal(run.columns["x"], np.arange(120))
     assert not {"note", "square", "z"} & run.columns.keys()
     report = ta.correct_logs(path, MODEL, tmp_path / "out.mat")
+    if other_order:  # readers take files of one order only
+        assert "its bytes the other way round" in str(report.logs[0].error)
+        return
     assert report.is_done, report.logs[0].error
     after = (tmp_path / "out.mat").read_bytes()
     assert after.startswith(path.read_bytes())
-    if not other_order:  # scipy reads files of one order only
-        found = io.loadmat(tmp_path / "out.mat")
-        np.testing.assert_array_equal(found["corrected_deg"].ravel(), MODEL.correct(READ))
-        assert '"column": "corrected_deg"' in found["trueangle_note"][0]
+    found = io.loadmat(tmp_path / "out.mat")
+    np.testing.assert_array_equal(found["corrected_deg"].ravel(), MODEL.correct(READ))
+    assert '"column": "corrected_deg"' in found["trueangle_note"][0]
     report = ta.correct_logs(tmp_path / "out.mat", MODEL, tmp_path / "again.mat")
     assert "corrected before" in str(report.logs[0].error)
 
 
 def test_what_is_damaged_or_not_read_is_told(tmp_path):
     io = pytest.importorskip("scipy.io")
-    sparse = pytest.importorskip("scipy.sparse")
     path = written(tmp_path / "rig.mat")
     whole = path.read_bytes()
     path.write_bytes(whole[:-100])
-    with pytest.raises(FileError, match=r"column 'indicated_deg': is shorter than its header"):
+    with pytest.raises(FileError, match=r"is damaged or not a MATLAB file: .*'indicated_deg'"):
         ta.read_runs(path)
     path.write_bytes(whole + whole[:7])
-    with pytest.raises(FileError, match="has no header"):
-        ta.read_runs(path)
-    io.savemat(path, {"a": TRUE[:, None], "s": sparse.eye_array(3).tocoo()}, format="4")
-    with pytest.raises(FileError, match="not a full one of numbers or text of MATLAB 4"):
+    with pytest.raises(FileError, match="is damaged or not a MATLAB file"):
         ta.read_runs(path)
     written(path)
     io.savemat(path, {"reference_deg": TRUE, "indicated_deg": READ[:-1]}, format="4")

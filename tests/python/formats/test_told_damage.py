@@ -23,11 +23,6 @@ def changed(data, place, form, value):
     return bytes(made)
 
 
-def matlab4(path, **heads):
-    head = {"kind": 0, "rows": 3, "width": 1, "imaginary": 0, "length": 2, **heads}
-    path.write_bytes(struct.pack("<5i", *head.values()) + b"a\0" + np.zeros(3).tobytes())
-
-
 def mdf(path, *groups):
     asammdf = pytest.importorskip("asammdf")
     with asammdf.MDF(version="4.10") as file:
@@ -74,13 +69,6 @@ def of_bytes(data):
 
 #: Name, how it is written, and what reading it as runs says behind the name.
 TOLD = {
-    "header": ("a.mat", lambda p: matlab4(p, rows=-1),
-               "is damaged: the header at byte 0 has wrong sizes"),
-    "kind": ("a.mat", lambda p: matlab4(p, kind=2),
-             "a matrix at byte 0 is not a full one of numbers or text of MATLAB 4 (its type is 2); "
-             "save the file with -v7"),
-    "short": ("a.mat", lambda p: matlab4(p, rows=4),
-              "column 'a': is shorter than its header states"),
     "version": ("a.wpilog", of_bytes(EXAMPLE[:6] + b"\2\0" + EXAMPLE[8:]),
                 "is a data log of version 0.2; version 1 is read"),
     "elements": ("a.mat", of_bytes(saved({"x": X}) + b"\0\0\0"),
