@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import MISSING, fields
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,6 +19,7 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.argumentkinds import told_kinds
 from ..support.decoding import Decoder, Entries, json_value, read_text
 from ..support.files import RUNS_BYTES
+from ..support.plainresult import declared_fields
 from .history import HistoryOrder, HistoryRow
 from .result import FORMAT, VERSION, BetweenOrder, CommonOrder, Fleet
 from .tolerance import Tolerance
@@ -29,14 +31,8 @@ T = TypeVar("T")
 
 _KEYS = ("prior", "units", "common", "between", "tolerance", "history", "notes")
 _PRIOR = {field.name: field.default is MISSING for field in fields(Prior)}
-_UNIT = ("unit", "verdict", "because", "orders", "peak_to_peak_arcsec", "left_arcsec", "p", "limit")
-_ROW = ("order", "amplitude_arcsec", "phase_deg", "std_arcsec", "z")
-_COMMON = ("order", "shaft", "amplitude_arcsec", "phase_deg", "std_arcsec")
-_BETWEEN = ("order", "std_arcsec", "repeatability_arcsec")
 _SHAFT = ("name", "cycles_per_turn", "orders")
-_TOLERANCE = ("share", "confidence", "factor", "method", "peak_to_peak_arcsec", "left_arcsec")
-_HISTORY = (*(name for name in HistoryRow._fields if name != "bound"), "bound_arcsec")
-
+_ROWS = {f"tuple[{kind.__name__}, ...]": kind for kind in (UnitOrder, HistoryOrder)}
 #: Units, at most.
 _MOST_UNITS = 2_000_000
 
@@ -72,16 +68,20 @@ class _FleetReader(Decoder):
         aligned = common["aligned"]
         if not isinstance(aligned, bool):
             raise self.error("true or false is needed", "common.aligned")
-        shared = tuple(self.each(common["orders"], "common.orders", self.common))
-        scatter = tuple(self.each(between["orders"], "between.orders", self.between))
+        shared = self.rows(CommonOrder, common["orders"], "common.orders")
+        scatter = tuple(
+            self.each(between["orders"], "between.orders", partial(self.row, BetweenOrder))
+        )
         if [order.order for order in scatter] != [order.order for order in shared]:
             raise self.error("the orders of common.orders are needed", "between.orders")
         return Fleet(
-            tuple(self.each(content["units"], "units", self.unit, _MOST_UNITS)),
+            self.rows(FleetUnit, content["units"], "units", _MOST_UNITS),
             shared,
             scatter,
-            self.tolerance(content["tolerance"]),
-            tuple(self.each(content["history"], "history", self.history, _MOST_UNITS)),
+            self.row(Tolerance, content["tolerance"], "tolerance"),
+            tuple(
+                self.each(content["history"], "history", partial(self.row, HistoryRow), _MOST_UNITS)
+            ),
             aligned,
             prior,
             tuple(self.each(content["notes"], "notes", self.text)),
@@ -103,18 +103,8 @@ class _FleetReader(Decoder):
             raise self.error("must be positive", key)
         return number
 
-    def angle(self, value: Any, key: str) -> float:
-        return self.positive(value, key) * self.turn
-
     def maybe(self, value: Any, key: str) -> float | None:
         return None if value is None else self.number(value, key)
-
-    def maybe_angle(self, value: Any, key: str) -> float | None:
-        number = self.maybe(value, key)
-        return None if number is None else number * self.turn
-
-    def maybe_text(self, value: Any, key: str) -> str | None:
-        return None if value is None else self.text(value, key)
 
     def listed(self, read: Callable[[Any, str], T]) -> Callable[[Any, str], tuple[T, ...]]:
         return lambda value, key: tuple(self.each(value, key, read))
@@ -153,80 +143,34 @@ class _FleetReader(Decoder):
         cycles = of(self.above_zero, "cycles_per_turn")
         return ShaftOrders(of(self.text, "name"), cycles, orders)
 
-    def verdict(self, value: Any, key: str) -> Any:
-        if value not in VERDICTS:
-            raise self.error(f"one of {', '.join(VERDICTS)} is needed", key)
-        return value
+    def row(self, kind: type[T], value: Any, key: str) -> T:
+        """A row by the fields of its class, as `plain_row` writes them."""
+        names = {
+            f"{name}_arcsec" if of.startswith("Angle") else name: of
+            for name, of in declared_fields(kind).items()
+        }
+        table = self.table(value, dict.fromkeys(names, True), key)
+        return kind(*(self.cell(of, table[name], f"{key}.{name}") for name, of in names.items()))
 
-    def unit(self, value: Any, key: str) -> FleetUnit:
-        of = self.entries(value, _UNIT, key)
-        verdict = of(self.verdict, "verdict")
-        return FleetUnit(
-            of(self.text, "unit"),
-            verdict,
-            of(self.text, "because"),
-            of(self.listed(self.row), "orders"),
-            of(self.angle, "peak_to_peak_arcsec"),
-            of(self.angle, "left_arcsec"),
-            of(self.number, "p"),
-            of(self.number, "limit"),
-        )
+    def rows(self, kind: type[T], value: Any, key: str, most: int = MOST_ORDERS) -> tuple[T, ...]:
+        """A list of such rows."""
+        return tuple(self.each(value, key, partial(self.row, kind), most))
 
-    def row(self, value: Any, key: str) -> UnitOrder:
-        of = self.entries(value, _ROW, key)
-        return UnitOrder(
-            of(self.number, "order"),
-            of(self.angle, "amplitude_arcsec"),
-            of(self.number, "phase_deg"),
-            of(self.angle, "std_arcsec"),
-            of(self.number, "z"),
-        )
-
-    def common(self, value: Any, key: str) -> CommonOrder:
-        of = self.entries(value, _COMMON, key)
-        amplitude = of(self.angle, "amplitude_arcsec")
-        phase = math.radians(of(self.number, "phase_deg"))
-        return CommonOrder(
-            of(self.number, "order"),
-            of(self.text, "shaft"),
-            amplitude * math.sin(phase),
-            amplitude * math.cos(phase),
-            of(self.angle, "std_arcsec"),
-        )
-
-    def between(self, value: Any, key: str) -> BetweenOrder:
-        of = self.entries(value, _BETWEEN, key)
-        again = of(self.maybe_angle, "repeatability_arcsec")
-        return BetweenOrder(of(self.number, "order"), of(self.angle, "std_arcsec"), again)
-
-    def tolerance(self, value: Any) -> Tolerance:
-        of = self.entries(value, _TOLERANCE, "tolerance")
-        sizes = [of(self.maybe_angle, name) for name in ("peak_to_peak_arcsec", "left_arcsec")]
-        return Tolerance(
-            of(self.number, "share"),
-            of(self.number, "confidence"),
-            of(self.maybe, "factor"),
-            of(self.text, "method"),
-            *(math.nan if size is None else size for size in sizes),
-        )
-
-    def history(self, value: Any, key: str) -> HistoryRow:
-        of = self.entries(value, _HISTORY, key)
-        bound = of(self.maybe_angle, "bound_arcsec")
-        return HistoryRow(
-            of(self.text, "unit"),
-            of(self.text, "when"),
-            of(self.maybe, "order"),
-            of(self.number, "statistic"),
-            of(self.number, "limit"),
-            of(self.text, "verdict"),
-            of(self.maybe_text, "next_calibration"),
-            of(lambda v, _: v is True, "extrapolated"),
-            bound,
-            of(self.number, "cusum_limit"),
-            of(self.listed(self.moved), "orders"),
-        )
-
-    def moved(self, value: Any, key: str) -> HistoryOrder:
-        of = self.entries(value, HistoryOrder._fields, key)
-        return HistoryOrder(*(of(self.positive, name) for name in HistoryOrder._fields))
+    def cell(self, kind: str, value: Any, key: str) -> Any:
+        """One field of a row, by its declaration."""
+        if value is None and kind.endswith("| None"):
+            return None
+        match kind.removesuffix(" | None"):
+            case "AngleOrNaN" if value is None:
+                return math.nan
+            case "Angle" | "AngleOrNaN":
+                return self.positive(value, key) * self.turn
+            case "float":
+                return self.number(value, key)
+            case "bool":
+                return value is True
+            case "Verdict" if value not in VERDICTS:
+                raise self.error(f"one of {', '.join(VERDICTS)} is needed", key)
+            case "str" | "Verdict":
+                return self.text(value, key)
+        return self.rows(_ROWS[kind], value, key)

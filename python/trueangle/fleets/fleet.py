@@ -192,8 +192,7 @@ def _judged_fleet(
             CommonOrder(
                 order,
                 shaft,
-                float(one.mean[0]),
-                float(one.mean[1]),
+                *_polar(*one.mean.tolist()),
                 math.sqrt(float(np.trace(one.covariance)) / 2.0),
             )
             for order, (shaft, _), one in rows
@@ -210,6 +209,11 @@ def _judged_fleet(
         _prior(units, chosen),
         tuple(notes),
     )
+
+
+def _polar(cosine: float, sine: float) -> tuple[float, float]:
+    """Amplitude, and phase in [0, 360) degrees."""
+    return math.hypot(cosine, sine), math.degrees(math.atan2(cosine, sine)) % 360.0
 
 
 def _rows(dates: Sequence[tuple[Calibration, float]], changes: Mapping[str, Change]) -> Any:
@@ -271,8 +275,7 @@ def _unit_row(
         tuple(
             UnitOrder(
                 order,
-                math.hypot(a, b),
-                math.degrees(math.atan2(a, b)) % 360.0,
+                *_polar(a, b),
                 float(std),
                 float(z),
             )

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import f_quantile
+from ..support.plainresult import Angle
 from ..support.runlength import chart_limit
 from ..support.times import parsed_time
 from .calibration import Calibration, order_columns
@@ -60,19 +61,9 @@ class HistoryRow(NamedTuple):
     verdict: str
     next_calibration: str | None
     extrapolated: bool
-    bound: float | None
+    bound: Angle | None
     cusum_limit: float
     orders: tuple[HistoryOrder, ...]
-
-    def plain(self, scale: float) -> dict[str, Any]:
-        """As plain values; angles times ``scale``."""
-        values = self._asdict()
-        bound = values.pop("bound")
-        return {
-            **values,
-            "bound_arcsec": None if bound is None else scale * bound,
-            "orders": [row._asdict() for row in self.orders],
-        }
 
 
 class Change(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -12,7 +13,7 @@ from ..support.angles import arcsec
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.files import FLEET, written_atomically
 from ..support.layout import counted, laid_out
-from ..support.plainresult import PlainResult, finite_or_none, pretty_json, result_picture
+from ..support.plainresult import Angle, PlainResult, plain_row, pretty_json, result_picture
 from .history import HistoryRow
 from .tolerance import Tolerance
 from .unit import FleetUnit
@@ -37,19 +38,19 @@ class CommonOrder(NamedTuple):
 
     order: float
     shaft: str
-    cosine: float
-    sine: float
-    std: float
+    amplitude: Angle
+    phase_deg: float
+    std: Angle
 
     @property
-    def amplitude(self) -> float:
-        """``hypot(cosine, sine)``."""
-        return math.hypot(self.cosine, self.sine)
+    def cosine(self) -> float:
+        """``amplitude sin(phase)``."""
+        return self.amplitude * math.sin(math.radians(self.phase_deg))
 
     @property
-    def phase_deg(self) -> float:
-        """``atan2(cosine, sine)`` in [0, 360)."""
-        return math.degrees(math.atan2(self.cosine, self.sine)) % 360.0
+    def sine(self) -> float:
+        """``amplitude cos(phase)``."""
+        return self.amplitude * math.cos(math.radians(self.phase_deg))
 
 
 class BetweenOrder(NamedTuple):
@@ -60,8 +61,8 @@ class BetweenOrder(NamedTuple):
     """
 
     order: float
-    std: float
-    repeatability: float | None
+    std: Angle
+    repeatability: Angle | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,40 +119,16 @@ class Fleet(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle fleet`` prints as JSON; angles in arcsec."""
-        scale = arcsec(1.0, self.period)
-        tolerance = {
-            key: finite_or_none(value) if isinstance(value, float) else value
-            for key, value in self.tolerance.plain(scale).items()
-        }
+
+        def plain(rows: Iterable[Any]) -> list[dict[str, Any]]:
+            return [plain_row(row, arcsec(1.0, self.period)) for row in rows]
+
         return {
-            "units": [unit.plain(scale) for unit in self.units],
-            "common": {
-                "aligned": self.aligned,
-                "orders": [
-                    {
-                        "order": row.order,
-                        "shaft": row.shaft,
-                        "amplitude_arcsec": scale * row.amplitude,
-                        "phase_deg": row.phase_deg,
-                        "std_arcsec": scale * row.std,
-                    }
-                    for row in self.common
-                ],
-            },
-            "between": {
-                "orders": [
-                    {
-                        "order": row.order,
-                        "std_arcsec": scale * row.std,
-                        "repeatability_arcsec": None
-                        if row.repeatability is None
-                        else scale * row.repeatability,
-                    }
-                    for row in self.between
-                ]
-            },
-            "tolerance": tolerance,
-            "history": [row.plain(scale) for row in self.history],
+            "units": plain(self.units),
+            "common": {"aligned": self.aligned, "orders": plain(self.common)},
+            "between": {"orders": plain(self.between)},
+            "tolerance": plain([self.tolerance])[0],
+            "history": plain(self.history),
             "notes": list(self.notes),
         }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from ..errors import ArgumentError
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, normal_quantile, normal_tail
+from ..support.plainresult import AngleOrNaN
 
 #: Nodes of Gauss and Legendre's rule on each of the pieces of an integral.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -31,19 +32,8 @@ class Tolerance(NamedTuple):
     confidence: float
     factor: float | None
     method: str
-    peak_to_peak: float
-    left: float
-
-    def plain(self, scale: float) -> dict[str, Any]:
-        """As plain values; angles times ``scale``."""
-        return {
-            "share": self.share,
-            "confidence": self.confidence,
-            "factor": self.factor,
-            "method": self.method,
-            "peak_to_peak_arcsec": scale * self.peak_to_peak,
-            "left_arcsec": scale * self.left,
-        }
+    peak_to_peak: AngleOrNaN
+    left: AngleOrNaN
 
 
 @told_kinds

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal, NamedTuple, TypeAlias
+from typing import Final, Literal, NamedTuple, TypeAlias
+
+from ..support.plainresult import Angle
 
 Verdict: TypeAlias = Literal["fine", "outlier", "recalibrate", "changed", "zero_moved"]
 
@@ -19,9 +21,9 @@ class UnitOrder(NamedTuple):
     """
 
     order: float
-    amplitude: float
+    amplitude: Angle
     phase_deg: float
-    std: float
+    std: Angle
     z: float
 
 
@@ -52,29 +54,7 @@ class FleetUnit:
     verdict: Verdict
     because: str
     orders: tuple[UnitOrder, ...]
-    peak_to_peak: float
-    left: float
+    peak_to_peak: Angle
+    left: Angle
     p: float
     limit: float
-
-    def plain(self, scale: float) -> dict[str, Any]:
-        """As plain values; angles times ``scale``."""
-        return {
-            "unit": self.unit,
-            "verdict": self.verdict,
-            "because": self.because,
-            "orders": [
-                {
-                    "order": row.order,
-                    "amplitude_arcsec": scale * row.amplitude,
-                    "phase_deg": row.phase_deg,
-                    "std_arcsec": scale * row.std,
-                    "z": row.z,
-                }
-                for row in self.orders
-            ],
-            "peak_to_peak_arcsec": scale * self.peak_to_peak,
-            "left_arcsec": scale * self.left,
-            "p": self.p,
-            "limit": self.limit,
-        }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..support.plainresult import ShownResult, finite_or_none
+from ..support.plainresult import Angle, ShownResult, plain_row
 
 
 @dataclass(frozen=True)
@@ -13,7 +13,7 @@ class WatchedOrder:
     """One order of a window, less the model's: sizes in the unit of the model's period."""
 
     order: float
-    amplitude: float
+    amplitude: Angle
     phase_deg: float
     statistic: float
 
@@ -52,21 +52,6 @@ class WatchedWindow(ShownResult):
 
     def plain(self, scale: float) -> dict[str, Any]:
         """As plain values; sizes times ``scale`` are arcsec."""
-        return {
-            "window": self.window,
-            "angle": self.angle,
-            "time_s": None if self.time is None else finite_or_none(self.time),
-            "orders": [
-                {
-                    "order": row.order,
-                    "amplitude_arcsec": scale * row.amplitude,
-                    "phase_deg": row.phase_deg,
-                    "statistic": row.statistic,
-                }
-                for row in self.orders
-            ],
-            "statistic": self.statistic,
-            "limit": self.limit,
-            "alarm": self.alarm,
-            "because": self.because,
-        }
+        found = plain_row(self, scale)
+        del found["readings"]
+        return {"time_s": found.pop("time"), **found}

@@ -5,7 +5,12 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, TypeAlias
+
+#: Fields of a row that are angles, in the unit of a period; they are written in arcsec.
+Angle: TypeAlias = float
+#: NaN in place of one that is not known.
+AngleOrNaN: TypeAlias = float
 
 #: Characters of a result's ``repr`` at most: one line of a screen.
 WIDTH = 100
@@ -76,6 +81,25 @@ class PlainResult(ShownResult):
 def finite_or_none(value: float) -> float | None:
     """A number that JSON can hold, else None."""
     return float(value) if math.isfinite(value) else None
+
+
+def plain_row(row: Any, scale: float) -> dict[str, Any]:
+    """The fields of a row as plain values; angles (`Angle`) times ``scale``, ``NAME_arcsec``."""
+    found: dict[str, Any] = {}
+    for name, kind in declared_fields(type(row)).items():
+        value = getattr(row, name)
+        if kind.startswith("Angle"):
+            name, value = f"{name}_arcsec", None if value is None else scale * value
+        elif kind.startswith("tuple"):
+            value = [plain_row(one, scale) for one in value]
+        found[name] = finite_or_none(value) if isinstance(value, float) else value
+    return found
+
+
+def declared_fields(kind: type) -> dict[str, str]:
+    """Names and declarations of the fields of a row's class, which may be a named tuple."""
+    declared = kind.__annotations__.items()
+    return {name: str(getattr(of, "__forward_arg__", of)) for name, of in declared}
 
 
 def json_text(value: Any, indent: int | None = None) -> str:

@@ -5,6 +5,7 @@ import pytest
 
 from trueangle.errors import ArgumentError
 from trueangle.fleets.tolerance import tolerance_factor, tolerance_of, wilks_units
+from trueangle.support.plainresult import plain_row
 
 SEED = 52_001
 
@@ -58,7 +59,7 @@ def test_few_units_are_bounded_by_the_scatter_of_their_logarithms():
     bound = np.exp(logs.mean() + found.factor * np.sqrt(((logs - logs.mean()) ** 2).sum() / 9.0))
     assert found.peak_to_peak == pytest.approx(bound)
     assert found.left == pytest.approx(0.5 * bound)
-    assert found.plain(3600.0)["peak_to_peak_arcsec"] == pytest.approx(3600.0 * bound)
+    assert plain_row(found, 3600.0)["peak_to_peak_arcsec"] == pytest.approx(3600.0 * bound)
 
 
 def test_impossible_limits_are_refused():
