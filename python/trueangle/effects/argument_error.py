@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
@@ -17,7 +16,6 @@ from .effect import Effect
 from .missing_order import MissingOrder
 from .search import (
     Array,
-    Fitted,
 )
 from .sidebands import Sidebands
 
@@ -42,7 +40,6 @@ class ArgumentShift(Effect):
     coefficient: float = -1.0
 
     kind: ClassVar[str] = "argument_error"
-    size_name: ClassVar[str] = "coefficient"
     size_most: ClassVar[float] = 1.0
     sentence: ClassVar[str] = (
         "The pattern was taken as a function of one angle and belongs to the other (indicated "
@@ -57,9 +54,7 @@ class ArgumentShift(Effect):
     changes_lines: ClassVar[bool] = True
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
-        pattern = around.pattern
-        change = pattern.indicated_value(signals.theta) - pattern.value(signals.theta)
-        return np.asarray(-self.coefficient * change)
+        return np.asarray(self.coefficient * self.columns(signals, around, {})[:, 0])
 
     @classmethod
     def drawn(
@@ -82,14 +77,6 @@ class ArgumentShift(Effect):
         extension = regression.propose(cls.kind, {}, columns, parameters=0, deviance=deviance)
         # The pattern belongs to one angle or to the other: nothing lies beyond.
         return extension if abs(extension.coefficients[0] + 1.0) < ALLOWED else None
-
-    @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
-        _, (coefficient,), covariance = terms[0]
-        std = float(np.sqrt(covariance[0, 0]))
-        return {"coefficient": quantity(coefficient, std)}, [ArgumentShift(float(coefficient))]
 
     @classmethod
     def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:

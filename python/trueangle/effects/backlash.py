@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.lines import line_sum
 from ..joint.pattern import JointPattern
@@ -18,7 +18,7 @@ from ..model.term import Term, line_values
 from ..model.terms.travel import BacklashTerm
 from ..support.angles import ARCSEC_PER_DEG, from_arcsec
 from .ambiguity import Ambiguity
-from .effect import Effect
+from .effect import Effect, Reported
 from .search import Array, Fitted
 
 #: Half width in standard deviations of the noise from which on the crossing of a play is looked
@@ -134,9 +134,7 @@ class Backlash(Effect):
         return rest.bic - sharp.bic_gain - regression.bic > TOLD
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         extension, (width,), covariance = terms[0]
         std = float(np.sqrt(covariance[0, 0]))
         parameters = {"half_width_arcsec": quantity(width, std)}

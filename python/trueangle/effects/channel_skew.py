@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.joint import Joint
 from ..joint.lines import line_columns
@@ -20,7 +20,7 @@ from ..model.terms.motion import ChannelSkewTerm
 from ..support.angles import ARCSEC_PER_DEG
 from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .drawing import drawn_phase
-from .effect import Effect
+from .effect import Effect, Reported
 from .filter_lag import FilterLag
 from .latency import UNTIMED, Latency
 from .missing_order import MissingOrder
@@ -55,7 +55,6 @@ class ChannelSkew(Effect):
     phase_deg: float = 0.0
 
     kind: ClassVar[str] = ChannelSkewTerm.kind
-    size_name: ClassVar[str] = "delay_s"
     sentence: ClassVar[str] = (
         "The two channels of a sine and cosine sensor are read one after the other: a constant "
         "and twice the sensor's order, both in proportion to speed."
@@ -122,9 +121,7 @@ class ChannelSkew(Effect):
         return np.asarray(half * (1.0 + turned[:, None]))
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         extension, (delay,), covariance = terms[0]
         phase = float(np.degrees(extension.shape["phase"]) % 360.0)
         order = skewed_order(regression.around.joint)

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
@@ -18,7 +17,7 @@ from .drift_within_run import DriftWithinRun
 from .effect import Effect
 from .latency import UNTIMED, Latency
 from .scale_error import ScaleError
-from .search import Array, Fitted
+from .search import Array
 
 #: Arcsec that one degree per second makes of a second's millionth.
 ARCSEC_PER_PPM = 3600.0 * 1e-6
@@ -73,13 +72,6 @@ class ClockDrift(Effect):
     def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         speed = signals.turns_per_s * 360.0
         return np.asarray((ARCSEC_PER_PPM * speed * signals.clock)[:, None])
-
-    @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
-        _, (ppm,), covariance = terms[0]
-        return {"ppm": quantity(ppm, float(np.sqrt(covariance[0, 0])))}, [ClockDrift(float(ppm))]
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:

@@ -17,10 +17,10 @@ from ..model.term import Term, line_values
 from ..model.terms.load import CurrentCouplingTerm
 from ..support.angles import from_arcsec
 from .ambiguity import OWN_OF_VELOCITY, Ambiguity, share_left
-from .effect import Effect
+from .effect import Effect, Reported
 from .factor import FactorEffect
 from .load_dependent_gear_error import LoadDependentGearError
-from .search import Array, Fitted, known_orders
+from .search import Array, Fitted, known_orders, line_quantities
 from .thermal_drift import ThermalDrift
 from .torsional_compliance import TorsionalCompliance
 
@@ -83,21 +83,13 @@ class CurrentCoupling(FactorEffect):
         return [{"what": "zero"}, *lines]
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         zero, lines = cls.single(terms, "zero"), cls.line_rows(terms)
         parameters: Parameters = {}
         if zero:
             parameters["arcsec_per_A"] = quantity(*zero)
         if lines:
-            parameters["orders"] = quantity([line[0] for line in lines])
-            parameters["amplitudes_arcsec_per_A"] = quantity(
-                [line[1] for line in lines], [line[3] for line in lines]
-            )
-            parameters["phases_deg"] = quantity(
-                [line[2] for line in lines], [line[4] for line in lines]
-            )
+            parameters |= line_quantities(lines, "amplitudes_arcsec_per_A")
         effect = CurrentCoupling(
             zero[0] if zero else 0.0, tuple((m, c, p) for m, c, p, *_ in lines)
         )

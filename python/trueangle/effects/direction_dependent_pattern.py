@@ -10,7 +10,6 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.lines import line_columns, line_sum
 from ..joint.pattern import JointPattern
@@ -20,10 +19,10 @@ from ..model.terms.travel import DirectionalPatternTerm
 from .ambiguity import Ambiguity
 from .backlash import ONE_WAY, Backlash, goes_both_ways
 from .drawing import drawn_phase
-from .effect import Effect
+from .effect import Effect, Reported
 from .latency import Latency
 from .presliding_hysteresis import PreslidingHysteresis
-from .search import Array, Fitted, line_parameters
+from .search import Array, Fitted, line_parameters, line_quantities
 from .shapes import best_shape
 
 #: Orders that play has where a gear is eccentric or worn on one side: half of the prior
@@ -112,17 +111,10 @@ class DirectionalPattern(Effect):
         return signals.direction[:, None] * line_columns(signals.theta, shape["order"])
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         rows = [(t.shape["order"], *line_parameters(c, v)) for t, c, v in terms]
-        orders, amplitudes, phases, stds, phase_stds = zip(*rows, strict=True)
-        parameters = {
-            "orders": quantity(orders),
-            "amplitudes": quantity(amplitudes, stds),
-            "phases_deg": quantity(phases, phase_stds),
-        }
-        return parameters, [DirectionalPattern(orders, amplitudes, phases)]
+        orders, amplitudes, phases, *_ = zip(*rows, strict=True)
+        return line_quantities(rows), [DirectionalPattern(orders, amplitudes, phases)]
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:

@@ -11,7 +11,7 @@ import numpy as np
 import trueangle._core as _core
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..estimation.whitening import drift_basis
 from ..joint.pattern import JointPattern
@@ -24,7 +24,7 @@ from .ambiguity import (
     share_left,
 )
 from .backlash import Backlash
-from .effect import ALWAYS, Effect
+from .effect import ALWAYS, Effect, Reported, Spots
 from .latency import Latency
 from .missing_order import MissingOrder
 from .presliding_hysteresis import PreslidingHysteresis
@@ -89,7 +89,6 @@ class DriftWithinRun(Effect):
     wander_arcsec: float = 0.0
 
     kind: ClassVar[str] = "drift_within_run"
-    size_name: ClassVar[str] = "arcsec_per_s"
     sentence: ClassVar[str] = (
         "The set-up settles, warms up or creeps during a run: the error follows time "
         "and not angle, differently in every run. It is a ramp, one relaxation or a "
@@ -230,9 +229,7 @@ class DriftWithinRun(Effect):
         return np.asarray(cosines / np.sqrt(k * np.log(DRIFT_TERMS)))
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         extension = terms[0][0]
         assert extension.run_effect is not None
         size = float(np.sqrt(extension.run_effect.ratio * regression.variance))
@@ -276,9 +273,7 @@ class DriftWithinRun(Effect):
         return rest.propose_run_effect(cls.kind, extension.shape, columns).bic_gain > TOLD
 
     @classmethod
-    def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
-    ) -> Ambiguity | None:
+    def doubt(cls, extension: Extension, regression: Regression, spots: Spots) -> Ambiguity | None:
         """A drift in time may be an error of reversal: few runs that reverse once."""
         signals = regression.signals
         if (

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 
 from ..errors import ArgumentError
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
@@ -30,6 +30,10 @@ KINDS: dict[str, type[Effect]] = {}
 
 #: Turns of travel up to which a flexible cause can imitate others: any.
 ALWAYS = math.inf
+
+#: What a finding states: its parameters, and the effects that a simulation takes.
+Reported: TypeAlias = "tuple[Parameters, list[Effect]]"
+Spots: TypeAlias = Sequence[Ambiguity]
 
 
 class Effect(TabledParameters):
@@ -211,14 +215,16 @@ class Effect(TabledParameters):
         return departure_columns(signals, cls.factor, np.asarray(signal))
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         """Parameters of the finding and the effects to extend the simulation with.
 
-        ``terms`` are this cause's terms with their coefficients and covariances.
+        ``terms`` are this cause's terms with their coefficients and covariances. One of one size
+        has that of its first field.
         """
-        raise NotImplementedError
+        _, (size,), covariance = terms[0]
+        name = fields(cls)[0].name  # type: ignore[arg-type]
+        std = float(np.sqrt(covariance[0, 0]))
+        return {name: quantity(size, std)}, [cls(float(size))]  # type: ignore[call-arg]
 
     @classmethod
     def form_limits(cls, regression: Regression, terms: Sequence[Fitted]) -> Parameters:
@@ -234,9 +240,7 @@ class Effect(TabledParameters):
         yield from ()
 
     @classmethod
-    def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
-    ) -> Ambiguity | None:
+    def doubt(cls, extension: Extension, regression: Regression, spots: Spots) -> Ambiguity | None:
         """Why this effect may be behind what another (or it) explains, or None."""
         return None
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, Pattern
 from ..joint.signals import Signals
@@ -22,7 +22,7 @@ from ..model.term import Term
 from ..model.terms.motion import FilterLagTerm
 from ..support.quantiles import quantile
 from .ambiguity import Ambiguity
-from .effect import Effect
+from .effect import Effect, Reported, Spots
 from .latency import UNTIMED, Latency
 from .missing_order import MissingOrder
 from .search import Array, Fitted, golden_maximum, is_gear_order
@@ -72,7 +72,6 @@ class FilterLag(Effect):
     damping: float | None = None
 
     kind: ClassVar[str] = FilterLagTerm.kind
-    size_name: ClassVar[str] = "cutoff_hz"
     size_grows: ClassVar[bool] = False
     sentence: ClassVar[str] = (
         "A filter or tracking loop in the encoder follows the ramp but smooths the pattern: "
@@ -189,9 +188,7 @@ class FilterLag(Effect):
         return _lagged(waves, frequency, **shape)[:, None]
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         extension = terms[0][0]
         cutoff, damping = extension.shape["cutoff_hz"], extension.shape["damping"]
         waves = _waves(regression.around.pattern, regression.signals.theta)
@@ -228,9 +225,7 @@ class FilterLag(Effect):
             yield cls.blind("nothing moved, or no line is known to filter")
 
     @classmethod
-    def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
-    ) -> Ambiguity | None:
+    def doubt(cls, extension: Extension, regression: Regression, spots: Spots) -> Ambiguity | None:
         if extension.cause != MissingOrder.kind:
             return None
         order = float(extension.shape["output_order"])

@@ -50,7 +50,6 @@ class HeteroscedasticNoise(Effect):
     per_Nm: float = 0.0
 
     kind: ClassVar[str] = "heteroscedastic_noise"
-    size_name: ClassVar[str] = "cosine"
     size_most: ClassVar[float] = 6.0
     sentence: ClassVar[str] = (
         "Readings scatter more at some angles, speeds or loads (friction zones, weak field, "

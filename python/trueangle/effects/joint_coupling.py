@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self, TypeAlias
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
@@ -17,7 +17,7 @@ from ..model.term import Term
 from ..model.terms.place import JointCouplingTerm
 from ..support.angles import ARCSEC_PER_DEG
 from .ambiguity import OWN_POWER, Ambiguity, share_left
-from .effect import Effect
+from .effect import Effect, Reported
 from .scale_error import ScaleError
 from .search import Array, Fitted
 from .shapes import best_shape
@@ -95,9 +95,7 @@ class JointCoupling(_OfOthers):
         return ARCSEC_PER_DEG * signals.coupled[shape["joint"]][:, None]
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         found: list[Effect] = [
             JointCoupling(extension.shape["joint"], float(value))
             for extension, (value,), _ in terms

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.earlier import earlier_signals
 from ..joint.pattern import JointPattern
@@ -20,7 +19,7 @@ from ..support.angles import ARCSEC_PER_DEG
 from .ambiguity import OWN_OF_VELOCITY, OWN_POWER, Ambiguity, share_left
 from .backlash import Backlash
 from .effect import Effect
-from .search import Array, Fitted
+from .search import Array
 
 TWO_SPEEDS = (
     "move in both directions at two speeds at least a factor of 3 apart, or read at rest as well"
@@ -73,14 +72,6 @@ class Latency(Effect):
             cls.kind, None, lambda: cls.columns(regression.signals, regression.around, {})
         )
         return regression.propose(cls.kind, {}, columns)
-
-    @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
-        _, (delay,), covariance = terms[0]
-        std = float(np.sqrt(covariance[0, 0]))
-        return {"delay_s": quantity(delay, std)}, [Latency(float(delay))]
 
     @classmethod
     def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:

@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.lines import line_columns, line_sum
 from ..joint.pattern import JointPattern
@@ -18,10 +17,10 @@ from ..model.term import Term, line_values
 from ..model.terms.load import LoadDependentGearErrorTerm
 from .ambiguity import OWN_OF_VELOCITY, OWN_POWER, Ambiguity, share_left
 from .drawing import drawn_carrier, drawn_free_line, drawn_phase
-from .effect import Effect
+from .effect import Effect, Reported, Spots
 from .factor import FactorEffect
 from .missing_order import MissingOrder
-from .search import Array, Fitted, is_gear_order, known_orders
+from .search import Array, Fitted, is_gear_order, known_orders, line_quantities
 from .thermal_drift import ThermalDrift
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
@@ -106,17 +105,8 @@ class LoadDependentGearError(FactorEffect):
         return likely if shape["order"] in mesh else len(shapes)
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         lines = cls.line_rows(terms)
-        parameters = {
-            "orders": quantity([line[0] for line in lines]),
-            "amplitudes_arcsec_per_Nm": quantity(
-                [line[1] for line in lines], [line[3] for line in lines]
-            ),
-            "phases_deg": quantity([line[2] for line in lines], [line[4] for line in lines]),
-        }
         effects: list[Effect] = []
         for kind in ("signed", "absolute"):
             chosen = tuple(
@@ -126,7 +116,7 @@ class LoadDependentGearError(FactorEffect):
             )
             if chosen:
                 effects.append(LoadDependentGearError(chosen, kind))
-        return parameters, effects
+        return line_quantities(lines, "amplitudes_arcsec_per_Nm"), effects
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
@@ -169,9 +159,7 @@ class LoadDependentGearError(FactorEffect):
         return bool(regression.of_pattern(f"{cls.kind} as lines", None, build))
 
     @classmethod
-    def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
-    ) -> Ambiguity | None:
+    def doubt(cls, extension: Extension, regression: Regression, spots: Spots) -> Ambiguity | None:
         if extension.cause != MissingOrder.kind or unloaded(regression.signals):
             return None
         if is_gear_order(regression.belief, float(extension.shape["output_order"])):

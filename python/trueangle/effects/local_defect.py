@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
@@ -22,7 +22,7 @@ from ..support.angles import from_arcsec
 from ..support.deadline import current_deadline
 from .ambiguity import Ambiguity
 from .argument_error import ArgumentShift
-from .effect import Effect
+from .effect import Effect, Reported
 from .missing_order import MissingOrder
 from .search import SAME_CORRELATION, Array, Fitted, tangent_covariance
 from .sidebands import Sidebands
@@ -249,9 +249,7 @@ class LocalDefect(Effect):
         return np.degrees(signals.theta * around.joint.output_order(shaft, 1))
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         extension, (height,), _ = terms[0]
         shape = extension.shape
         # Place, width and height together.

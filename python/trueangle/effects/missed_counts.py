@@ -9,11 +9,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from .effect import ALWAYS, Effect
+from .effect import ALWAYS, Effect, Reported
 from .search import (
     Array,
     Fitted,
@@ -45,7 +45,6 @@ class MissedCounts(Effect):
     row: int
 
     kind: ClassVar[str] = "missed_counts"
-    size_name: ClassVar[str] = "step_arcsec"
     sentence: ClassVar[str] = (
         "Counts or whole periods were lost at one moment: from there to the end of the run "
         "every reading is off by the same step."
@@ -137,9 +136,7 @@ class MissedCounts(Effect):
         return np.asarray(np.hstack([term.columns for term, _ in terms]) @ whole)[:, None]
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         rows = [(float(c[0]), float(np.sqrt(v[0, 0])), t.shape) for t, c, v in terms]
         labels = regression.signals.labels
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.lines import line_columns, line_sum
 from ..joint.pattern import JointPattern
@@ -18,7 +18,7 @@ from .ambiguity import (
     Ambiguity,
 )
 from .drawing import drawn_free_line, drawn_phase
-from .effect import Effect
+from .effect import Effect, Reported, Spots
 from .scale_error import ScaleError
 from .search import (
     Array,
@@ -139,9 +139,7 @@ class MissingOrder(Effect):
         return line_columns(signals.theta, shape["output_order"])
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         extension, coefficients, covariance = terms[0]
         output_order = extension.shape["output_order"]
         joint = regression.around.joint
@@ -165,9 +163,7 @@ class MissingOrder(Effect):
         return parameters, [MissingOrder(shaft, order, amplitude, phase)]
 
     @classmethod
-    def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
-    ) -> Ambiguity | None:
+    def doubt(cls, extension: Extension, regression: Regression, spots: Spots) -> Ambiguity | None:
         if extension.cause != cls.kind:
             return None
         order = float(extension.shape["output_order"])

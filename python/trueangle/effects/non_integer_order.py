@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.grid import aliases_of
 from ..joint.lines import line_columns, lines_columns
@@ -20,7 +20,7 @@ from .ambiguity import (
     Ambiguity,
 )
 from .drift_within_run import DriftWithinRun
-from .effect import ALWAYS, Effect
+from .effect import ALWAYS, Effect, Reported, Spots
 from .missing_order import HIGHEST, MissingOrder
 from .orderspectrum import OrderSpectrum
 from .randomphase import RandomPhaseLine
@@ -208,15 +208,11 @@ class NonIntegerOrder(Effect):
         return orders, best
 
     @classmethod
-    def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
-    ) -> Ambiguity | None:
+    def doubt(cls, extension: Extension, regression: Regression, spots: Spots) -> Ambiguity | None:
         return grid_ambiguity(regression, spots) if extension.cause == cls.kind else None
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         extension = terms[0][0]
         theta = regression.signals.theta
         waves = line_columns(theta, extension.shape["order"])

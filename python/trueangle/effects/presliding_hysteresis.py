@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
@@ -20,7 +20,7 @@ from ..support.deadline import current_deadline
 from .ambiguity import OWN_OF_VELOCITY, Ambiguity, share_left
 from .backlash import ONE_WAY, Backlash, goes_both_ways
 from .departures import spring_transitions
-from .effect import Effect
+from .effect import Effect, Reported
 from .latency import TWO_SPEEDS, Latency
 from .search import (
     Array,
@@ -80,7 +80,6 @@ class PreslidingHysteresis(Effect):
     start_state: float = 0.0
 
     kind: ClassVar[str] = PreslidingHysteresisTerm.kind
-    size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
         "Friction winds up the elastic parts after each reversal: the error moves from one "
         "branch to the other over a transition length, and depends on where it reversed."
@@ -190,9 +189,7 @@ class PreslidingHysteresis(Effect):
         return np.asarray(size * spring_transitions(signals) - signal[:, None])
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         total = sum(float(c[0]) for _, c, _ in terms)
         weights = np.array([abs(float(c[0])) for _, c, _ in terms])
         lengths = np.array([t.shape["length_deg"] for t, _, _ in terms])

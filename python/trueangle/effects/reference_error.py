@@ -10,16 +10,16 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.lines import line_columns, line_sum
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .ambiguity import Ambiguity
 from .drawing import drawn_phase
-from .effect import Effect
+from .effect import Effect, Reported, Spots
 from .missing_order import MissingOrder
-from .search import Array, Fitted, is_gear_order, line_parameters
+from .search import Array, Fitted, is_gear_order, line_parameters, line_quantities
 from .shapes import best_shape
 from .torsional_compliance import TorsionalCompliance
 
@@ -130,27 +130,15 @@ class ReferenceLines(Effect):
         return pair, spread
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         rows = [
-            (
-                t.shape["order"],
-                *line_parameters(*cls._both(regression.signals, t.shape, c, v)),
-                t.shape["mount_sign"],
-            )
+            (t.shape["order"], *line_parameters(*cls._both(regression.signals, t.shape, c, v)))
             for t, c, v in terms
         ]
-        parameters = {
-            "orders": quantity([row[0] for row in rows]),
-            "amplitudes": quantity([row[1] for row in rows], [row[3] for row in rows]),
-            "phases_deg": quantity([row[2] for row in rows], [row[4] for row in rows]),
-            "mount_sign": quantity([row[5] for row in rows]),
-        }
-        effects: list[Effect] = [
-            ReferenceLines((row[0],), (row[1],), (row[2],), row[5]) for row in rows
-        ]
-        return parameters, effects
+        signs = [t.shape["mount_sign"] for t, _, _ in terms]
+        pairs = zip(rows, signs, strict=True)
+        effects = [ReferenceLines((m,), (a,), (p,), sign) for (m, a, p, *_), sign in pairs]
+        return line_quantities(rows) | {"mount_sign": quantity(signs)}, [*effects]
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
@@ -166,9 +154,7 @@ class ReferenceLines(Effect):
             yield replace(spot, measure=cls.measure)
 
     @classmethod
-    def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
-    ) -> Ambiguity | None:
+    def doubt(cls, extension: Extension, regression: Regression, spots: Spots) -> Ambiguity | None:
         if extension.cause != MissingOrder.kind or regression.signals.mount is None:
             return None
         order = float(extension.shape["output_order"])

@@ -10,13 +10,13 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import ARCSEC_PER_RAD, JointPattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.place import ScaleErrorTerm
-from .effect import Effect
+from .effect import Effect, Reported
 from .search import Array, Fitted
 
 
@@ -75,9 +75,7 @@ class ScaleError(Effect):
         return (ARCSEC_PER_RAD * angle)[:, None]
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         _, (scale,), covariance = terms[0]
         std = float(np.sqrt(covariance[0, 0]))
         travel = np.degrees(regression.signals.theta)

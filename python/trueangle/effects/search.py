@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..estimation.extension import Extension
+from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
@@ -43,6 +44,16 @@ def line_parameters(coefficients: Array, covariance: Array) -> tuple[float, floa
     std = float(np.sqrt(along @ covariance @ along))
     turn = float(np.degrees(np.sqrt(across @ covariance @ across) / amplitude))
     return amplitude, phase, std, min(turn, 180.0)
+
+
+def line_quantities(rows: Iterable[Sequence[float]], amplitudes: str = "amplitudes") -> Parameters:
+    """Lines (order and `line_parameters`) as parameters of a finding."""
+    orders, sizes, phases, stds, phase_stds = zip(*rows, strict=True)
+    return {
+        "orders": quantity(orders),
+        amplitudes: quantity(sizes, stds),
+        "phases_deg": quantity(phases, phase_stds),
+    }
 
 
 def golden_maximum(

@@ -10,16 +10,16 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.lines import line_columns, line_sum
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .ambiguity import Ambiguity
 from .drawing import drawn_carrier, drawn_phase
-from .effect import Effect
+from .effect import Effect, Reported, Spots
 from .missing_order import FREE_ANGLES, MissingOrder
-from .search import Array, Fitted, known_orders, line_parameters
+from .search import Array, Fitted, known_orders, line_parameters, line_quantities
 from .shapes import best_shape
 
 #: Periods of the modulation that a run must cover for sidebands to be looked for.
@@ -162,9 +162,7 @@ class Sidebands(Effect):
         return map_ @ coefficients, map_ @ covariance @ map_.T
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         effects: list[Effect] = []
         rows = []
         for extension, coefficients, covariance in terms:
@@ -179,18 +177,14 @@ class Sidebands(Effect):
             effects.append(Sidebands(carrier, seen, sizes, phases))
         parameters = {
             "carrier": quantity(rows[0][0]),
-            "amplitudes": quantity([row[2] for row in rows], [row[4] for row in rows]),
-            "orders": quantity([row[0] + row[1] for row in rows]),
-            "phases_deg": quantity([row[3] for row in rows], [row[5] for row in rows]),
+            **line_quantities((carrier + k, *line) for carrier, k, *line in rows),
         }
         if any(row[0] != rows[0][0] for row in rows):
             parameters["carriers"] = quantity([row[0] for row in rows])
         return parameters, effects
 
     @classmethod
-    def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
-    ) -> Ambiguity | None:
+    def doubt(cls, extension: Extension, regression: Regression, spots: Spots) -> Ambiguity | None:
         if extension.cause != cls.kind:
             return None
         carrier, k = extension.shape["carrier"], extension.shape["offset"]

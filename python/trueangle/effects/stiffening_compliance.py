@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.lines import line_columns
 from ..joint.pattern import JointPattern
@@ -20,7 +20,7 @@ from ..support.angles import from_arcsec
 from ..support.arrays import distinct
 from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .departures import departure_beyond
-from .effect import Effect
+from .effect import Effect, Reported
 from .search import Array, Fitted, golden_maximum, tangent_covariance
 from .shapes import best_shape
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
@@ -186,9 +186,7 @@ class StiffeningCompliance(Effect):
         return np.hstack(columns)
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         (extension, (linear, second), covariance) = terms[0]
         shape = extension.shape
         gravity = shape["gravity_deg"]

@@ -18,9 +18,9 @@ from ..model.terms.place import ThermalDriftTerm
 from ..support.angles import from_arcsec
 from .ambiguity import LEAST_KELVIN, Ambiguity
 from .backlash import Backlash
-from .effect import Effect
+from .effect import Effect, Reported
 from .factor import FactorEffect
-from .search import Array, Fitted, known_orders
+from .search import Array, Fitted, known_orders, line_quantities
 from .torsional_compliance import TorsionalCompliance
 
 #: Temperature at which the simulation's lines hold, degrees Celsius.
@@ -94,9 +94,7 @@ class ThermalDrift(FactorEffect):
         return shapes
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         lines = cls.line_rows(terms)
         zero, pattern = cls.single(terms, "zero"), cls.single(terms, "pattern")
         parameters: Parameters = {}
@@ -105,13 +103,7 @@ class ThermalDrift(FactorEffect):
         if pattern:
             parameters["pattern_per_K"] = quantity(*pattern)
         if lines:
-            parameters["orders"] = quantity([line[0] for line in lines])
-            parameters["amplitudes_arcsec_per_K"] = quantity(
-                [line[1] for line in lines], [line[3] for line in lines]
-            )
-            parameters["phases_deg"] = quantity(
-                [line[2] for line in lines], [line[4] for line in lines]
-            )
+            parameters |= line_quantities(lines, "amplitudes_arcsec_per_K")
         effect = ThermalDrift(
             zero[0] if zero else 0.0,
             pattern[0] if pattern else 0.0,

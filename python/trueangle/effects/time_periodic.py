@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.lines import line_columns
 from ..joint.pattern import JointPattern
@@ -22,7 +22,7 @@ from ..support.quantiles import quantile
 from .ambiguity import Ambiguity
 from .drawing import reading_rate
 from .drift_within_run import DriftWithinRun
-from .effect import ALWAYS, Effect
+from .effect import ALWAYS, Effect, Reported, Spots
 from .missing_order import MissingOrder
 from .non_integer_order import NonIntegerOrder
 from .randomphase import RandomPhaseLine
@@ -167,9 +167,7 @@ class TimePeriodic(Effect):
         )
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         extension = terms[0][0]
         frequencies = np.array(extension.shape["frequency_hz"])
         frequency = float(np.median(frequencies))
@@ -194,9 +192,7 @@ class TimePeriodic(Effect):
             yield cls.blind("no time stamps were recorded")
 
     @classmethod
-    def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
-    ) -> Ambiguity | None:
+    def doubt(cls, extension: Extension, regression: Regression, spots: Spots) -> Ambiguity | None:
         if extension.cause != cls.kind or regression.signals.velocity is None:
             return None
         speed = np.abs(regression.signals.turns_per_s)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.lines import line_columns
 from ..joint.pattern import JointPattern
@@ -19,7 +19,7 @@ from ..joint.signals import Signals
 from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .backlash import Backlash
 from .direction_dependent_pattern import DirectionalPattern
-from .effect import Effect
+from .effect import Effect, Reported
 from .search import Array, Fitted, golden_maximum, is_of_one_sign, tangent_covariance
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
 
@@ -60,7 +60,6 @@ class TorqueHysteresis(Effect):
     span_Nm: float
 
     kind: ClassVar[str] = "torque_hysteresis"
-    size_name: ClassVar[str] = "half_width_arcsec"
     sentence: ClassVar[str] = (
         "Friction between teeth delays the wind-up: at one torque the gear has two "
         "angles, one for rising and one for falling load."
@@ -132,9 +131,7 @@ class TorqueHysteresis(Effect):
         return cls.loop(signals, shape["span_Nm"])[:, None]
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         widths = np.array([float(c[0]) for _, c, _ in terms])
         spans = np.array([t.shape["span_Nm"] for t, _, _ in terms])
         n, signals = len(terms), regression.signals

@@ -18,7 +18,7 @@ from ..model.term import Term, line_values
 from ..model.terms.load import TorsionalComplianceTerm
 from ..support.angles import from_arcsec
 from .ambiguity import OWN_POWER, Ambiguity, share_left
-from .effect import Effect
+from .effect import Reported
 from .factor import FactorEffect
 from .search import Array, Fitted, shows_line
 
@@ -81,9 +81,7 @@ class TorsionalCompliance(FactorEffect):
         return None
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         direct, lines = cls.single(terms, "zero"), cls.line_rows(terms)
         parameters: Parameters = {}
         if direct:

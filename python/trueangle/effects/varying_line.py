@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.lines import line_columns, line_sum
 from ..joint.pattern import JointPattern
@@ -19,7 +19,7 @@ from ..model.terms.motion import VaryingLineTerm
 from .ambiguity import Ambiguity
 from .channel_skew import ChannelSkew, skewed_order
 from .drawing import drawn_carrier, drawn_free_line, drawn_phase
-from .effect import ALWAYS, Effect
+from .effect import ALWAYS, Effect, Reported, Spots
 from .filter_lag import FilterLag
 from .load_dependent_gear_error import LoadDependentGearError
 from .search import Array, Fitted, grid_ambiguity, is_gear_order, line_parameters
@@ -130,15 +130,11 @@ class VaryingLine(Effect):
         return scale[:, None] * line_columns(signals.theta, shape["order"])
 
     @classmethod
-    def doubt(
-        cls, extension: Extension, regression: Regression, spots: Sequence[Ambiguity]
-    ) -> Ambiguity | None:
+    def doubt(cls, extension: Extension, regression: Regression, spots: Spots) -> Ambiguity | None:
         return grid_ambiguity(regression, spots) if extension.cause == cls.kind else None
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         rows = [(t.shape["order"], t.shape["follows"], *line_parameters(c, v)) for t, c, v in terms]
         orders, follows, amplitudes, phases, stds, phase_stds = zip(*rows, strict=True)
         parameters = {

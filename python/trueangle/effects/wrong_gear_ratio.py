@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.joint import Joint
 from ..joint.lines import line_columns
@@ -18,7 +18,7 @@ from ..joint.pattern import JointPattern, Pattern
 from ..joint.shafts import shaft_cycles
 from ..joint.signals import Signals
 from .drawing import drawn_carrier
-from .effect import Effect
+from .effect import Effect, Reported
 from .missing_order import MissingOrder
 from .search import Array, Fitted
 from .sidebands import Sidebands
@@ -130,9 +130,7 @@ class WrongGearRatio(Effect):
         return np.hstack([line_columns(signals.theta, m) for m in shape["orders"]])
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         shape = terms[0][0].shape
         parameters = {
             "gear_ratio": quantity(shape["gear_ratio"]),

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..estimation.extension import Extension
-from ..estimation.quantity import Parameters, quantity
+from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
@@ -20,7 +20,7 @@ from .ambiguity import (
 )
 from .backlash import Backlash, goes_both_ways
 from .current_coupling import CurrentCoupling
-from .effect import ALWAYS, Effect
+from .effect import ALWAYS, Effect, Reported
 from .latency import Latency
 from .missed_counts import MissedCounts
 from .presliding_hysteresis import PreslidingHysteresis
@@ -95,9 +95,7 @@ class ZeroSlip(Effect):
         return max(own, key=lambda found: found.deviance)
 
     @classmethod
-    def report(
-        cls, regression: Regression, terms: Sequence[Fitted]
-    ) -> tuple[Parameters, list[Effect]]:
+    def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
         effect = terms[0][0].run_effect
         assert effect is not None
         size = float(np.sqrt(effect.ratio * regression.variance))
