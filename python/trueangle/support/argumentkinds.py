@@ -140,26 +140,21 @@ def _fits(value: Any, kind: Any) -> bool:
     if not isinstance(origin, type):
         return True
     if issubclass(origin, Mapping):
-        return isinstance(value, Mapping) and _all_fit(value.items(), inner)
+        if not isinstance(value, Mapping):
+            return False
+        parts = (value.keys(), value.values())[: len(inner)]
+        return all(_fits(one, of) for of, part in zip(inner, parts, strict=True) for one in part)
     if issubclass(origin, str) or not issubclass(origin, Iterable) or hasattr(origin, "summary"):
         return isinstance(value, origin)
-    if isinstance(value, str | bytes | Mapping) or not _is_iterable(value):
+    if isinstance(value, str | bytes | Mapping):
         return False
-    if isinstance(value, Iterator) or not inner:
-        return True
-    return all(_fits(item, inner[0]) for item in islice(value, MOST_ITEMS))
-
-
-def _all_fit(items: Iterable[tuple[Any, Any]], inner: tuple[Any, ...]) -> bool:
-    return not inner or all(_fits(k, inner[0]) and _fits(v, inner[1]) for k, v in items)
-
-
-def _is_iterable(value: Any) -> bool:
     try:
         iter(value)
     except TypeError:
         return False
-    return True
+    if isinstance(value, Iterator) or not inner:
+        return True
+    return all(_fits(item, inner[0]) for item in islice(value, MOST_ITEMS))
 
 
 def _is_numbers(value: Any, kinds: str = "iuf") -> bool:

@@ -1,70 +1,35 @@
 """The one door for files: what may be read, what may be written, and that it appears whole."""
 
-from .inputs import (
-    MODEL_BYTES,
-    RUNS_BYTES,
-    SIMULATION_BYTES,
-    InputFile,
-    check_input,
-    partition_keys,
-    partition_name,
-    read_whole,
-    same_file,
-    sha256_of,
-)
-from .kinds import (
-    CERTIFICATE,
-    FLEET,
-    MODEL,
-    PAGE,
-    PDF,
-    PICTURE,
-    REPORT,
-    RUNS,
-    SENSOR,
-    SIMULATION,
-    FileKind,
-    declare_endings,
-    ending_of,
-    kind_of_log,
-    promised_format,
-    refuse_own,
-)
-from .outputs import check_output, external_output, named_output, publish, written_atomically
-from .workplace import remove_leftovers, restore
-
-__all__ = [
-    "CERTIFICATE",
-    "FLEET",
-    "MODEL",
-    "MODEL_BYTES",
-    "PAGE",
-    "PDF",
-    "PICTURE",
-    "REPORT",
-    "RUNS",
-    "RUNS_BYTES",
-    "SENSOR",
-    "SIMULATION",
-    "SIMULATION_BYTES",
-    "FileKind",
-    "InputFile",
-    "check_input",
-    "check_output",
-    "declare_endings",
-    "ending_of",
-    "external_output",
-    "kind_of_log",
-    "named_output",
-    "partition_keys",
-    "partition_name",
-    "promised_format",
-    "publish",
-    "read_whole",
-    "refuse_own",
-    "remove_leftovers",
-    "restore",
-    "same_file",
-    "sha256_of",
-    "written_atomically",
-]
+from .inputs import MODEL_BYTES as MODEL_BYTES
+from .inputs import RUNS_BYTES as RUNS_BYTES
+from .inputs import SIMULATION_BYTES as SIMULATION_BYTES
+from .inputs import InputFile as InputFile
+from .inputs import check_input as check_input
+from .inputs import partition_keys as partition_keys
+from .inputs import partition_name as partition_name
+from .inputs import read_whole as read_whole
+from .inputs import same_file as same_file
+from .inputs import sha256_of as sha256_of
+from .kinds import CERTIFICATE as CERTIFICATE
+from .kinds import FLEET as FLEET
+from .kinds import MODEL as MODEL
+from .kinds import PAGE as PAGE
+from .kinds import PDF as PDF
+from .kinds import PICTURE as PICTURE
+from .kinds import REPORT as REPORT
+from .kinds import RUNS as RUNS
+from .kinds import SENSOR as SENSOR
+from .kinds import SIMULATION as SIMULATION
+from .kinds import FileKind as FileKind
+from .kinds import declare_endings as declare_endings
+from .kinds import ending_of as ending_of
+from .kinds import kind_of_log as kind_of_log
+from .kinds import promised_format as promised_format
+from .kinds import refuse_own as refuse_own
+from .outputs import check_output as check_output
+from .outputs import external_output as external_output
+from .outputs import named_output as named_output
+from .outputs import publish as publish
+from .outputs import written_atomically as written_atomically
+from .workplace import remove_leftovers as remove_leftovers
+from .workplace import restore as restore
