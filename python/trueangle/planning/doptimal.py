@@ -140,7 +140,7 @@ def d_optimal(columns: OrthonormalColumns) -> ArcDesign:
     weights = np.full(grid.size, 1.0 / grid.size)
     excess = math.inf
     for _ in range(_GRID_STEPS):
-        variances = _variances(rows, weights)
+        variances = _variances(rows, rows.T @ (weights[:, None] * rows))
         excess = float(variances.max()) / p - 1.0
         if excess < _GRID_EXCESS:
             break
@@ -156,9 +156,8 @@ def d_optimal(columns: OrthonormalColumns) -> ArcDesign:
     return ArcDesign(places, shares, excess, columns.log_det(places, shares))
 
 
-def _variances(rows: Array, weights: Array) -> Array:
+def _variances(rows: Array, information: Array) -> Array:
     """Variance of the curve at every row, for one reading of variance 1."""
-    information = rows.T @ (weights[:, None] * rows)
     return np.asarray(np.einsum("ij,ij->i", rows @ np.linalg.inv(information), rows))
 
 
@@ -239,9 +238,7 @@ def _highest(height: Callable[[Array], Array], low: float, high: float) -> float
 
 
 def _excess(columns: OrthonormalColumns, places: Array, weights: Array) -> float:
-    information = columns.information(places, weights)
-    rows = columns.at(columns.grid)
-    variances = np.einsum("ij,ij->i", rows @ np.linalg.inv(information), rows)
+    variances = _variances(columns.at(columns.grid), columns.information(places, weights))
     return float(variances.max()) / columns.count - 1.0
 
 

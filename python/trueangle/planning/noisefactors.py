@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -199,33 +199,33 @@ def search_offsets(positions: int, mounts: int, orders: Sequence[float]) -> list
     if float(_worst(positions, even[None], orders)[0]) <= 1.0 + _IDEAL:
         return [round(float(o), 9) for o in even]
     steps = np.arange(1, _STEPS, dtype=np.float64) * (pitch / _STEPS)
-    if mounts == 2:
-        trial = np.stack([np.zeros_like(steps), steps], axis=1)
-        # Mirror images are equally good: take the smaller offset.
-        best = [trial[first_largest(-_worst(positions, trial, orders))]]
-    else:
-        random = np.random.default_rng(0)
-        starts: Array = np.zeros((_STARTS, mounts))
-        starts[:, 1:] = random.choice(steps, size=(_STARTS, mounts - 1))
-        ranked = np.argsort(_worst(positions, starts, orders), kind="stable")[:_REFINED]
-        best = [_refine(positions, starts[i], steps, orders) for i in ranked]
-    scores = np.array([float(_worst(positions, o[None], orders)[0]) for o in best])
-    chosen = best[first_largest(-scores)]
+    # Mirror images are equally good: the smaller offset of two is taken.
+    starts: Array = np.zeros((_STARTS if mounts > 2 else 1, mounts))
+    if mounts > 2:
+        starts[:, 1:] = np.random.default_rng(0).choice(steps, size=(_STARTS, mounts - 1))
+    chosen = search_spread(lambda trial: _worst(positions, trial, orders), starts, steps)
     return sorted(round(float(o), 9) for o in chosen)
 
 
-def _refine(positions: int, start: Array, steps: Array, orders: Sequence[float]) -> Array:
-    """One offset at a time moved to its best place, until none moves."""
-    offsets: Array = start.copy()
-    for _ in range(_SWEEPS):
-        before = offsets.copy()
-        for j in range(1, offsets.size):
-            trial = np.repeat(offsets[None], steps.size, axis=0)
-            trial[:, j] = steps
-            offsets = trial[first_largest(-_worst(positions, trial, orders))]
-        if (offsets == before).all():
-            break
-    return offsets
+def search_spread(worst: Callable[[Array], Array], starts: Array, steps: Array) -> Array:
+    """The row with the least ``worst``, the first of its numbers fixed.
+
+    The best of ``starts`` are refined: one number at a time moves to its best step, until none
+    moves.
+    """
+    found = []
+    for start in starts[np.argsort(worst(starts), kind="stable")[:_REFINED]]:
+        here: Array = start.copy()
+        for _ in range(_SWEEPS):
+            before = here.copy()
+            for j in range(1, here.size):
+                trial = np.repeat(here[None], steps.size, axis=0)
+                trial[:, j] = steps
+                here = trial[first_largest(-worst(trial))]
+            if (here == before).all():
+                break
+        found.append(here)
+    return found[first_largest(-worst(np.array(found)))]
 
 
 def search_shifts(positions: int, mounts: int) -> tuple[tuple[int, ...], float]:

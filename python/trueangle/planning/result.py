@@ -155,17 +155,9 @@ class CalibrationPlan(PlainResult):
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON."""
         return {
-            "kind": self.kind,
-            "positions": self.positions,
-            "mount_offsets_deg": list(self.mount_offsets_deg),
-            "facet_shifts": list(self.facet_shifts),
-            "facet_noise_factor": finite_or_none(self.facet_noise_factor),
+            **plain_plan(vars(self)),
             "worst_noise_factor": finite_or_none(self.worst_noise_factor),
-            "noise_factors": plain_plan(self.noise_factors),
             "invisible_orders": list(self.invisible_orders),
-            "tolerance_deg": self.tolerance_deg,
-            "readings": self.readings,
-            "notes": list(self.notes),
         }
 
     def summary(self) -> str:
@@ -287,20 +279,9 @@ class SelfPlan(PlainResult):
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON."""
         return {
-            "method": self.method,
-            "orders": list(self.orders),
-            "noise_factors": plain_plan(self.noise_factors),
-            "worst_noise_factor": plain_plan(self.worst_noise_factor),
+            **plain_plan(vars(self)),
+            "worst_noise_factor": finite_or_none(self.worst_noise_factor),
             "blind_orders": list(self.blind_orders),
-            "angles_deg": list(self.angles_deg),
-            "given": plain_plan(self.given),
-            "speed_ratio": self.speed_ratio,
-            "speed_ratio_factors": plain_plan(self.speed_ratio_factors),
-            "turns": self.turns,
-            "readings": self.readings,
-            "seconds": self.seconds,
-            "knots_per_turn": self.knots_per_turn,
-            "notes": list(self.notes),
         }
 
     def summary(self) -> str:

@@ -17,6 +17,7 @@ from ..simulation.simulation import Simulation
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
+from .noisefactors import search_spread
 from .plan import readings_needed
 from .result import SelfPlan
 
@@ -30,8 +31,7 @@ _KNOTS: Final = 0.5
 _STEP: Final = 0.1
 _BLIND: Final = 1e-3
 
-_STARTS: Final = 400
-_SWEEPS: Final = 6
+_STARTS: Final = 4000
 
 
 def angle_factors(angles_deg: ArrayLike, orders: Sequence[float]) -> Array:
@@ -82,25 +82,10 @@ def best_angles(count: int, orders: Sequence[float]) -> tuple[float, ...]:
     k = sorted(orders)
     if count == 2 and k == list(range(1, len(k) + 1)):
         return 0.0, round(360.0 / (len(k) + 1), 4)
+    starts: Array = np.zeros((_STARTS, count))
+    starts[:, 1:] = np.random.default_rng(0).uniform(0.0, 360.0, (_STARTS, count - 1))
     steps = np.arange(0.0, 360.0, _STEP)
-    random = np.random.default_rng(0)
-    trial: Array = np.zeros((_STARTS * 10, count))
-    trial[:, 1:] = random.uniform(0.0, 360.0, (_STARTS * 10, count - 1))
-    start = trial[np.argsort(angle_factors(trial, k).max(axis=-1))[:8]]
-    best, score = start[0], math.inf
-    for angles in start:
-        here = angles.copy()
-        for _ in range(_SWEEPS):
-            before = here.copy()
-            for i in range(1, count):
-                tried = np.repeat(here[None], steps.size, axis=0)
-                tried[:, i] = steps
-                here = tried[int(np.argmin(angle_factors(tried, k).max(axis=-1)))]
-            if (here == before).all():
-                break
-        worst = float(angle_factors(here, k).max())
-        if worst < score - 1e-9:
-            best, score = here, worst
+    best = search_spread(lambda trial: angle_factors(trial, k).max(axis=-1), starts, steps)
     return tuple(round(float(a), 4) for a in np.sort(best))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ArgumentError
 from . import palette
-from .canvas import described, grid, new_axes, new_figure
+from .canvas import described, grid, new_axes, new_figure, plain_logarithms
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -148,19 +148,6 @@ def detection(rehearsal: Rehearsal) -> Figure:
     return figure
 
 
-def _size_ticks(ax: Axes) -> None:
-    """At most `_TICKS` plain numbers: those of matplotlib run into each other here."""
-    low, high = sorted(ax.get_xlim())
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    for marks in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
-        ticks = [m * 10.0**d for d in decades for m in marks if low <= m * 10.0**d <= high]
-        if len(ticks) <= _TICKS:
-            break
-    ticks = ticks[:: -(-len(ticks) // _TICKS)] if ticks else [math.sqrt(low * high)]
-    ax.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
-    ax.minorticks_off()
-
-
 def _draw(ax: Axes, cause: RehearsedCause) -> None:
     size = np.array([*cause.tried])
     entries = cause.to_dict()["tried"]
@@ -181,7 +168,7 @@ def _draw(ax: Axes, cause: RehearsedCause) -> None:
         ax.set_xlim(size[0] / 2.0, size[0] * 2.0)
     if not cause.grows:
         ax.invert_xaxis()
-    _size_ticks(ax)
+    plain_logarithms(ax, "x", _TICKS)
     ax.set_ylim(-0.05, 1.05)
     ax.set_title(cause.cause, fontsize="small")
     ax.set_xlabel(cause.size_name, fontsize="small")

@@ -14,9 +14,10 @@ from trueangle import plots
 from trueangle.certificate.typesetting import certified_errors
 from trueangle.fitting.phases import run_phases
 from trueangle.plots import curves
+from trueangle.plots.canvas import plain_logarithms
 from trueangle.plots.curves import Points
 from trueangle.plots.diagnosispictures import error_left, gains
-from trueangle.plots.planpictures import _size_ticks, detection
+from trueangle.plots.planpictures import detection
 from trueangle.plots.readingpictures import before_after_picture, residual_picture
 from trueangle.rehearsal.result import RehearsedCause
 from trueangle.support.display_units import error_unit
@@ -160,7 +161,7 @@ def test_sizes_are_marked_evenly_on_their_logarithmic_axis(low, span):
     _, ax = matplotlib.pyplot.subplots()
     ax.set_xscale("log")
     ax.set_xlim(low, span * low)
-    _size_ticks(ax)
+    plain_logarithms(ax, "x", 4)
     marks = ax.get_xticks()
     assert 1 <= marks.size <= 4
     assert low * (1.0 - 1e-9) <= marks.min() <= marks.max() <= span * low * (1.0 + 1e-9)
