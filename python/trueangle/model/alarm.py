@@ -53,5 +53,4 @@ class WatchedWindow(ShownResult):
     def plain(self, scale: float) -> dict[str, Any]:
         """As plain values; sizes times ``scale`` are arcsec."""
         found = plain_row(self, scale)
-        del found["readings"]
-        return {"time_s": found.pop("time"), **found}
+        return {{"time": "time_s"}.get(k, k): v for k, v in found.items() if k != "readings"}
