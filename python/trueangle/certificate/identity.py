@@ -237,8 +237,8 @@ def _known(table: Mapping[str, Any], names: tuple[str, ...], where: str) -> None
     for key in table:
         if key not in names:
             raise ArgumentError(
-                f"{where} has an unknown entry {key!r}{did_you_mean(key, names)}; known are "
-                f"{', '.join(names)}"
+                f"{where} has an unknown entry {key!r}; it may have "
+                f"{', '.join(names)}{did_you_mean(key, names)}"
             )
 
 

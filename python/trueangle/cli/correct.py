@@ -143,8 +143,8 @@ def _columns_of_joints(
     for joint in args.joint or ():
         if joint not in known:
             raise ArgumentError(
-                f"--joint {joint}: it has no model{did_you_mean(joint, known)}; the joints are "
-                f"{listed_names(known)}"
+                f"--joint {joint}: it has no model; the joints are "
+                f"{listed_names(known)}{did_you_mean(joint, known)}"
             )
     if args.robot is None:
         signals_by_joint(args.signal, single=False)  # that of a joint has its name before it

@@ -358,8 +358,7 @@ def _written(result: Diagnosis, args: argparse.Namespace, model: HarmonicModel |
 
 def _unwritten(args: argparse.Namespace, complete: bool) -> str:
     """What an interruption left undone."""
-    outputs = (args.extend, args.plan, args.extend_into, args.corrected_model)
-    files = [path for path in outputs if path]
+    files = [f for f in (args.extend, args.plan, args.extend_into, args.corrected_model) if f]
     told = "the account is complete" if complete else "the account so far is incomplete"
     return told + (f", and {' and '.join(map(str, files))} not written" if files else "")
 
@@ -370,7 +369,6 @@ def _corrected(result: Diagnosis, path: str, extended: bool) -> Iterator[str]:
 
     yield f"\n{'Extended correction' if extended else 'Correction'} model: {path}"
     for finding in result.findings:
-        if finding.cause in NOT_AT_RUN_TIME:
-            yield f"  not corrected: {finding.cause} ({NOT_AT_RUN_TIME[finding.cause]})"
-        elif not finding.confirmed:
-            yield f"  not corrected: {finding.cause} (not confirmed)"
+        why = NOT_AT_RUN_TIME.get(finding.cause, "" if finding.confirmed else "not confirmed")
+        if why:
+            yield f"  not corrected: {finding.cause} ({why})"

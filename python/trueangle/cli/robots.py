@@ -124,16 +124,15 @@ def _asked(
             own.setdefault(COUPLED + other, type(entry)((None, COUPLED + other, *entry[2:])))
     signals = [type(e)((None, *e[1:])) for e in own.values()]
     signals += [e for e in entries if e[0] == _SIMULATED]
-    changed: dict[str, Any] = {"signal": signals, "robot": None, "joint": None}
-    changed["of_joint"] = joint.name
+    new: dict[str, Any] = {"signal": signals, "robot": None, "joint": None, "of_joint": joint.name}
     if args.robot is not None:
-        changed |= {
+        new |= {
             "gear_ratio": joint.gear_ratio,
             "fixed_member": joint.fixed_member,
             "shaft": [f"{name}={cycles!r}" for name, cycles in joint.shafts.items()] or None,
             "simulation": None if joint.simulation is None else str(joint.simulation),
         }
-    return JointAsked(joint.name, argparse.Namespace(**{**vars(args), **changed}))
+    return JointAsked(joint.name, argparse.Namespace(**{**vars(args), **new}))
 
 
 def _key(entry: Any) -> str:

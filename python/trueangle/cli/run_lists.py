@@ -37,8 +37,8 @@ def read_selected_runs(args: argparse.Namespace) -> list[CalibrationRun]:
         )
     if missing:
         raise ArgumentError(
-            f"--run {missing[0]}: no such run{did_you_mean(missing[0], known)}; "
-            f"the runs are {listed_names(known)}"
+            f"--run {missing[0]}: no such run; the runs are "
+            f"{listed_names(known)}{did_you_mean(missing[0], known)}"
         )
     chosen = {name for names in found.values() for name in names}
     return [run for run in runs if run.label in chosen]

@@ -164,8 +164,8 @@ def orders_by_shaft(
         shaft = name.strip()
         if shaft not in known:
             raise ArgumentError(
-                f"--orders: there is no shaft {shaft!r}{did_you_mean(shaft, known)}; "
-                f"the shafts are {', '.join(known)}"
+                f"--orders: there is no shaft {shaft!r}; the shafts are "
+                f"{', '.join(known)}{did_you_mean(shaft, known)}"
             )
         if shaft in by_shaft:
             raise ArgumentError(f"--orders names shaft {shaft!r} twice: {text!r}")

@@ -50,17 +50,20 @@ _OPTIONS: Final = {
 #: Units of columns by the period that they have in Python.
 _UNITS: Final = {"360": "deg", "360.0": "deg", "1": "turn", "1.0": "turn"}
 
-#: Functions of Python that are commands of another name.
+#: Functions of Python that are commands of another name, and methods that are options.
 _COMMANDS: Final = {
     "correct_logs": "correct",
+    "diagnosis.correction()": "--corrected-model FILE",
     "export_model": "export",
     "fit_logs": "fit --one-pass",
     "import_model": "import",
+    "diagnosis.plan()": "--plan FILE",
     "plan_encoder": "plan --reference encoder",
     "plan_mounts": "plan",
     "plan_self": "plan --self",
     "plan_tilts": "plan --reference off-null",
     "select_orders": "orders",
+    "diagnosis.simulation()": "--extend FILE",
 }
 
 #: Makes the parser of commands: with the arguments of some, of those that are named.
@@ -116,7 +119,7 @@ class Wording:
         if _ARGUMENT.fullmatch(code):
             return self._option(code[:-1]) or found[0]
         if not (_ARGUMENT.match(code) or _CALL.fullmatch(code)):
-            return found[0]
+            return _COMMANDS.get(code, found[0])
         import ast  # needed only where something is wrong
 
         try:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from ..effects import EFFECTS
-from ..effects.ambiguity import Ambiguity
 from ..errors import ArgumentError, NoModelError
 from ..model.model import HarmonicModel
 from ..simulation.simulation import Simulation
@@ -15,7 +13,6 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.argumentkinds import of_type
 from ..support.plainresult import PlainResult
 from .correction import extend_model
-from .finding import Finding
 
 if TYPE_CHECKING:
     from ..fitting.argument import AnyArgument
@@ -23,15 +20,21 @@ if TYPE_CHECKING:
     from ..runs.run import CalibrationRun
 
 
+#: What to do where nothing else is known.
+MEASURE_MORE = "measure more runs, in both directions and at two speeds, then diagnose again"
+
+
 class Correctable(PlainResult):
     """A diagnosis that a model can be made of."""
 
     if TYPE_CHECKING:
         # What the diagnosis holds.
-        findings: list[Finding]
+        @property
+        def next_steps(self) -> list[str]:
+            """What to do next."""
+
         extended: Simulation
         noise: float
-        not_identifiable: list[Ambiguity]
         runs: Sequence[CalibrationRun]
         simulated: MeasuredMinusSimulated | None
 
@@ -142,23 +145,7 @@ class Correctable(PlainResult):
         """Raise where nothing was confirmed that a model can hold."""
         if self._is_correctable:
             return
+        steps = "; ".join(self.next_steps or [MEASURE_MORE])
         raise NoModelError(
-            "no correction can be given: no confirmed cause can be corrected"
-            + "".join(f"; {reason}" for reason in self._uncorrected())
+            f"no correction can be given: no confirmed cause can be corrected; {steps}"
         )
-
-    def _uncorrected(self) -> Iterator[str]:
-        """Why nothing can be corrected, and what to measure."""
-        sure = [f for f in self.findings if f.confirmed]
-        if sure:
-            why = (f"{f.cause} ({EFFECTS[f.cause].not_at_run_time or 'no term'})" for f in sure)
-            yield f"confirmed: {', '.join(why)}"
-        if len(sure) < len(self.findings):
-            why = (f"{f.cause} ({f.reason})" for f in self.findings if not f.confirmed)
-            yield f"not confirmed: {', '.join(why)}"
-        seen = [spot for spot in self.not_identifiable if spot.supported]
-        told = {spot.measure: ", ".join(spot.causes) for spot in reversed(seen)}
-        if told:
-            yield from (f"to distinguish {causes}: {measure}" for measure, causes in told.items())
-        else:
-            yield "measure more runs, in both directions and at two speeds, then diagnose again"

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
 from ..estimation.regression import ROUNDING
 from ..joint.signals import join_runs
@@ -16,7 +17,7 @@ from ..simulation.simulation import Simulation
 from ..support.layout import counted
 from ..support.plainresult import json_text
 from .beliefs import Belief
-from .correctable import Correctable
+from .correctable import MEASURE_MORE, Correctable
 from .discrepancy import Discrepancy
 from .factors.factor import Factor
 from .finding import Finding
@@ -65,8 +66,13 @@ class DiagnosisData(Correctable):
             self.complete
             and not self.findings
             and not (self.unexplained is not None and self.unexplained.found)
-            and all(belief.verdict == "confirmed" for belief in self.beliefs)
+            and not self.wrong
         )
+
+    @property
+    def wrong(self) -> list[Belief]:
+        """What the simulation assumes and the readings do not confirm."""
+        return [belief for belief in self.beliefs if belief.verdict != "confirmed"]
 
     def simulation(self) -> Simulation:
         """`extended`, with the noise of the readings and designs of their runs.
@@ -135,6 +141,43 @@ class DiagnosisData(Correctable):
         """
         is_open = any(spot.supported and spot.hypotheses for spot in self.not_identifiable)
         return self.plan() if is_open and self.complete and self.runs else None
+
+    @property
+    def planned(self) -> set[tuple[str, ...]]:
+        """The causes that `next_runs` distinguish."""
+        plan = self.next_runs
+        return {
+            entry.causes for entry in (plan.between if plan and plan.runs else ()) if entry.told
+        }
+
+    @property
+    def in_question(self) -> list[Ambiguity]:
+        """Causes of which one is detected, and none is named."""
+        return [spot for spot in self.not_identifiable if spot.supported and not spot.common]
+
+    @property
+    def next_steps(self) -> list[str]:
+        """What to do: about the data, with what is confirmed, about what is open."""
+        if self.data_faults:
+            return ["remove the faults of the data and diagnose again"]
+        steps = []
+        sure = [finding for finding in self.findings if finding.confirmed]
+        curves = [curve for factor in self.factors for curve in factor.effects]
+        added = [*(effect for finding in sure for effect in finding.effects), *curves]
+        if self.simulated is None and any(not effect.not_at_run_time for effect in added):
+            steps.append("write the correction model (`diagnosis.correction()`)")
+        elif added or self.wrong:
+            steps.append("write the extended simulation (`diagnosis.simulation()`)")
+        lasting = {f.cause: EFFECTS[f.cause].not_at_run_time for f in sure}
+        steps += [f"{cause} cannot be corrected: {why}" for cause, why in lasting.items() if why]
+        steps += ["measure the next runs (`diagnosis.plan()`)"] if self.planned else []
+        still = [spot for spot in self.in_question if spot.causes not in self.planned]
+        told = {spot.measure: ", ".join(spot.causes) for spot in reversed(still)}
+        steps += [f"to distinguish {causes}: {measure}" for measure, causes in told.items()]
+        unexplained = self.unexplained is not None and self.unexplained.found
+        if not self.planned and (unexplained or len(sure) < len(self.findings)):
+            steps.append(MEASURE_MORE)
+        return steps
 
     def _without_open(self) -> Simulation:
         """The extended simulation without what may be due to another cause."""

@@ -242,4 +242,7 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
         stds = std if isinstance(std, list) else [std] * len(sizes)
         shown = [*map((ErrorUnit(word, factor) if word else unit).number, sizes[:4], stds)]
         return f"{name} ({', '.join(shown)}{' ...' * (len(sizes) > 4)} {word or unit.name})"
-    return name
+    if finding.gain is None:
+        return name
+    before, after = finding.gain.before[0], finding.gain.after[0]
+    return f"{name} ({unit.text(max(before**2 - after**2, 0.0) ** 0.5)} rms)"

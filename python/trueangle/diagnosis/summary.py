@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Iterable, Iterator
 
 from ..effects.ambiguity import Ambiguity
 from ..effects.missing_order import MissingOrder
@@ -11,7 +12,7 @@ from ..support.layout import laid_out
 from ..support.layout import wrapped_lines as _wrapped
 from .beliefs import Belief
 from .diagnosisdata import DiagnosisData
-from .finding import brief_finding, finding_lines, named_quantity, parameter_unit
+from .finding import Finding, brief_finding, finding_lines, named_quantity, parameter_unit
 from .goodness.evidence import Evidence
 from .goodness.scatter import AGAINST_STATED
 
@@ -32,17 +33,14 @@ def diagnosis_summary(
     d = diagnosis.discrepancy
     unit = error_unit(errors_in, sine_of_rms(d.rms))
     n = unit.number
+    neighbours = f", correlation between neighbours {diagnosis.correlation:.2f}"
+    correlated = neighbours if diagnosis.correlation else ""
     lines = [
         *_headline(diagnosis, unit),
         *_wrapped(diagnosis.simulated.summary() if diagnosis.simulated else "", 0),
         f"Measured minus simulated: rms {unit.text(d.rms)}, peak-to-peak "
         f"{n(d.peak_to_peak)}, max abs {n(d.max_abs)} ({diagnosis.readings} readings).",
-        f"Noise of one reading: {unit.text(diagnosis.noise)}"
-        + (
-            f", correlation between neighbours {diagnosis.correlation:.2f}."
-            if diagnosis.correlation
-            else "."
-        ),
+        f"Noise of one reading: {unit.text(diagnosis.noise)}{correlated}.",
     ]
     if diagnosis.structure:
         shares = [f"{cause} {100.0 * s:.0f} %" for cause, s in diagnosis.structure.items()]
@@ -52,10 +50,9 @@ def diagnosis_summary(
         lines += _wrapped(f"{used} at a turning point, where the direction is not known.", 0)
     for k, finding in enumerate(diagnosis.findings, 1):
         lines += ["", *finding_lines(f"{k}. ", finding, unit)]
-    wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
-    if wrong:
+    if diagnosis.wrong:
         lines += ["", "Wrong in the simulation:"]
-        for belief in wrong:
+        for belief in diagnosis.wrong:
             lines += _wrapped(f"- {_belief(belief, unit)}", 2)
     g = diagnosis.gain
     together = (
@@ -69,7 +66,7 @@ def diagnosis_summary(
         lines.append("")
         for text in diagnosis.torque.lines():
             lines += _wrapped(text, 2)
-    open_still = [*_ambiguity_entries(diagnosis, verbose, lambda spot: _if_it_is(spot, unit))]
+    open_still = [*_ambiguity_entries(diagnosis, verbose, unit)]
     if diagnosis.next_runs is not None and diagnosis.next_runs.runs:
         lines += ["", *diagnosis.next_runs.summary().splitlines()]
     lines += [""] if open_still else []
@@ -87,53 +84,60 @@ def _if_it_is(spot: Ambiguity, unit: ErrorUnit) -> Iterator[str]:
 
 
 def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
-    """What a reader must know first: faults, what is not understood, what is found or wrong."""
-    lines: list[str] = []
-    for note in diagnosis.notes:
-        lines += _wrapped(f"{note}.", 2)
-    for fault in diagnosis.data_faults:
-        lines += _wrapped(f"Fault of the data, {fault}.", 2)
+    """What a reader must know first: what is found, how large it is, and what to do."""
+    entries = [*_found(diagnosis, unit)]
+    rest = diagnosis.unexplained
+    noise = [] if rest is None else [item for item in rest.noise_firing if _is_material(item)]
+    if entries:
+        told = (unit.spoken(item.says) for item in noise if item.test == AGAINST_STATED)
+        entries += [(f"{text[0].upper()}{text[1:]}.", 2, 0) for text in told]
+    elif noise:
+        entries.append(("No pattern beyond the simulation, but the noise differs:", 0, 0))
+        entries += _items(noise, unit)
+    else:
+        entries.append(("Nothing beyond the simulation: no test is significant.", 0, 0))
+    steps = "; ".join(diagnosis.next_steps)
+    entries += [(f"What to do: {steps}.", 2, 0)] if steps else []
+    return [*(line for entry in entries for line in _wrapped(*entry)), ""]
+
+
+def _items(evidence: Iterable[Evidence], unit: ErrorUnit) -> Iterator[Entry]:
+    return ((f"- {unit.spoken(item.says)} (p {_chance(item.p)})", 4, 2) for item in evidence)
+
+
+def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
+    """Faults of the data, what is not understood, what is found or wrong."""
+    yield from ((f"{note}.", 2, 0) for note in diagnosis.notes)
+    yield from ((f"Fault of the data, {fault}.", 2, 0) for fault in diagnosis.data_faults)
     rest = diagnosis.unexplained
     if rest is not None and rest.found:
-        lines += _wrapped(
-            f"NOT UNDERSTOOD: at least {unit.text(rest.rms)} rms ({100.0 * rest.share:.0f} % of "
-            "the residual variance) is not noise and has no known cause.",
-            2,
-        )
-        for item in rest.firing[:3]:
-            lines += _wrapped(f"- {unit.spoken(item.says)} (p {_chance(item.p)})", 4, 2)
-    confirmed = [brief_finding(f, unit) for f in diagnosis.findings if f.confirmed]
-    doubtful = [brief_finding(f, unit) for f in diagnosis.findings if not f.confirmed]
-    wrong = [belief for belief in diagnosis.beliefs if belief.verdict != "confirmed"]
-    if confirmed:
-        lines += _wrapped(f"Confirmed: {', '.join(confirmed)}.", 2)
-    if diagnosis.torque is not None:
-        lacking = [f.summary() for f in diagnosis.torque.findings if f.confirmed]
-        if lacking:
-            lines += _wrapped(f"Confirmed in the drive's torque: {'; '.join(lacking)}.", 2)
-    for factor in diagnosis.factors:
-        if not factor.named_by:
-            lines += _wrapped(f"Follows {factor.sentence(unit)}.", 2)
-    if doubtful:
-        lines += _wrapped(f"Not confirmed: {', '.join(doubtful)}.", 2)
+        share = f"{100.0 * rest.share:.0f} % of the residual variance"
+        text = f"NOT UNDERSTOOD: at least {unit.text(rest.rms)} rms ({share}) is not noise"
+        yield f"{text} and has no known cause.", 2, 0
+        yield from _items(rest.firing[:3], unit)
+    for title, status in (("Confirmed", True), ("Not confirmed", False)):
+        named = [brief_finding(f, unit) for f in diagnosis.findings if f.confirmed is status]
+        if named:
+            yield f"{title}: {_by_cause(named)}.", 2, 0
+    lacking = () if diagnosis.torque is None else diagnosis.torque.findings
+    torque = "; ".join(f.summary() for f in lacking if f.confirmed)
+    if torque:
+        yield f"Confirmed in the drive's torque: {torque}.", 2, 0
+    yield from ((f"Follows {factor.sentence(unit)}.", 2, 0) for factor in diagnosis.factors)
+    wrong = "; ".join(f"{b.what} {b.verdict.replace('_', ' ')}" for b in diagnosis.wrong[:4])
     if wrong:
-        told = "; ".join(f"{b.what} {b.verdict.replace('_', ' ')}" for b in wrong[:4])
-        lines += _wrapped(f"Wrong in the simulation: {told}.", 2)
-    for spot in diagnosis.not_identifiable:
-        if spot.supported and not spot.common:
-            lines += _wrapped(f"Detected, not distinguished: {_seen(spot, unit)}.", 2)
-    noise = [] if rest is None else [item for item in rest.noise_firing if _is_material(item)]
-    if lines:
-        for item in noise:
-            if item.test == AGAINST_STATED:
-                lines += _wrapped(f"{unit.spoken(item.says[0].upper() + item.says[1:])}.", 2)
-    elif noise:
-        lines = ["No pattern beyond the simulation, but the noise differs:"]
-        for item in noise:
-            lines += _wrapped(f"- {unit.spoken(item.says)} (p {_chance(item.p)})", 4, 2)
-    else:
-        lines = ["Nothing beyond the simulation: no test is significant."]
-    return [*lines, ""]
+        yield f"Wrong in the simulation: {wrong}.", 2, 0
+    for spot in diagnosis.in_question:
+        yield f"Detected, not distinguished: {_seen(spot, unit)}.", 2, 0
+
+
+def _by_cause(named: Iterable[str]) -> str:
+    """Findings in brief, those of one kind together: what they are once, then each size."""
+    sizes: dict[str, list[str]] = {}
+    for text in named:
+        what, *size = re.split(r" (?=[-\d(])", text, maxsplit=1)
+        sizes.setdefault(what, []).extend(size)
+    return "; ".join(f"{what} {', '.join(each)}".strip() for what, each in sizes.items())
 
 
 def _is_material(item: Evidence) -> bool:
@@ -143,18 +147,8 @@ def _is_material(item: Evidence) -> bool:
 
 def _seen(spot: Ambiguity, unit: ErrorUnit) -> str:
     """Causes of which one is detected, each with the size that it would have."""
-    sizes = []
-    for cause in spot.causes:
-        first = next(
-            (
-                " ".join(named_quantity(name, q, unit))
-                for name, q in spot.estimates.get(cause, {}).items()
-                if isinstance(q.value, float)
-            ),
-            "",
-        )
-        sizes.append(f"{cause}{f' ({first})' if first else ''}")
-    return " or ".join(sizes)
+    each = (Finding(cause, spot.estimates.get(cause, {}), {}, None, []) for cause in spot.causes)
+    return " or ".join(brief_finding(finding, unit) for finding in each)
 
 
 def _belief(belief: Belief, unit: ErrorUnit) -> str:
@@ -186,16 +180,12 @@ def _ambiguity_matters(spot: Ambiguity, diagnosis: DiagnosisData) -> bool:
     return spot.supported or bool(set(spot.causes) & (asked - {MissingOrder.kind}))
 
 
-def _ambiguity_entries(
-    diagnosis: DiagnosisData, verbose: bool, sizes: Callable[[Ambiguity], Iterator[str]]
-) -> Iterator[Entry]:
+def _ambiguity_entries(diagnosis: DiagnosisData, verbose: bool, unit: ErrorUnit) -> Iterator[Entry]:
     """Entries on what cannot be determined, what is detected first.
 
     Causes neither in question nor detected are named in one line, unless ``verbose``.
-    ``sizes`` gives what each cause of a blind spot would amount to.
     """
-    plan = diagnosis.next_runs
-    planned = {entry.causes for entry in (plan.between if plan and plan.runs else ()) if entry.told}
+    planned = diagnosis.planned
     spots = sorted(diagnosis.not_identifiable, key=lambda spot: not spot.supported)
     shown = [spot for spot in spots if verbose or _ambiguity_matters(spot, diagnosis)]
     if shown:
@@ -203,19 +193,14 @@ def _ambiguity_entries(
     for spot in shown:
         how = "" if spot.causes in planned and not verbose else f" To find out: {spot.measure}."
         yield f"- {_head(spot)}: {spot.because}.{how}", 2, 0
-        for text in sizes(spot):
-            yield text, 6, 4
+        yield from ((text, 6, 4) for text in _if_it_is(spot, unit))
     named = {finding.cause for finding in diagnosis.findings}
     others = (cause for spot in spots if spot not in shown for cause in spot.causes)
     rest = [cause for cause in others if cause not in named]
     if rest:
         names = ", ".join(dict.fromkeys(rest))
         again = " either" if shown else ""
-        yield (
-            f"Not detectable in these runs{again}: {names} (why: `verbose=True`).",
-            2,
-            0,
-        )
+        yield f"Not detectable in these runs{again}: {names} (why: `verbose=True`).", 2, 0
 
 
 def _head(spot: Ambiguity) -> str:

@@ -30,8 +30,8 @@ class TabledParameters:
         for name in table:
             if name not in known:
                 raise ArgumentError(
-                    f"effect '{cls.kind}' has no parameter '{name}'{did_you_mean(name, known)}; "
-                    f"it has {', '.join(known) or 'none'}"
+                    f"effect '{cls.kind}' has no parameter '{name}'; it has "
+                    f"{', '.join(known) or 'none'}{did_you_mean(name, known)}"
                 )
         values: dict[str, Any] = {}
         for name, field in known.items():

@@ -241,8 +241,8 @@ class Target(ABC):
             if value is not None and name not in self.options:
                 known = ", ".join(f"`{known}=`" for known in self.options)
                 raise ArgumentError(
-                    f"{self.name} has no option `{name}=`{did_you_mean(name, self.options)}; "
-                    f"it has {known or 'none'}"
+                    f"{self.name} has no option `{name}=`; it has "
+                    f"{known or 'none'}{did_you_mean(name, self.options)}"
                 )
         found = {}
         for name, option in self.options.items():

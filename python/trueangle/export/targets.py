@@ -64,7 +64,7 @@ def export_target(name: str) -> Target:
     """
     if name not in TARGETS:
         raise ArgumentError(
-            f"there is no target {name!r}{did_you_mean(name, TARGETS)}; the targets are "
-            f"{', '.join(TARGETS)}"
+            f"there is no target {name!r}; the targets are "
+            f"{', '.join(TARGETS)}{did_you_mean(name, TARGETS)}"
         )
     return TARGETS[name]

@@ -28,7 +28,7 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
         ("argument", f"{model.argument} angle"),
         ("zero", zero_text(model.constant, model.period) + _spread(fit, shown)),
         ("residual", f"{left}, {fit.degrees_of_freedom:.6g} degrees of freedom"),
-        ("method", f"{fit.method}, condition number {fit.condition_number:.3g}"),
+        ("condition", f"number {fit.condition_number:.3g}; 1 where all orders are independent"),
     ]
     if model.covariance is not None:
         head.append(("intervals", _intervals(fit)))

@@ -46,8 +46,8 @@ def matching_column(path: object, header: Sequence[str], name: str) -> str:
     import difflib
 
     near = difflib.get_close_matches(_plain(name), by_plain, 1)
-    hint = f"did you mean {by_plain[near[0]]!r}? " if near else ""
-    raise FileError(path, f"no such column; {hint}{listed_columns(header)}", line=1, column=name)
+    hint = f"; did you mean {by_plain[near[0]]!r}?" if near else ""
+    raise FileError(path, f"no such column; {listed_columns(header)}{hint}", line=1, column=name)
 
 
 def signed_name(path: object, header: Sequence[str], name: str) -> tuple[str, bool]:

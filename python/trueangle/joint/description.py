@@ -84,8 +84,8 @@ class RobotDescription:
         for name in names or ():
             if name not in known:
                 raise ArgumentError(
-                    f"no joint {name!r}{did_you_mean(name, known)}; the joints are "
-                    f"{', '.join(known)}"
+                    f"no joint {name!r}; the joints are "
+                    f"{', '.join(known)}{did_you_mean(name, known)}"
                 )
         kept = tuple(joint for joint in self.joints if not names or joint.name in names)
         return RobotDescription(self.name, kept)

@@ -183,7 +183,7 @@ def _search(path: object, header: Sequence[str], joint: str | None) -> str:
         guess = next(filter(None, guesses), "")
         raise FileError(
             path,
-            f"{problem}: name the angle's column with `column=`{guess}; {listed_columns(header)}",
+            f"{problem}: name the angle's column with `column=`; {listed_columns(header)}{guess}",
             line=1,
         )
     for candidates in _joint_names(joint):

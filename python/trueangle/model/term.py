@@ -111,8 +111,8 @@ class Term:
         for name in table:
             if name not in known:
                 raise ArgumentError(
-                    f"{cls.kind} has no parameter '{name}'{did_you_mean(name, known)}; "
-                    f"it has {', '.join(known)}"
+                    f"{cls.kind} has no parameter '{name}'; it has "
+                    f"{', '.join(known)}{did_you_mean(name, known)}"
                 )
         for name, field in known.items():
             if field.default is MISSING and name not in table:

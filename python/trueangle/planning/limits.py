@@ -203,10 +203,8 @@ def load_limits(path: str | Path) -> Limits:
     values = {}
     for name, value in table.items():
         if name not in known:
-            close = did_you_mean(name, known)
-            raise FileError(
-                path, f"[limits]: unknown key {shown_value(name)}{close}; it has {', '.join(known)}"
-            )
+            text = f"[limits]: unknown key {shown_value(name)}; it has {', '.join(known)}"
+            raise FileError(path, text + did_you_mean(name, known))
         values[name] = _value(path, name, value, known[name])
     try:
         return Limits(**values)

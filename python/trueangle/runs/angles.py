@@ -199,7 +199,7 @@ def _refuse_missing(path: object, header: Sequence[str], role: str) -> None:
     raise FileError(
         path,
         f"no column {role}_deg (one of {names} is needed, or another named with "
-        f"{role_code(role)}){guess}; {listed_columns(header)}",
+        f"{role_code(role)}); {listed_columns(header)}{guess}",
         line=1,
     )
 

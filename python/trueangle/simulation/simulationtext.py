@@ -69,8 +69,8 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> StatedSimulation:
         if name not in _TABLES:
             raise FileError(
                 path,
-                f"unknown table {shown_value(name)}{did_you_mean(name, _TABLES)}; a simulation has "
-                f"{', '.join(_TABLES)}",
+                f"unknown table {shown_value(name)}; a simulation has "
+                f"{', '.join(_TABLES)}{did_you_mean(name, _TABLES)}",
             )
     joint = _joint(path, document)
     harmonics = tuple(
@@ -106,8 +106,8 @@ def _joint(path: str | Path, document: Mapping[str, Any]) -> Joint:
         if name not in _JOINT_KEYS:
             raise FileError(
                 path,
-                f"[joint]: unknown key {shown_value(name)}{did_you_mean(name, _JOINT_KEYS)}; it "
-                f"has {', '.join(_JOINT_KEYS)}",
+                f"[joint]: unknown key {shown_value(name)}; it has "
+                f"{', '.join(_JOINT_KEYS)}{did_you_mean(name, _JOINT_KEYS)}",
             )
     gear = _build(path, "[joint]", Joint, _geared(table))
     further: dict[str, Any] = {
@@ -153,8 +153,8 @@ def _build(path: str | Path, where: str, kind: type[T], table: Mapping[str, Any]
         if name not in known:
             raise FileError(
                 path,
-                f"{where}: unknown key {shown_value(name)}{did_you_mean(name, known)}; it has "
-                f"{', '.join(known)}",
+                f"{where}: unknown key {shown_value(name)}; it has "
+                f"{', '.join(known)}{did_you_mean(name, known)}",
             )
         values[name] = _value(path, where, name, value, known[name])
     try:

@@ -215,8 +215,8 @@ class _Encoder:
         if joint < 0:
             names = [mjmodel.joint(i).name for i in range(mjmodel.njnt)]
             raise ArgumentError(
-                f"the model has no joint {name!r}{did_you_mean(name, names)}; it has "
-                f"{', '.join(names) or 'none'}"
+                f"the model has no joint {name!r}; it has "
+                f"{', '.join(names) or 'none'}{did_you_mean(name, names)}"
             )
         if mjmodel.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
             raise ArgumentError(f"joint {name!r} is not a hinge: its position is not an angle")
@@ -303,8 +303,8 @@ def _known(signals: Mapping[str, ArrayLike]) -> dict[str, Array]:
     for name in signals:
         if name not in known:
             raise ArgumentError(
-                f"there is no signal `{name}=`{did_you_mean(name, known)}; there are "
-                f"{', '.join(known)}"
+                f"there is no signal `{name}=`; there are "
+                f"{', '.join(known)}{did_you_mean(name, known)}"
             )
     return {name: np.asarray(value, np.float64) for name, value in signals.items()}
 

@@ -143,8 +143,8 @@ def role_kind(role: str) -> str:
     except ArgumentError:
         known = [*ANGLES, "reference_offset", *SIGNALS, *LABELS, "head1"]
         raise ArgumentError(
-            f"no column has the role {role!r}{did_you_mean(role, known)}; roles are "
-            f"{', '.join(known)}"
+            f"no column has the role {role!r}; roles are "
+            f"{', '.join(known)}{did_you_mean(role, known)}"
         ) from None
 
 

@@ -81,8 +81,8 @@ def check_signal_names(given: Iterable[str]) -> None:
     for name in given:
         if not is_run_time_signal(name):
             raise TypeError(
-                f"got an unexpected keyword argument {name!r}{did_you_mean(name, AT_RUN_TIME)}; "
-                f"signals are {', '.join(AT_RUN_TIME)} and {COUPLED}JOINT"
+                f"got an unexpected keyword argument {name!r}; signals are "
+                f"{', '.join(AT_RUN_TIME)} and {COUPLED}JOINT{did_you_mean(name, AT_RUN_TIME)}"
             )
 
 
@@ -157,8 +157,8 @@ def find_signal(name: str) -> Signal:
     except KeyError:
         known = [*SIGNALS, "head1", "head2", f"{COUPLED}JOINT"]
         raise ArgumentError(
-            f"no signal is called {name!r}{did_you_mean(name, known)}; signals are "
-            f"{', '.join(known)}"
+            f"no signal is called {name!r}; signals are "
+            f"{', '.join(known)}{did_you_mean(name, known)}"
         ) from None
 
 

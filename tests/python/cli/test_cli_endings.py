@@ -120,25 +120,6 @@ def test_warnings_are_shown_as_before_after_a_command(desk, monkeypatch):
     assert warnings.showwarning is mine
 
 
-# -- usage
-
-
-@pytest.mark.parametrize(
-    ("arguments", "guess"),
-    [
-        (["fitt", "r.csv"], "did you mean fit?"),
-        (["fit", "r.csv", "-o", "x", "--gear-ration", "3"], "did you mean --gear-ratio?"),
-        (["fit", "r.csv", "-o", "x", "--zzz", "3"], "unrecognized arguments: --zzz"),
-        (["fit", "r.csv", "-o", "x", "--loss", "hubert"], "did you mean huber?"),
-    ],
-)
-def test_usage_errors_suggest_what_was_meant(arguments, guess, capsys):
-    with pytest.raises(SystemExit) as left:
-        main(arguments)
-    assert left.value.code == 2
-    assert guess in capsys.readouterr().err
-
-
 # -- Ctrl-C
 
 

@@ -101,6 +101,7 @@ def test_a_terminal_has_colours_unless_it_is_told_otherwise(monkeypatch):
         ("fti", "there is no command 'fti'; did you mean fit?"),
         ("diganose r.csv", "did you mean diagnose?"),
         ("fit r.csv -o m.json --gaer-ratio 3", "did you mean --gear-ratio?"),
+        ("fit r.csv -o m.json --zzz 3", "unrecognized arguments: --zzz"),
         ("fit r.csv -o m.json --loss hubre", "did you mean huber?"),
         ("fit r.csv -o m.json --signal refrence=a", "did you mean reference?"),
         ("fit r.csv -o m.json --signal arm.torqe=a", "did you mean torque?"),
@@ -113,11 +114,6 @@ def test_what_is_mistyped_is_answered_by_the_nearest(words, said, capsys):
     told = capsys.readouterr().err.splitlines()
     assert len(told) == 2, told  # how it is used, and what is wrong
     assert said in told[1]
-
-
-def test_a_mistyped_cause_is_answered_by_the_nearest(desk, capsys):
-    assert main(["rehearse", str(desk / "believed.toml"), "--causes", "baclash"]) == 1
-    assert "did you mean backlash?" in capsys.readouterr().err
 
 
 def test_one_model_has_one_picture(desk, capsys):

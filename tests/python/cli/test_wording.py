@@ -101,7 +101,11 @@ def test_the_python_that_messages_hold_is_python_that_there_is():
 def test_every_option_of_another_name_is_one():
     options = {action.dest for p in parsers().values() for action in p._actions}
     assert {dest for names in _OPTIONS.values() for dest in names} <= options | {"method"}
-    assert {command.split()[0] for command in _COMMANDS.values()} <= set(COMMANDS)
+    first = {command.split()[0] for command in _COMMANDS.values()}
+    assert {word for word in first if word[0] != "-"} <= set(COMMANDS)
+    assert {word for word in first if word[0] == "-"} <= set(
+        parsers()["diagnose"]._option_string_actions
+    )
 
 
 def parsers():

@@ -34,8 +34,7 @@ def test_a_headline_says_which_line_and_how_large(geared):
     first = " ".join(geared.summary().split())  # at whatever width
     sizes = [f.parameters["amplitude_arcsec"].value for f in geared.findings]
     assert first.startswith(
-        f"Confirmed: missing_order output order 1 ({sizes[0]:.3f} arcsec), missing_order output "
-        f"order 2 ("
+        f"Confirmed: missing_order output order 1 ({sizes[0]:.3f} arcsec), 2 ({sizes[1]:.3f} "
     )
     # One unit for all of a joint.
     in_degrees = geared.summary(errors_in="deg")
@@ -104,3 +103,19 @@ def test_the_command_line_tells_in_full_where_asked(tmp_path, capsys):
     assert "(why: --verbose)" in said[0]
     assert "no temperature was recorded" not in said[0]
     assert "no temperature was recorded" in said[1]
+
+
+def test_a_headline_ends_with_what_to_do(geared):
+    first = " ".join(geared.summary().split("\n\n")[0].split())
+    assert "Follows the place" in first
+    assert first.endswith("What to do: write the correction model (`diagnosis.correction()`).")
+    # What is in question comes after it, by the runs that separate it or by a measurement.
+    spot = replace(geared.not_identifiable[0], supported=True, common="", measure="turn the mount")
+    open_still = replace(geared, not_identifiable=[spot])
+    assert open_still.next_steps[1:] == [f"to distinguish {', '.join(spot.causes)}: turn the mount"]
+    # What no corrector can subtract is told with its reason, and a doubt asks for more runs.
+    jitter = replace(geared.findings[0], cause="timestamp_jitter", effects=[])
+    (step,) = replace(geared, findings=[jitter], factors=[]).next_steps
+    assert step.startswith("timestamp_jitter cannot be corrected: scatter has no value")
+    doubt = replace(geared.findings[0], status="not_confirmed")
+    assert "measure more runs" in replace(geared, findings=[doubt]).next_steps[-1]

@@ -117,7 +117,7 @@ def test_so_many_joints_and_not_one_more(tmp_path: Path) -> None:
 def test_only_some_joints_in_the_order_of_the_file() -> None:
     assert WHOLE.only(None) == WHOLE.only([]) == WHOLE
     assert [j.name for j in WHOLE.only(["wrist", "base"]).joints] == ["base", "wrist"]
-    with pytest.raises(ArgumentError, match=r"no joint 'wirst'.*wrist.*; the joints are base, "):
+    with pytest.raises(ArgumentError, match=r"no joint 'wirst'; the joints are base, .*mean wrist"):
         WHOLE.only(["wirst"])
 
 
