@@ -15,6 +15,7 @@ __all__ = [
     "MissingExtraError",
     "MissingSignalError",
     "ModelFileError",
+    "NoCurveError",
     "NoModelError",
     "NoOrderError",
     "NotCorrectedWarning",
@@ -120,6 +121,10 @@ class NoOrderError(NoModelError):
     def __init__(self, message: str, readings: int = 0) -> None:
         super().__init__(message)
         self.readings = readings
+
+
+class NoCurveError(NoModelError):
+    """Channels of a sensor that draw no curve; the message states why and what to do."""
 
 
 class MissingSignalError(TrueAngleError):

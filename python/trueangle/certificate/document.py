@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..fitting.summary import fit_error_unit
-from ..runs.checks import check
+from ..runs.checks.check import check
 from ..runs.run import CalibrationRun, as_runs
 from ..runs.writing import provenance
 from ..support.angles import ARCSEC_PER_TURN

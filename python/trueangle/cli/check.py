@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the check; 1 where a fault makes the data unusable."""
-    from ..runs.checks import check
+    from ..runs.checks.check import check
 
     asked = joints_asked(args)
     if asked is not None:
@@ -77,7 +77,7 @@ def _tell_columns(error: FileError, args: argparse.Namespace) -> None:
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
     """Check every joint; 1 where the data of one are unusable."""
     from ..reports.robot import checked_rank, plain_ranking, ranked
-    from ..runs.checks import check
+    from ..runs.checks.check import check
     from ..runs.files import read_runs
 
     def work(joint: JointAsked) -> Any:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from ..errors import (
     MissingSignalError,
+    NoCurveError,
     NoModelError,
     NoOrderError,
     NotInvertibleError,
@@ -234,6 +235,8 @@ def command_that_helps(error: TrueAngleError, args: argparse.Namespace, build: _
 def _words(error: TrueAngleError, args: argparse.Namespace, build: _Build) -> list[str]:
     """The command, word by word."""
     command = args.command
+    if isinstance(error, NoCurveError):  # its message has what to do
+        return []
     if isinstance(error, NotInvertibleError) and command in ("fit", "diagnose"):
         return _again(build, args, command, ("--argument", "indicated"), _named_outputs(args))
     if isinstance(error, MissingSignalError) and command == "diagnose":

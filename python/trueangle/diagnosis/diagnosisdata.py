@@ -11,7 +11,7 @@ from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
 from ..estimation.regression import ROUNDING
 from ..joint.signals import join_runs
-from ..runs.checks import DataFault
+from ..runs.checks.fault import DataFault
 from ..simulation.measured import design_of
 from ..simulation.simulation import Simulation
 from ..support.layout import counted

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from ..errors import NoModelError
+from ..errors import NoCurveError
 from ..runs.checks.channelreadings import ChannelReadings
 from ..runs.rawchannels import CONSTANTS, ChannelHarmonic, Channels
 from ..support.arrays import Array
@@ -27,8 +27,14 @@ _MOST_IN_CELL: Final = 4.0
 #: Harmonics ``z_(-m)`` that are tried: radius of order up to 8.
 _HARMONICS: Final = tuple(range(2, 8))
 
+#: Harmonics of the curve, where the channels went through their whole period.
+_REFERENCED: Final = (-3, -2, 2, 3)
+
+#: Steps to the zeros of several runs, each about squares the distance left.
+_STEPS: Final = 6
+
 #: Share of the period that a harmonic needs, so that it is not one with the ellipse.
-WHOLE: Final = 0.9
+_WHOLE: Final = 0.9
 
 #: Standard error of the middle, in radii, from which the curvature of the arc is not known.
 _LINEAR: Final = 0.2
@@ -44,7 +50,7 @@ def estimate_channels(
 
     Raises
     ------
-    NoModelError
+    NoCurveError
         A channel is constant, both are one, too few readings, an arc that is too short: one line
         that states which.
     """
@@ -91,16 +97,16 @@ def _refuse_beyond_limit(found: ChannelEstimate, named: str) -> None:
     """Refuse constants that the arc settles worse than the correction is large."""
     std = np.sqrt(np.diag(np.asarray(found.channels.covariance)))[:2].max()
     if std > _LINEAR * abs(found.channels.fundamental):
-        raise NoModelError(
+        raise NoCurveError(
             f"{named}: {found.coverage:.0f} deg of the channels' period with this noise do not "
             "determine the offsets of the channels: turn the shaft further, 120 deg or more"
         )
-    if found.takes > (1.0 + normal_quantile(_CONFIDENCE)) * found.limit:
+    # A whole period of a sound sensor: the limit is small, and so is what is taken.
+    enough = (1.0 + normal_quantile(_CONFIDENCE)) * found.limit
+    if found.takes > enough or found.coverage >= 360.0 * _WHOLE:
         return
-    if found.coverage >= 360.0 * WHOLE:
-        return  # a sound sensor: the limit is small, and so is what is taken
     unit = math.degrees(1.0) / found.channels.periods_per_turn
-    raise NoModelError(
+    raise NoCurveError(
         f"{named}: {found.coverage:.0f} deg of the channels' period with this noise settle the "
         f"angle to {found.limit * unit:.2g} deg, and the correction takes "
         f"{found.takes * unit:.2g} deg: turn the shaft further, 120 deg or more, or average "
@@ -139,7 +145,7 @@ class ChannelEstimate:
             self.weights = weights
             self._solve()
         share = float((cells > 0).mean())
-        if share >= WHOLE:
+        if share >= _WHOLE:
             self._choose_harmonics()
         self._fit_noise_ratio()
         self.coverage = 360.0 * share
@@ -159,7 +165,7 @@ class ChannelEstimate:
             self.sine, self.cosine, self.weights, self.variances, list(self.orders), self.start
         )
         if found is None:
-            raise NoModelError(
+            raise NoCurveError(
                 f"{self.named}: the channels draw no ellipse: too short an arc, or noise alone; "
                 "turn the shaft through a period of the channels"
             )
@@ -262,6 +268,76 @@ class ChannelEstimate:
         unit = np.exp(1j * raw)
         off = np.angle(unit / unit.mean())
         return math.sqrt(float(spread.mean())), float(np.std(off))
+
+
+def referenced_channels(
+    signals: Sequence[tuple[Array, Array, Array]], channels: Channels, named: str
+) -> Channels:
+    """Constants of channels whose phase a reference determines, of runs with a zero each.
+
+    ``signals`` are sine, cosine and reference of every run; ``channels`` state the sense, periods
+    and unit.
+
+    ::
+
+        z = sum_k z_k exp(i k (φ + ψ_r)),    φ = ± 2 pi p θ / period
+
+    Raises
+    ------
+    NoCurveError
+        A channel is dead, or both are one.
+    """
+    sine, cosine, reference = (np.concatenate([run[i] for run in signals]) for i in range(3))
+    kept = ChannelReadings.of(sine, cosine).checked(named).kept
+    run = np.repeat(np.arange(len(signals)), [run[0].size for run in signals])[kept]
+    sine, cosine = sine[kept], cosine[kept]
+    unit = channels.direction * channels.periods_per_turn * 2.0 * math.pi / channels.period
+    phase = unit * reference[kept]
+    # Every run from where its cosine is at the top; what several runs then differ is estimated.
+    for i in range(len(signals)):
+        own = run == i
+        design = np.column_stack([np.ones(own.sum()), np.cos(phase[own]), -np.sin(phase[own])])
+        _, re, im = least_squares(design, cosine[own])
+        phase[own] += math.atan2(im, re)
+    harmonics = _REFERENCED if (cell_counts(phase) > 0).mean() >= _WHOLE else ()
+    target = np.concatenate([cosine, sine])
+    others = (run == np.arange(1, len(signals))[:, None]).T
+    design = _design(phase, harmonics)
+    found = least_squares(design, target)
+    width = found.size
+    for _ in range(_STEPS if len(signals) > 1 else 1):
+        slope = (_design(phase, harmonics, derivative=True) @ found[:width]).reshape(2, -1, 1)
+        zeros = (slope * others).reshape(target.size, -1)
+        design = np.column_stack([_design(phase, harmonics), zeros])
+        model = _core.LinearModel.of_rows(design, target.reshape(-1, 1), None)
+        found = np.asarray(model.coefficients).ravel()
+        phase = phase + others @ found[width:]
+    freedom = target.size - found.size
+    if freedom < 1:
+        raise NoCurveError(f"{named}: {sine.size} readings are too few for the channels")
+    residuals = target - design @ found
+    variance = float(residuals @ residuals) / freedom
+    correlated = max(inflation(residuals[: sine.size]), inflation(residuals[sine.size :]))
+    return channels_of(
+        found[:width],
+        np.asarray(model.inverse)[:width, :width] * variance * correlated,
+        harmonics,
+        direction=channels.direction,
+        periods_per_turn=channels.periods_per_turn,
+        period=channels.period,
+    )
+
+
+def _design(phase: Array, harmonics: Sequence[int], *, derivative: bool = False) -> Array:
+    """Rows of the cosine, then of the sine, by the parameters of `channels_of`; or their slopes."""
+    none = np.zeros_like(phase)
+    one = none if derivative else np.ones_like(phase)
+    columns = [(one, none), (none, one)]
+    for k in (1, *harmonics):
+        wave = (1j * k if derivative else 1.0) * np.exp(1j * k * phase)
+        x, y = wave.real, wave.imag
+        columns += [(x, none), (-y, none), (none, y), (none, x)] if k == 1 else [(x, y), (-y, x)]
+    return np.column_stack([np.concatenate(pair) for pair in columns])
 
 
 def channels_of(

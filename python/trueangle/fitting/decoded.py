@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import ArgumentError
+from ..estimation.channels import referenced_channels
+from ..estimation.tracks import joined
 from ..runs.channelangle import following
-from ..runs.rawchannels import TRACKS, joined
+from ..runs.rawchannels import TRACKS
 from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 
@@ -27,9 +29,6 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
     given = [run.channels for run in runs]
     if all(channels is None for channels in given):
         return list(runs)
-    # Few runs have channels.
-    from ..estimation.referencedchannels import referenced_channels
-
     first = given[0]
     kinds = {c and (c.direction, c.periods_per_turn, c.period) for c in given}
     if first is None or len(kinds) > 1:
@@ -44,7 +43,7 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
         others = [(run.signals["sine2"], run.signals["cosine2"], run.reference) for run in runs]
         named = f"{_named(runs[0])}, second track"
         second = referenced_channels(others, first.second, named)
-        channels, _ = joined(channels, second, track_readings(runs), _named(runs[0]))
+        channels = joined(channels, second, track_readings(runs), _named(runs[0]))
     return [
         replace(
             run,

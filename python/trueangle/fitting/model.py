@@ -11,6 +11,7 @@ import numpy as np
 
 from .._core import __version__
 from ..errors import ArgumentError
+from ..estimation.tracks import Mismatch
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
@@ -55,9 +56,7 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         dropouts = "" if channels is None else "off the channels' curve or "
         yield f"{fit.missing} {rows} {dropouts}with an empty cell omitted."
     if channels is not None and channels.second is not None:
-        from ..runs.checks.channelreadings import mismatch_words  # few runs have two tracks
-
-        yield _sentence(mismatch_words(channels.mismatch(*track_readings(fit.problem.runs))))
+        yield _sentence(Mismatch.of(channels, track_readings(fit.problem.runs)).says)
     yield from (_sentence(remark) for remark in fit.remarks)
     records = records_of(fit.runs) if fit.moments is None else []
     for test in (channel_faults, duplicate_runs, duplicate_rows, missed_counts):

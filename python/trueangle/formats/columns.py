@@ -159,6 +159,15 @@ def listed_columns(header: Sequence[str]) -> str:
     return f"its columns are {shown}" + (f" and {len(header) - 20} more" if header[20:] else "")
 
 
+def channels_code(header: Sequence[str]) -> str:
+    """How columns whose names hold "sin" and "cos" are named as channels, in Python; else empty."""
+    cosine = [name for name in header if re.search("[ck]os", name.lower())]
+    sine = [name for name in header if "sin" in name.lower() and name not in cosine]
+    if len(sine) != 1 or len(cosine) != 1:
+        return ""
+    return f"`signals={{'sine': {sine[0]!r}, 'cosine': {cosine[0]!r}}}`"
+
+
 def _plain(name: str) -> str:
     return "".join(name.split()).lower()
 

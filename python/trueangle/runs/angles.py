@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import FileError
-from ..formats.columns import listed_columns
+from ..formats.columns import channels_code, listed_columns
 from ..support.angles import UNIT_PERIODS
 from ..support.arrays import Array
 from ..support.roles import RoleColumn, offsets_of, role_code
@@ -196,6 +196,8 @@ def _refuse_missing(path: object, header: Sequence[str], role: str) -> None:
     units = (*UNIT_PERIODS, "count") if role == "indicated" else tuple(UNIT_PERIODS)
     names = ", ".join(f"{role}_{unit}" for unit in units)
     guess = next(filter(None, (did_you_mean(f"{role}_{unit}", header) for unit in units)), "")
+    if not guess and (code := channels_code(header)):
+        guess = f"; channels are named with {code}"
     raise FileError(
         path,
         f"no column {role}_deg (one of {names} is needed, or another named with "

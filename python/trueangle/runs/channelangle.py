@@ -15,6 +15,7 @@ from ..support.angles import UNIT_PERIODS, circular_mean, wrap
 from ..support.arrays import Array
 from ..support.roles import RoleColumn, role_code
 from .angles import PERIOD
+from .checks.channelreadings import ChannelReadings
 from .rawchannels import TRACKS, Channels
 from .readings import FileReadings
 from .run import CalibrationRun
@@ -68,8 +69,6 @@ def with_channel_angle(
                 f"{listed_columns(list(table.columns))}",
                 line=1,
             )
-    from .checks.channelreadings import ChannelReadings  # a fit of an angle needs none of it
-
     reference = roles["reference"]
     unit = reference.unit or table.format.unit or "deg"
     period = UNIT_PERIODS.get(unit, PERIOD)
@@ -108,7 +107,7 @@ def _periods(channels: Channels, sine: Array, cosine: Array, reference: Array) -
     """Periods in a turn of the reference; those stated where the readings are too far apart."""
     stated = channels.periods_per_turn
     phase = stated / channels.period * channels.angle(sine, cosine)
-    moved = np.diff(reference) / channels.period
+    moved = wrap(np.diff(reference) / channels.period, 1.0)
     steps = np.nan_to_num(wrap(np.diff(phase), 1.0))
     travel = float(np.abs(moved).sum())
     if travel < 1.0 / stated or np.abs(steps).max(initial=0.0) > _DENSE:

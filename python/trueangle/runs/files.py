@@ -17,6 +17,9 @@ from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, u
 from ..support.signals import FIELDS
 from ..support.times import local_day
 from .angles import PERIOD, find_run_angles
+from .channelangle import with_channel_angle
+from .checks.channelreadings import dropout_words
+from .excitation import demodulated
 from .facets import Facets, read_facets
 from .rawchannels import Channels
 from .readings import FileReadings
@@ -215,9 +218,6 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
         return _entries(table, given.counts)
     channels = dropouts = None
     if given.periods is not None or {"sine", "cosine"} & table.roles.keys():
-        from .channelangle import with_channel_angle  # few files have channels
-        from .excitation import demodulated
-
         table, excitation = demodulated(table)
         table, channels, dropouts = with_channel_angle(table, given.periods, given.reference_counts)
         if channels is not None and excitation is not None:
@@ -312,8 +312,6 @@ def _runs_of_readings(table: FileReadings, given: Conversion) -> list[Calibratio
     found = _columns(table, given)
     signals, table = found.signals, found.table
     if found.dropouts is not None and (off := np.flatnonzero(found.dropouts)).size:
-        from .checks.channelreadings import dropout_words
-
         fault = "; ".join(dropout_words(int(off.size), int(off[0]) + 1))
         warnings.warn(f"{table.path}: {fault}", EmptyCellsWarning, stacklevel=level_of_caller())
     used = {c.name for role, c in table.roles.items() if c.is_asked or role in _USED}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final, NamedTuple
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import _core
-from ..errors import ArgumentError, NoModelError
-from ..support.angles import check_period, checked_sign
+from ..errors import ArgumentError
+from ..support.angles import check_period, checked_sign, wrap
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.display_units import ErrorUnit
@@ -25,9 +25,6 @@ CONSTANTS: Final = ("offset_cosine", "offset_sine", "amplitude", "gain_ratio", "
 #: Phases at which the error of a curve is sampled, and the highest order kept of it.
 _SAMPLES: Final = 512
 _HIGHEST: Final = 64
-#: Steps to the zero at which it has no mean; each leaves the square of a slope.
-_STEPS: Final = 8
-
 #: Amplitudes of the error, radians, that no double angle resolves.
 _NOTHING: Final = 1e-12
 
@@ -36,9 +33,6 @@ _NEGLIGIBLE: Final = 0.1
 
 #: Roles of two tracks.
 TRACKS: Final = ("sine", "cosine", "sine2", "cosine2")
-
-#: Mean resultant of the mismatch of two tracks that agree: of 0.2 periods rms.
-_AGREE: Final = 0.45
 
 #: Periods in a turn, at most, as of order numbers.
 MOST_PERIODS: Final = 1_000_000
@@ -242,6 +236,10 @@ class Channels:
         angle = plain + np.rint((absolute - plain) * (periods / turn)) * (turn / periods)
         return np.asarray(angle - turn * np.ceil(angle / turn - 0.5))
 
+    def unwrapped(self, sine: Array, cosine: Array) -> Array:
+        """The same from reading to reading, without jumps of a period."""
+        return np.unwrap(self.angle(sine, cosine), period=self.period / self.periods_per_turn)
+
     def angle_of(self, *readings: float) -> float:
         """The same of one reading."""
         return float(self.angle(*readings))
@@ -312,32 +310,37 @@ class Channels:
             z = z + size * complex(re, im) * np.exp(1j * k * (phase + turn))
         return z.imag.copy(), z.real.copy()
 
-    def error_harmonics(self) -> tuple[list[int], list[float], list[float]]:
-        """Error that the harmonics leave in `angle`: orders of the channels' period, cosine, sine.
+    def error_series(self) -> NDArray[np.complex128]:
+        """Error that the harmonics leave in `angle`: amplitudes of the orders from 1, radians.
 
-        Of the curve itself, to all orders of the harmonics; in the unit of ``period``.
+        ::
+
+            error = sum_k Re(e_k exp(i k φ))
+
+        Of the curve itself, to all orders of the harmonics.
+        """
+        phase = 2.0 * math.pi * np.arange(_SAMPLES) / _SAMPLES
+        found = self.angle(*self.curve(phase)) / self.constants[-1]
+        error = wrap(found - phase, 2.0 * math.pi)
+        # Counted from where the error's mean is zero: the zero of the angle is free.
+        turned = np.exp(-1j * np.arange(1, _HIGHEST + 1) * error.mean())
+        return np.asarray(np.fft.rfft(error)[1 : _HIGHEST + 1] * turned * (2.0 / _SAMPLES))
+
+    def error_harmonics(self) -> tuple[list[int], list[float], list[float]]:
+        """The same as a correction: orders of the channels' period, cosine, sine by the angle.
+
+        In the unit of ``period``.
         """
         if not self.harmonics:
             return [], [], []
-        phase = 2.0 * math.pi * np.arange(_SAMPLES) / _SAMPLES
-        unit = abs(self.constants[-1])
-        error, zero = phase, 0.0
-        # Counted from where the error's mean is zero: the zero of the angle is free.
-        for _ in range(_STEPS):
-            sine, cosine = self.curve(phase - zero)
-            error = self.angle(sine, cosine) / (self.direction * unit) - phase
-            error = (error + math.pi) % (2.0 * math.pi) - math.pi
-            zero += float(error.mean())
-        found = np.fft.rfft(error)[1 : _HIGHEST + 1] * 2.0 / _SAMPLES
         # Orders far below the standard error of the harmonics cost time and correct nothing.
         least = max(_NOTHING, _NEGLIGIBLE * max(h.std for h in self.harmonics))
-        kept = [k for k in range(_HIGHEST) if abs(found[k]) > least]
-        # As functions of the angle, which falls with the phase where the direction is -1.
-        return (
-            [k + 1 for k in kept],
-            [self.direction * unit * float(found[k].real) for k in kept],
-            [-unit * float(found[k].imag) for k in kept],
-        )
+        found = self.error_series()
+        kept = np.flatnonzero(np.abs(found) > least)
+        # The angle falls with the phase where the direction is -1.
+        part = self.constants[-1] * found[kept]
+        sine = -self.direction * part.imag
+        return (kept + 1).tolist(), part.real.tolist(), sine.tolist()
 
     def replace(self, **changes: Any) -> Channels:
         """A copy with some fields changed, checked anew."""
@@ -346,24 +349,16 @@ class Channels:
     def to_dict(self) -> dict[str, Any]:
         """Each constant with its standard error: ``{"value", "std"}``."""
         cov = np.zeros((5, 5)) if self.covariance is None else np.asarray(self.covariance)
-        std = dict(zip(CONSTANTS, np.sqrt(np.diag(cov)).tolist(), strict=True))
+        stds = dict(zip(CONSTANTS, np.sqrt(np.diag(cov)).tolist(), strict=True))
+        rows = self.to_table()
+        del rows["covariance"]
+        for name in (*CONSTANTS, "direction", "periods_per_turn"):
+            rows[name] = {"value": rows[name], "std": stds.get(name, 0.0)}
         size = abs(self.fundamental)
-        rows: dict[str, Any] = {
-            name: {"value": getattr(self, name), "std": std[name]} for name in CONSTANTS
-        }
         for name in ("offset_sine", "offset_cosine"):
-            rows[f"{name}_relative"] = {
-                "value": getattr(self, name) / size,
-                "std": std[name] / size,
-            }
-        rows["harmonics"] = [h._asdict() for h in self.harmonics]
-        rows["direction"] = {"value": self.direction, "std": 0.0}
-        rows["periods_per_turn"] = {"value": self.periods_per_turn, "std": 0.0}
+            rows[f"{name}_relative"] = {key: value / size for key, value in rows[name].items()}
         if self.second is not None:
             rows["second"] = self.second.to_dict()
-            rows["second_zero_deg"] = self.second_zero_deg
-        if self.excitation_deg is not None:
-            rows["excitation_deg"] = self.excitation_deg
         return rows
 
     def constant_lines(self) -> list[str]:
@@ -450,42 +445,11 @@ def checked_track_periods(value: Any) -> tuple[int, ...]:
     return periods
 
 
-def joined(
-    first: Channels, second: Channels, readings: Sequence[Array], named: str
-) -> tuple[Channels, Array]:
-    """Two tracks as one, in the sense and with the zero in which they agree, and their mismatch.
-
-    ``readings`` are sine, cosine, sine2 and cosine2.
-
-    Raises
-    ------
-    NoModelError
-        They do not agree.
-    """
-    tracks = []
-    for sense in (1, -1):
-        track = first.replace(second=second.replace(direction=sense), second_zero_deg=0.0)
-        off = np.exp(2j * math.pi * track.mismatch(*readings)).mean()
-        tracks.append((abs(off), cmath.phase(off), track))
-    agreement, phase, track = max(tracks, key=lambda found: found[0])
-    periods = first.periods_per_turn, second.periods_per_turn
-    if agreement < _AGREE:
-        raise NoModelError(
-            f"{named}: two tracks of {periods[0]} and {periods[1]} periods do not agree on a "
-            "period: check the columns and `periods_per_turn`"
-        )
-    found = track.replace(second_zero_deg=math.degrees(phase) / periods[0])
-    return found, found.mismatch(*readings)
-
-
 def _elementwise(angles: Any, sine: ArrayLike, cosine: ArrayLike) -> Array:
-    pair: list[NDArray[np.float64]] = []
-    for name, values in (("sine", sine), ("cosine", cosine)):
-        try:
-            pair.append(np.asarray(values, dtype=np.float64))
-        except (TypeError, ValueError) as cause:
-            raise ArgumentError(f"{name} must be numbers: {cause}") from None
-    y, x = pair
+    try:
+        y, x = (np.asarray(values, dtype=np.float64) for values in (sine, cosine))
+    except (TypeError, ValueError) as cause:
+        raise ArgumentError(f"sine and cosine must be numbers: {cause}") from None
     if y.shape != x.shape:
         raise ArgumentError(f"sine and cosine must have one shape, got {y.shape} and {x.shape}")
     return np.asarray(angles(y.reshape(-1), x.reshape(-1))).reshape(y.shape)

@@ -1,46 +1,40 @@
-"""What is wrong with a sine and a cosine channel, in words: causes, changes between runs, drift."""
+"""What is wrong with a sine and a cosine channel, in words: causes of the angle error."""
 
 from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import NoModelError
-from ..estimation.channels import ChannelEstimate, estimate_channels
-from ..estimation.referencedchannels import referenced_channels
+from ..estimation.channels import ChannelEstimate, estimate_channels, referenced_channels
 from ..runs.channelangle import following
 from ..runs.checks.channelreadings import CENTRED
-from ..runs.rawchannels import CONSTANTS, Channels
+from ..runs.rawchannels import Channels
 from ..runs.source import OtherReadingOptions
 from ..support.argumentkinds import told_kinds
-from ..support.arrays import Array
 from ..support.layout import counted, laid_out, wrapped_lines
 from ..support.plainresult import PlainResult
-from .recording import Recording, as_recordings
-
-#: Standard errors from which a size is reported, and the least one, relative to the amplitude.
-_SURE: Final = 4.0
-_LEAST: Final = 1e-3
-
-#: Change of ln(amplitude) that counts as much as one of 1 of a coefficient of the curve: also
-#: temperature, supply and a shift of the sensor change the amplitude.
-_AMPLITUDE: Final = 30.0
+from .channelchanges import (
+    LEAST,
+    SURE,
+    ChannelChange,
+    between_periods,
+    changes_between,
+    per_kelvin,
+    standard_errors,
+)
+from .recording import Recording, as_recordings, track_readings
 
 #: Noise of one reading, relative to the amplitude, from which the signal is weak.
 _WEAK: Final = 0.01
 
 #: Gain ratio of the channels from which one is weak.
 _UNEQUAL: Final = 1.5
-
-#: Kelvin from which drift is estimated, and parts of the readings by temperature.
-_KELVIN: Final = 2.0
-_PARTS: Final = 5
 
 #: Displacement over distance, up to which the field of a dipole is expanded.
 _EXPANDED: Final = 0.5
@@ -57,17 +51,6 @@ class ChannelCause(NamedTuple):
     """Amplitude of the angle error of these orders."""
     says: str
     not_distinguished_from: tuple[str, ...] = ()
-
-
-class ChannelChange(NamedTuple):
-    """What moved between the first run and another one."""
-
-    run: str
-    cause: str
-    sensor: float
-    magnet: float
-    amplitude: float
-    says: str
 
 
 @dataclass(frozen=True)
@@ -180,24 +163,21 @@ def channel_diagnosis(
         No channels, or some that draw no curve.
     """
     first = recordings[0]
-    pairs = [channel_pair(recording) for recording in recordings]
-    sine, cosine = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
+    pairs = [recording.tracks[:2] for recording in recordings]
+    sine, cosine = track_readings(recordings)[:2]
     if found is None:
         found = estimate_channels(sine, cosine, first.named, periods=first.periods)
     known = all(r.reference is not None for r in recordings)
     channels = _by_reference(recordings, found.channels) if known else found.channels
-    labelled = [(r.label or str(i), r) for i, r in enumerate(recordings)]
-    several = labelled if len(labelled) > 1 else []
-    runs = [(label, _constants_of(r, known, found.channels)) for label, r in several]
-    changes = tuple(_changes([(label, c) for label, c in runs if c is not None], known))
+    several = enumerate(recordings if len(recordings) > 1 else ())
+    runs = [(r.label or str(i), _constants_of(r, known, found.channels)) for i, r in several]
+    changes = tuple(changes_between([(label, c) for label, c in runs if c is not None], known))
     drift = {}
     if all(r.temperature is not None for r in recordings):
         temperature = np.concatenate([np.asarray(r.temperature) for r in recordings])
-        drift["per kelvin"] = _per_kelvin(sine, cosine, temperature, first.named)
+        drift["per kelvin"] = per_kelvin(sine, cosine, temperature, first.named)
     if first.periods > 1:
-        drift["between the periods of a turn"] = _between_periods(
-            pairs, found.channels, first.named
-        )
+        drift["between the periods of a turn"] = between_periods(pairs, found.channels, first.named)
     return ChannelDiagnosis(
         _causes(channels, known, found, several=bool(changes)),
         changes,
@@ -208,26 +188,9 @@ def channel_diagnosis(
     )
 
 
-def channel_pair(recording: Recording) -> tuple[Array, Array]:
-    """Sine and cosine of a recording.
-
-    Raises
-    ------
-    NoModelError
-        One is missing.
-    """
-    if recording.sine is None or recording.cosine is None:
-        missing = "sine" if recording.sine is None else "cosine"
-        raise NoModelError(
-            f"{recording.named}: no column {missing}: name the channel with "
-            f"`signals={{'{missing}': 'NAME'}}`"
-        )
-    return recording.sine, recording.cosine
-
-
 def _by_reference(recordings: Sequence[Recording], channels: Channels) -> Channels:
     """Constants by the reference, in its sense."""
-    signals = [(*channel_pair(r), np.degrees(np.asarray(r.reference))) for r in recordings]
+    signals = [(*r.tracks[:2], np.degrees(np.asarray(r.reference))) for r in recordings]
     signed = following(channels, *signals[0])[1]
     return referenced_channels(signals, signed, recordings[0].named)
 
@@ -237,22 +200,16 @@ def _constants_of(recording: Recording, known: bool, channels: Channels) -> Chan
     with contextlib.suppress(NoModelError):
         if known:
             return _by_reference([recording], channels)
-        return estimate_channels(*channel_pair(recording), recording.named).channels
+        sine, cosine = recording.tracks[:2]
+        return estimate_channels(sine, cosine, recording.named).channels
     return None
-
-
-def _stds(channels: Channels) -> Array:
-    """Standard errors of the constants; offsets and the amplitude relative to it."""
-    std = np.sqrt(np.diag(np.asarray(channels.covariance)))
-    std[:3] /= abs(channels.fundamental)
-    return np.asarray(std)
 
 
 def _causes(
     channels: Channels, known: bool, found: ChannelEstimate, several: bool
 ) -> tuple[ChannelCause, ...]:
     """Causes whose size is significant, by the angle error that they make."""
-    p, std = channels.periods_per_turn, _stds(channels)
+    p, std = channels.periods_per_turn, standard_errors(channels)
     unit = math.degrees(1.0) / p
     z = {h.order: (abs(complex(h.re, h.im)), h.std) for h in channels.harmonics}
     offset, std_offset = abs(channels.offset), float(max(std[:2]))
@@ -266,7 +223,7 @@ def _causes(
     def add(
         name: str, order: int, size: float, error: float, says: str, *, at: float, rivals: Any = ()
     ) -> None:
-        if size > max(_SURE * at, _LEAST):
+        if size > max(SURE * at, LEAST):
             digits = max(0, 1 - math.floor(math.log10(100.0 * at))) if at > 0.0 else 3
             size_of = f"{100.0 * size:.{digits}f} +- {100.0 * at:.{digits}f} % of the amplitude"
             says = f"{says} ({size_of}): {error * unit:.2g} deg of order {order * p}"
@@ -321,89 +278,3 @@ def _off(share: float, periods: int) -> str:
         f" by about {share:.2g} of the distance from the magnet's middle to the sensor "
         f"({2.0 * share:.1g} mm at 2 mm)"
     )
-
-
-def _changes(runs: Sequence[tuple[str, Channels]], known: bool) -> Iterable[ChannelChange]:
-    """What moved between the first run and each other one."""
-    for label, after in runs[1:]:
-        base, before = runs[0]
-        sensor = abs(after.image - before.image)
-        size, was = abs(after.fundamental), abs(before.fundamental)
-        # In the unit of the columns: the gap does not change an offset of the electronics.
-        magnet = 0.5 * abs(after.offset - before.offset * was / size)
-        if known:
-            magnet = abs(_second(after) - _second(before))
-        amplitude = math.log(size / was)
-        sizes = {
-            "sensor_eccentricity": (sensor, "the sensor moved off the axis, or the gains changed"),
-            "magnet_eccentricity": (
-                magnet,
-                "the magnet moved off the axis" + ("" if known else ", or the offsets changed"),
-            ),
-            "gap": (
-                abs(amplitude) / _AMPLITUDE,
-                f"the gap changed (amplitude {100.0 * math.expm1(amplitude):+.2g} %)",
-            ),
-        }
-        cause = max(sizes, key=lambda name: sizes[name][0])
-        std = float(np.hypot(_stds(before), _stds(after))[:4].max())
-        if sizes[cause][0] > max(_SURE * std, _LEAST):
-            says = f"run {label} compared with run {base}: {sizes[cause][1]}"
-            yield ChannelChange(label, cause, sensor, magnet, amplitude, says)
-
-
-def _second(channels: Channels) -> complex:
-    return sum(complex(h.re, h.im) for h in channels.harmonics if h.order == 2)
-
-
-def _constants_by(
-    group: NDArray[np.intp], sine: Array, cosine: Array, named: str
-) -> tuple[list[int], Array, Array]:
-    """Groups whose readings settle the constants, those, and their standard errors."""
-    kept, values, stds = [], [], []
-    for i in np.unique(group):
-        with contextlib.suppress(NoModelError):
-            channels = estimate_channels(sine[group == i], cosine[group == i], named).channels
-            kept.append(int(i))
-            values.append([getattr(channels, name) for name in CONSTANTS])
-            stds.append(np.sqrt(np.diag(np.asarray(channels.covariance))))
-    return kept, np.array(values), np.array(stds)
-
-
-def _per_kelvin(sine: Array, cosine: Array, temperature: Array, named: str) -> dict[str, Any]:
-    """Slopes of the constants with temperature that are significant."""
-    known = np.isfinite(temperature)
-    sine, cosine, temperature = sine[known], cosine[known], temperature[known]
-    if temperature.size == 0 or float(np.ptp(temperature)) < _KELVIN:
-        return {}
-    edges = np.quantile(temperature, np.linspace(0.0, 1.0, _PARTS + 1)[1:-1])
-    part = np.searchsorted(edges, temperature, side="right")
-    kept, values, std = _constants_by(part, sine, cosine, named)
-    at = np.array([temperature[part == i].mean() for i in kept])[:, None]
-    if len(kept) < 2 or not np.ptp(at) > 0.0:
-        return {}
-    weights = std**-2.0
-    off = at - (weights * at).sum(axis=0) / weights.sum(axis=0)
-    power = (weights * off**2).sum(axis=0)
-    return _significant((weights * off * values).sum(axis=0) / power, power**-0.5)
-
-
-def _between_periods(
-    pairs: Sequence[tuple[Array, Array]], channels: Channels, named: str
-) -> dict[str, Any]:
-    """Standard deviation of each constant over the periods of a turn, beyond its own errors."""
-    phases = [np.unwrap(channels.angle(*pair) / channels.constants[-1]) for pair in pairs]
-    turn = np.floor(np.concatenate(phases) / (2.0 * math.pi)).astype(np.intp)
-    sine, cosine = np.hstack([np.array(pair) for pair in pairs])
-    kept, values, std = _constants_by(turn % channels.periods_per_turn, sine, cosine, named)
-    if len(kept) < 2:
-        return {}
-    own = (std**2).mean(axis=0)
-    spread = np.sqrt(np.maximum(values.var(axis=0, ddof=1) - own, 0.0))
-    # The standard error of the standard deviation of n samples of the errors alone.
-    return _significant(spread, np.sqrt(own) / (2.0 * (len(kept) - 1)) ** 0.25)
-
-
-def _significant(values: Array, std: Array) -> dict[str, Any]:
-    rows = zip(CONSTANTS, values.tolist(), std.tolist(), strict=True)
-    return {n: {"value": v, "std": s} for n, v, s in rows if abs(v) > _SURE * s}

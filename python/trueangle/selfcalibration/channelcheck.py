@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import NoModelError
 from ..estimation.channels import ChannelEstimate, estimate_channels
+from ..estimation.tracks import Mismatch, with_second_track
 from ..runs.checks.channelreadings import ChannelReadings
 from ..runs.checks.fault import DataFault
 from ..runs.rawchannels import Channels
@@ -18,8 +19,8 @@ from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.layout import counted, laid_out, wrapped_lines
 from ..support.plainresult import PlainResult
-from .channelcauses import ChannelDiagnosis, channel_diagnosis, channel_pair
-from .recording import Recording, as_recordings
+from .channelcauses import ChannelDiagnosis, channel_diagnosis
+from .recording import Recording, as_recordings, track_readings
 
 #: Degrees of the channels' period from which it is whole.
 _WHOLE: Final = 355.0
@@ -37,6 +38,8 @@ class ChannelCheck(PlainResult):
         Travel, in periods of the channels.
     diagnosis : ChannelDiagnosis or None
         Causes of the angle error; None where the data are not usable.
+    mismatch : Mismatch or None
+        Of two tracks: how far the second is off choosing another period of the first.
     """
 
     data_faults: tuple[DataFault, ...]
@@ -44,6 +47,7 @@ class ChannelCheck(PlainResult):
     runs: int
     turns: float | None
     diagnosis: ChannelDiagnosis | None
+    mismatch: Mismatch | None = None
 
     @property
     def usable(self) -> bool:
@@ -59,6 +63,7 @@ class ChannelCheck(PlainResult):
             "runs": self.runs,
             "turns": self.turns,
             "diagnosis": self.diagnosis and self.diagnosis.to_dict(),
+            "mismatch_periods": self.mismatch and self.mismatch._asdict(),
         }
 
     def _brief(self) -> str:
@@ -78,6 +83,8 @@ class ChannelCheck(PlainResult):
         lines[-1] += (
             f", {self.turns:.3g} periods, {self.diagnosis.coverage_deg:.0f} deg of one covered."
         )
+        if self.mismatch is not None:
+            lines += wrapped_lines(f"{self.mismatch.says}.", 2)
         return laid_out([*lines, *self.diagnosis.lines()])
 
 
@@ -112,7 +119,8 @@ def check_channels(logs: Any, **reading: Unpack[OtherReadingOptions]) -> Channel
     ['dead_channel']
     """
     recordings = as_recordings(logs, {**reading, "period": None})
-    sine, cosine = np.hstack([np.array(channel_pair(r)) for r in recordings])
+    readings = track_readings(recordings)
+    sine, cosine = readings[:2]
     size, named, runs = sine.size, recordings[0].named, [r.label or "" for r in recordings]
 
     def refused(name: str, problem: str) -> ChannelCheck:
@@ -123,16 +131,20 @@ def check_channels(logs: Any, **reading: Unpack[OtherReadingOptions]) -> Channel
     if problem := ChannelReadings.of(sine, cosine).problem:
         name = "wrapped_counter" if "wraps" in problem else "dead_channel"
         return refused(name, problem)
+    mismatch = None
     try:
         found = estimate_channels(sine, cosine, named, periods=recordings[0].periods)
+        if (second := recordings[0].periods2) is not None:
+            channels = with_second_track(found.channels, readings, second, named)
+            mismatch = Mismatch.of(channels, readings)
     except NoModelError as error:
         return refused("short_arc", str(error).removeprefix(f"{named}: "))
     faults = channel_faults(found, recordings, sense(found.channels, recordings)[0])
+    angles = [found.channels.unwrapped(*r.tracks[:2]) for r in recordings]
     period = found.channels.period / found.channels.periods_per_turn
-    angles = [found.channels.angle(*channel_pair(r)) for r in recordings]
-    turns = sum(float(np.ptp(np.unwrap(angle, period=period))) for angle in angles) / period
+    turns = sum(float(np.ptp(angle)) for angle in angles) / period
     diagnosis = channel_diagnosis(recordings, found)
-    return ChannelCheck(tuple(faults), size, len(runs), turns, diagnosis)
+    return ChannelCheck(tuple(faults), size, len(runs), turns, diagnosis, mismatch)
 
 
 def channel_faults(
@@ -166,7 +178,7 @@ def sense(channels: Channels, recordings: Sequence[Recording]) -> tuple[float, s
     """How far the phase agrees with another angle of the log less with its reverse, and which."""
     rising, by = 0.0, ""
     for recording in recordings:
-        phase: Array = channels.angle(*channel_pair(recording)) / channels.constants[-1]
+        phase: Array = channels.angle(*recording.tracks[:2]) / channels.constants[-1]
         for name in ("reference", "indicated"):
             other = getattr(recording, name)
             if other is not None:

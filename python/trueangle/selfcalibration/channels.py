@@ -14,16 +14,17 @@ from typing import Final
 
 import numpy as np
 
-from ..errors import NoModelError, NotInvertibleError
+from ..errors import NoCurveError, NoModelError, NotInvertibleError
 from ..estimation.channels import ChannelEstimate, estimate_channels
-from ..runs.checks.channelreadings import CENTRED, mismatch_words
-from ..runs.rawchannels import TRACKS, Channels, joined
+from ..estimation.tracks import Mismatch, with_second_track
+from ..runs.checks.channelreadings import CENTRED
+from ..runs.rawchannels import Channels
 from ..support.arrays import Array
 from ..support.layout import counted
-from .channelcauses import channel_diagnosis, channel_pair
+from .channelcauses import channel_diagnosis
 from .channelcheck import channel_faults, sense
 from .model import reference_free_model
-from .recording import Recording
+from .recording import Recording, track_readings
 from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, blind_words
 from .spindown import spin_down
 
@@ -41,22 +42,24 @@ def channel_patterns(
 ) -> SelfCalibration:
     """Constants of the channels; with time stamps of several turns the pattern of the angle too."""
     first = recordings[0]
-    pairs = [channel_pair(recording) for recording in recordings]
-    sine, cosine = (np.concatenate([pair[i] for pair in pairs]) for i in (0, 1))
-    found = estimate_channels(sine, cosine, first.named, periods=first.periods, period=period)
+    pairs = [recording.tracks[:2] for recording in recordings]
+    readings = track_readings(recordings)
+    named, (sine, cosine) = first.named, readings[:2]
+    found = estimate_channels(sine, cosine, named, periods=first.periods, period=period)
     channels, followed = _in_sense(found.channels, recordings, pairs)
-    second = _second_track(channels, recordings)
-    if second is not None:
-        channels = second[0]
+    mismatch = None
+    if first.periods2 is not None:
+        channels = with_second_track(channels, readings, first.periods2, first.named)
+        mismatch = Mismatch.of(channels, readings)
     if first.excitation_deg is not None:
         channels = channels.replace(excitation_deg=first.excitation_deg)
     unit = abs(channels.constants[-1]) * 2.0 * math.pi / period * ARCSEC
-    angles = [_unwrapped(channels, *pair) for pair in pairs]
+    angles = [channels.unwrapped(*pair) for pair in pairs]
     turns = sum(float(np.ptp(angle)) for angle in angles) / period
     diagnosis = channel_diagnosis(recordings, found)
     apart = ["the curves of the runs differ: calibrate each run alone"] if diagnosis.changes else []
     faults = channel_faults(found, recordings, 0.0)
-    notes = [] if second is None else [mismatch_words(second[1])]
+    notes = [] if mismatch is None else [mismatch.says]
     notes += [followed, *(f"{fault.says}; {fault.mend}" for fault in faults), *apart]
     if found.correlated > 1.0:
         notes.append(
@@ -96,7 +99,7 @@ def channel_patterns(
             channels=channels,
         )
     except NotInvertibleError:
-        raise NoModelError(
+        raise NoCurveError(
             f"{first.named}: the curve found is too far from an ellipse for one angle at each place"
         ) from None
     return SelfCalibration(
@@ -114,7 +117,7 @@ def channel_patterns(
             "noise_relative": {"cosine": found.noise[0], "sine": found.noise[1]},
             "radius_left_relative": found.radius_left,
             "clipped": found.recorded.clipped,
-            **({} if second is None else {"mismatch_periods": _sizes(second[1])}),
+            **({} if mismatch is None else {"mismatch_periods": mismatch._asdict()}),
         },
         coverage_deg=found.coverage,
         limit_arcsec=found.limit * unit,
@@ -122,35 +125,16 @@ def channel_patterns(
     )
 
 
-def _second_track(
-    channels: Channels, recordings: Sequence[Recording]
-) -> tuple[Channels, Array] | None:
-    """The channels with their second track, where its periods are given, and the mismatch."""
-    first = recordings[0]
-    if first.periods2 is None:
-        return None
-    columns = ([getattr(recording, role) for recording in recordings] for role in TRACKS)
-    readings = [np.concatenate(column) for column in columns]
-    named = f"{first.named}, second track"
-    sine, cosine = readings[2:]
-    found = estimate_channels(sine, cosine, named, periods=first.periods2, period=channels.period)
-    return joined(channels, found.channels, readings, first.named)
-
-
-def _sizes(mismatch: Array) -> dict[str, float]:
-    return {"rms": float(np.sqrt(np.mean(mismatch**2))), "max": float(np.abs(mismatch).max())}
-
-
 def _in_sense(
-    channels: Channels, recordings: Sequence[Recording], pairs: Sequence[tuple[Array, Array]]
+    channels: Channels, recordings: Sequence[Recording], pairs: Sequence[Sequence[Array]]
 ) -> tuple[Channels, str]:
     """The channels in the sense of another angle of the log, else of the travel."""
     rising, by = sense(channels, recordings)
     if by:
         words = f"the channels' phase {'rises' if rising >= 0.0 else 'falls'} with the {by} angle"
         return channels.replace(direction=1 if rising >= 0.0 else -1), words
-    phases = [channels.angle(*pair) / channels.constants[-1] for pair in pairs]
-    travelled = sum(float(np.diff(np.unwrap(phase)[[0, -1]])[0]) for phase in phases)
+    phases = [channels.unwrapped(*pair) / channels.constants[-1] for pair in pairs]
+    travelled = sum(float(phase[-1] - phase[0]) for phase in phases)
     if abs(travelled) < 0.5 * math.pi:
         return channels, "the readings hardly travel: the angle is taken to rise with the phase"
     word = "rises" if travelled > 0.0 else "falls"
@@ -159,11 +143,6 @@ def _in_sense(
         f"the channels' phase {word} through the readings, and the angle is taken to rise: where "
         "the shaft turned backwards the sign of the angle is the other one",
     )
-
-
-def _unwrapped(channels: Channels, sine: Array, cosine: Array) -> Array:
-    period = channels.period / channels.periods_per_turn
-    return np.unwrap(channels.angle(sine, cosine), period=period)
 
 
 def _by_time(
@@ -196,17 +175,14 @@ def _table(channels: Channels, found: ChannelEstimate) -> list[OrderEstimate]:
     """Orders of the angle that the harmonics of the curve make, with what these leave of them."""
     unit = ARCSEC * 2.0 * math.pi / channels.period
     orders, cosine, sine = channels.error_harmonics()
-    variances = np.zeros(len(orders))
+    series = channels.error_series()
+    variances = np.zeros(series.size)
     for i, h in enumerate(channels.harmonics):
         for part in (h._replace(re=h.re + h.std), h._replace(im=h.im + h.std)):
-            moved = [*channels.harmonics]
-            moved[i] = part
-            other = channels.replace(harmonics=tuple(moved)).error_harmonics()
-            rows = {k: complex(a, b) for k, a, b in zip(*other, strict=True)}
-            variances += [
-                0.5 * abs(rows.get(k, 0.0) - complex(a, b)) ** 2
-                for k, a, b in zip(orders, cosine, sine, strict=True)
-            ]
+            others = (*channels.harmonics[:i], part, *channels.harmonics[i + 1 :])
+            moved = channels.replace(harmonics=others).error_series() - series
+            variances += 0.5 * np.abs(channels.constants[-1] * moved) ** 2
+    stds = [math.sqrt(variances[k - 1]) for k in orders]
     least = math.hypot(*found.noise) / math.sqrt(found.readings) * abs(channels.constants[-1])
     return [
         OrderEstimate(
@@ -218,7 +194,7 @@ def _table(channels: Channels, found: ChannelEstimate) -> list[OrderEstimate]:
             std_factor=std / least if least > 0.0 else math.inf,
             of="the channels",
         )
-        for k, a, b, std in zip(orders, cosine, sine, np.sqrt(variances).tolist(), strict=True)
+        for k, a, b, std in zip(orders, cosine, sine, stds, strict=True)
     ]
 
 
@@ -254,7 +230,7 @@ def _blind(channels: Channels, unit: float, known: set[float]) -> list[Blind]:
         Blind(
             (k * p,),
             f"{words.format(share=f'{100.0 * size:.2g} %')}, and then the correction makes this "
-            f"order larger, by up to {2.0 * size * unit:.3g} arcsec",
+            f"order larger, by up to {2.0 * size * unit / 3600.0:.2g} deg",
             measure,
         )
         for k, size, words in rows

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError, NoModelError
+from ..formats.columns import channels_code, listed_columns
 from ..runs.excitation import demodulated
 from ..runs.rawchannels import TRACKS
 from ..runs.readings import FileReadings
@@ -20,7 +21,7 @@ from ..runs.source import ReadingOptions, checked_reading_options, each_table, g
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.files import InputFile
-from ..support.roles import LABELS, RoleColumn, role_kind
+from ..support.roles import LABELS, RoleColumn, role_code, role_kind
 
 _LABELS = ("unit", "run")
 
@@ -88,6 +89,35 @@ class Recording:
         run = f"run {self.label}" if self.label else ""
         return ", ".join(part for part in (self.file, run) if part) or "the log"
 
+    @property
+    def tracks(self) -> list[Array]:
+        """Sine and cosine, with a second track sine2 and cosine2 too.
+
+        Raises
+        ------
+        NoModelError
+            One is missing.
+        """
+        found: list[Array] = []
+        for role in TRACKS[: 2 if self.periods2 is None else 4]:
+            values = getattr(self, role)
+            if values is None:
+                code = role_code(role, unit=None)
+                raise NoModelError(f"{self.named}: no column {role}: name the channel with {code}")
+            found.append(values)
+        return found
+
+
+def track_readings(recordings: Sequence[Recording]) -> list[Array]:
+    """Sine and cosine of all recordings, with a second track sine2 and cosine2 too.
+
+    Raises
+    ------
+    NoModelError
+        One is missing.
+    """
+    return [np.concatenate(track) for track in zip(*(r.tracks for r in recordings), strict=True)]
+
 
 def as_recordings(logs: Any, reading: Mapping[str, Any]) -> list[Recording]:
     """Recordings of files, folders, patterns, tables in memory, calibration runs.
@@ -114,6 +144,8 @@ def _of_run(run: CalibrationRun) -> Recording:
         values = run.signal(name)
         return None if values is None else values * turn
 
+    second = None if run.channels is None else run.channels.second
+    tracks: dict[str, Any] = {role: run.signal(role) for role in TRACKS}
     return Recording(
         label=run.label,
         time=run.time,
@@ -125,14 +157,9 @@ def _of_run(run: CalibrationRun) -> Recording:
         heads={int(name[4:]): values * turn for name, values in run.heads.items()},
         current=run.signal("current"),
         temperature=run.temperature,
-        sine=run.signal("sine"),
-        cosine=run.signal("cosine"),
-        sine2=run.signal("sine2"),
-        cosine2=run.signal("cosine2"),
+        **tracks,
         periods=1 if run.channels is None else run.channels.periods_per_turn,
-        periods2=None
-        if run.channels is None or run.channels.second is None
-        else run.channels.second.periods_per_turn,
+        periods2=None if second is None else second.periods_per_turn,
         file=run.source.file if run.source else "",
         source=run.source,
         indicated_sign=run.indicated_sign,
@@ -156,10 +183,12 @@ def _of_table(table: FileReadings, reading: ReadingOptions) -> list[Recording]:
         any(role in channels for role in ("indicated", "motor", "head1"))
         or {"sine", "cosine"} <= channels.keys()
     ):
+        names = list(table.columns)
+        channels_are = channels_code(names) or "`signals={'sine': 'NAME', 'cosine': 'NAME'}`"
         raise FileError(
             table.path,
             "no column indicated_deg (or _rad, _turn, _count), head1_deg, motor_deg, or sine and "
-            f"cosine; its columns are {', '.join(list(table.columns)[:12])}",
+            f"cosine: name channels with {channels_are}; {listed_columns(names)}",
             line=1,
         )
     labels = [table.columns[table.roles[role].name] for role in _LABELS if role in table.roles]
@@ -168,13 +197,6 @@ def _of_table(table: FileReadings, reading: ReadingOptions) -> list[Recording]:
     sign = next((column.sign for column in read), 1)
     found = _split(channels, labels, file, table.source, sign)
     periods = given_periods(reading) or (1,)
-    if len(periods) > 1 and not {*TRACKS} <= channels.keys():
-        raise FileError(
-            table.path,
-            "two periods per turn are of two tracks, and the columns sine2 and cosine2 are not "
-            "there: name them by `signals={'sine2': 'NAME', 'cosine2': 'NAME'}`",
-            line=1,
-        )
     second = periods[1] if len(periods) > 1 else None
     return [
         replace(recording, periods=periods[0], periods2=second, excitation_deg=excitation)

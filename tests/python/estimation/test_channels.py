@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from trueangle.errors import NoModelError
-from trueangle.estimation.channels import estimate_channels
-from trueangle.estimation.referencedchannels import referenced_channels
+from trueangle.estimation.channels import estimate_channels, referenced_channels
 from trueangle.runs.checks.channelreadings import ChannelReadings
 from trueangle.runs.rawchannels import CONSTANTS, Channels
 

@@ -95,11 +95,12 @@ def test_constants_that_decode_nothing_are_refused(fields, words):
 
 
 def test_angles_are_made_in_the_sense_and_turns_of_the_reference():
-    theta = np.linspace(0.0, 700.0, 800)
-    for periods in (1, 3):
+    theta = np.linspace(0.0, 1400.0, 1600)
+    for periods, end in ((1, 1e9), (3, 1e9), (16, 360.0)):
         for sign in (1.0, -1.0):
             phase = sign * periods * np.radians(theta) + 0.4
-            table = {"reference_deg": theta, "sine": np.sin(phase), "cosine": np.cos(phase)}
+            columns = {"sine": np.sin(phase), "cosine": np.cos(phase)}
+            table = {"reference_deg": theta % end, **columns}
             (run,) = read_runs(table, periods_per_turn=periods)
             assert run.channels.direction == sign
             assert np.ptp(run.centred_error) < 1e-9

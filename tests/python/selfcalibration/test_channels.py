@@ -95,7 +95,7 @@ def test_an_eccentric_magnet_is_never_made_worse_without_a_word():
         if after > before:
             (blind,) = (b for b in found.blind if b.orders == (1.0,))
             assert "magnet" in blind.because
-            bound = float(blind.because.split("up to ")[1].split(" arcsec")[0]) / 3600.0
+            bound = float(blind.because.split("up to ")[1].split(" deg")[0])
             assert (after - before) * math.sqrt(2.0) < bound
 
 

@@ -11,7 +11,8 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError, NoModelError
-from trueangle.runs.rawchannels import TRACKS, joined
+from trueangle.estimation.tracks import joined
+from trueangle.runs.rawchannels import TRACKS
 
 
 def sensor(first, second, senses=(1, 1), period=360.0):
@@ -53,9 +54,9 @@ def test_the_angle_is_absolute_over_the_turn(first, second, senses, period):
     theta = rng.uniform(-math.pi, math.pi, 2000)
     tracks = sensor(first, second, senses, period)
     values = readings(tracks, theta)
-    found, mismatch = joined(tracks[0], tracks[1].replace(direction=1), values, "log")
+    found = joined(tracks[0], tracks[1].replace(direction=1), values, "log")
     assert found.second.direction == senses[1]
-    assert np.abs(mismatch).max() < 1e-9
+    assert np.abs(found.mismatch(*values)).max() < 1e-9
     angle = found.correct(*values)
     # The phase of the second track is not that of its harmonics' zero: both have a constant.
     assert np.abs(off(angle, theta, period)).max() < 1e-9
@@ -71,7 +72,8 @@ def test_the_mismatch_is_that_of_the_noise_of_both_tracks(noise):
         ta.Channels(periods_per_turn=31, period=360.0),
     )
     values = readings(tracks, theta, noise)
-    found, mismatch = joined(*tracks, values, "log")
+    found = joined(*tracks, values, "log")
+    mismatch = found.mismatch(*values)
     wanted = noise * math.hypot(32.0, 31.0) / (2.0 * math.pi)
     assert np.sqrt(np.mean(mismatch**2)) == pytest.approx(wanted, rel=0.04)
     error = off(found.correct(*values), theta, 360.0)
@@ -81,7 +83,7 @@ def test_the_mismatch_is_that_of_the_noise_of_both_tracks(noise):
 def test_a_wrong_period_is_a_jump_of_whole_periods():
     theta = 2.0 * math.pi * np.arange(4000) / 4000
     tracks = sensor(16, 15)
-    found, _ = joined(*tracks, readings(tracks, theta), "log")
+    found = joined(*tracks, readings(tracks, theta), "log")
     wrong = readings(tracks, theta, noise=0.08, seed=1)
     error = off(found.correct(*wrong), theta, 360.0) * 16 / (2.0 * math.pi)
     jumps = np.rint(error)
@@ -110,7 +112,7 @@ def test_the_commands_calibrate_correct_and_watch_the_margin(reference, tmp_path
     periods = ["--periods-per-turn", "16,15"]
     assert main(["check", log, *periods]) == 0
     command = ["fit", log] if reference else ["selfcal", log, "--method", "channels"]
-    capsys.readouterr()
+    assert ("at most, margin 0.4" in capsys.readouterr().out) is not reference
     assert main([*command, *periods, "-o", model, "--json"]) == 0
     plain = json.loads(capsys.readouterr().out)
     assert any("the second track chooses the period" in n.lower() for n in plain["notes"])

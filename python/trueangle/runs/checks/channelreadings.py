@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import _core
-from ...errors import NoModelError
+from ...errors import NoCurveError
 from ...support.arrays import Array
 from ...support.layout import counted
 from .fault import DataFault
@@ -93,11 +93,11 @@ class ChannelReadings:
 
         Raises
         ------
-        NoModelError
+        NoCurveError
             No curve: one line that begins with ``named``.
         """
         if self.problem:
-            raise NoModelError(f"{named}: {self.problem}")
+            raise NoCurveError(f"{named}: {self.problem}")
         return self
 
     @property
@@ -120,44 +120,33 @@ class ChannelReadings:
         self, runs: Sequence[str], rows: NDArray[np.int64] | None = None, *, falls: bool = False
     ) -> list[DataFault]:
         """Faults that do not forbid a fit; the phase ``falls`` where another angle rises."""
-        found = [
-            DataFault.of(
-                "clipping",
-                runs,
-                [],
-                f"{counted(count, 'reading')} of the {name} channel "
-                f"{'is' if count == 1 else 'are'} at its rail (clipped) and omitted",
-                "lower the gain of the amplifier",
-            )
-            for name, count in self.clipped.items()
-        ]
+        found: list[DataFault] = []
+
+        def add(name: str, says: str, mend: str, places: Sequence[int] = ()) -> None:
+            found.append(DataFault.of(name, runs, places, says, mend))
+
+        for name, count in self.clipped.items():
+            are = "is" if count == 1 else "are"
+            says = f"{counted(count, 'reading')} of the {name} channel {are} at its rail (clipped)"
+            add("clipping", f"{says} and omitted", "lower the gain of the amplifier")
         if (off := np.flatnonzero(self.dropouts)).size:
             places = off + 1 if rows is None else rows[off]
-            words = dropout_words(off.size, int(places[0]))
-            found.append(DataFault.of("dropouts", runs, places.tolist(), *words))
+            add("dropouts", *dropout_words(off.size, int(places[0])), places.tolist())
         if any(self.middle):
             y, x = self.middle
-            found.append(
-                DataFault.of(
-                    "no_centre",
-                    runs,
-                    [],
-                    f"the channels do not go round zero but about {y:.6g} (sine) and {x:.6g} "
-                    "(cosine): their values are not centred on zero",
-                    "nothing: the offsets are estimated and subtracted",
-                )
+            add(
+                "no_centre",
+                f"the channels do not go round zero but about {y:.6g} (sine) and {x:.6g} (cosine): "
+                "their values are not centred on zero",
+                "nothing: the offsets are estimated and subtracted",
             )
         if falls:
-            found.append(
-                DataFault.of(
-                    "swapped_channels",
-                    runs,
-                    [],
-                    "the channels' phase falls as the recorded angle rises: sine and cosine are "
-                    "swapped, or the sensor is reversed",
-                    "nothing: the model keeps the direction; or name them anew, "
-                    "`signals={'sine': 'NAME'}`",
-                )
+            add(
+                "swapped_channels",
+                "the channels' phase falls as the recorded angle rises: sine and cosine are "
+                "swapped, or the sensor is reversed",
+                "nothing: the model keeps the direction; or name them anew, "
+                "`signals={'sine': 'NAME'}`",
             )
         return found
 
@@ -170,15 +159,6 @@ def dropout_words(count: int, first: int) -> tuple[str, str]:
         f"{'the' if is_one else 'their'} curve (dropout), {'in' if is_one else 'the first in'} row "
         f"{first}",
         "check the wire and the converter",
-    )
-
-
-def mismatch_words(mismatch: Array) -> str:
-    """How far a second track is off choosing another period of the first."""
-    most, rms = float(np.abs(mismatch).max()), float(np.sqrt(np.mean(mismatch**2)))
-    return (
-        f"the second track chooses the period of the first: mismatch {rms:.2g} periods rms, "
-        f"{most:.2g} at most, margin {0.5 - most:.2g} (a period is wrong from 0.5 on)"
     )
 
 

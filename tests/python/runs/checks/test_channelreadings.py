@@ -86,7 +86,7 @@ def test_every_command_states_a_fault_in_the_same_words(name, tmp_path, capsys):
     for command in (
         ["check", bare],
         ["check", known],
-        ["selfcal", bare, "--method", "channels", "-o", model],
+        ["selfcal", bare, "-o", model],
         ["fit", known, "-o", str(tmp_path / "f.json")],
     ):
         assert main(command) == int(is_fatal), command
@@ -95,6 +95,7 @@ def test_every_command_states_a_fault_in_the_same_words(name, tmp_path, capsys):
         assert words in told, command
         if is_fatal and command[0] != "check":
             assert len(err.strip().splitlines()) == 1
+            assert "run: trueangle" not in err  # no other command helps
 
 
 def test_sound_channels_have_no_fault(tmp_path, capsys):
