@@ -10,6 +10,7 @@ from ..support.files import FileKind
 from .chain import Chain, source_identifier
 from .codetext import code_parts, filled_code, float_literal, number_rows
 from .cstep import c_step
+from .decoding import decoding
 from .portable import PortableTarget, self_test, table_lines
 from .runtimeterms import RunTimeTerms
 from .table import PER_RADIAN, Table
@@ -48,7 +49,8 @@ class CHeader(PortableTarget):
             step = c_step(terms, chain.zero, chain.at_indicated, whole)
             parts.append(filled_code(step, n=name))
         if chain.channels is not None:
-            parts.append(filled_code(chain.decoding(code_parts("header.c")["decode"]), name=name))
+            named = f"{name}_{{}}".format
+            parts.append(decoding(chain.channels, code_parts("header.c"), 2.0**32, named))
         parts.append(_self_test(name, chain))
         parts.append(f"#endif /* {guard} */\n")
         return "\n".join(parts)
@@ -76,7 +78,8 @@ def _comment(name: str, chain: Chain, terms: RunTimeTerms | None, header: Commen
     if chain.whole:
         own.append(f"Use: uint32_t corrected = {name}_correct(indicated);")
     if chain.channels is not None:
-        own.append(f"Channels: uint32_t indicated = {name}_decode(sine, cosine);")
+        roles = ", ".join(chain.channels.roles)
+        own.append(f"Channels: uint32_t indicated = {name}_decode({roles});")
     own += [
         f"{'Or' if chain.whole else 'Use'}: int64_t corrected = {name}_correct_unwrapped(turns, "
         "indicated), in 2^-32 turns: whole turns of the output since the model's zero "

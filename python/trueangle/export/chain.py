@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
-from .codetext import filled_code, float_literal
 from .pattern import TurnPattern
 from .table import TURN, Table, make_table
 
@@ -47,12 +46,6 @@ class Chain:
     tables: tuple[Table, ...]
     at_indicated: bool
     channels: Channels | None = None
-
-    def decoding(self, part: str) -> str:
-        """``part`` with the constants of the channels; empty without them."""
-        if self.channels is None:
-            return ""
-        return decoding(self.channels, part, 2.0**32)
 
     @property
     def whole(self) -> bool:
@@ -87,14 +80,6 @@ class Chain:
         """What is subtracted in all, in turns."""
         taken = np.asarray(places).astype(np.int64) - self.corrected_unwrapped(places, contracted)
         return np.asarray(taken / TURN)
-
-
-def decoding(channels: Channels, part: str, turn: float) -> str:
-    """``part`` of a program with the constants of channels; a turn is ``turn``."""
-    *numbers, factor = channels.constants
-    names = ("offset_cosine", "offset_sine", "per_cosine", "per_sine", "slope")
-    values = dict(zip(names, numbers, strict=True), factor=factor / channels.period * turn)
-    return filled_code(part, **{name: float_literal(v, 17) for name, v in values.items()})
 
 
 #: Turns after which shafts may be back together, and those looked at of shafts that never are.

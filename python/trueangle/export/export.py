@@ -19,6 +19,7 @@ from ..model.writing import model_text
 from ..support.argumentkinds import told_kinds
 from ..support.display_units import error_unit
 from ..support.files import check_output, read_whole, written_atomically
+from .decoding import check_choice
 from .exported import HEADER_DIGITS, Exported, run_time_bound, term_sizes
 from .pattern import TurnPattern
 from .proof import Proof, lost_orders, prove_export, rounded_up
@@ -108,11 +109,8 @@ def export_model(
     pattern = TurnPattern(loaded.in_sensor_sense() if found.at_sensor else loaded)
     channels = pattern.source.channels if found.decodes else None
     decodes = channels is not None
-    if channels is not None and channels.second is not None:
-        raise ArgumentError(
-            f"{target} decodes one track, and the model has two: calibrate the first alone, "
-            f"`periods_per_turn={channels.periods_per_turn}`"
-        )
+    if channels is not None:
+        check_choice(channels)
     holds_any = any(map(found.holds, pattern.left_out)) or decodes or found.may_be_empty(given)
     if pattern.is_empty and not holds_any:
         raise ArgumentError(

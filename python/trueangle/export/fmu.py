@@ -26,9 +26,9 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.writing import model_text
 from ..support.files import FileKind
-from .chain import decoding
 from .codetext import code_file, code_parts, filled_code
 from .cstep import DOUBLE, c_search, c_state, wave_tables
+from .decoding import decoding
 from .pattern import TurnPattern
 from .proof import Proof
 from .reading import table_error
@@ -238,10 +238,11 @@ def variables_of(model: HarmonicModel, sensor: bool, noise_std: float = 0.0) -> 
     if sensor or model.channels is None:
         rows.append((first[0], "input", "continuous", "rad", 0.0, first[1]))
     else:
-        starts = model.channels.curve(np.zeros(1))
+        tracks = filter(None, (model.channels, model.channels.second))
+        starts = np.concatenate([track.curve(np.zeros(1)) for track in tracks]).ravel().tolist()
         rows += [
-            (name, "input", "continuous", "", float(start[0]), f"{name} channel of its encoder")
-            for name, start in zip(("sine", "cosine"), starts, strict=True)
+            (name, "input", "continuous", "", start, f"{name} channel of its encoder")
+            for name, start in zip(model.channels.roles, starts, strict=False)
         ]
     rows += [
         ("velocity", "input", "continuous", "rad/s", 0.0, "velocity of the joint"),
@@ -286,8 +287,9 @@ def fmu_source(
     by_name = {variable.name: variable.reference for variable in variables}
     reading = "me->value[1] / turn"
     if "sine" in by_name and model.channels is not None:
-        core.append(decoding(model.channels, _part("channels"), 1.0))
-        reading = "m_decoded(me->value[1], me->value[2])"
+        core.append(decoding(model.channels, code_parts("fmu.c"), 1.0, "m_{}".format))
+        values = (f"me->value[{by_name[role]}]" for role in model.channels.roles)
+        reading = f"m_decode({', '.join(values)})"
     scale = {"velocity": " / turn", "temperature": " - 273.15"}
     signals = [
         f"known += signals.{name} = me->value[{by_name[name]}]{scale.get(name, '')};"

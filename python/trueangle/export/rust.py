@@ -14,6 +14,7 @@ from ..model.forms import Form
 from ..support.files import FileKind
 from .chain import Chain, source_identifier
 from .codetext import code_parts, filled_code, float_literal, number_rows
+from .decoding import decoding
 from .portable import PortableTarget, self_test, table_lines
 from .runtimeterms import RunTimeTerms, RunTimeWaves
 from .table import PER_RADIAN, TURN, Table, ratio_of_cycles
@@ -45,7 +46,7 @@ class RustModule(PortableTarget):
             parts.append(_part("correct"))
         parts += [_unwrapped(chain), _self_test(chain)]
         if chain.channels is not None:
-            parts.append(chain.decoding(code_parts("module.rs")["decode"]))
+            parts.append(decoding(chain.channels, code_parts("module.rs"), 2.0**32, str))
         if terms is not None:
             whole = chain.whole and terms.whole
             parts.append(_rust_step(terms, chain.zero, chain.at_indicated, whole))
@@ -61,7 +62,7 @@ def _comment(chain: Chain, terms: RunTimeTerms | None, header: CommentBlock) -> 
         "shifted left by 32 - n. Corrected = indicated - correction, looked up at the indicated "
         "angle" + ("; all tables at the same one." if chain.at_indicated else "."),
         "`correct_unwrapped` takes and gives the whole turns of the output as well.",
-        *([] if chain.channels is None else ["`decode` gives the reading of two channels."]),
+        *([] if chain.channels is None else ["`decode` gives the reading of the channels."]),
         *([] if terms is None else [terms.use("step", "&mut state", "State::default()")]),
         *table_lines(chain),
     ]

@@ -131,14 +131,14 @@ def test_a_table_of_the_angle_states_how_the_channels_are_decoded():
     assert -np.arctan2(y, x) == pytest.approx(wanted, abs=1e-7)
 
 
-#: Reads pairs of doubles from a file, writes pairs of decoded and corrected angles.
+#: Reads rows of doubles from a file, writes pairs of decoded and corrected angles.
 C_MAIN = """#include <stdint.h>
 #include <stdio.h>
 #include "joint.h"
 int main(void) {
-    double pair[2];
-    while (fread(pair, 8, 2, stdin) == 2) {
-        uint32_t angle = joint_decode(pair[0], pair[1]);
+    double row[COUNT];
+    while (fread(row, 8, COUNT, stdin) == COUNT) {
+        uint32_t angle = joint_decode(READINGS);
         uint32_t both[2] = {angle, joint_correct(angle)};
         fwrite(both, 4, 2, stdout);
     }
@@ -151,9 +151,9 @@ use std::io::{Read, Write};
 fn main() {
     let mut bytes = Vec::new();
     std::io::stdin().read_to_end(&mut bytes).unwrap();
-    let number = |b: &[u8]| f64::from_le_bytes(b.try_into().unwrap());
-    for pair in bytes.chunks(16) {
-        let angle = joint::decode(number(&pair[..8]), number(&pair[8..]));
+    let number = |b: &[u8], i: usize| f64::from_le_bytes(b[8 * i..][..8].try_into().unwrap());
+    for row in bytes.chunks(8 * COUNT) {
+        let angle = joint::decode(READINGS);
         for value in [angle, joint::correct(angle)] {
             std::io::stdout().write_all(&value.to_le_bytes()).unwrap();
         }
@@ -165,10 +165,14 @@ fn main() {
 
 @pytest.mark.parametrize("target", ["c", "rust"])
 @pytest.mark.parametrize(
-    ("direction", "periods", "alone"), [(1, 1, False), (-1, 3, False), (1, 1, True)]
+    ("direction", "periods", "alone", "second"),
+    [
+        *[(1, 1, False, None), (-1, 3, False, None), (1, 1, True, None)],
+        *[(-1, 16, False, 15), (1, 5, True, 32), (1, 7, True, 1), (1, 1, True, 9)],
+    ],
 )
 def test_both_channels_are_decoded_and_corrected_as_by_a_step(
-    tmp_path, target, direction, periods, alone
+    tmp_path, target, direction, periods, alone, second
 ):
     compiler = {"c": "gcc", "rust": "rustc"}[target]
     if shutil.which(compiler) is None:
@@ -176,26 +180,45 @@ def test_both_channels_are_decoded_and_corrected_as_by_a_step(
     model = drawn(8, 0.3, direction=direction, periods_per_turn=periods)
     if alone:
         model = model.replace(shafts=())
+    if second is not None:
+        other = drawn(9, direction=-1, periods_per_turn=second, offset_sine=-3.0).channels
+        tracks = model.channels.replace(second=other, second_zero_deg=77.0)
+        model = model.replace(channels=tracks)
     ending = {"c": ".h", "rust": ".rs"}[target]
     made = ta.export_model(model, target, tmp_path / f"joint{ending}", bits=16)
     main = tmp_path / ("main.c" if target == "c" else "main.rs")
-    main.write_text(C_MAIN if target == "c" else RUST_MAIN)
+    count = len(model.channels.roles)
+    text, one = {"c": (C_MAIN, "row[{}]"), "rust": (RUST_MAIN, "number(row, {})")}[target]
+    text = text.replace("READINGS", ", ".join(map(one.format, range(count))))
+    main.write_text(text.replace("COUNT", str(count)))
     flags = ["-O2", "-std=c99", "-Wall", "-Werror", "-ffp-contract=off"]
     flags = flags if target == "c" else ["--edition", "2021", "-O"]
     subprocess.run([compiler, *flags, main, "-o", tmp_path / "main"], check=True, cwd=tmp_path)
     rng = np.random.default_rng(3)
-    pairs = 2048.0 + 1000.0 * rng.normal(size=(5000, 2))
-    pairs[0] = math.nan
+    pairs = 2048.0 + 1000.0 * rng.normal(size=(5000, count))
+    if second is None:
+        pairs[0] = math.nan
+    else:  # of a sensor, so that the period is not a matter of the last digit
+        phase = np.linspace(0.0, 2.0 * math.pi, 5000)
+        first = tracks.curve(tracks.direction * periods * phase)
+        coarse = other.curve(-second * (phase + math.radians(77.0) / second))
+        pairs = np.transpose([*first, *coarse]) + 0.01 * rng.normal(size=pairs.shape)
     ran = subprocess.run(
         [tmp_path / "main"], input=pairs.tobytes(), capture_output=True, check=True
     )
     angle, corrected = np.frombuffer(ran.stdout, np.uint32).reshape(-1, 2).T
-    assert angle[0] == 0
+    assert angle[0] == 0 or second is not None
     exact = model.channels.angle(*pairs[1:].T) * (2.0**32 / 360.0)
-    # The same double, rounded to the unit of the device; halves may fall to either side.
+    # The same double, rounded to the unit of the device, and so are the periods of two tracks;
+    # halves may fall to either side.
     off = (angle[1:].astype(np.float64) - exact + 2.0**31) % 2.0**32 - 2.0**31
-    assert np.abs(off).max() < 0.5001
+    assert np.abs(off).max() < (0.5001 if second is None else 1.0001)
     step = model.compensator()
-    wanted = np.array([step(s, c) for s, c in pairs[1:].tolist()]) / 360.0
+    wanted = np.array([step(*row) for row in pairs[1:].tolist()]) / 360.0
     off = (corrected[1:] / 2.0**32 - wanted + 0.5) % 1.0 - 0.5
     assert np.abs(off).max() * 1296000.0 <= made.max_difference_arcsec + 0.01
+    if second is not None:
+        bent = {"harmonics": ((3, 0.2, 0.1, 0.0),)}
+        far = tracks.replace(second=other.replace(**bent), **bent)
+        with pytest.raises(ArgumentError, match="of a period by up to"):
+            ta.export_model(model.replace(channels=far), target)

@@ -125,11 +125,14 @@ def test_a_sensor_says_what_the_model_does(name, fmi, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "fmi", "direction", "periods"),
-    [("channels alone", "3", 1, 1), ("harmonics alone", "2", -1, 3), ("all", "3", -1, 1)],
+    ("name", "fmi", "direction", "periods", "second"),
+    [
+        *[("channels alone", "3", 1, 1, 0), ("harmonics alone", "2", -1, 3, 0)],
+        *[("all", "3", -1, 1, 0), ("channels alone", "2", -1, 16, 15)],
+    ],
 )
 def test_a_correction_of_two_channels_takes_sine_and_cosine(
-    name, fmi, direction, periods, tmp_path
+    name, fmi, direction, periods, second, tmp_path
 ):
     """What it decodes and corrects is a step's angle; at its starts that of the phase zero."""
     seed = int(np.random.SeedSequence().generate_state(1)[0])
@@ -138,25 +141,31 @@ def test_a_correction_of_two_channels_takes_sine_and_cosine(
         offset_sine=2100.0, offset_cosine=1980.0, amplitude=905.0, gain_ratio=1.07, phase_deg=-4.0,
         direction=direction, periods_per_turn=periods,
     )  # fmt: skip
+    other = ta.Channels(offset_sine=0.1, periods_per_turn=second or 1)
+    if second:
+        channels = channels.replace(second=other, second_zero_deg=100.0)
     shafts = () if name == "channels alone" else (OUTPUT,)
     model = ta.HarmonicModel(shafts, 0.01, terms=TERMS.get(name, ()), channels=channels)
     path = tmp_path / "joint.fmu"
     ta.export_model(model, "fmu", path, fmi=fmi)
     assert validate_fmu(str(path)) == []
     moved = motion(seed)
-    sine, cosine = channels.curve(moved["angle"] * periods * direction)
-    want = model.corrector()(channels.angle(sine, cosine), **signals_of(model, moved))
+    readings = [*channels.curve(moved["angle"] * periods * direction)]
+    if second:
+        readings += other.curve(moved["angle"] * second + np.radians(100.0))
+    want = model.corrector()(channels.angle(*readings), **signals_of(model, moved))
     if not model.terms:
         step = model.compensator()
-        assert [step(*pair) for pair in zip(sine[:9], cosine[:9], strict=True)] == [*want[:9]]
-    given = {**{k: v for k, v in moved.items() if k != "angle"}, "sine": sine, "cosine": cosine}
+        assert [step(*row) for row in np.transpose(readings)[:9].tolist()] == [*want[:9]]
+    given = dict(zip(channels.roles, readings, strict=True))
+    given |= {k: v for k, v in moved.items() if k != "angle"}
     for kind in ("CoSimulation", "ModelExchange"):
         found = simulated(path, "sine", "true_angle", given, kind)
         worst = np.max(np.abs(found - want[: len(found)]))
         print(f"{kind}: {worst}")
         assert worst <= WITHIN
     names = [v.name for v in variables_of(model, False)]
-    assert names[1:3] == ["sine", "cosine"]
+    assert tuple(names[1 : 1 + len(readings)]) == channels.roles
     assert "indicated" not in names
     assert ta.import_model(path, "fmu") == model
 

@@ -165,11 +165,3 @@ def test_a_second_track_needs_its_columns():
     for run in (ta.fit, lambda t, **k: ta.selfcal(t, method="channels", **k)):
         with pytest.raises(ta.TrueAngleError, match="cosine2"):
             run(columns, periods_per_turn=(16, 15))
-
-
-@pytest.mark.parametrize("target", ["c", "rust", "fmu"])
-def test_an_export_that_decodes_one_track_refuses_two(target):
-    first, second = sensor(16, 15)
-    model = ta.HarmonicModel((), 0.0, 360.0, channels=first.replace(second=second))
-    with pytest.raises(ArgumentError, match="decodes one track"):
-        ta.export_model(model, target)

@@ -84,13 +84,23 @@ static double m_output(m_state *state, double reading, const m_signals *signals)
     return m_seen(state, reading, start - m_level(signals), signals)@late@;
 }
 
-//@ channels
+//@ decode
 /* The angle of two channels, in turns. */
-static double m_decoded(double sine, double cosine)
+static double @decode@(double sine, double cosine)
 {
     const double x = (cosine - (@offset_cosine@)) * @per_cosine@;
     const double y = (sine - (@offset_sine@)) * @per_sine@ - x * (@slope@);
     return x == 0.0 && y == 0.0 ? NAN : atan2(y, x) * (@factor@);
+}
+
+//@ tracks
+/* The angle of two tracks, in turns within half of one: the second chooses the period of the first. */
+static double @decode@(double sine, double cosine, double sine2, double cosine2)
+{
+    const double fine = @one@(sine, cosine), coarse = @two@(sine2, cosine2);
+    const double steps = floor((coarse - fine) * @product@.0 + @lift@.0 / 4294967296.0);
+    const double turn = fine + fmod(fmod(steps, @first@.0) * @inverse@.0, @first@.0) / @first@.0;
+    return turn - ceil(turn - 0.5);
 }
 
 //@ sense

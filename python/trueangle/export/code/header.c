@@ -164,7 +164,7 @@ static inline int @name@_self_test(void)
 //@ decode
 /* The angle of two channels in 2^-32 turns; 0 where both are at their middle or not finite. Compile
    with -ffp-contract=off for the last bit. */
-static inline uint32_t @name@_decode(double sine, double cosine)
+static inline uint32_t @decode@(double sine, double cosine)
 {
     static const double c[11] = {
         1.0, -0.3333333333332844, 0.1999999999885511,
@@ -193,4 +193,16 @@ static inline uint32_t @name@_decode(double sine, double cosine)
         return 0;
     }
     return (uint32_t)(int64_t)(angle + (angle < 0.0 ? -0.5 : 0.5));
+}
+
+//@ tracks
+/* The angle of two tracks in 2^-32 turns over a whole turn: the second one chooses the period of the
+   first. */
+static inline uint32_t @decode@(double sine, double cosine, double sine2, double cosine2)
+{
+    const int64_t fine = (int32_t)@one@(sine, cosine);
+    const int64_t coarse = (int32_t)@two@(sine2, cosine2);
+    const uint64_t steps = (uint64_t)((coarse - fine) * INT64_C(@product@) + INT64_C(@lift@));
+    const uint64_t period = (steps >> 32) % @first@u * @inverse@u % @first@u;
+    return (uint32_t)fine + (uint32_t)(((period << 32) + @half@u) / @first@u);
 }

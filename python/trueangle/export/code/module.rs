@@ -60,7 +60,7 @@ pub const SELF_TEST: [(i32, u32, u32); 8] = [
 //@ decode
 /// The angle of two channels in 2^-32 turns; 0 where both are at their middle or not finite.
 #[rustfmt::skip]
-pub fn decode(sine: f64, cosine: f64) -> u32 {
+pub fn @decode@(sine: f64, cosine: f64) -> u32 {
     const PI: f64 = core::f64::consts::PI;
     const C: [f64; 11] = [
         1.0, -0.3333333333332844, 0.1999999999885511,
@@ -88,4 +88,15 @@ pub fn decode(sine: f64, cosine: f64) -> u32 {
     let angle = (if y < 0.0 { -half } else { half }) * (@factor@);
     // A conversion of what is not a number gives 0.
     (angle + if angle < 0.0 { -0.5 } else { 0.5 }) as i64 as u32
+}
+
+//@ tracks
+/// The angle of two tracks in 2^-32 turns over a whole turn: the second one chooses the period of the
+/// first.
+pub fn @decode@(sine: f64, cosine: f64, sine2: f64, cosine2: f64) -> u32 {
+    let fine = i64::from(@one@(sine, cosine) as i32);
+    let coarse = i64::from(@two@(sine2, cosine2) as i32);
+    let steps = ((coarse - fine) * @product@ + @lift@) as u64;
+    let period = (steps >> 32) % @first@ * @inverse@ % @first@;
+    (fine as u32).wrapping_add((((period << 32) + @half@) / @first@) as u32)
 }
