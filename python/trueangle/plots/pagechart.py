@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 SIDE: Final = 10_000.0
 #: Height of the smaller charts of a page.
 LOW: Final = "height:11rem"
-#: Ends of strokes of no length that are dots, squares and diamonds, and their signs in legends.
-_ENDS: Final = {"o": "round", "s": "square", "D": "diamond"}
+#: Strokes that are dots, squares and diamonds, where each ends, and their signs in legends. PDF
+#: paints a stroke of no length only if its ends are round.
+_DOTS: Final = {"o": ("h0", (0, 0)), "s": ("h1", (1, 0)), "D": ("l2 2", (2, 2))}
 _SIGNS: Final = {"o": "●", "s": "■", "D": "◆", "ring": "○"}
 #: Rows of a legend beyond which the table of runs names them.
 _MOST_RUNS: Final = 6
@@ -189,8 +190,8 @@ def _legend(ax: Axes) -> Iterator[dict[str, str]]:
 
 
 def _kind(marker: Any) -> str:
-    """Which of the shapes that a stroke of no length can have."""
-    return marker if marker in _ENDS else "o" if marker == "." else "D"
+    """Which of the shapes that a short stroke can have."""
+    return marker if marker in _DOTS else "o" if marker == "." else "D"
 
 
 def _strokes(ax: Axes) -> str:
@@ -285,10 +286,9 @@ def _renderer(ax: Axes) -> Any:
             size *= {"o": 1.0, "s": 0.9, "D": 0.8}[kind] if self.artist.get_marker() != "." else 0.6
             colour = gc.get_rgb() if hollow else rgbFace
             style = f"stroke:{page_colour(colour[:3])};stroke-width:{size:.3g}"
-            end = "square" if kind == "D" else _ENDS[kind]
-            style += "" if end == "round" else f";stroke-linecap:{end}"
+            style += "" if kind == "o" else ";stroke-linecap:square"
             style += f";opacity:{gc.get_alpha():.3g}" if gc.get_alpha() < 1.0 else ""
-            dot = "h0" if kind != "D" else "l2 2"
+            dot, end_at = _DOTS[kind]
             inner = f"stroke:var(--back);stroke-width:{max(size - 2.6, 1.0):.3g}"
             if titles := marks.get("titles"):
                 for (x, y), keep, title in zip(at.astype(int), inside, titles, strict=True):
@@ -297,7 +297,7 @@ def _renderer(ax: Axes) -> Any:
                         if marks.get("ring"):
                             self._add(inner, f"M{x} {y}{dot}", title)
                 return
-            d = _dots(at[inside].astype(int), dot)
+            d = _dots(at[inside].astype(int), dot, end_at)
             self._add(style, d)
             if marks.get("ring"):
                 self._add(inner, d)
@@ -305,12 +305,12 @@ def _renderer(ax: Axes) -> Any:
     return Strokes()
 
 
-def _dots(places: Any, dot: str) -> str:
-    """Strokes of no length, each from the one before: a third of the letters."""
+def _dots(places: Any, dot: str, end_at: tuple[int, int]) -> str:
+    """Short strokes, each from the end of the one before: a third of the letters."""
     spots = np.unique(places, axis=0)
     if not spots.size:
         return ""
-    moved = np.diff(spots, axis=0) - (0 if dot == "h0" else 2)
+    moved = np.diff(spots, axis=0) - end_at
     first = f"M{spots[0, 0]} {spots[0, 1]}{dot}"
     return first + "".join(f"m{a}{b:+d}{dot}" for a, b in moved.tolist())
 

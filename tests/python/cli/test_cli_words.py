@@ -53,7 +53,7 @@ def test_a_mistyped_run_is_answered_with_the_one_meant(tmp_path, capsys):
 def test_a_mistyped_shaft_is_answered_with_the_one_meant(command, tmp_path, capsys):
     runs = write(tmp_path / "r.csv", [])
     text = told([command, runs, "-o", tmp_path / "x", "--orders", "moter:1"], capsys)
-    assert "there is no shaft 'moter'; " in text
+    assert "there is no shaft 'moter'; the shafts are " in text
     assert text.endswith("; did you mean motor?\n")
     assert "shafts=" not in text
 

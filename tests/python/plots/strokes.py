@@ -38,7 +38,7 @@ def strokes(chart: dict[str, Any]) -> list[Stroke]:
         points = np.column_stack(
             [_number(chart["x"], places[:, 0]), _number(chart["y"], 1.0 - places[:, 1])]
         )
-        kind = "dots" if re.search("h0|l2 2", d) else "area" if "fill" in looks else "line"
+        kind = "dots" if re.search("h[01]|l2 2", d) else "area" if "fill" in looks else "line"
         found.append(Stroke(int(run) if run else None, unescape(title), looks, points, kind))
     return found
 
@@ -57,8 +57,8 @@ def _vertices(d: str) -> list[tuple[int, int]]:
         numbers = [int(n) for n in re.findall(r"-?\d+", text)]
         if command in "ML":
             at = (numbers[0], numbers[1])
-        elif command in "ml":
-            at = (at[0] + numbers[0], at[1] + numbers[1])
+        elif command in "mlh":
+            at = (at[0] + numbers[0], at[1] + (0 if command == "h" else numbers[1]))
         if command in "MLm":
             found.append(at)
     return found

@@ -51,8 +51,9 @@ def test_dots_are_where_the_axes_have_them(some, marker):
     ax, (x, y) = some
     (line,) = ax.plot(x, y, linestyle="none", marker=marker, color=palette.AFTER)
     marked(line, run=3)
-    (dots,) = strokes(page_chart(ax))
+    (dots,) = strokes(chart := page_chart(ax))
     assert (dots.run, dots.style["stroke"]) == (3, "var(--after)")
+    assert ("h0" in chart["svg"]) == (marker == "o")  # PDF paints no square end without a length
     assert len(dots.points) == 40
     for point in np.column_stack([x, y]):
         assert min(apart(ax, found, point) for found in dots.points) < NEAR

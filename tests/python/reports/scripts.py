@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-#: Dots of readings of a figure that are shown: each is a stroke without a length.
+#: Dots of readings of a figure that are shown: each is a short stroke.
 VISIBLE_POINTS = """(id) => [...document.getElementById(id).querySelectorAll("path[data-run]")]
   .filter((e) => e.checkVisibility())
-  .reduce((n, e) => n + (e.getAttribute("d").match(/h0|l2 2/g) || []).length, 0)"""
+  .reduce((n, e) => n + (e.getAttribute("d").match(/h[01]|l2 2/g) || []).length, 0)"""
 #: What a box shows: the part of its square.
 VIEW = """(id) => document.getElementById(id).querySelector(".box svg").getAttribute("viewBox")
   .split(" ").map(Number)"""
