@@ -212,7 +212,7 @@ class UnlikeRunsWarning(UserWarning):
 
 
 class UnreadColumnWarning(UserWarning):
-    """A column with the name of a role was left aside: it holds what that role cannot be."""
+    """A column with the name of a role was ignored: it holds what that role cannot be."""
 
 
 class LargeModelWarning(UserWarning):

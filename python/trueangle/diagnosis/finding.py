@@ -46,7 +46,7 @@ _SIZED: dict[str, tuple[float, str]] = {
     "cutoff_hz": (1.0, "Hz"),
     "fraction": (100.0, "% of the readings"),
     "arcsec_per_Nm": (1.0, "arcsec per Nm"),
-    "gear_ratio": (1.0, "is the ratio"),
+    "gear_ratio": (1.0, "to 1"),
 }
 
 #: Place or object of a finding, by its parameters.
@@ -224,7 +224,7 @@ def _number(value: Any, of: ErrorUnit) -> str:
 
 
 def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
-    """A finding by its cause, of which line it is, and how large."""
+    """A finding by its cause, of which line it is, and how large with its standard error."""
     known = {name: quantity.value for name, quantity in finding.parameters.items()}
     name = finding.cause
     if isinstance(known.get("shaft"), str):
@@ -240,8 +240,8 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
             continue
         std = finding.parameters[parameter].std
         stds = std if isinstance(std, list) else [std] * len(sizes)
-        shown = [*map((ErrorUnit(word, factor) if word else unit).number, sizes[:4], stds)]
-        return f"{name} ({', '.join(shown)}{' ...' * (len(sizes) > 4)} {word or unit.name})"
+        shown = map((ErrorUnit(word, factor) if word else unit).text, sizes[:4], stds)
+        return f"{name} ({', '.join(shown)}{' ...' * (len(sizes) > 4)})"
     if finding.gain is None:
         return name
     before, after = finding.gain.before[0], finding.gain.after[0]

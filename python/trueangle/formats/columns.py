@@ -102,7 +102,7 @@ def warn_of_unread(path: object, names: Sequence[str], roles: Collection[str]) -
     for role in (*LABELS, *SIGNALS):  # where an angle is missing that is an error
         for column in () if role in roles else _by_name(names, role):
             warnings.warn(
-                f"{path}: column {column.name!r} is left aside: it holds neither numbers nor text; "
+                f"{path}: column {column.name!r} is ignored: it holds neither numbers nor text; "
                 f"write it as one of them to use it as the role {role}, or rename it",
                 UnreadColumnWarning,
                 stacklevel=level_of_caller(),

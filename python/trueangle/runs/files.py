@@ -384,7 +384,7 @@ def _groups(table: FileReadings, size: int) -> Groups:
         if table.roles["when"].is_asked:
             raise error
         warnings.warn(
-            f"{error}; the column is left aside", UnreadColumnWarning, stacklevel=level_of_caller()
+            f"{error}; the column is ignored", UnreadColumnWarning, stacklevel=level_of_caller()
         )
         del columns["when"]  # a column of this name that holds something else
         days = {}

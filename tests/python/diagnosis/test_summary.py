@@ -143,7 +143,7 @@ BRIEFLY = {
     "backlash": ({"half_width_arcsec": 7.2}, "backlash (0.002000 deg)"),
     "sidebands": (
         {"carrier": 102.0, "amplitudes": [3.6, 7.2]},
-        "sidebands of order 102 (0.001000, 0.002000 deg)",
+        "sidebands of order 102 (0.001000 deg, 0.002000 deg)",
     ),
     "missing_order": (
         {"shaft": "wave_generator", "order": 2, "amplitude_arcsec": 36.0},

@@ -104,7 +104,7 @@ def test_a_column_with_the_name_of_a_role_that_is_left_aside_is_reported(
     path = tmp_path / f"runs.{ending}"
     lists(path, name)
     told = (
-        rf"runs\.{ending}: column '{name}' is left aside: it holds neither numbers nor text; write "
+        rf"runs\.{ending}: column '{name}' is ignored: it holds neither numbers nor text; write "
         f"it as one of them to use it as the role {role}, or rename it"
     )
     with pytest.warns(UnreadColumnWarning, match=told):
@@ -127,7 +127,7 @@ def test_a_text_that_is_no_date_is_left_aside_and_reported(ending, tmp_path):
     else:
         rows = "".join(f"{a},{b},spring\n" for a, b in zip(x, y, strict=True))
         path.write_text(f"reference_deg,indicated_deg,when\n{rows}")
-    told = r"line 2, column 'when': a date and time .* got 'spring'; the column is left aside"
+    told = r"line 2, column 'when': a date and time .* got 'spring'; the column is ignored"
     with pytest.warns(UnreadColumnWarning, match=told):
         (run,) = ta.read_runs(path)
     assert run.when is None

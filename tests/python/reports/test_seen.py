@@ -40,7 +40,7 @@ def sizes(text):
     return [
         (float(value), float(std))
         for value, std in re.findall(
-            r"half[_ ]width(?:_arcsec)? ([0-9.]+) (?:\+-|±) ([0-9.]+)", text
+            r"(?:half width|backlash) \(?([0-9.]+) (?:\+-|±) ([0-9.]+)", text
         )
     ]
 
