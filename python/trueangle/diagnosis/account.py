@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
 from ..effects.effect import ScatterFinding
-from ..effects.scatter import NEW_SCATTER
+from ..effects.noiselaw import NEW_SCATTER
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation

@@ -21,8 +21,7 @@ from ..effects.heteroscedastic_noise import (
     noise_blocks,
     speed_penalty,
 )
-from ..effects.noiselaw import NoiseLaw, noise_law
-from ..effects.scatter import standardised_residuals
+from ..effects.noiselaw import NoiseLaw, noise_law, standardised_residuals
 from ..effects.timestamp_jitter import TimestampJitter, shares_of_speed
 from ..estimation.regression import Regression
 from .levels import levels_of_runs

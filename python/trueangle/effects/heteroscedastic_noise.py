@@ -14,9 +14,8 @@ from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .effect import Effect, ScatterFinding
-from .noiselaw import NoiseLaw, noise_law
+from .noiselaw import SQUARE_CLIP, NoiseLaw, noise_law, standardised_residuals
 from .outliers import Outliers
-from .scatter import SQUARE_CLIP, standardised_residuals
 from .search import Array
 
 #: The block of noise that follows the speed.

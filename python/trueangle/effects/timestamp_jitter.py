@@ -15,8 +15,7 @@ from ..joint.signals import Signals
 from ..support.angles import ARCSEC_PER_DEG
 from .effect import Effect, ScatterFinding
 from .heteroscedastic_noise import HeteroscedasticNoise, speed_penalty
-from .noiselaw import NoiseLaw, noise_law
-from .scatter import standardised_residuals
+from .noiselaw import NoiseLaw, noise_law, standardised_residuals
 from .search import Array
 
 

@@ -20,13 +20,13 @@ from .ahead import read_ahead
 from .arrowtables import (
     ArrowDigest,
     add_corrected,
+    arrow_dtype,
     column_batches,
     corrected_schema,
     element_names,
     other_names,
     top_names,
 )
-from .arrowvalues import arrow_dtype
 from .budget import FileExtent, check_part
 from .damage import damage_told
 from .format import Batch, Contents, CopyTask, Selection

@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.csv
 from numpy.typing import NDArray
 
-from .arrowvalues import arrow_numbers, label_codes
+from .arrowtables import arrow_numbers, label_codes
 from .csvheader import Header
 from .csvrows import QuotedBlock
 from .format import Labels

@@ -26,8 +26,7 @@ from ..errors import FileError
 from .damage import damage_told
 from .format import Addition, note
 from .jointstates import JointStateBlock
-from .mcapchunks import BagReader, ChunkReader
-from .mcaprows import RecordRows
+from .mcapchunks import BagReader, ChunkReader, RecordRows
 from .unpacking import unpacked
 
 #: Signals of a joint in the message, under the names of columns.

@@ -23,8 +23,7 @@ from .budget import FileExtent
 from .format import Addition, Batch, Contents, CopyTask, Selection
 from .jointstates import JointStateBlock
 from .mcapchunks import ChunkedBagWriter as Writer
-from .mcapchunks import ChunkReader
-from .mcaprows import RecordRows
+from .mcapchunks import ChunkReader, RecordRows
 from .openbag import (
     BLOCK,
     FIELDS,

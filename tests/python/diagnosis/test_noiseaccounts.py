@@ -9,8 +9,7 @@ import pytest
 
 from trueangle.diagnosis.penalty import NEW_CAUSE
 from trueangle.diagnosis.unevennoise import uneven_noise
-from trueangle.effects.noiselaw import NoiseLaw, noise_law
-from trueangle.effects.scatter import standardised_residuals
+from trueangle.effects.noiselaw import NoiseLaw, noise_law, standardised_residuals
 from trueangle.estimation.quantity import Parameters
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals

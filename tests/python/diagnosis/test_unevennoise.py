@@ -9,8 +9,7 @@ import trueangle as ta
 from trueangle.diagnosis.account import _uneven
 from trueangle.diagnosis.penalty import NEW_CAUSE
 from trueangle.diagnosis.unevennoise import uneven_noise
-from trueangle.effects.noiselaw import noise_law
-from trueangle.effects.scatter import CLIPPED_MEAN
+from trueangle.effects.noiselaw import CLIPPED_MEAN, noise_law
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Joint, RunDesign, Simulation

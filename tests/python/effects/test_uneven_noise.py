@@ -8,8 +8,7 @@ import pytest
 import trueangle as ta
 from trueangle.effects import HeteroscedasticNoise
 from trueangle.effects.heteroscedastic_noise import noise_blocks
-from trueangle.effects.noiselaw import noise_law
-from trueangle.effects.scatter import SQUARE_CLIP, standardised_residuals
+from trueangle.effects.noiselaw import SQUARE_CLIP, noise_law, standardised_residuals
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.simulation import Joint, RunDesign, Simulation

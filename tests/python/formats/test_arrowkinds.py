@@ -15,8 +15,11 @@ import pyarrow.parquet as pq  # noqa: E402
 
 import trueangle as ta  # noqa: E402
 from trueangle.formats import parquet  # noqa: E402
-from trueangle.formats.arrowtables import ArrowDigest, element_names  # noqa: E402
-from trueangle.formats.arrowvalues import arrow_numbers  # noqa: E402
+from trueangle.formats.arrowtables import (  # noqa: E402
+    ArrowDigest,
+    arrow_numbers,
+    element_names,
+)
 
 ROWS = 60
 NOON = datetime.datetime(2000, 1, 1, 12, 0, 1, 500_000)

@@ -14,7 +14,7 @@ pa = pytest.importorskip("pyarrow")
 import pyarrow.parquet as pq  # noqa: E402
 
 from trueangle.formats.arrow import BatchRange  # noqa: E402
-from trueangle.formats.arrowvalues import arrow_numbers, arrow_values, label_codes  # noqa: E402
+from trueangle.formats.arrowtables import arrow_numbers, arrow_values, label_codes  # noqa: E402
 
 KINDS = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"]
 KINDS += ["float", "double"]

@@ -15,7 +15,7 @@ from rosbags.rosbag2 import Writer as PlainWriter
 from rosbags.typesys import Stores, get_typestore
 
 from trueangle.formats import openbag
-from trueangle.formats.mcaprows import RecordRows, interleaved_rows
+from trueangle.formats.mcapchunks import RecordRows, interleaved_rows
 
 SEED = 33
 STORE = get_typestore(Stores.LATEST)

@@ -13,7 +13,7 @@ h5py = pytest.importorskip("h5py")
 pa = pytest.importorskip("pyarrow")
 from trueangle.formats import arrow, hdf5  # noqa: E402
 from trueangle.formats.arrow import placed_batch  # noqa: E402
-from trueangle.formats.arrowvalues import arrow_numbers  # noqa: E402
+from trueangle.formats.arrowtables import arrow_numbers  # noqa: E402
 from trueangle.formats.hdf5sets import Hdf5Places  # noqa: E402
 
 ROWS = 30_001
