@@ -133,6 +133,12 @@ def show(
         print(result.to_json())
 
 
+def given(args: argparse.Namespace, *names: str, **renamed: str) -> dict[str, Any]:
+    """The options that were given, by the names under which a function takes them."""
+    renamed |= {name: name for name in names}
+    return {to: getattr(args, name) for to, name in renamed.items() if vars(args)[name] is not None}
+
+
 def refuse_given(args: argparse.Namespace, options: Sequence[str], because: str) -> None:
     """Refuse options that the others leave without a meaning.
 

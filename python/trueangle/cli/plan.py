@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
 from ..selfcalibration.methods import PLANNED
 from ..support.files import SIMULATION
-from .options import refuse_given
+from .options import given, refuse_given
 from .parser import declare
 from .paths import Input, Output
 from .signal_options import add_signals
@@ -23,20 +24,20 @@ if TYPE_CHECKING:
 HELP = "propose calibration positions that keep the wanted orders apart"
 EXAMPLE = "trueangle plan --gear-ratio 100 --positions 36 --mounts 2"
 
-#: Arcsec to which a polygon is tilted where nothing is stated.
-TILT = 1200.0
-#: What is of plans for whole turns alone.
-OF_TURNS = ("positions", "mounts", "reference", "tilts", "tilt_arcsec")
-
 #: Degrees over which an uncertainty is wanted where no arc is stated.
 WHOLE_TURN = (0.0, 360.0)
 
-#: What is of other plans.
-_OTHERS = (
-    *("gear_ratio", "positions", "mounts", "reference", "tilts", "tilt_arcsec", "orders"),
-    *("noise_arcsec", "std_arcsec", "arc", "readings", "runs", "both_directions", "apart"),
-    *("uncertainty", "prior", "self_method", "count", "angles", "speed_ratio", "start_speed"),
-    "rate",
+#: What is of one kind of plan alone: whole turns, an arc, no reference, after a diagnosis.
+OF_TURNS = ("positions", "mounts", "reference", "tilts", "tilt_arcsec")
+OF_ARC = ("readings", "runs", "both_directions", "apart")
+OF_SELF = ("count", "angles", "speed_ratio", "start_speed", "rate")
+OF_AFTER = (
+    *("between", "limits", "seeds", "within", "output", "signal", "counts_per_turn"),
+    *("counts_per_turn_reference", "topic", "facets", "unit_from", "periods_per_turn"),
+)
+_OF_OTHERS = (
+    *("gear_ratio", *OF_TURNS, "orders", "noise_arcsec", "std_arcsec", "arc", *OF_ARC),
+    *("uncertainty", "prior", "self_method", *OF_SELF),
 )
 
 
@@ -58,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "polygon: remount it; off-null: read the autocollimator at tilts instead; "
         "encoder: a free reference encoder (default: polygon)",
     )
-    add("--tilt-arcsec U", float, f"off-null: largest tilt to both sides (default: {TILT:g})")
+    add("--tilt-arcsec U", float, "off-null: largest tilt to both sides (default: 1200)")
     add("--tilts T", int, "off-null: tilts per facet (default: 2)")
     add("--orders 1-17,202", str, "orders wanted (default: 1-17 and the gear's own)")
     add("--noise-arcsec S", float, "scatter of one reading")
@@ -86,7 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "what --readings are enough for",
     )
     add("--json", bool, "print the plan as JSON")
-    add_after_arguments(parser)
+    _add_after_arguments(parser)
     _add_self_arguments(parser)
 
 
@@ -116,9 +117,9 @@ def run(args: argparse.Namespace) -> int:
     orders = None if args.orders is None else parse_orders(args.orders)
     if args.after is not None:
         return _run_after(args)
-    refuse_without_after(args)
+    refuse_given(args, OF_AFTER, "is of plans after a diagnosis: add --after RUNS")
     if args.self_method is None:
-        of_self = ("count", "angles", "speed_ratio", "start_speed", "rate", "simulation")
+        of_self = (*OF_SELF, "simulation")
         refuse_given(args, of_self, "is of plans without a reference: add --self METHOD")
     plan = _planned(args, orders)
     print(plan.to_json() if args.json else plan.summary())
@@ -129,62 +130,35 @@ def _planned(
     args: argparse.Namespace, orders: tuple[float, ...] | None
 ) -> CalibrationPlan | ArcPlan | UnitPlan | SelfPlan:
     """The plan that is requested: without a reference, of a unit, an arc or whole turns."""
+    wanted = given(args, noise="noise_arcsec", standard_error="std_arcsec") | {"orders": orders}
+    if args.self_method is not None:
+        return _of_self(args, wanted)
+    if args.prior is not None or args.arc is not None or args.uncertainty is not None:
+        return _of_arc(args, wanted)
+    refuse_given(args, OF_ARC, "is of plans for an arc: add --arc START:STOP")
     from ..planning import plan as planning
 
-    if args.self_method is not None:
-        return _of_self(args, orders)
-    if args.prior is not None:
-        return _of_unit(args, orders)
-    if args.arc is not None or args.uncertainty is not None:
-        return _of_arc(args, orders)
-    of_arc = ("readings", "runs", "both_directions", "apart")
-    refuse_given(args, of_arc, "is of plans for an arc: add --arc START:STOP")
-    common = {
-        "fixed_member": args.fixed_member,
-        "orders": orders,
-        "noise": args.noise_arcsec,
-        "standard_error": args.std_arcsec,
-    }
     if args.reference != "off-null":
         refuse_given(args, ("tilts", "tilt_arcsec"), "goes with --reference off-null")
     if args.reference in ("encoder", "off-null"):
         refuse_given(args, ("mounts",), f"is of a polygon, not of --reference {args.reference}")
-    if args.reference == "encoder":
-        return planning.plan_encoder(args.gear_ratio, args.positions, **common)
-    positions = 36 if args.positions is None else args.positions
-    if args.reference == "off-null":
-        return planning.plan_tilts(
-            args.gear_ratio,
-            positions,
-            2 if args.tilts is None else args.tilts,
-            tilt_arcsec=TILT if args.tilt_arcsec is None else args.tilt_arcsec,
-            **common,
-        )
-    mounts = 2 if args.mounts is None else args.mounts
-    return planning.plan_mounts(args.gear_ratio, positions, mounts, **common)
+    plans: dict[str, Callable[..., CalibrationPlan]] = {
+        "encoder": planning.plan_encoder,
+        "off-null": planning.plan_tilts,
+    }
+    told = given(args, *set(OF_TURNS) - {"reference"}, fixed_member="fixed_member")
+    return plans.get(args.reference, planning.plan_mounts)(args.gear_ratio, **told, **wanted)
 
 
-def _of_arc(args: argparse.Namespace, orders: tuple[float, ...] | None) -> ArcPlan:
-    from ..planning.arc import plan_arc
-
-    refuse_given(args, OF_TURNS, "is of plans for whole turns: it has --readings")
-    refuse_given(args, ("gear_ratio",), "is of plans for whole turns: name its orders by --orders")
+def _of_arc(args: argparse.Namespace, wanted: dict[str, Any]) -> ArcPlan | UnitPlan:
     start, stop = WHOLE_TURN if args.arc is None else args.arc
-    return plan_arc(
-        start,
-        stop,
-        orders,
-        readings=args.readings,
-        runs=1 if args.runs is None else args.runs,
-        both_directions=args.both_directions,
-        apart=0.0 if args.apart is None else args.apart,
-        noise=args.noise_arcsec,
-        standard_error=args.std_arcsec,
-        uncertainty=args.uncertainty,
-    )
+    if args.prior is None:
+        from ..planning.arc import plan_arc
 
-
-def _of_unit(args: argparse.Namespace, orders: tuple[float, ...] | None) -> UnitPlan:
+        refuse_given(args, OF_TURNS, "is of plans for whole turns: it has --readings")
+        by_orders = "is of plans for whole turns: name its orders by --orders"
+        refuse_given(args, ("gear_ratio",), by_orders)
+        return plan_arc(start, stop, **given(args, *OF_ARC, "uncertainty"), **wanted)
     from ..fleets import load_fleet, plan_unit
 
     others = (*OF_TURNS, "gear_ratio", "runs", "both_directions", "apart", "std_arcsec")
@@ -194,44 +168,24 @@ def _of_unit(args: argparse.Namespace, orders: tuple[float, ...] | None) -> Unit
             "--prior needs what the readings are for, --uncertainty 2arcsec, or how many there "
             "are, --readings N; one of them"
         )
-    start, stop = WHOLE_TURN if args.arc is None else args.arc
-    return plan_unit(
-        load_fleet(args.prior),
-        start,
-        stop,
-        orders,
-        uncertainty=args.uncertainty,
-        readings=args.readings,
-        noise=args.noise_arcsec,
-    )
+    told = given(args, "readings", "uncertainty")
+    return plan_unit(load_fleet(args.prior), start, stop, **told, **wanted)
 
 
-def _of_self(args: argparse.Namespace, orders: tuple[float, ...] | None) -> SelfPlan:
-    from ..planning.selfplan import plan_self
+def _of_self(args: argparse.Namespace, wanted: dict[str, Any]) -> SelfPlan:
+    from ..planning.selfplan import designed_selfplan, plan_self
+    from ..simulation import load_simulation
 
-    others = (
-        *(*OF_TURNS, "arc", "readings", "runs", "both_directions", "apart"),
-        *("uncertainty", "prior"),
-    )
+    others = (*OF_TURNS, "arc", *OF_ARC, "uncertainty", "prior")
     refuse_given(args, others, "is of plans with a reference: leave it or --self out")
-    told = {
-        "orders": orders,
-        "count": args.count,
-        "angles": None if args.angles is None else _angles(args.angles),
-        "speed_ratio": args.speed_ratio,
-        "start_speed": args.start_speed,
-        "rate": args.rate,
-        "gear_ratio": args.gear_ratio,
-        "noise": args.noise_arcsec,
-        "standard_error": args.std_arcsec,
-    }
-    given = {name: value for name, value in told.items() if value is not None}
+    told = given(args, *OF_SELF, "gear_ratio") | wanted
+    if args.angles is not None:
+        told["angles"] = _angles(args.angles)
+    if args.orders is None:
+        del told["orders"]
     if args.simulation is not None:
-        from ..planning.selfplan import designed_selfplan
-        from ..simulation import load_simulation
-
-        given = designed_selfplan(load_simulation(args.simulation), args.self_method) | given
-    return plan_self(args.self_method, **given)
+        told = designed_selfplan(load_simulation(args.simulation), args.self_method) | told
+    return plan_self(args.self_method, **told)
 
 
 def _angles(text: str) -> list[float]:
@@ -244,7 +198,7 @@ def _angles(text: str) -> list[float]:
     return found
 
 
-def add_after_arguments(parser: argparse.ArgumentParser) -> None:
+def _add_after_arguments(parser: argparse.ArgumentParser) -> None:
     """Options of ``--after``."""
     add = partial(declare, parser.add_argument_group("after a diagnosis with open questions"))
     add(
@@ -274,22 +228,21 @@ def add_after_arguments(parser: argparse.ArgumentParser) -> None:
 def _run_after(args: argparse.Namespace) -> int:
     """Print the runs that show what the present ones could not, and write them."""
     from ..planning.limits import load_limits
-    from ..rehearsal.after import SEEDS, WITHIN, plan_after
+    from ..rehearsal.after import plan_after
     from ..simulation import load_simulation
     from .run_lists import read_checked_runs
 
     if args.simulation is None:
         raise ArgumentError("--after needs the assumed joint: add --simulation FILE")
-    refuse_given(args, _OTHERS, "does not go with --after; leave one of them out")
+    refuse_given(args, _OF_OTHERS, "does not go with --after; leave one of them out")
     args.runs = args.after
     plan = plan_after(
         read_checked_runs(args),
         load_simulation(args.simulation),
         between=args.between,
         limits=None if args.limits is None else load_limits(args.limits),
-        seeds=SEEDS if args.seeds is None else args.seeds,
-        within=WITHIN if args.within is None else args.within,
         progress="auto",
+        **given(args, "seeds", "within"),
     )
     print(plan.to_json() if args.json else plan.summary(), flush=True)
     if args.output is not None:
@@ -299,13 +252,3 @@ def _run_after(args: argparse.Namespace) -> int:
             )
         plan.save(args.output)
     return 0
-
-
-def refuse_without_after(args: argparse.Namespace) -> None:
-    """Refuse options that are of ``--after`` only."""
-    after = [
-        *("between", "limits", "seeds", "within", "output"),
-        *("signal", "counts_per_turn", "counts_per_turn_reference"),
-        *("topic", "facets", "unit_from", "periods_per_turn"),
-    ]
-    refuse_given(args, after, "is of plans after a diagnosis: add --after RUNS")

@@ -8,26 +8,32 @@ from types import SimpleNamespace
 import pytest
 
 import trueangle as ta
-from trueangle.cli import fit, main
-from trueangle.cli.plan import add_after_arguments, refuse_without_after
+from trueangle.cli import fit, main, plan
+from trueangle.cli.options import refuse_given
+from trueangle.cli.signal_options import add_signals
 from trueangle.logs.keeping import KEPT, SAMPLE
 
 
 def after_options():
     parser = argparse.ArgumentParser(add_help=False)
-    add_after_arguments(parser)
-    return [action for action in parser._actions if action.dest != "after"]
+    plan.add_arguments(parser)
+    (group,) = [g for g in parser._action_groups if "after" in str(g.title)]
+    signals = argparse.ArgumentParser(add_help=False)
+    add_signals(signals)
+    output = [action for action in parser._actions if action.dest == "output"]
+    found = [*group._group_actions, *signals._actions, *output]
+    return [action for action in found if action.dest != "after"]
 
 
 @pytest.mark.parametrize("given", after_options(), ids=lambda action: action.dest)
 def test_an_option_of_a_plan_after_a_diagnosis_is_refused_without_one(given):
     """Whichever it is, and by its long name, also where what is given counts as nothing."""
     args = argparse.Namespace(**{action.dest: None for action in after_options()})
-    refuse_without_after(args)
+    refuse_given(args, plan.OF_AFTER, "is of")
     for value in ("x", 0):
         setattr(args, given.dest, value)
-        with pytest.raises(ta.errors.ArgumentError, match=rf"^{given.option_strings[-1]} is of "):
-            refuse_without_after(args)
+        with pytest.raises(ta.errors.ArgumentError, match=rf"^{given.option_strings[-1]} is of"):
+            refuse_given(args, plan.OF_AFTER, "is of")
 
 
 def test_a_command_refuses_it(capsys):
