@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -11,13 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
+from ..support.deadline import ProgressLine, clock_text
 from ..support.plainresult import PlainResult
 from .joints import LogSettings
 from .manifest import Manifest
 from .sources import LogTarget
-
-#: Seconds between two lines.
-_INTERVAL = 0.5
 
 
 @dataclass
@@ -118,20 +114,14 @@ class Progress:
         stream: TextIO | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        found = sys.stderr if stream is None else stream
-        # The line that rewrites itself steers the terminal, which printed text must not.
-        self._stream: TextIO = getattr(found, "steering", found)
-        if style == "auto":
-            style = "text" if self._stream.isatty() else "none"
-        self._style = style
         self._clock = clock
         self._files = files
         self._total = max(total, 1)
-        self._start = self._shown = clock()
+        self._start = clock()
+        self._line = ProgressLine(style, stream, self._start)
         self._before = 0.0
         self._lock = threading.Lock()
         self._skipped = 0
-        self._width = 0
         self._size = 0
         self.files = 0
         self.rows = 0
@@ -144,8 +134,7 @@ class Progress:
         """``rows`` more are done, now ``part`` of the file in hand."""
         self.rows += rows
         now = self._clock()
-        if self._style != "none" and now - self._shown >= _INTERVAL:
-            self._shown = now
+        if self._line.is_due(now):
             self._show(now, self._before + part * self._size)
 
     def add(self, rows: int, size: float) -> None:
@@ -163,38 +152,23 @@ class Progress:
 
     def clear(self) -> None:
         """Remove the line of text."""
-        if self._width:
-            self._stream.write("\r" + " " * self._width + "\r")
-            self._stream.flush()
-            self._width = 0
+        self._line.clear()
 
     def _show(self, now: float, size: float) -> None:
         seconds = now - self._start
         worked = size - self._skipped
         left = (self._total - size) * seconds / worked if worked > 0 else None
         rate = self.rows / seconds
-        if self._style == "json":
-            state = {
-                "files_done": self.files,
-                "files": self._files,
-                "rows": self.rows,
-                "rows_per_second": round(rate),
-                "part": round(size / self._total, 4),
-                "seconds_left": None if left is None else round(left, 1),
-            }
-            self._stream.write(json.dumps(state) + "\n")
-        else:
-            text = (
-                f"{self.files}/{self._files} files, {self.rows:,} rows, "
-                f"{rate:,.0f} rows/s, {100 * size / self._total:.0f} %"
-            )
-            text += "" if left is None else f", {_clock_text(left)} left"
-            self._stream.write("\r" + text.ljust(self._width))
-            self._width = max(self._width, len(text))
-        self._stream.flush()
-
-
-def _clock_text(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+        state = {
+            "files_done": self.files,
+            "files": self._files,
+            "rows": self.rows,
+            "rows_per_second": round(rate),
+            "part": round(size / self._total, 4),
+            "seconds_left": None if left is None else round(left, 1),
+        }
+        text = (
+            f"{self.files}/{self._files} files, {self.rows:,} rows, "
+            f"{rate:,.0f} rows/s, {100 * size / self._total:.0f} %"
+        )
+        self._line.show(text + ("" if left is None else f", {clock_text(left)} left"), state)

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from types import FrameType
-from typing import Final, TextIO
+from typing import Any, Final, TextIO
 
 from ..errors import ArgumentError
 from .suggestions import check_choice
@@ -28,6 +28,60 @@ STYLES: Final = ("auto", "text", "json", "none")
 
 #: Seconds before anything is shown, and between two times that it is.
 _FIRST, _INTERVAL = 1.0, 0.5
+
+
+class ProgressLine:
+    """Where progress is shown: a line of stderr that rewrites itself, or an object a line.
+
+    Parameters
+    ----------
+    style : {"auto", "text", "json", "none"}
+        ``"auto"`` is text on a terminal and nothing elsewhere.
+    stream : text stream, optional
+        In place of stderr.
+    shown : float
+        When it was shown last.
+    """
+
+    def __init__(self, style: str, stream: TextIO | None, shown: float) -> None:
+        check_choice("progress", style, STYLES)
+        found = sys.stderr if stream is None else stream
+        # The line that rewrites itself steers the terminal, which printed text must not.
+        self._stream: TextIO | None = getattr(found, "steering", found)
+        if style == "auto":
+            style = "text" if self._stream is not None and self._stream.isatty() else "none"
+        self._style = "none" if self._stream is None else style
+        self._shown = shown
+        self._width = 0
+
+    def is_due(self, now: float) -> bool:
+        """Whether it is time to show something; it then counts as shown."""
+        due = self._style != "none" and now - self._shown >= _INTERVAL
+        if due:
+            self._shown = now
+        return due
+
+    def show(self, text: str, state: dict[str, Any]) -> None:
+        """Show a text, or the object that says the same."""
+        if self._style == "json":
+            import json  # a help needs none of it
+
+            self._write(json.dumps(state) + "\n")
+            return
+        self._write("\r" + text.ljust(self._width))
+        self._width = max(self._width, len(text))
+
+    def clear(self) -> None:
+        """Remove the line of text."""
+        if self._width:
+            self._write("\r" + " " * self._width + "\r")
+            self._width = 0
+
+    def _write(self, text: str) -> None:
+        assert self._stream is not None
+        with contextlib.suppress(OSError):  # a closed terminal
+            self._stream.write(text)
+            self._stream.flush()
 
 
 class Deadline:
@@ -66,19 +120,11 @@ class Deadline:
     ) -> None:
         if within is not None and not (within > 0.0 and math.isfinite(within)):
             raise ArgumentError(f"within must be a time above zero in seconds, got {within!r}")
-        check_choice("progress", style, STYLES)
-        found = sys.stderr if stream is None else stream
-        # The line that rewrites itself steers the terminal, which printed text must not.
-        self._stream: TextIO | None = getattr(found, "steering", found)
-        if style == "auto":
-            style = "text" if self._stream is not None and self._stream.isatty() else "none"
-        self._style = "none" if self._stream is None else style
         self._clock = clock
-        self._begun = self._shown = clock()
-        self._shown += _FIRST - _INTERVAL
+        self._begun = clock()
+        self._line = ProgressLine(style, stream, self._begun + _FIRST - _INTERVAL)
         self._share = 1.0
         self._stage, self._entered = "", self._begun
-        self._width = 0
         self._cut = ""
         #: Of `bounded` work: what was done, and what may be.
         self._spent, self._bound = 0.0, math.inf
@@ -155,28 +201,18 @@ class Deadline:
         now = self._clock()
         if stage != self._stage or done == 0:
             self._stage, self._entered = stage, now
-        if self._style == "none" or now - self._shown < _INTERVAL:
+        if not self._line.is_due(now):
             return
-        self._shown = now
         left, open_end = self._left(now, done, total, then)
-        if self._style == "json":
-            state = {"stage": stage, "done": done, "total": total}
-            times = {"seconds": now - self._begun, "seconds_left": left}
-            import json  # a help needs none of it
-
-            self._write(json.dumps(state | {k: v and round(v, 1) for k, v in times.items()}) + "\n")
-            return
         text = f"{stage}: {done} of {total}"
         if left is not None:
-            text += f", {f'{bound} ' if open_end else ''}{_clock_text(left)} left"
-        self._write("\r" + text.ljust(self._width))
-        self._width = max(self._width, len(text))
+            text += f", {f'{bound} ' if open_end else ''}{clock_text(left)} left"
+        times = {"seconds": round(now - self._begun, 1), "seconds_left": left and round(left, 1)}
+        self._line.show(text, {"stage": stage, "done": done, "total": total, **times})
 
     def clear(self) -> None:
         """Remove the line of text."""
-        if self._width:
-            self._write("\r" + " " * self._width + "\r")
-            self._width = 0
+        self._line.clear()
 
     def _left(self, now: float, done: int, total: int, then: float) -> tuple[float | None, bool]:
         """Seconds left, and whether it may take longer."""
@@ -185,12 +221,6 @@ class Deadline:
         if done == 0:
             return None, True
         return (now - self._entered) * (total - done) / done + then, True
-
-    def _write(self, text: str) -> None:
-        assert self._stream is not None
-        with contextlib.suppress(OSError):  # a closed terminal
-            self._stream.write(text)
-            self._stream.flush()
 
 
 _CURRENT: ContextVar[Deadline | None] = ContextVar("pace", default=None)
@@ -264,6 +294,7 @@ def ending_early() -> Iterator[_Interruption]:
             signal.signal(signal.SIGINT, before)
 
 
-def _clock_text(seconds: float) -> str:
+def clock_text(seconds: float) -> str:
+    """Seconds, or minutes and seconds, as a clock shows them."""
     minutes, rest = divmod(math.ceil(seconds), 60)
     return f"{minutes}:{rest:02d} min" if minutes else f"{rest} s"

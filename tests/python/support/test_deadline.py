@@ -23,7 +23,7 @@ from trueangle.simulation import Backlash, Harmonic, Latency, RunDesign, Simulat
 from trueangle.support import deadline
 from trueangle.support.deadline import (
     Deadline,
-    _clock_text,
+    clock_text,
     current_deadline,
     ending_early,
     under_deadline,
@@ -326,6 +326,6 @@ def test_within_of_the_command_line(files, capsys, monkeypatch):
      (119.0, "1:59 min"), (119.5, "2:00 min"), (3725.0, "62:05 min")],
 )  # fmt: skip
 def test_what_is_left_is_told_in_minutes_and_seconds(seconds: float, said: str) -> None:
-    assert _clock_text(seconds) == said
+    assert clock_text(seconds) == said
     minutes, _, rest = said.removesuffix(" min").removesuffix(" s").rpartition(":")
     assert 60 * int(minutes or 0) + int(rest) == math.ceil(seconds)
