@@ -7,10 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FileError, NoModelError
-from ..support.plainresult import json_text
 from .parser import declare
 from .paths import Input
-from .robots import add_robot, each_joint, joints_asked, robot_messages
+from .robots import add_robot, each_joint, joints_asked, show_joints
 from .signal_options import add_signals, of_joint, reading_options
 
 if TYPE_CHECKING:
@@ -76,7 +75,7 @@ def _tell_columns(error: FileError, args: argparse.Namespace) -> None:
 
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
     """Check every joint; 1 where the data of one are unusable."""
-    from ..reports.robot import checked_rank, plain_ranking, ranked
+    from ..reports.robot import checked_rank
     from ..runs.checks.check import check
     from ..runs.files import read_runs
 
@@ -89,14 +88,12 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
         return found, checked_rank(joint.name, found, runs)
 
     found, _ = each_joint(joints, work)
-    ranking = ranked(rank for _, rank in found.values())
     checks = {joint: result for joint, (result, _) in found.items()}
-    if args.json:
-        plain = {joint: result.to_dict() for joint, result in checks.items()}
-        print(json_text({"joints": plain, "ranking": plain_ranking(ranking)}, indent=2))
-    else:
-        texts = {row.joint: of_joint(checks[row.joint].summary(), row.joint) for row in ranking}
-        print(
-            robot_messages(f"Data of {name or 'the robot'}, the worst joint first:", ranking, texts)
-        )
+    show_joints(
+        args,
+        checks,
+        (rank for _, rank in found.values()),
+        f"Data of {name or 'the robot'}",
+        told=lambda joint: of_joint(checks[joint].summary(), joint),
+    )
     return 0 if all(result.usable for result in checks.values()) else 1

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ArgumentError, FileError, NoModelError, TrueAngleError
 from ..support.deadline import ending_early
 from ..support.files import MODEL, SENSOR, SIMULATION
-from ..support.plainresult import json_text
 from .options import add_joint, add_shared, errors_in, refuse_given
 from .parser import declare
 from .paths import Input, Output
-from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
+from .robots import add_robot, each_joint, joints_asked, save_models, show_joints
 from .signal_options import of_joint, reading_options, signals_by_joint
 from .values import declared_shafts, seconds
 
@@ -207,7 +206,7 @@ def _is_fmu(path: str) -> bool:
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
     """Diagnose every joint against its simulation, or an empty one of its gear."""
     from ..diagnosis import diagnose
-    from ..reports.robot import diagnosed_rank, plain_ranking, ranked
+    from ..reports.robot import diagnosed_rank
     from .run_lists import read_checked_runs
 
     single = (args.simulated, args.extend, args.extend_into, args.model, args.plan)
@@ -223,17 +222,15 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
         return diagnose(runs, simulation, within=args.within, progress=args.progress)
 
     found, _ = each_joint(joints, work)
-    ranking = ranked(diagnosed_rank(joint, result) for joint, result in found.items())
-    if args.json:
-        plain = {joint: result.to_dict() for joint, result in found.items()}
-        print(json_text({"joints": plain, "ranking": plain_ranking(ranking)}))
-    else:
-        texts = {
-            row.joint: found[row.joint].summary(errors_in(args), verbose=args.verbose)
-            for row in ranking
-        }
-        title = f"Diagnosis of {name or 'the robot'}, the worst joint first:"
-        print(robot_messages(title, ranking, texts, errors_in(args)), flush=True)
+    ranks = (diagnosed_rank(joint, result) for joint, result in found.items())
+    title = f"Diagnosis of {name or 'the robot'}"
+    show_joints(
+        args,
+        found,
+        ranks,
+        title,
+        told=lambda joint: found[joint].summary(errors_in(args), verbose=args.verbose),
+    )
     if args.corrected_model is not None:
         models = {
             joint: result.correction(argument=args.argument)

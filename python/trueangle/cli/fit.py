@@ -7,12 +7,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from ..errors import ArgumentError
-from ..support.plainresult import json_text
 from .ending import own_interrupts
-from .options import add_joint, add_shared, errors_in, show
+from .options import add_joint, add_shared, show
 from .parser import declare
 from .paths import Input
-from .robots import add_robot, each_joint, joints_asked, robot_messages, save_models
+from .robots import add_robot, each_joint, joints_asked, save_models, show_joints
 from .signal_options import reading_options
 from .values import declared_shafts, orders_by_shaft, parse_orders
 
@@ -79,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
     """Fit every joint; one file of all models."""
-    from ..reports.robot import fitted_rank, plain_ranking, ranked
+    from ..reports.robot import fitted_rank
 
     refuse_robot(args)
     runs: dict[str, Any] = {}
@@ -91,19 +90,9 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
         return _in_memory(joint.args, runs[joint.name])
 
     fits, failed = each_joint(joints, work)
-    every = {**fits, **failed}
-    ranking = ranked(fitted_rank(joint, runs[joint], fit) for joint, fit in every.items())
+    ranks = (fitted_rank(joint, runs[joint], fit) for joint, fit in {**fits, **failed}.items())
     save_models(args.output, name, joints, {joint: fit.model for joint, fit in fits.items()})
-    if args.json:
-        plain = {joint: fit.to_dict() for joint, fit in fits.items()}
-        rows = plain_ranking(ranking)
-        print(json_text({"model": args.output, "joints": plain, "ranking": rows}))
-    else:
-        told_of = [row.joint for row in ranking if row.joint in fits]
-        texts = {joint: fits[joint].summary(errors_in(args)) for joint in told_of}
-        title = f"Fit of {name or 'the robot'}, the worst joint first:"
-        print(robot_messages(title, ranking, texts, errors_in(args)))
-        print(f"\nsaved {args.output}")
+    show_joints(args, fits, ranks, f"Fit of {name or 'the robot'}", args.output)
     return 0
 
 

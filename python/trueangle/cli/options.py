@@ -110,10 +110,9 @@ def add_joint(parser: argparse.ArgumentParser) -> None:
 
 def errors_in(args: argparse.Namespace) -> ErrorsIn:
     """What a summary takes: the name, or the counts of a turn where they are given."""
+    asked = str(getattr(args, "errors_in", "auto"))
     counts: float | None = getattr(args, "counts_per_turn", None)
-    if args.errors_in == "count" and counts is not None:
-        return counts
-    return str(args.errors_in)
+    return counts if asked == "count" and counts is not None else asked
 
 
 def show(

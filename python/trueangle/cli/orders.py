@@ -7,17 +7,15 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
-from ..support.plainresult import json_text
 from .fit import add_one_pass, log_options, refuse_robot, wants_one_pass
-from .options import add_joint, add_shared, errors_in, show
+from .options import add_joint, add_shared, show
 from .parser import declare
 from .paths import Input
-from .robots import add_robot, each_joint, joints_asked
+from .robots import add_robot, each_joint, joints_asked, show_joints
 from .values import declared_shafts, parse_orders
 
 if TYPE_CHECKING:
     from ..fitting.orders.result import OrderSelection
-    from .robots import JointAsked
 
 HELP = "list which orders of the angle error are real, and their possible sources"
 EXAMPLE = "trueangle orders joint_a.csv --gear-ratio 100"
@@ -49,19 +47,11 @@ def run(args: argparse.Namespace) -> int:
     asked = joints_asked(args)
     if asked is not None:
         refuse_robot(args)
-        tables, _ = each_joint(asked[1], _of_joint)
-        if args.json:
-            print(json_text({"joints": {joint: t.to_dict() for joint, t in tables.items()}}))
-        else:
-            unit = errors_in(args)
-            print("\n\n".join(f"--- {j} ---\n{t.summary(unit)}" for j, t in tables.items()))
+        tables, _ = each_joint(asked[1], lambda joint: _in_memory(joint.args))
+        show_joints(args, tables)
         return 0
     show(args, _in_one_pass(args) if wants_one_pass(args) else _in_memory(args))
     return 0
-
-
-def _of_joint(joint: JointAsked) -> OrderSelection:
-    return _in_memory(joint.args)
 
 
 def _in_memory(args: argparse.Namespace) -> OrderSelection:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import ArgumentError, NoModelError, NotInvertibleError, RankError, TrueAngleError
-from ..support.display_units import ErrorsIn
+from ..support.plainresult import json_text
 from ..support.suggestions import did_you_mean
+from .options import errors_in
 from .parser import declare
 from .signal_options import of_joint, signal_option, signals_by_joint
 
@@ -182,15 +183,35 @@ def save_models(
     Robot(dict(models), name=name, signals=signals).save(path)
 
 
-def robot_messages(
-    title: str, ranking: list[Any], texts: dict[str, str], errors_in: ErrorsIn = "auto"
-) -> str:
-    """The ranking in front, and what is reported about every joint after it."""
-    from ..reports.robot import ranking_text
+def show_joints(
+    args: argparse.Namespace,
+    found: Mapping[str, Any],
+    ranks: Iterable[Any] = (),
+    title: str = "",
+    saved: str | None = None,
+    told: Callable[[str], str] | None = None,
+) -> None:
+    """Print what was found of every joint, the worst first where they are ranked.
 
-    parts = [ranking_text(title, ranking, errors_in)]
-    parts += [f"--- {joint} ---\n{text}" for joint, text in texts.items()]
-    return "\n\n".join(parts)
+    ``told`` tells a joint's, by its summary where not given.
+    """
+    from ..reports.robot import plain_ranking, ranked, ranking_text
+
+    ranking = ranked(ranks)
+    if args.json:
+        joints = {joint: result.to_dict() for joint, result in found.items()}
+        more = {"model": saved, "joints": joints, "ranking": plain_ranking(ranking) or None}
+        print(json_text({name: value for name, value in more.items() if value is not None}))
+        return
+    unit = errors_in(args)
+    parts = [ranking_text(f"{title}, the worst joint first:", ranking, unit)] if ranking else []
+    for joint in [row.joint for row in ranking] or found:
+        if joint in found:
+            text = found[joint].summary(unit) if told is None else told(joint)
+            parts.append(f"--- {joint} ---\n{text}")
+    print("\n\n".join(parts), flush=True)
+    if saved is not None:
+        print(f"\nsaved {saved}")
 
 
 def model_asked(path: str, joint: str | None = None) -> HarmonicModel:

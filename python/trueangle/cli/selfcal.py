@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
 from ..selfcalibration.methods import LOOPS, METHODS
-from ..support.plainresult import json_text
-from .options import add_shared, errors_in, show
+from .options import add_shared, show
 from .parser import declare
 from .paths import Input
-from .robots import add_robot, each_joint, joints_asked, save_models
+from .robots import add_robot, each_joint, joints_asked, save_models, show_joints
 from .signal_options import add_signals, reading_options
 from .values import parse_orders
 
@@ -83,19 +82,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int:
     """Calibrate every joint; one file of all models."""
-
-    def work(joint: JointAsked) -> SelfCalibration:
-        return _calibrated(joint.args)
-
-    found, _ = each_joint(joints, work)
+    found, _ = each_joint(joints, lambda joint: _calibrated(joint.args))
     save_models(args.output, name, joints, {joint: r.model for joint, r in found.items()})
-    if args.json:
-        plain = {joint: result.to_dict() for joint, result in found.items()}
-        print(json_text({"model": args.output, "joints": plain}))
-    else:
-        for joint, result in found.items():
-            print(f"--- {joint} ---\n{result.summary(errors_in(args))}\n")
-        print(f"saved {args.output}")
+    show_joints(args, found, saved=args.output)
     return 0
 
 
