@@ -12,6 +12,7 @@ from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
+from .drawing import Drawing
 from .effect import Effect
 from .missing_order import MissingOrder
 from .search import (
@@ -57,10 +58,8 @@ class ArgumentShift(Effect):
         return np.asarray(self.coefficient * self.columns(signals, around, {})[:, 0])
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        if around.pattern.orders.size == 0:
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        if of.around.pattern.orders.size == 0:
             return None
         return cls(-1.0)  # the argument is one angle or the other: it has no other size
 

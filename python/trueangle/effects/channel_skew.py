@@ -19,7 +19,7 @@ from ..model.term import Term
 from ..model.terms.motion import ChannelSkewTerm
 from ..support.angles import ARCSEC_PER_DEG
 from .ambiguity import OWN_POWER, Ambiguity, share_left
-from .drawing import drawn_phase
+from .drawing import Drawing
 from .effect import Effect, Reported
 from .filter_lag import FilterLag
 from .latency import UNTIMED, Latency
@@ -78,13 +78,11 @@ class ChannelSkew(Effect):
         return np.asarray(half * (1.0 + line))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        joint = around.joint
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        joint = of.around.joint
         side = "motor" if joint.encoder_side == "motor" and "motor" in joint.shafts else "output"
         order = joint.output_order(side, 2.0 * joint.pole_pairs)
-        return cls(size, order, drawn_phase(rng))
+        return cls(size, order, of.phase())
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

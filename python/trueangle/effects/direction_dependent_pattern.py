@@ -18,7 +18,7 @@ from ..model.term import Term, line_values
 from ..model.terms.travel import DirectionalPatternTerm
 from .ambiguity import Ambiguity
 from .backlash import ONE_WAY, Backlash, goes_both_ways
-from .drawing import drawn_phase
+from .drawing import Drawing
 from .effect import Effect, Reported
 from .latency import Latency
 from .presliding_hysteresis import PreslidingHysteresis
@@ -86,11 +86,9 @@ class DirectionalPattern(Effect):
         return np.asarray(signals.direction * line_sum(signals.theta, self.lines))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        order = float(rng.integers(1, 5))
-        return cls((order,), (size,), (drawn_phase(rng),))
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        order = float(of.whole(1, 5))
+        return cls((order,), (size,), (of.phase(),))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

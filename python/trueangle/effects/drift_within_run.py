@@ -24,6 +24,7 @@ from .ambiguity import (
     share_left,
 )
 from .backlash import Backlash
+from .drawing import Drawing
 from .effect import ALWAYS, Effect, Reported, Spots
 from .latency import Latency
 from .missing_order import MissingOrder
@@ -121,9 +122,7 @@ class DriftWithinRun(Effect):
         return out
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
         # A free path is no cause, and is not to be found as one.
         return cls(arcsec_per_s=size)
 

@@ -18,6 +18,7 @@ from ..joint.signals import Signals
 from ..model.term import Term
 from .ambiguity import Ambiguity
 from .departures import departure_columns
+from .drawing import Drawing
 from .parameters import TabledParameters
 from .search import Array, Fitted
 
@@ -160,10 +161,8 @@ class Effect(TabledParameters):
     # -- rehearse ------------------------------------------------------------------
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        """One of this size, all else random, to be hidden in readings of ``signals``.
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        """One of this size, all else random, to be hidden in these readings.
 
         None where these runs of this joint cannot have it. Here the first parameter is the size,
         and there is nothing else to draw.

@@ -22,6 +22,7 @@ from ..model.term import Term
 from ..model.terms.motion import FilterLagTerm
 from ..support.quantiles import quantile
 from .ambiguity import Ambiguity
+from .drawing import Drawing
 from .effect import Effect, Reported, Spots
 from .latency import UNTIMED, Latency
 from .missing_order import MissingOrder
@@ -98,10 +99,8 @@ class FilterLag(Effect):
         return np.asarray(seen - pattern.value(signals.theta))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        return None if around.pattern.orders.size == 0 else cls(size)
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        return None if of.around.pattern.orders.size == 0 else cls(size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -13,6 +13,7 @@ from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
+from .drawing import Drawing
 from .effect import Effect, ScatterFinding
 from .noiselaw import SQUARE_CLIP, NoiseLaw, noise_law, standardised_residuals
 from .outliers import Outliers
@@ -73,10 +74,8 @@ class HeteroscedasticNoise(Effect):
         return np.asarray(np.exp(0.5 * log_variance))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        angle = float(rng.uniform(0.0, 2.0 * np.pi))
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        angle = of.between(0.0, 2.0 * np.pi)
         return cls(size * float(np.cos(angle)), size * float(np.sin(angle)))
 
     @classmethod

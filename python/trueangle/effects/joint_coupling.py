@@ -17,6 +17,7 @@ from ..model.term import Term
 from ..model.terms.place import JointCouplingTerm
 from ..support.angles import ARCSEC_PER_DEG
 from .ambiguity import OWN_POWER, Ambiguity, share_left
+from .drawing import Drawing
 from .effect import Effect, Reported
 from .scale_error import ScaleError
 from .search import Array, Fitted
@@ -69,11 +70,9 @@ class JointCoupling(_OfOthers):
         return np.asarray(self.factor * ARCSEC_PER_DEG * angle)
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        moved = [joint for joint, angle in signals.coupled.items() if np.ptp(angle) > 0.0]
-        return cls(str(rng.choice(moved)), size) if moved else None
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        moved = [joint for joint, angle in of.signals.coupled.items() if np.ptp(angle) > 0.0]
+        return cls(str(of.rng.choice(moved)), size) if moved else None
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -16,7 +16,7 @@ from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.load import LoadDependentGearErrorTerm
 from .ambiguity import OWN_OF_VELOCITY, OWN_POWER, Ambiguity, share_left
-from .drawing import drawn_carrier, drawn_free_line, drawn_phase
+from .drawing import Drawing
 from .effect import Effect, Reported, Spots
 from .factor import FactorEffect
 from .missing_order import MissingOrder
@@ -67,13 +67,11 @@ class LoadDependentGearError(FactorEffect):
         return np.asarray(torque * line_sum(signals.theta, self.lines_per_Nm))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        order = drawn_carrier(around, rng)
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        order = of.carrier()
         if order is None:
-            _, _, order = drawn_free_line(around, rng)
-        return cls(((order, size, drawn_phase(rng)),))
+            _, _, order = of.free_line()
+        return cls(((order, size, of.phase()),))
 
     @classmethod
     def scale(cls, signals: Signals, kind: str) -> Array | None:

@@ -22,6 +22,7 @@ from ..support.angles import from_arcsec
 from ..support.deadline import current_deadline
 from .ambiguity import Ambiguity
 from .argument_error import ArgumentShift
+from .drawing import Drawing
 from .effect import Effect, Reported
 from .missing_order import MissingOrder
 from .search import SAME_CORRELATION, Array, Fitted, tangent_covariance
@@ -107,11 +108,9 @@ class LocalDefect(Effect):
         return bump
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        place = float(np.mod(signals.degrees[int(rng.integers(len(signals)))], 360.0))
-        return cls(place, float(rng.uniform(3.0, 8.0)), size)
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        place = float(np.mod(of.signals.degrees[of.whole(0, len(of.signals))], 360.0))
+        return cls(place, of.between(3.0, 8.0), size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -13,6 +13,7 @@ from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
+from .drawing import Drawing
 from .effect import ALWAYS, Effect, Reported
 from .search import (
     Array,
@@ -66,13 +67,11 @@ class MissedCounts(Effect):
         return np.asarray(self.step_arcsec * after)
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        bounds = signals.run_bounds()
-        run = int(rng.integers(len(bounds)))
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        bounds = of.signals.run_bounds()
+        run = of.whole(0, len(bounds))
         start, stop = bounds[run]
-        return cls(size, run, int((stop - start) * rng.uniform(0.2, 0.8)))
+        return cls(size, run, int((stop - start) * of.between(0.2, 0.8)))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

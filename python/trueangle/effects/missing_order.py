@@ -17,7 +17,7 @@ from ..joint.signals import Signals
 from .ambiguity import (
     Ambiguity,
 )
-from .drawing import drawn_free_line, drawn_phase
+from .drawing import Drawing
 from .effect import Effect, Reported, Spots
 from .scale_error import ScaleError
 from .search import (
@@ -77,11 +77,9 @@ class MissingOrder(Effect):
         return line_sum(signals.theta, ((order, self.amplitude_arcsec, self.phase_deg),))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        shaft, order, _ = drawn_free_line(around, rng)
-        return cls(shaft, order, size, drawn_phase(rng))
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        shaft, order, _ = of.free_line()
+        return cls(shaft, order, size, of.phase())
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -19,6 +19,7 @@ from ..support.deadline import current_deadline
 from .ambiguity import (
     Ambiguity,
 )
+from .drawing import Drawing
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect, Reported, Spots
 from .missing_order import HIGHEST, MissingOrder
@@ -95,10 +96,8 @@ class NonIntegerOrder(Effect):
         return np.asarray(self.amplitude_arcsec * np.sin(self.order * signals.theta + phase))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        return cls(float(rng.integers(5, 40)) + float(rng.uniform(0.3, 0.7)), size)
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        return cls(float(of.whole(5, 40)) + of.between(0.3, 0.7), size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -18,6 +18,7 @@ from ..estimation.segments import MOST_IN_ROW, flagged_segments, less_local_leve
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.distributions import binomial_tail
+from .drawing import Drawing
 from .effect import Effect, ScatterFinding
 from .local_defect import LocalDefect
 from .presliding_hysteresis import PreslidingHysteresis
@@ -107,10 +108,8 @@ class Outliers(Effect):
         return np.asarray(far_off * self.size_arcsec * rng.standard_normal(len(signals)))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        return cls(float(rng.uniform(0.01, 0.03)), size)
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        return cls(of.between(0.01, 0.03), size)
 
     @classmethod
     def find_scatter(cls, regression: Regression) -> ScatterFinding | None:

@@ -20,6 +20,7 @@ from ..support.deadline import current_deadline
 from .ambiguity import OWN_OF_VELOCITY, Ambiguity, share_left
 from .backlash import ONE_WAY, Backlash, goes_both_ways
 from .departures import spring_transitions
+from .drawing import Drawing
 from .effect import Effect, Reported
 from .latency import TWO_SPEEDS, Latency
 from .search import (
@@ -99,10 +100,8 @@ class PreslidingHysteresis(Effect):
         return self.amplitude_arcsec * signals.presliding(self.length_deg, self.start_state)
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        return cls(size, float(rng.uniform(2.0, 6.0)))
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        return cls(size, of.between(2.0, 6.0))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -16,7 +16,7 @@ from ..joint.lines import line_columns, line_sum
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .ambiguity import Ambiguity
-from .drawing import drawn_phase
+from .drawing import Drawing
 from .effect import Effect, Reported, Spots
 from .missing_order import MissingOrder
 from .search import Array, Fitted, is_gear_order, line_parameters, line_quantities
@@ -81,11 +81,9 @@ class ReferenceLines(Effect):
         return np.asarray(signals.theta + mount_sign * signals.mount)
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        order = float(rng.integers(1, 5))
-        return cls((order,), (size,), (drawn_phase(rng),))
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        order = float(of.whole(1, 5))
+        return cls((order,), (size,), (of.phase(),))
 
     @classmethod
     def alike(cls, other: Effect, around: JointPattern) -> Self | None:

@@ -16,7 +16,7 @@ from ..joint.lines import line_columns, line_sum
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from .ambiguity import Ambiguity
-from .drawing import drawn_carrier, drawn_phase
+from .drawing import Drawing
 from .effect import Effect, Reported, Spots
 from .missing_order import FREE_ANGLES, MissingOrder
 from .search import Array, Fitted, known_orders, line_parameters, line_quantities
@@ -73,13 +73,11 @@ class Sidebands(Effect):
         return line_sum(signals.theta, tuple((self.carrier + o, a, p) for o, a, p in lines))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        carrier = drawn_carrier(around, rng)
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        carrier = of.carrier()
         if carrier is None:
             return None
-        return cls(carrier, (-1.0, 1.0), (size, size), (drawn_phase(rng), drawn_phase(rng)))
+        return cls(carrier, (-1.0, 1.0), (size, size), (of.phase(), of.phase()))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

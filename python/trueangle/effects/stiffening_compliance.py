@@ -20,6 +20,7 @@ from ..support.angles import from_arcsec
 from ..support.arrays import distinct
 from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .departures import departure_beyond
+from .drawing import Drawing
 from .effect import Effect, Reported
 from .search import Array, Fitted, golden_maximum, tangent_covariance
 from .shapes import best_shape
@@ -97,11 +98,9 @@ class StiffeningCompliance(Effect):
         return np.asarray(np.sign(torque) * np.maximum(np.abs(torque) - knee, 0.0))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
         # At the largest load the cubic part is a quarter of the linear part.
-        largest = float(np.abs(torque_of(signals)).max())
+        largest = float(np.abs(torque_of(of.signals)).max())
         return cls(4.0 * size * largest**2, -size)
 
     @classmethod

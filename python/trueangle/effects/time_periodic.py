@@ -20,7 +20,7 @@ from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.quantiles import quantile
 from .ambiguity import Ambiguity
-from .drawing import reading_rate
+from .drawing import Drawing
 from .drift_within_run import DriftWithinRun
 from .effect import ALWAYS, Effect, Reported, Spots
 from .missing_order import MissingOrder
@@ -97,12 +97,10 @@ class TimePeriodic(Effect):
         return np.asarray(self.amplitude_arcsec * np.sin(turn + phase))
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        if signals.time is None:
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        if of.signals.time is None:
             return None
-        return cls(float(rng.uniform(0.1, 0.4)) * reading_rate(signals), size)
+        return cls(of.between(0.1, 0.4) * of.reading_rate(), size)
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -19,6 +19,7 @@ from ..joint.signals import Signals
 from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .backlash import Backlash
 from .direction_dependent_pattern import DirectionalPattern
+from .drawing import Drawing
 from .effect import Effect, Reported
 from .search import Array, Fitted, golden_maximum, is_of_one_sign, tangent_covariance
 from .torsional_compliance import TorsionalCompliance, torque_of, unloaded
@@ -85,11 +86,9 @@ class TorqueHysteresis(Effect):
         return self.half_width_arcsec * self.loop(signals, self.span_Nm)
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        span = 0.0 if signals.torque is None else float(np.ptp(signals.torque))
-        return cls(size, float(rng.uniform(0.1, 0.3)) * span) if span > 0.0 else None
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        span = 0.0 if of.signals.torque is None else float(np.ptp(of.signals.torque))
+        return cls(size, of.between(0.1, 0.3) * span) if span > 0.0 else None
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

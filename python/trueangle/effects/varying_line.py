@@ -18,7 +18,7 @@ from ..model.term import Term, line_values
 from ..model.terms.motion import VaryingLineTerm
 from .ambiguity import Ambiguity
 from .channel_skew import ChannelSkew, skewed_order
-from .drawing import drawn_carrier, drawn_free_line, drawn_phase
+from .drawing import Drawing
 from .effect import ALWAYS, Effect, Reported, Spots
 from .filter_lag import FilterLag
 from .load_dependent_gear_error import LoadDependentGearError
@@ -87,13 +87,11 @@ class VaryingLine(Effect):
         )
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        order = drawn_carrier(around, rng)
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        order = of.carrier()
         if order is None:
-            _, _, order = drawn_free_line(around, rng)
-        return cls(order, "speed", size, drawn_phase(rng))
+            _, _, order = of.free_line()
+        return cls(order, "speed", size, of.phase())
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

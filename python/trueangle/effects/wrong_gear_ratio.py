@@ -17,7 +17,7 @@ from ..joint.lines import line_columns
 from ..joint.pattern import JointPattern, Pattern
 from ..joint.shafts import shaft_cycles
 from ..joint.signals import Signals
-from .drawing import drawn_carrier
+from .drawing import Drawing
 from .effect import Effect, Reported
 from .missing_order import MissingOrder
 from .search import Array, Fitted
@@ -79,13 +79,11 @@ class WrongGearRatio(Effect):
         return pattern.value(signals.theta) - around.pattern.value(signals.theta)
 
     @classmethod
-    def drawn(
-        cls, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-    ) -> Self | None:
-        ratio = around.joint.gear_ratio
-        if ratio == 1.0 or drawn_carrier(around, rng) is None:
+    def drawn(cls, size: float, of: Drawing) -> Self | None:
+        ratio = of.around.joint.gear_ratio
+        if ratio == 1.0 or of.carrier() is None:
             return None
-        return cls(ratio + size * float(rng.choice([-1.0, 1.0])))
+        return cls(ratio + size * float(of.rng.choice([-1.0, 1.0])))
 
     @classmethod
     def propose(cls, regression: Regression) -> Extension | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..effects import EFFECTS, Effect
 from ..effects.ambiguity import Ambiguity
+from ..effects.drawing import Drawing
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
@@ -131,7 +132,7 @@ def effect_of_size(
         log_size, one = min(0.0, most), None
         for _ in range(_ROUNDS):
             size = math.exp(log_size if effect.size_grows else -log_size)
-            one = effect.drawn(size, signals, around, np.random.default_rng(number))
+            one = effect.drawn(size, Drawing(signals, around, np.random.default_rng(number)))
             if one is None:
                 break
             error = one.signal(signals, around, np.random.default_rng(0))

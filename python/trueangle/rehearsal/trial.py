@@ -9,8 +9,8 @@ import numpy as np
 
 from ..diagnosis import Diagnosis, diagnose
 from ..effects import EFFECTS, Effect
+from ..effects.drawing import Drawing
 from ..errors import TrueAngleError
-from ..joint.pattern import JointPattern
 from ..joint.signals import Signals, join_runs
 from ..simulation.simulation import Simulation, simulate
 
@@ -85,17 +85,15 @@ def measured_signals(sim: Simulation) -> Signals:
     return join_runs(simulate(replace(sim, effects=()), 0))
 
 
-def drawn_effect(
-    cause: str, size: float, signals: Signals, around: JointPattern, rng: np.random.Generator
-) -> Effect | None:
+def drawn_effect(cause: str, size: float, of: Drawing) -> Effect | None:
     """An effect of this cause and size; None where these runs cannot have it."""
-    return EFFECTS[cause].drawn(size, signals, around, rng)
+    return EFFECTS[cause].drawn(size, of)
 
 
 def run_trial(sim: Simulation, signals: Signals, trial: Trial, seed: int) -> TrialOutcome:
     """Hide the effect of a trial in readings of the simulation, diagnose them, and compare."""
     rng = trial_rng(seed, trial.cause, trial.number)
-    effect = drawn_effect(trial.cause, trial.size, signals, sim.surroundings, rng)
+    effect = drawn_effect(trial.cause, trial.size, Drawing(signals, sim.surroundings, rng))
     if effect is None:
         return TrialOutcome(NOTHING)
     runs = simulate(sim.with_effects([effect]), rng)

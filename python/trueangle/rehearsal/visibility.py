@@ -9,6 +9,7 @@ import numpy as np
 from ..effects import EFFECTS, Effect
 from ..effects.ambiguity import Ambiguity
 from ..effects.blindspots import blind_spots
+from ..effects.drawing import Drawing
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
@@ -78,7 +79,7 @@ def size_range(sim: Simulation, signals: Signals, cause: str, seed: int) -> Size
         found = []
         for number in range(DRAWS):
             rng = trial_rng(seed, cause, number)
-            drawn = drawn_effect(cause, size, signals, sim.surroundings, rng)
+            drawn = drawn_effect(cause, size, Drawing(signals, sim.surroundings, rng))
             found.append(0.0 if drawn is None else _deviance(drawn, regression, rng, sim))
         return float(np.mean(found))
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.effects.drawing import Drawing
 from trueangle.effects.joint_coupling import JointCoupling, _about_means
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
@@ -136,7 +137,7 @@ def test_a_coupling_is_drawn_of_a_joint_that_moves() -> None:
     a = motions(60, SEED)
     signals = signals_of(a=a, rest=[np.full(60, 30.0)] * 4)
     around, rng = Simulation().surroundings, np.random.default_rng(0)
-    drawn = {JointCoupling.drawn(0.01, signals, around, rng) for _ in range(20)}
+    drawn = {JointCoupling.drawn(0.01, Drawing(signals, around, rng)) for _ in range(20)}
     assert drawn == {JointCoupling("a", 0.01)}
     still = signals_of(rest=[np.full(60, 30.0)] * 4)
-    assert JointCoupling.drawn(0.01, still, around, rng) is None
+    assert JointCoupling.drawn(0.01, Drawing(still, around, rng)) is None

@@ -9,6 +9,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.effects import EFFECTS, FilterLag, MissedCounts
+from trueangle.effects.drawing import Drawing
 from trueangle.effects.missed_counts import STEP_MARGIN
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
@@ -139,6 +140,6 @@ def test_a_run_has_room_for_a_step(less: int, found: bool) -> None:
 
 def test_steps_are_drawn_well_within_any_run(signals: Signals) -> None:
     rng = np.random.default_rng(71_600)
-    drawn = [MissedCounts.drawn(-4.0, signals, SIM.surroundings, rng) for _ in range(100)]
+    drawn = [MissedCounts.drawn(-4.0, Drawing(signals, SIM.surroundings, rng)) for _ in range(100)]
     assert {step.run for step in drawn if step} == set(range(8))
     assert all(step and 96 <= step.row < 384 and step.step_arcsec == -4.0 for step in drawn)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from trueangle.effects import EFFECTS
+from trueangle.effects.drawing import Drawing
 from trueangle.rehearsal.trial import drawn_effect, measured_signals, trial_rng
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 
@@ -56,7 +57,7 @@ CURVED = {
 
 def drawn(kind, size, number):
     rng = trial_rng(SEED, kind, number)
-    return drawn_effect(kind, size, SIGNALS, SIM.surroundings, rng), rng
+    return drawn_effect(kind, size, Drawing(SIGNALS, SIM.surroundings, rng)), rng
 
 
 @pytest.mark.parametrize("kind", list(EFFECTS))
@@ -103,7 +104,7 @@ def test_a_spring_that_stiffens_is_softer_by_a_quarter_at_the_largest_load():
         assert effect.arcsec_per_Nm3 == -size
     # Where no load was recorded there is no error.
     bare = replace(SIGNALS, torque=None)
-    free = EFFECTS["stiffening_compliance"].drawn(0.3, bare, SIM.surroundings, rng)
+    free = EFFECTS["stiffening_compliance"].drawn(0.3, Drawing(bare, SIM.surroundings, rng))
     assert not free.signal(bare, SIM.surroundings, rng).any()
 
 
@@ -112,6 +113,6 @@ def test_what_these_runs_cannot_have_is_not_drawn():
     signals = measured_signals(still)
     rng = np.random.default_rng(SEED)
     for kind in ("torque_hysteresis", "joint_coupling"):
-        assert drawn_effect(kind, 1.0, signals, still.surroundings, rng) is None
+        assert drawn_effect(kind, 1.0, Drawing(signals, still.surroundings, rng)) is None
     bare = replace(SIM, harmonics=())
-    assert drawn_effect("filter_lag", 1.0, SIGNALS, bare.surroundings, rng) is None
+    assert drawn_effect("filter_lag", 1.0, Drawing(SIGNALS, bare.surroundings, rng)) is None

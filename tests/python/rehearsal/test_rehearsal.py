@@ -22,6 +22,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.effects import EFFECTS, Effect
+from trueangle.effects.drawing import Drawing
 from trueangle.errors import ArgumentError
 from trueangle.rehearsal import rehearse
 from trueangle.rehearsal import trial as trials
@@ -345,7 +346,7 @@ def test_every_cause_can_be_hidden_or_is_seen_to_be_impossible():
         for number in range(3):
             rng = trials.trial_rng(1, cause, number)
             size = min(1.0, effect.size_most)
-            drawn = effect.drawn(size, signals, rich.surroundings, rng)
+            drawn = effect.drawn(size, Drawing(signals, rich.surroundings, rng))
             assert drawn is not None, cause
             assert drawn.kind == cause
             assert np.isfinite(drawn.signal(signals, rich.surroundings, rng)).all()

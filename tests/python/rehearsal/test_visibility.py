@@ -11,6 +11,7 @@ import pytest
 
 from trueangle.effects import EFFECTS
 from trueangle.effects.ambiguity import Ambiguity
+from trueangle.effects.drawing import Drawing
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
 from trueangle.rehearsal import visibility
@@ -64,7 +65,9 @@ def test_noise_that_varies_shows_as_half_the_variance_of_its_logarithm() -> None
     regression = regression_of(sim)
     kind = EFFECTS["heteroscedastic_noise"]
     assert kind is HeteroscedasticNoise
-    effect = kind.drawn(1.0, regression.signals, sim.surroundings, np.random.default_rng(2))
+    effect = kind.drawn(
+        1.0, Drawing(regression.signals, sim.surroundings, np.random.default_rng(2))
+    )
     factor = effect.noise_factor(regression.signals, sim.surroundings)
     found = _deviance(effect, regression, np.random.default_rng(1), sim)
     assert found == pytest.approx(0.5 * N * np.var(np.log(factor**2)), rel=1e-9)
@@ -131,8 +134,8 @@ def sized(
     monkeypatch.setattr(visibility, "EFFECTS", {"x": kind})
     monkeypatch.setattr(visibility, "trial_rng", lambda *key: asked.append(key) or key[2])
 
-    def drawn(cause: str, size: float, signals: Any, around: Any, rng: int) -> Any:
-        found = law(size, rng)
+    def drawn(cause: str, size: float, of: Any) -> Any:
+        found = law(size, of.rng)
         return None if found is None else (found,)
 
     monkeypatch.setattr(visibility, "drawn_effect", drawn)
