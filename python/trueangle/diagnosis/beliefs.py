@@ -18,7 +18,7 @@ import numpy as np
 
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, normal_tail
-from ..support.plainresult import ShownResult
+from ..support.plainresult import ShownResult, plain_fields
 
 #: Probability with which one of many correct assumptions is refuted.
 LEVEL = 1e-4
@@ -62,14 +62,7 @@ class Belief(ShownResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``beliefs``."""
-        return {
-            "what": self.what,
-            "verdict": self.verdict,
-            "believed": self.believed,
-            "measured": self.measured,
-            "std": self.std,
-            "gain": None if self.gain is None else self.gain.to_dict(),
-        }
+        return plain_fields(self, "what verdict believed measured std gain")
 
 
 def judge_line(what: str, believed: Sequence[float], change: Array, covariance: Array) -> Belief:

@@ -15,7 +15,7 @@ from ..runs.checks.fault import DataFault
 from ..simulation.measured import design_of
 from ..simulation.simulation import Simulation
 from ..support.layout import counted
-from ..support.plainresult import json_text
+from ..support.plainresult import json_text, plain_fields
 from .beliefs import Belief
 from .correctable import MEASURE_MORE, Correctable
 from .discrepancy import Discrepancy
@@ -208,28 +208,14 @@ class DiagnosisData(Correctable):
 
     def to_dict(self, extended_simulation: str | None = None) -> dict[str, Any]:
         """The object that ``trueangle diagnose`` prints as JSON."""
+        sizes = ("rms", "peak_to_peak", "max_abs", "closure", "zero_spread")
+        noise = "noise_arcsec=noise noise_correlation=correlation"
+        found = "factors findings beliefs data_faults gain complete notes not_identifiable"
         return {
-            "simulation": {
-                "rms_arcsec": self.discrepancy.rms,
-                "peak_to_peak_arcsec": self.discrepancy.peak_to_peak,
-                "max_abs_arcsec": self.discrepancy.max_abs,
-                "closure_arcsec": self.discrepancy.closure,
-                "zero_spread_arcsec": self.discrepancy.zero_spread,
-            },
-            "structure": self.structure,
-            "noise_arcsec": self.noise,
-            "noise_correlation": self.correlation,
-            "readings": self.readings,
-            "readings_used": self.readings_used,
+            "simulation": {f"{size}_arcsec": getattr(self.discrepancy, size) for size in sizes},
+            **plain_fields(self, f"structure {noise} readings readings_used"),
             "unexplained": self._unexplained(),
-            "factors": [factor.to_dict() for factor in self.factors],
-            "findings": [finding.to_dict() for finding in self.findings],
-            "beliefs": [belief.to_dict() for belief in self.beliefs],
-            "data_faults": [fault.to_dict() for fault in self.data_faults],
-            "gain": self.gain,
-            "complete": self.complete,
-            "notes": self.notes,
-            "not_identifiable": [spot.to_dict() for spot in self.not_identifiable],
+            **plain_fields(self, found),
             "extended_simulation": extended_simulation,
             **({} if self.simulated is None else {"simulated": self.simulated.to_dict()}),
             **({} if self.torque is None else {"torque": self.torque.to_dict()}),

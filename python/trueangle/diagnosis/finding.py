@@ -9,7 +9,7 @@ from ..effects import EFFECTS, Effect
 from ..estimation.quantity import Parameters, Quantity
 from ..support.display_units import ErrorUnit, error_unit, sine_of_rms
 from ..support.layout import wrapped_lines
-from ..support.plainresult import ShownResult
+from ..support.plainresult import ShownResult, plain_fields
 from .confirmation import CONFIRMED
 from .gain import Gain
 from .levels import LevelGain
@@ -119,12 +119,7 @@ class Finding(ShownResult):
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``findings``."""
         return {
-            "cause": self.cause,
-            "status": self.status,
-            "status_reason": self.reason,
-            "parameters": {name: q.to_dict() for name, q in self.parameters.items()},
-            "evidence": self.evidence,
-            "gain": None if self.gain is None else self.gain.to_dict(),
+            **plain_fields(self, "cause status status_reason=reason parameters evidence gain"),
             "rivals": [{"cause": cause, "bic_gap": gap} for cause, gap in self.rivals],
             "physics": self.sentence,
             "correctable": self.cause not in EFFECTS or not EFFECTS[self.cause].not_at_run_time,

@@ -17,6 +17,7 @@ from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array, distinct
 from ..support.deadline import current_deadline
+from ..support.plainresult import plain_fields
 from .holdout import error_numbers, held_out_residuals, rebuilt_term, reducible_share
 
 Rows = NDArray[np.bool_]
@@ -80,17 +81,9 @@ class LevelGain:
 
     def to_dict(self) -> dict[str, Any]:
         """The ``by_level`` object of a gain."""
-        return {
-            "factor": self.factor,
-            "unit": self.unit,
-            "levels": self.levels,
-            "held_out": self.held_out,
-            "rms_before_arcsec": self.rms_before,
-            "rms_after_arcsec": self.rms_after,
-            "reducible_share": self.reducible_share,
-            "reducible_share_interval": None if self.interval is None else [*self.interval],
-            "note": self.note,
-        }
+        rms = "rms_before_arcsec=rms_before rms_after_arcsec=rms_after"
+        share = "reducible_share reducible_share_interval=interval"
+        return plain_fields(self, f"factor unit levels held_out {rms} {share} note")
 
 
 def levels_of_runs(signals: Signals, factor: str) -> tuple[NDArray[np.int64], list[float]] | None:

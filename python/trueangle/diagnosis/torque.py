@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from ..estimation.quantity import Parameters, Quantity
-from ..support.plainresult import ShownResult
+from ..support.plainresult import ShownResult, plain_fields
 
 #: What parameters are called, and their units.
 _TOLD: Final = {
@@ -55,12 +55,7 @@ class TorqueFinding(ShownResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "effect": self.effect,
-            "status": self.status,
-            "status_reason": self.reason,
-            "parameters": {name: q.to_dict() for name, q in self.parameters.items()},
-        }
+        return plain_fields(self, "effect status status_reason=reason parameters")
 
 
 @dataclass(frozen=True)
@@ -137,13 +132,7 @@ class TorqueAccount(ShownResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "rms_Nm": self.rms,
-            "noise_Nm": self.noise,
-            "unexplained": self.unexplained,
-            "findings": [finding.to_dict() for finding in self.findings],
-            "complete": self.complete,
-        }
+        return plain_fields(self, "rms_Nm=rms noise_Nm=noise unexplained findings complete")
 
 
 def number_of_quantity(given: Quantity) -> float:

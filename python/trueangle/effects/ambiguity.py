@@ -11,7 +11,7 @@ from ..estimation.factor import orthonormal_basis
 from ..estimation.quantity import Parameters
 from ..estimation.regression import Regression
 from ..support.arrays import Array
-from ..support.plainresult import ShownResult
+from ..support.plainresult import ShownResult, plain_fields
 
 #: Share of velocity that direction must leave for latency and backlash to be separated.
 OWN_OF_VELOCITY = 0.10
@@ -72,17 +72,7 @@ class Ambiguity(ShownResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``not_identifiable``."""
-        return {
-            "causes": list(self.causes),
-            "because": self.because,
-            "measure": self.measure,
-            "supported": self.supported,
-            "bic_gain": self.evidence,
-            "estimates": {
-                cause: {name: q.to_dict() for name, q in parameters.items()}
-                for cause, parameters in self.estimates.items()
-            },
-        }
+        return plain_fields(self, "causes because measure supported bic_gain=evidence estimates")
 
 
 def share_left(regression: Regression, columns: Array, *others: Array) -> float:

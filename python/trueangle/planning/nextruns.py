@@ -11,7 +11,7 @@ from typing import Any
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 from ..support.layout import counted, laid_out
-from ..support.plainresult import PlainResult
+from ..support.plainresult import PlainResult, plain_fields
 from .evidence import Hypothesis
 from .further import run_steps
 
@@ -94,15 +94,8 @@ class NextRuns(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON."""
-        return {
-            "runs": [_plain_run(design) for design in self.runs],
-            "between": [entry.to_dict() for entry in self.between],
-            "readings": self.readings,
-            "seconds": self.seconds,
-            "alone": self.alone,
-            "beyond": list(self.beyond),
-            "notes": list(self.notes),
-        }
+        found = plain_fields(self, "between readings seconds alone beyond notes")
+        return {"runs": [_plain_run(design) for design in self.runs], **found}
 
     def save(self, path: str | Path) -> None:
         """Write the simulation with these runs as TOML, ready for ``trueangle simulate``."""

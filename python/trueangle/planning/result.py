@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..support.layout import counted, laid_out
-from ..support.plainresult import PlainResult, finite_or_none
+from ..support.plainresult import PlainResult, finite_or_none, plain_value
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class CalibrationPlan(PlainResult):
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON."""
         return {
-            **plain_plan(vars(self)),
+            **plain_value(vars(self)),
             "worst_noise_factor": finite_or_none(self.worst_noise_factor),
             "invisible_orders": list(self.invisible_orders),
         }
@@ -212,19 +212,7 @@ def factor_table(factors: dict[float, float]) -> list[str]:
 
 def plain_arc_plan(plan: Any, kind: str) -> dict[str, Any]:
     """The JSON object of a plan of readings at places: lists, and orders as the keys of objects."""
-    return {"kind": kind, **plain_plan(vars(plan)), "readings": plan.readings}
-
-
-def plain_plan(value: Any) -> Any:
-    """Orders as keys of an object, tuples as lists; what is not finite is None."""
-    if isinstance(value, dict):
-        return {
-            (f"{k:g}" if isinstance(k, (int, float)) else k): plain_plan(v)
-            for k, v in value.items()
-        }
-    if isinstance(value, list | tuple):
-        return [plain_plan(entry) for entry in value]
-    return finite_or_none(value) if isinstance(value, float) else value
+    return {"kind": kind, **plain_value(vars(plan)), "readings": plan.readings}
 
 
 @dataclass(frozen=True)
@@ -279,7 +267,7 @@ class SelfPlan(PlainResult):
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle plan`` prints as JSON."""
         return {
-            **plain_plan(vars(self)),
+            **plain_value(vars(self)),
             "worst_noise_factor": finite_or_none(self.worst_noise_factor),
             "blind_orders": list(self.blind_orders),
         }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..planning.nextruns import NextRuns
 from ..support.layout import counted, laid_out, wrapped_lines
-from ..support.plainresult import PlainResult, ShownResult, result_picture
+from ..support.plainresult import PlainResult, ShownResult, plain_fields, result_picture
 from .detection import Chance, binomial_interval
 from .trial import TrialOutcome
 from .visibility import SizeRange
@@ -80,28 +80,19 @@ class RehearsedCause(ShownResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``causes``."""
+        ends = [list(self.intervals.get(share, (None, None))) for share in SHARES]
+        tried = [
+            {"size": size, "named": n, "trials": of, "interval": list(binomial_interval(n, of))}
+            for size, (n, of) in self.tried.items()
+        ]
         return {
-            "cause": self.cause,
-            "size_name": self.size_name,
-            "named_50": self.named_50,
-            "named_50_interval": [*self.intervals.get(SHARES[0], (None, None))],
+            **plain_fields(self, "cause size_name named_50"),
+            "named_50_interval": ends[0],
             "named_95": self.named_95,
-            "named_95_interval": [*self.intervals.get(SHARES[1], (None, None))],
+            "named_95_interval": ends[1],
             "confused_with": list(self.confused_with),
-            "blind_because": self.blind_because,
-            "measure": self.measure,
-            "trials": self.trials,
-            "told": self.told,
-            "beside": self.beside,
-            "tried": [
-                {
-                    "size": size,
-                    "named": named,
-                    "trials": count,
-                    "interval": [*binomial_interval(named, count)],
-                }
-                for size, (named, count) in self.tried.items()
-            ],
+            **plain_fields(self, "blind_because measure trials told beside"),
+            "tried": tried,
         }
 
 
@@ -190,18 +181,8 @@ class Rehearsal(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The object that ``trueangle rehearse`` prints as JSON."""
-        return {
-            "causes": [cause.to_dict() for cause in self.causes],
-            "next_run": None if self.next_runs is None else self.next_runs.to_dict(),
-            "readings": self.readings,
-            "runs": self.runs,
-            "noise_arcsec": self.noise,
-            "seed": self.seed,
-            "seeds": self.seeds,
-            "trials": self.trials,
-            "complete": self.complete,
-            "notes": self.notes,
-        }
+        numbers = "readings runs noise_arcsec=noise seed seeds trials"
+        return plain_fields(self, f"causes next_run=next_runs {numbers} complete notes")
 
     def _brief(self) -> str:
         named = sum(cause.named_50 is not None for cause in self.causes)

@@ -15,7 +15,7 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.layout import counted, laid_out, wrapped_lines
-from ..support.plainresult import PlainResult
+from ..support.plainresult import PlainResult, plain_fields
 from .channelcauses import ChannelDiagnosis
 
 #: Seconds of arc in a radian.
@@ -50,15 +50,12 @@ class OrderEstimate:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "order": int(self.order) if float(self.order).is_integer() else self.order,
-            "amplitude_arcsec": self.amplitude,
-            "phase_deg": self.phase_deg,
-            "std_arcsec": self.std,
-            "retained": self.retained,
-            "std_factor": self.std_factor if math.isfinite(self.std_factor) else None,
-            "of": self.of,
-        }
+        sizes = "amplitude_arcsec=amplitude phase_deg std_arcsec=std retained std_factor of"
+        return plain_fields(self, f"order {sizes}") | {"order": _whole(self.order)}
+
+
+def _whole(order: float) -> float:
+    return int(order) if float(order).is_integer() else order
 
 
 @dataclass(frozen=True)
@@ -76,10 +73,8 @@ class Blind:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "orders": [int(k) if float(k).is_integer() else k for k in self.orders],
-            "because": self.because,
-            "measure": self.measure,
+        return plain_fields(self, "orders because measure") | {
+            "orders": [*map(_whole, self.orders)]
         }
 
 
@@ -97,14 +92,8 @@ class HeldOutPattern:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "fitted_on": self.fitted_on,
-            "judged_on": self.judged_on,
-            "rms_before_arcsec": self.rms_before,
-            "rms_after_arcsec": self.rms_after,
-            "p": self.p,
-            "agrees": self.p > 0.001,
-        }
+        rms = "rms_before_arcsec=rms_before rms_after_arcsec=rms_after"
+        return plain_fields(self, f"fitted_on judged_on {rms} p") | {"agrees": self.p > 0.001}
 
 
 @dataclass(frozen=True)
@@ -159,14 +148,7 @@ class SelfCalibration(PlainResult):
         return {
             "method": self.method,
             "calibrated_without_reference": True,
-            "orders": [o.to_dict() for o in self.orders],
-            "sums": [o.to_dict() for o in self.sums],
-            "blind": [b.to_dict() for b in self.blind],
-            "held_out": {name: test.to_dict() for name, test in self.held_out.items()},
-            "noise_arcsec": self.noise_arcsec,
-            "readings": self.readings,
-            "turns": self.turns,
-            "beside": dict(self.beside),
+            **plain_fields(self, "orders sums blind held_out noise_arcsec readings turns beside"),
             **self._plain_channels(),
             "notes": list(self.notes),
         }

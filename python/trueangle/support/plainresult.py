@@ -83,6 +83,30 @@ def finite_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
+def plain_fields(result: Any, keys: str) -> dict[str, Any]:
+    """Attributes of a result as plain values, in the order of ``keys``: ``"NAME KEY=NAME ..."``."""
+    named = [key.partition("=") for key in keys.split()]
+    return {key: plain_value(getattr(result, name or key)) for key, _, name in named}
+
+
+def plain_value(value: Any) -> Any:
+    """Plain values that JSON can hold: results by ``to_dict``, rows as objects, numbers as keys.
+
+    What is not a finite number is None.
+    """
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
+    if isinstance(value, Mapping):
+        return {k if isinstance(k, str) else f"{k:g}": plain_value(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain_value(one) for one in value]
+    return finite_or_none(value) if isinstance(value, float) else value
+
+
 def plain_row(row: Any, scale: float) -> dict[str, Any]:
     """The fields of a row as plain values; angles (`Angle`) times ``scale``, ``NAME_arcsec``."""
     found: dict[str, Any] = {}
@@ -110,15 +134,7 @@ def json_text(value: Any, indent: int | None = None) -> str:
     >>> json_text({"factor": math.inf, "orders": (1, 2.5)})
     '{"factor": null, "orders": [1, 2.5]}'
     """
-
-    def plain(entry: Any) -> Any:
-        if isinstance(entry, float):
-            return finite_or_none(entry)
-        if isinstance(entry, Mapping):
-            return {name: plain(one) for name, one in entry.items()}
-        return [plain(one) for one in entry] if isinstance(entry, (list, tuple)) else entry
-
-    return _dumps(plain(value), indent=indent, allow_nan=False)
+    return _dumps(plain_value(value), indent=indent, allow_nan=False)
 
 
 def _dumps(value: Any, **how: Any) -> str:

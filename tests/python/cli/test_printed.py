@@ -80,17 +80,6 @@ def test_correct_tells_readings_outside_the_span_beside_those_missing(desk, caps
     assert ", 1 missing kept, 3 outside the calibrated span\n" in text
 
 
-def test_correct_that_fails_for_many(desk, capsys):
-    for k in range(7):
-        (desk / f"bad{k}.csv").write_text("indicated_deg\nopen\n")
-    logs = [f"bad{k}.csv" for k in range(7)]
-    assert main(["correct", "a.csv", *logs, "-m", "m.json", "-o", "out"]) == 1
-    told = capsys.readouterr().err
-    assert "1 of 8 logs are corrected and complete" in told
-    assert told.count("failed: ") == 5
-    assert "2 more failed" in told
-
-
 @pytest.mark.parametrize("period", [360.0, 2.0 * np.pi, 1.0])
 def test_import(period, desk, capsys):
     one = model(period)

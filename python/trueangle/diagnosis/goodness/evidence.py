@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...support.plainresult import finite_or_none
+from ...support.plainresult import plain_fields
 
 #: Repetitions of a search with random signs, and units from which on the signs differ enough.
 DRAWS, ENOUGH_UNITS = 32, 6
@@ -50,14 +50,7 @@ class Evidence:
 
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``unexplained.evidence``."""
-        return {
-            "test": self.test,
-            "statistic": finite_or_none(self.statistic),
-            "p": self.p,
-            "says": self.says,
-            "decides": self.decides,
-            "looks_like": self.looks_like,
-        }
+        return plain_fields(self, "test statistic p says decides looks_like")
 
 
 def largest_of(p: float, count: float) -> float:

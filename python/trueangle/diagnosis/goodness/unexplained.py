@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...support.plainresult import ShownResult
+from ...support.plainresult import ShownResult, plain_fields
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise, estimate_noise
@@ -78,12 +78,7 @@ class Unexplained(ShownResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The ``unexplained`` object of a diagnosis."""
-        return {
-            "found": self.found,
-            "rms_arcsec": self.rms,
-            "share": self.share,
-            "evidence": [item.to_dict() for item in self.evidence],
-        }
+        return plain_fields(self, "found rms_arcsec=rms share evidence")
 
 
 def goodness_of_fit(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
+from ...support.plainresult import plain_fields
+
 #: Faults with which nothing may be fitted: the angles are not what they seem.
 UNUSABLE = (
     "unsorted_time",
@@ -78,8 +80,5 @@ class DataFault(NamedTuple):
             "fault": self.fault,
             "rows": [*self.rows[:LISTED]],
             "rows_total": len(self.rows),
-            "runs": [*self.runs],
-            "says": self.says,
-            "mend": self.mend,
-            "unusable": self.unusable,
+            **plain_fields(self, "runs says mend unusable"),
         }

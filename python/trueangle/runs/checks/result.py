@@ -10,7 +10,7 @@ import numpy as np
 
 from ...support.arrays import Array
 from ...support.layout import counted, laid_out, wrapped_lines
-from ...support.plainresult import PlainResult
+from ...support.plainresult import PlainResult, plain_fields
 from ...support.quantiles import median, quantile
 from .fault import DataFault
 from .record import LEAST_READINGS, Record
@@ -221,27 +221,15 @@ class Check(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """What ``trueangle check`` prints as JSON."""
-        e = self.extent
+        moved = "directions speeds loads temperatures mounts"
+        columns = [
+            {"role": r, "name": name, "unit": unit} for r, (name, unit) in self.columns.items()
+        ]
         return {
-            "data_faults": [fault.to_dict() for fault in self.data_faults],
-            "usable": self.usable,
-            "ratio": self.ratio,
-            "ratio_suggests": self.suggests,
-            "readings": e.readings,
-            "runs": e.runs,
-            "span_deg": e.span_deg,
-            "turns": e.turns,
-            "directions": [*e.directions],
-            "speeds": [*e.speeds],
-            "loads": [*e.loads],
-            "temperatures": [*e.temperatures],
-            "mounts": [*e.mounts],
-            "columns": [
-                {"role": role, "name": name, "unit": unit}
-                for role, (name, unit) in self.columns.items()
-            ],
-            "can": [*self.can],
-            "cannot": [*self.cannot],
+            **plain_fields(self, "data_faults usable ratio ratio_suggests=suggests"),
+            **plain_fields(self.extent, f"readings runs span_deg turns {moved}"),
+            "columns": columns,
+            **plain_fields(self, "can cannot"),
         }
 
     def _brief(self) -> str:

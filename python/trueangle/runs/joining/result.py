@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from ...support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ...support.layout import counted, laid_out
-from ...support.plainresult import PlainResult
+from ...support.plainresult import PlainResult, plain_fields
 from ..run import CalibrationRun
 
 
@@ -56,18 +56,11 @@ class Joined(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
+        clocks = "offset_s offset_std_s rate_ppm rate_std_ppm std_arcsec"
         return {
             "readings": sum(len(run) for run in self.runs),
             "runs": len(self.runs),
-            "left_out": self.left_out,
-            "offset_s": self.offset_s,
-            "offset_std_s": self.offset_std_s,
-            "rate_ppm": self.rate_ppm,
-            "rate_std_ppm": self.rate_std_ppm,
-            "std_arcsec": self.std_arcsec,
-            "gaps": [gap._asdict() for gap in self.gaps],
-            "on_change": list(self.on_change),
-            "notes": list(self.notes),
+            **plain_fields(self, f"left_out {clocks} gaps on_change notes"),
         }
 
     def _brief(self) -> str:

@@ -14,7 +14,7 @@ from ...errors import ArgumentError
 from ...support.angles import ARCSEC_PER_TURN
 from ...support.arrays import Array
 from ...support.layout import counted, wrapped_lines
-from ...support.plainresult import ShownResult
+from ...support.plainresult import ShownResult, plain_fields
 from ...support.signals import FIELDS
 from ..files import runs_of
 from ..run import CalibrationRun
@@ -83,14 +83,7 @@ class MeasuredMinusSimulated(ShownResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "source": self.source,
-            "joined_by": list(self.by),
-            "left_out": self.left_out,
-            "offsets_s": list(self.offsets_s),
-            "std_arcsec": self.std_arcsec,
-            "notes": list(self.notes),
-        }
+        return plain_fields(self, "source joined_by=by left_out offsets_s std_arcsec notes")
 
     def summary(self) -> str:
         """How the log was joined, in a line and its notes."""
