@@ -81,10 +81,10 @@ pub fn fit(
         values.iter().map(|v| (v - middle) / size).collect()
     };
     let (sine, cosine) = (scaled(readings.sine, my), scaled(readings.cosine, mx));
-    let whole = Problem {
+    let whole = Readings {
         sine: &sine,
         cosine: &cosine,
-        ..Problem::of(readings)
+        ..readings
     };
     let curve = match start {
         Some(start) if start.is_whole() => start.moved([mx, my], size),
@@ -97,43 +97,20 @@ pub fn fit(
     Ok(whole.fit(state, size, [mx, my]))
 }
 
-#[derive(Clone, Copy)]
-struct Problem<'a> {
-    sine: &'a [f64],
-    cosine: &'a [f64],
-    weights: &'a [f64],
-    variances: [f64; 2],
-}
-
 struct State {
     curve: Curve,
     phases: Vec<f64>,
     squares: f64,
 }
 
-impl<'a> Problem<'a> {
-    fn of(readings: Readings<'a>) -> Self {
-        let Readings {
-            sine,
-            cosine,
-            weights,
-            variances,
-        } = readings;
-        Self {
-            sine,
-            cosine,
-            weights,
-            variances,
-        }
-    }
-
+impl Readings<'_> {
     /// The best ellipse of a grid of starts, of some of the readings.
     fn begun(&self) -> Option<Curve> {
         let stride = self.sine.len().div_ceil(LOOKED_AT);
         let every =
             |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(stride).collect() };
         let (sine, cosine, weights) = (every(self.sine), every(self.cosine), every(self.weights));
-        let few = Problem {
+        let few = Readings {
             sine: &sine,
             cosine: &cosine,
             weights: &weights,

@@ -21,8 +21,6 @@ pub struct Demodulated {
     pub cosine: Vec<f64>,
     /// Phase of both channels against the excitation, radians.
     pub phase: f64,
-    /// Root mean square of what is at right angles to that phase, relative to both channels.
-    pub quadrature: f64,
 }
 
 /// Amplitudes of the excitation in both channels, with the phase that is common to all periods, or one
@@ -74,18 +72,11 @@ pub fn demodulate(
         let turned = ratios.iter().map(|ratio| ratio[i]);
         turned.map(|[a, b]| a * c + b * s).collect()
     };
-    let across: f64 = ratios
-        .iter()
-        .flatten()
-        .map(|[a, b]| (b * c - a * s).powi(2))
-        .sum();
-    let all: f64 = ratios.iter().flatten().map(|[a, b]| a * a + b * b).sum();
     Ok(Some(Demodulated {
         sine: along(0),
         cosine: along(1),
         starts,
         phase,
-        quadrature: (across / all).sqrt(),
     }))
 }
 
@@ -145,7 +136,6 @@ mod tests {
                     assert!((sine + 0.3).abs() < 1e-3, "{sine} {period} {lag}");
                     assert!((cosine - 0.4).abs() < 1e-3, "{cosine}");
                 }
-                assert!(found.quadrature < 1e-3);
                 assert_eq!(found.starts.len(), found.sine.len() + 1);
             }
         }

@@ -95,6 +95,19 @@ pub fn shown(shape: &[usize]) -> String {
     }
 }
 
+/// A new contiguous array that `work` fills.
+pub fn filled<'py, T: Element>(
+    py: Python<'py>,
+    shape: &[usize],
+    work: impl FnOnce(&mut [T]) -> PyResult<()>,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let array = empty::<T>(py, shape, false)?;
+    let size = shape.iter().product();
+    // SAFETY: a fresh contiguous array of this type and size, that nobody else knows.
+    work(unsafe { std::slice::from_raw_parts_mut(data::<T>(&array), size) })?;
+    Ok(array)
+}
+
 /// A new array whose elements are to be written before they are seen, or `MemoryError`.
 pub fn empty<'py, T: Element>(
     py: Python<'py>,

@@ -3,11 +3,12 @@
 use std::ffi::CStr;
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyUntypedArray};
+use numpy::{PyArray2, PyReadonlyArray1, PyUntypedArray};
 use pyo3::ffi;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
-use super::array::{columns, data, empty, square, values, vector};
+use super::array::{columns, filled, square, values, vector};
 use super::number::single;
 use super::release::detached;
 use super::series::PySeries;
@@ -16,17 +17,9 @@ use crate::channels::{self, Angle, Curve, Decoder, Off, Readings};
 use crate::check::same_length;
 use crate::compensator::Compensator;
 
-/// Parameters, covariance, phases, residuals, and shares of the cosine's noise in them.
-type Found<'py> = (
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-);
-
-/// The curve of two channels, from orders and parameters of another one on; None where the
-/// readings do not settle it.
+/// The curve of two channels, from orders and parameters of another one on: parameters, covariance,
+/// phases, residuals, and shares of the cosine's noise in them; None where the readings do not settle
+/// it.
 #[pyfunction]
 #[pyo3(signature = (sine, cosine, weights, variances, orders, start=None))]
 pub fn fit_curve<'py>(
@@ -37,7 +30,7 @@ pub fn fit_curve<'py>(
     variances: [f64; 2],
     orders: Vec<u32>,
     start: Option<(Vec<u32>, Vec<f64>)>,
-) -> PyResult<Option<Found<'py>>> {
+) -> PyResult<Option<Bound<'py, PyTuple>>> {
     let (sine, cosine, weights) = (values(&sine), values(&cosine), values(&weights));
     let start = start.map(|(orders, parameters)| Curve { orders, parameters });
     let readings = Readings {
@@ -50,13 +43,11 @@ pub fn fit_curve<'py>(
         return Ok(None);
     };
     let parameters = found.curve.parameters;
-    Ok(Some((
-        vector(py, &parameters)?,
-        square(py, &found.covariance, parameters.len())?,
-        vector(py, &found.phases)?,
-        vector(py, &found.residuals)?,
-        vector(py, &found.shares)?,
-    )))
+    let covariance = square(py, &found.covariance, parameters.len())?;
+    let [first, phases, residuals, shares] =
+        [&parameters, &found.phases, &found.residuals, &found.shares].map(|v| vector(py, v));
+    let parts = (first?, covariance, phases?, residuals?, shares?);
+    Ok(Some(parts.into_pyobject(py)?))
 }
 
 /// Derivatives of the decoded angle by the parameters of a curve, a column for each phase.
@@ -74,9 +65,6 @@ pub fn curve_slopes<'py>(
     columns(py, &rows, &shape)
 }
 
-/// Flags of the readings, the codes after which either channel wraps, and the ellipse.
-type Faults<'py> = (Bound<'py, PyArray1<u8>>, [Option<f64>; 2], Option<Vec<f64>>);
-
 /// Flags of every reading (1: the sine is at its rail, 2: the cosine, 4: off the curve), the codes
 /// after which either channel wraps, and the ellipse of the readings without a flag.
 #[pyfunction]
@@ -84,18 +72,18 @@ pub fn channel_faults<'py>(
     py: Python<'py>,
     sine: PyReadonlyArray1<'_, f64>,
     cosine: PyReadonlyArray1<'_, f64>,
-) -> PyResult<Faults<'py>> {
+) -> PyResult<Bound<'py, PyTuple>> {
     let (sine, cosine) = (values(&sine), values(&cosine));
     let (found, wraps) = detached(py, || {
         let wraps = [&sine, &cosine].map(|channel| channels::wraps_at(channel));
         (channels::faults(&sine, &cosine), wraps)
     })?;
     let (flags, curve) = found?;
-    Ok((vector(py, &flags)?, wraps, curve.map(|c| c.parameters)))
+    (vector(py, &flags)?, wraps, curve.map(|c| c.parameters)).into_pyobject(py)
 }
 
-/// First readings of the periods of an excitation and their number, sine and cosine over it, their
-/// phase against it in radians and the share of both at right angles to that; None without periods.
+/// First readings of the periods of an excitation and their number, sine and cosine over it, and their
+/// phase against it in radians; None without periods.
 #[pyfunction]
 #[pyo3(signature = (excitation, sine, cosine, phase=None))]
 pub fn demodulate<'py>(
@@ -104,23 +92,15 @@ pub fn demodulate<'py>(
     sine: PyReadonlyArray1<'_, f64>,
     cosine: PyReadonlyArray1<'_, f64>,
     phase: Option<f64>,
-) -> PyResult<Option<Periods<'py>>> {
+) -> PyResult<Option<Bound<'py, PyTuple>>> {
     let (carrier, sine, cosine) = (values(&excitation), values(&sine), values(&cosine));
     let found = detached(py, || channels::demodulate(&carrier, &sine, &cosine, phase))??;
     let Some(found) = found else { return Ok(None) };
     let (sine, cosine) = (vector(py, &found.sine)?, vector(py, &found.cosine)?);
     let starts = vector(py, &found.starts)?;
-    Ok(Some((starts, sine, cosine, found.phase, found.quadrature)))
+    let parts = (starts, sine, cosine, found.phase);
+    Ok(Some(parts.into_pyobject(py)?))
 }
-
-/// Starts, sine, cosine, phase and quadrature.
-type Periods<'py> = (
-    Bound<'py, PyArray1<usize>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    f64,
-    f64,
-);
 
 /// The angle of two channels and its correction.
 #[pyclass(name = "Decoder", module = "trueangle._core", frozen)]
@@ -174,11 +154,9 @@ impl PyDecoder {
     ) -> PyResult<Bound<'py, PyUntypedArray>> {
         let (sine, cosine) = (values(&sine), values(&cosine));
         same_length("cosine", cosine.len(), "sine", sine.len())?;
-        let found = empty::<f64>(py, &[sine.len()], false)?;
-        // SAFETY: a fresh contiguous array of this length, that nobody else knows.
-        let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&found), sine.len()) };
-        detached(py, || self.inner.angle.all(&sine, &cosine, out))?;
-        Ok(found)
+        filled(py, &[sine.len()], |out| {
+            detached(py, || self.inner.angle.all(&sine, &cosine, out))
+        })
     }
 
     /// How readings are off the circle of the constants: their count, squares of the distances in
@@ -263,7 +241,9 @@ unsafe extern "C" fn step(
         let (sine, cosine) = if are_floats {
             (ffi::PyFloat_AsDouble(sine), ffi::PyFloat_AsDouble(cosine))
         } else {
-            match two(py, sine, cosine) {
+            let one = |value, what| single(&Bound::from_borrowed_ptr(py, value), what);
+            let sine = one(sine, "the sine of a step");
+            match sine.and_then(|sine| Ok((sine, one(cosine, "the cosine of a step")?))) {
                 Ok(channels) => channels,
                 Err(error) => {
                     error.restore(py);
@@ -275,26 +255,4 @@ unsafe extern "C" fn step(
         let decoder = &decoder.cast_unchecked::<PyDecoder>().get().inner;
         ffi::PyFloat_FromDouble(decoder.step(sine, cosine))
     }
-}
-
-/// Two numbers of any kind.
-///
-/// # Safety
-/// Both are objects.
-#[cold]
-unsafe fn two(
-    py: Python<'_>,
-    sine: *mut ffi::PyObject,
-    cosine: *mut ffi::PyObject,
-) -> PyResult<(f64, f64)> {
-    let (sine, cosine) = unsafe {
-        (
-            Bound::from_borrowed_ptr(py, sine),
-            Bound::from_borrowed_ptr(py, cosine),
-        )
-    };
-    Ok((
-        single(&sine, "the sine of a step")?,
-        single(&cosine, "the cosine of a step")?,
-    ))
 }

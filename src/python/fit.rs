@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 
-use super::array::{data, empty, slice, square, vector};
+use super::array::{filled, slice, square, vector};
 use super::number;
 use super::release::{attached, detached};
 use super::series::{PySeries, argument_named, unknown};
@@ -243,14 +243,13 @@ pub fn band<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let design = design(period, cycles, orders)?;
     let (theta, covariance) = (theta.as_slice()?, covariance.as_slice()?);
-    let out = empty::<f64>(py, &[theta.len()], false)?;
-    // SAFETY: a fresh contiguous array of doubles that nobody else has seen.
-    let values = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&out), theta.len()) };
     // Each angle costs as much as a hundred samples of a series.
     let threads = threads::count(py, None, theta.len().saturating_mul(100))?;
-    let work = || crate::band::band(&design, covariance, theta, threads, values);
-    detached(py, work)??;
-    Ok(out.into_any())
+    let found = filled(py, &[theta.len()], |values| {
+        let work = || crate::band::band(&design, covariance, theta, threads, values);
+        Ok(detached(py, work)??)
+    })?;
+    Ok(found.into_any())
 }
 
 /// A sample of the residuals of one run, and the largest.

@@ -1,9 +1,9 @@
 //! Lines of any order: columns, sums, sums over units of readings.
 
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use super::array::{data, empty};
+use super::array::filled;
 use super::failure::argument_error;
 use super::release::detached;
 use crate::check::same_length;
@@ -26,24 +26,20 @@ pub fn line_columns<'py>(
 ) -> PyResult<Bound<'py, PyUntypedArray>> {
     let (theta, orders) = (theta.as_slice()?, orders.as_slice()?);
     let shape = [theta.len(), 2 * orders.len()];
-    let size = shape[0] * shape[1];
-    // SAFETY: of both, a fresh contiguous array of this type and size.
     if single {
-        let array = empty::<f32>(py, &shape, false)?;
-        let out = unsafe { std::slice::from_raw_parts_mut(data::<f32>(&array), size) };
-        detached(py, || lines::columns(theta, orders, out))??;
-        return Ok(array);
+        return filled::<f32>(py, &shape, |out| {
+            Ok(detached(py, || lines::columns(theta, orders, out))??)
+        });
     }
-    let array = empty::<f64>(py, &shape, false)?;
-    let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), size) };
-    detached(py, || {
-        lines::columns(theta, orders, out)?;
-        if vanishing > 0.0 {
-            lines::vanished(orders, vanishing, out);
-        }
-        Ok::<_, Error>(())
-    })??;
-    Ok(array)
+    filled::<f64>(py, &shape, |out| {
+        Ok(detached(py, || {
+            lines::columns(theta, orders, out)?;
+            if vanishing > 0.0 {
+                lines::vanished(orders, vanishing, out);
+            }
+            Ok::<_, Error>(())
+        })??)
+    })
 }
 
 /// Sum of lines at every angle.
@@ -54,19 +50,17 @@ pub fn line_sum<'py>(
     orders: PyReadonlyArray1<'py, f64>,
     cosine: PyReadonlyArray1<'py, f64>,
     sine: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+) -> PyResult<Bound<'py, PyUntypedArray>> {
     let (theta, orders) = (theta.as_slice()?, orders.as_slice()?);
     let (cosine, sine) = (cosine.as_slice()?, sine.as_slice()?);
-    let array = empty::<f64>(py, &[theta.len()], false)?;
-    // SAFETY: a fresh contiguous array of this type and size.
-    let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), theta.len()) };
     let lines = Lines {
         orders,
         cosine,
         sine,
     };
-    detached(py, || lines::sum(theta, lines, out))??;
-    Ok(array.into_any().cast_into()?)
+    filled(py, &[theta.len()], |out| {
+        Ok(detached(py, || lines::sum(theta, lines, out))??)
+    })
 }
 
 /// `line_sum` and its derivative, shape (2, n).
@@ -85,12 +79,12 @@ pub fn line_sum_and_slope<'py>(
         sine: sine.as_slice()?,
     };
     let n = theta.len();
-    let array = empty::<f64>(py, &[2, n], false)?;
-    // SAFETY: a fresh contiguous array of this type and size.
-    let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), 2 * n) };
-    let (value, slope) = out.split_at_mut(n);
-    detached(py, || lines::sum_and_slope(theta, lines, value, slope))??;
-    Ok(array)
+    filled(py, &[2, n], |out| {
+        let (value, slope) = out.split_at_mut(n);
+        Ok(detached(py, || {
+            lines::sum_and_slope(theta, lines, value, slope)
+        })??)
+    })
 }
 
 /// Sums of values times `exp(-i order angle)` over units, real and imaginary parts, shape
@@ -116,15 +110,12 @@ pub fn unit_sums<'py>(
         ));
     }
     let shape = [count, starts.len(), 2 * columns];
-    let array = empty::<f64>(py, &shape, false)?;
-    let size = shape.iter().product();
-    // SAFETY: a fresh contiguous array of this type and size.
-    let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), size) };
     let orders = Ladder { first, step, count };
-    detached(py, || {
-        ladder::unit_sums(theta, values, &starts, orders, out)
-    })??;
-    Ok(array)
+    filled(py, &shape, |out| {
+        Ok(detached(py, || {
+            ladder::unit_sums(theta, values, &starts, orders, out)
+        })??)
+    })
 }
 
 /// Change of lines by a low-pass of a cutoff and, of second order, a damping: of every reading.
@@ -137,13 +128,11 @@ pub fn lagged<'py>(
     frequency: PyReadonlyArray2<'py, f64>,
     cutoff: f64,
     damping: Option<f64>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+) -> PyResult<Bound<'py, PyUntypedArray>> {
     let n = frequency.shape()[0];
     let (waves, frequency) = (waves.as_slice()?, frequency.as_slice()?);
     same_length("waves", waves.len(), "2 * frequency", 2 * frequency.len())?;
-    let array = empty::<f64>(py, &[n], false)?;
-    // SAFETY: a fresh contiguous array of this type and size.
-    let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), n) };
-    detached(py, || lag::lagged(waves, frequency, cutoff, damping, out))?;
-    Ok(array.into_any().cast_into()?)
+    filled(py, &[n], |out| {
+        detached(py, || lag::lagged(waves, frequency, cutoff, damping, out))
+    })
 }

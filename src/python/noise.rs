@@ -6,7 +6,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-use super::array::{data, empty, vector};
+use super::array::{filled, vector};
 use super::failure::argument_error;
 use super::release::detached;
 use crate::check::same_length;
@@ -68,11 +68,10 @@ fn products<'py, T: Element + RealField + Copy + Into<f64>>(
     let x = x.as_slice()?;
     let found = detached(py, || linear::block_products(noise, x, columns, width))?;
     let shaped = |values: &[f64]| -> PyResult<_> {
-        let array = empty::<f64>(py, &[columns / width, width, width], false)?;
-        // SAFETY: a fresh contiguous array of this type and size.
-        let out = unsafe { std::slice::from_raw_parts_mut(data::<f64>(&array), values.len()) };
-        out.copy_from_slice(values);
-        Ok(array)
+        filled::<f64>(py, &[columns / width, width, width], |out| {
+            out.copy_from_slice(values);
+            Ok(())
+        })
     };
     Ok((
         shaped(&found.same)?,

@@ -151,10 +151,7 @@ def _of_channels(args: argparse.Namespace) -> bool:
     from ..selfcalibration.channelcauses import channel_diagnosis
     from ..selfcalibration.recording import as_recordings
 
-    try:
-        recordings = as_recordings(args.runs, {**reading_options(args), "period": None})
-    except FileError:
-        return False  # read as runs it is reported in their words
+    recordings = as_recordings(args.runs, {**reading_options(args), "period": None})
     if any(r.sine is None or r.cosine is None for r in recordings):
         return False
     result = channel_diagnosis(recordings)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Sequence
 from typing import Any, Final
@@ -31,7 +30,7 @@ _HARMONICS: Final = tuple(range(2, 8))
 _REFERENCED: Final = (-3, -2, 2, 3)
 
 #: Steps to the zeros of several runs, each about squares the distance left.
-_STEPS: Final = 6
+_STEPS: Final = 4
 
 #: Share of the period that a harmonic needs, so that it is not one with the ellipse.
 _WHOLE: Final = 0.9
@@ -300,27 +299,27 @@ def referenced_channels(
         _, re, im = least_squares(design, cosine[own])
         phase[own] += math.atan2(im, re)
     harmonics = _REFERENCED if (cell_counts(phase) > 0).mean() >= _WHOLE else ()
-    target = np.concatenate([cosine, sine])
-    others = (run == np.arange(1, len(signals))[:, None]).T
-    design = _design(phase, harmonics)
-    found = least_squares(design, target)
-    width = found.size
+    target, both = np.concatenate([cosine, sine]), np.tile(run, 2)
+    found = least_squares(_design(phase, harmonics), target)
     for _ in range(_STEPS if len(signals) > 1 else 1):
-        slope = (_design(phase, harmonics, derivative=True) @ found[:width]).reshape(2, -1, 1)
-        zeros = (slope * others).reshape(target.size, -1)
-        design = np.column_stack([_design(phase, harmonics), zeros])
-        model = _core.LinearModel.of_rows(design, target.reshape(-1, 1), None)
+        # The first zero is in C. Without the others, each a parameter of one run alone:
+        slope = (_design(phase, harmonics, derivative=True) @ found) * (both > 0)
+        power = np.maximum(np.bincount(both, slope**2), 1e-300)
+        rows = np.column_stack([_design(phase, harmonics), target])
+        sums = np.stack([np.bincount(both, slope * c) for c in rows.T], axis=1) / power[:, None]
+        rows -= slope[:, None] * sums[both]
+        model = _core.LinearModel.of_rows(rows[:, :-1].copy(), rows[:, -1:].copy(), None)
         found = np.asarray(model.coefficients).ravel()
-        phase = phase + others @ found[width:]
-    freedom = target.size - found.size
+        phase = phase + (sums[:, -1] - sums[:, :-1] @ found)[run]
+    freedom = target.size - found.size - len(signals) + 1
     if freedom < 1:
         raise NoCurveError(f"{named}: {sine.size} readings are too few for the channels")
-    residuals = target - design @ found
+    residuals = rows[:, -1] - rows[:, :-1] @ found
     variance = float(residuals @ residuals) / freedom
     correlated = max(inflation(residuals[: sine.size]), inflation(residuals[sine.size :]))
     return channels_of(
-        found[:width],
-        np.asarray(model.inverse)[:width, :width] * variance * correlated,
+        found,
+        np.asarray(model.inverse) * variance * correlated,
         harmonics,
         direction=channels.direction,
         periods_per_turn=channels.periods_per_turn,
@@ -353,7 +352,6 @@ def channels_of(
     then real and imaginary part of ``z_k`` of every harmonic; ``covariance`` is that of all. The
     zero of the phase is that of ``C``.
     """
-    offset_cosine, offset_sine = (float(v) for v in parameters[:2])
     c, s = complex(*parameters[2:4]), complex(*parameters[4:6])
     ratio, z1 = abs(s) / abs(c), 0.5 * (c + s)
     # By the parameters: offsets, then the logarithm of C and that of S over C.
@@ -369,12 +367,10 @@ def channels_of(
         z = complex(*parameters[pair]) * (z1 / abs(z1)) ** (-k) / abs(z1)
         std = math.sqrt(0.5 * float(np.trace(covariance[pair, pair]))) / abs(z1)
         harmonics.append(ChannelHarmonic(k, z.real, z.imag, std))
-    return Channels(
-        offset_sine=offset_sine,
-        offset_cosine=offset_cosine,
-        amplitude=abs(c),
-        gain_ratio=ratio,
-        phase_deg=math.degrees(cmath.phase(s / c)),
+    return Channels.of_amplitudes(
+        complex(*parameters[:2]),
+        c,
+        s,
         harmonics=tuple(harmonics),
         covariance=tuple(map(tuple, (slopes @ covariance[:6, :6] @ slopes.T).tolist())),
         **fields,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import cmath
 import json
-import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, Final
 
@@ -71,25 +69,11 @@ class LeRobot(ChannelTarget):
             (joint,) = [j for j in joints if len(joints) == 1 or j["name"] == options["joint"]]
             x, y = (float(v) + _MIDDLE for v in joint["center_fit"])
             (a, b), (c, d) = ((float(v) for v in row) for row in joint["T"])
-            # Columns of the inverse are the cosine's and the sine's way round the ellipse.
-            along, across = complex(d, -c) / (a * d - b * c), complex(-b, a) / (a * d - b * c)
+            # The inverse has the way of the cosine and that of the sine round the ellipse.
+            size = a * d - b * c
+            ellipse = complex(x, y), complex(d, b) / size, complex(a, -c) / size
         except (KeyError, TypeError, ValueError, ZeroDivisionError):
             raise table_error(
                 path, f"is no calibration with one joint, or with the joint {options['joint']!r}"
             ) from None
-        z1, image = 0.5 * (along - 1j * across), 0.5 * (along + 1j * across)
-        # Counted from where the cosine is at its top.
-        turn = cmath.exp(-1j * cmath.phase(z1 + image.conjugate()))
-        along = z1 * turn + (image / turn).conjugate()
-        across = z1 * turn - (image / turn).conjugate()
-        return model_of_channels(
-            Channels(
-                offset_sine=y,
-                offset_cosine=x,
-                amplitude=abs(along),
-                gain_ratio=abs(across) / abs(along),
-                phase_deg=math.degrees(cmath.phase(across)),
-                direction=-1,
-                period=360.0,
-            )
-        )
+        return model_of_channels(Channels.of_amplitudes(*ellipse, direction=-1, period=360.0))

@@ -48,10 +48,9 @@ def demodulated(table: FileReadings) -> tuple[FileReadings, float | None]:
                 "excitation has: sample it faster, or leave its role out",
                 line=1,
             )
-        starts, *pair, phase, _ = found
-        starts = starts.astype(np.intp)
+        starts, phase = found[0].astype(np.intp), found[3]
         rows.append(part[(starts[:-1] + starts[1:] - 1) // 2])
-        channels.append(np.array(pair))
+        channels.append(np.array(found[1:3]))
     middle = np.concatenate(rows)
     kept = {name: column[middle] for name, column in table.columns.items()}
     names = [column.name for column in columns[1:]]

@@ -154,6 +154,23 @@ class Channels:
                 )
             put(self, "covariance", tuple(map(tuple, rows.tolist())))
 
+    @classmethod
+    def of_amplitudes(
+        cls, offset: complex, cosine: complex, sine: complex, **fields: Any
+    ) -> Channels:
+        """Of ``Re(offset + cosine exp(i φ))`` and ``Im(offset + sine exp(i φ))``.
+
+        The phase is counted from where the cosine is at its top.
+        """
+        return cls(
+            offset_sine=offset.imag,
+            offset_cosine=offset.real,
+            amplitude=abs(cosine),
+            gain_ratio=abs(sine) / abs(cosine),
+            phase_deg=math.degrees(cmath.phase(sine / cosine)),
+            **fields,
+        )
+
     @cached_property
     def constants(self) -> tuple[float, float, float, float, float, float]:
         """What the core decodes by: offsets, inverse amplitudes, slope, unit of the angle."""
