@@ -2,7 +2,8 @@
 
 ``python`` blocks are doctests (or plain code), one session a page; ``console`` blocks hold
 ``$ command`` lines and the output that must follow, run in one folder a page; a block
-under ``<!-- file: NAME -->`` is written there.
+under ``<!-- file: NAME -->`` is written there. Commands of ``text`` blocks, which need what only
+their reader has, are those of the program with its options.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-from trueangle.cli import main
+from trueangle.cli import build_parser, main
 
 FENCE = re.compile(
     r"(?:^<!-- file: (\S+) -->\n)?^```(\w+)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL
@@ -58,10 +59,19 @@ def run_page(page: Path, folder: Path, skip: tuple[str, ...] = ()) -> int:
             if any(word in block.text for word in skip):
                 continue
             run_console(block.text, folder, where)
+        elif block.language == "text":
+            check_options(block.text)
         else:
             continue
         ran += 1
     return ran
+
+
+def check_options(text: str) -> None:
+    """Parse commands that cannot be run here."""
+    commands = r"(?:^|\| )(?:\$ )?trueangle ([^|>\n]+)"
+    for command in re.findall(commands, text.replace("\\\n", ""), re.MULTILINE):
+        build_parser().parse_args(shlex.split(command, comments=True))
 
 
 def run_python(block: Block, session: dict[str, object], where: str) -> None:

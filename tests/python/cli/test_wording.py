@@ -336,9 +336,6 @@ def test_a_mistyped_word_is_answered_by_the_nearest(case, files):
 @pytest.mark.parametrize(
     ("line", "meant"),
     [
-        ("fot r.csv", "fit"),
-        ("diagnos r.csv", "diagnose"),
-        ("fit r.csv -o x.json --gear-ratoi 3", "--gear-ratio"),
         ("export m.json --to klippr -o x", "klipper"),
         ("import m.json --from linuxnc -o x", "linuxcnc"),
         ("fit r.csv -o x.json --signal torqe=tau", "torque"),
@@ -360,13 +357,6 @@ def test_a_mistyped_word_of_a_command_too(line, meant, files, capsys):
         status = ended.code
     assert status in (1, 2)
     assert f"did you mean {meant}?" in capsys.readouterr().err.splitlines()[-1]
-
-
-def test_a_mistyped_kind_of_a_simulation_file(tmp_path):
-    path = tmp_path / "s.toml"
-    path.write_text('[[effect]]\nkind = "backlsh"\nhalf_width_arcsec = 3.0\n')
-    with pytest.raises(TrueAngleError, match=r"did you mean backlash\?"):
-        ta.load_simulation(path)
 
 
 def test_words_are_suggested_by_one_function():
