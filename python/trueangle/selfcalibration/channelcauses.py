@@ -18,7 +18,7 @@ from ..runs.rawchannels import Channels
 from ..runs.source import OtherReadingOptions
 from ..support.argumentkinds import told_kinds
 from ..support.layout import counted, laid_out, wrapped_lines
-from ..support.plainresult import PlainResult
+from ..support.plainresult import PlainResult, plain_fields
 from .channelchanges import (
     LEAST,
     SURE,
@@ -87,15 +87,8 @@ class ChannelDiagnosis(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "sentence": self.sentence,
-            "causes": [c._asdict() for c in self.causes],
-            "changes": [c._asdict() for c in self.changes],
-            "drift": self.drift,
-            "reference": self.reference,
-            "coverage_deg": self.coverage_deg,
-            "channels": self.channels.to_dict(),
-        }
+        keys = "sentence causes changes drift reference coverage_deg channels"
+        return plain_fields(self, keys)
 
     def _brief(self) -> str:
         return f"{counted(self.causes, 'cause')}, {counted(self.changes, 'change')}"

@@ -18,7 +18,7 @@ from ..runs.source import OtherReadingOptions
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.layout import counted, laid_out, wrapped_lines
-from ..support.plainresult import PlainResult
+from ..support.plainresult import PlainResult, plain_fields
 from .channelcauses import ChannelDiagnosis, channel_diagnosis
 from .recording import Recording, as_recordings, track_readings
 
@@ -56,15 +56,8 @@ class ChannelCheck(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "data_faults": [fault.to_dict() for fault in self.data_faults],
-            "usable": self.usable,
-            "readings": self.readings,
-            "runs": self.runs,
-            "turns": self.turns,
-            "diagnosis": self.diagnosis and self.diagnosis.to_dict(),
-            "mismatch_periods": self.mismatch and self.mismatch._asdict(),
-        }
+        keys = "data_faults usable readings runs turns diagnosis mismatch_periods=mismatch"
+        return plain_fields(self, keys)
 
     def _brief(self) -> str:
         names = ", ".join(fault.fault for fault in self.data_faults) or "no fault"

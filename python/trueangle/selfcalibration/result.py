@@ -224,7 +224,7 @@ def order_estimates(
 
 def blind_words(orders: Sequence[float]) -> str:
     """What is blind, in words: orders, or the zero."""
-    return f"orders {order_ranges(orders)}" if any(orders) else "zero"
+    return f"order{'s' * (len(orders) > 1)} {order_ranges(orders)}" if any(orders) else "zero"
 
 
 def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
