@@ -146,6 +146,7 @@ def test_a_simulation_is_enough_where_nothing_is_left(unexplained, verdict, comp
         unexplained=SimpleNamespace(found=unexplained),
         beliefs=[SimpleNamespace(verdict=verdict)],
     )
+    made.wrong = Diagnosis.wrong.fget(made)
     enough = Diagnosis.is_enough.fget(made)
     assert enough == (complete and not unexplained and verdict == "confirmed")
     made.findings = ["something"]
