@@ -35,9 +35,6 @@ if TYPE_CHECKING:
 HELP = "watch a running joint against its model; status 3 where an alarm was raised"
 EXAMPLE = "trueangle watch joint.csv -m joint_a.json --every 1turn"
 
-#: Exit status where an alarm was raised.
-ALARMED = 3
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
@@ -108,7 +105,8 @@ def run(args: argparse.Namespace) -> int:
         from ..reports.watched import WatchReport
 
         WatchReport(kept, model.period, errors_in=errors_in(args)).save(args.report)
-    return ALARMED if alarmed else 0
+    # Exit status where an alarm was raised.
+    return 3 if alarmed else 0
 
 
 def _of_joint(args: argparse.Namespace) -> tuple[str | None, argparse.Namespace]:

@@ -29,8 +29,6 @@ SEEN, SETTLING = 0.5, 5
 #: scale of Kass and Raftery.
 TOLD = 10.0
 
-#: Radians by which an angle at rest may change: rounding.
-STANDS = 1e-9
 
 ONE_WAY = "all runs go in one direction: a constant reversal error is part of the zero"
 
@@ -166,7 +164,8 @@ def _crossing_at_rest(signals: Signals) -> Array:
     """The direction, changing linearly while the reference is at rest between two movements."""
     crossing = signals.direction.copy()
     for start, stop in signals.run_bounds():
-        moved = np.abs(np.diff(signals.theta[start:stop])) > STANDS
+        # Radians by which an angle at rest may change: rounding.
+        moved = np.abs(np.diff(signals.theta[start:stop])) > 1e-9
         moving = np.flatnonzero(np.concatenate([moved[:1], moved[1:] | moved[:-1], moved[-1:]]))
         if moving.size == 0:
             continue

@@ -32,9 +32,6 @@ LIKELY = 3
 #: Lines at most.
 MOST_LINES = 6
 
-#: Travel (turns) over less than which only low orders are separated.
-TOLD_APART = 0.5
-
 
 @dataclass(frozen=True)
 class DirectionalPattern(Effect):
@@ -97,7 +94,8 @@ class DirectionalPattern(Effect):
         if not goes_both_ways(signals) or len(present) >= MOST_LINES:
             return None
         orders = regression.lines.orders[regression.lines.plausible]
-        if float(signals.run_turns().max()) < TOLD_APART:
+        # Travel (turns) over less than which only low orders are separated.
+        if float(signals.run_turns().max()) < 0.5:
             orders = orders[orders <= LIKELY]
         shapes = [{"order": float(m)} for m in orders if m not in present]
         counts = [LIKELY if shape["order"] <= LIKELY else len(shapes) for shape in shapes]

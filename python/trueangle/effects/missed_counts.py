@@ -24,9 +24,6 @@ from .search import (
 #: few readings that are off and come back are outliers, no lost counts.
 STEP_MARGIN = 5
 
-#: Share of a count of the reading that a step must have.
-LEAST_COUNT = 0.9
-
 
 @dataclass(frozen=True)
 class MissedCounts(Effect):
@@ -111,7 +108,8 @@ class MissedCounts(Effect):
                     cls.kind, shape, columns, 2, float(np.log(regression.signals.runs))
                 )
                 # Less than a count is no count.
-                if abs(extension.coefficients[0]) < LEAST_COUNT * regression.signals.count:
+                # Share of a count of the reading that a step must have.
+                if abs(extension.coefficients[0]) < 0.9 * regression.signals.count:
                     continue
                 if best_extension is None or extension.deviance > best_extension.deviance:
                     best_extension = extension

@@ -62,9 +62,6 @@ EM_STEPS = 60
 
 SCALES = np.linspace(0.85, 1.1, 11)
 
-#: Evidence by which outliers must beat mere heavy tails.
-BEYOND_TAILS = 2.0
-
 
 #: Ratio of the largest of readings with a tail ``x^(-nu)`` to the next that is passed by a
 #: probability of ``8^(-nu)``: 0.2 % for nu = 3, 3e-5 for nu = 5. Such a reading is of another kind.
@@ -128,7 +125,8 @@ class Outliers(Effect):
         beyond = 2.0 * (value - tails) - regression.log_n
         if gain <= 0.0:
             return None
-        if beyond > BEYOND_TAILS:
+        # Evidence by which outliers must beat mere heavy tails.
+        if beyond > 2.0:
             x = e / scale
             wide = share / size * np.exp(-0.5 * (x / size) ** 2)
             chance = wide / (wide + (1.0 - share) * np.exp(-0.5 * x**2))

@@ -32,9 +32,6 @@ TURNED = (
     "that of a shaft's own line does not"
 )
 
-#: Share of the larger line below which the other of a pair is none: a modulation makes both.
-ONE_LINE = 0.1
-
 
 @dataclass(frozen=True)
 class Sidebands(Effect):
@@ -214,4 +211,5 @@ def _is_one_line(extension: Extension) -> bool:
     if extension.shape["form"] != "free":
         return False
     sizes = np.hypot(extension.coefficients[0::2], extension.coefficients[1::2])
-    return bool(sizes.min() < ONE_LINE * sizes.max())
+    # Share of the larger line below which the other of a pair is none: a modulation makes both.
+    return bool(sizes.min() < 0.1 * sizes.max())

@@ -32,8 +32,6 @@ from .search import Array, Fitted, golden_maximum
 OVERSAMPLING = 3
 MOST_TRIALS = 2**17
 
-#: Bins of time per period of the highest frequency: the quick search then loses 2 % there.
-BINS = 8
 
 #: Cycles that a run must show: fewer are a slow curve, not a line.
 LEAST_CYCLES = 3.0
@@ -44,12 +42,6 @@ FREQUENCY_DRIFT = 0.015
 #: Readings that a run must have to be searched.
 LEAST_READINGS = 16
 
-#: Orders of the fastest shaft beyond which no bearing has lines: at one speed a line up
-#: there is one of time.
-BEARINGS = 12.0
-
-#: Share of its level by which the speed must change to distinguish a line in time from an order.
-ONE_SPEED = 0.1
 
 #: Golden sections of a search about a trial frequency.
 SECTIONS = 14
@@ -196,10 +188,14 @@ class TimePeriodic(Effect):
         speed = np.abs(regression.signals.turns_per_s)
         moving = speed[speed > 0.0]
         level = float(np.median(moving)) if moving.size else 0.0
-        if not level or quantile(moving, 0.9) - quantile(moving, 0.1) > ONE_SPEED * level:
+        # Share of its level by which the speed must change to distinguish a line in time from an
+        # order.
+        if not level or quantile(moving, 0.9) - quantile(moving, 0.1) > 0.1 * level:
             return None
         order = float(np.median(extension.shape["frequency_hz"])) / level
-        if order > BEARINGS * max(regression.belief.joint.shafts.values()):
+        # Orders of the fastest shaft beyond which no bearing has lines: at one speed a line up
+        # there is one of time.
+        if order > 12.0 * max(regression.belief.joint.shafts.values()):
             return None
         return cls.blind(
             f"one speed: a line of {order * level:.4g} Hz and one of order {order:.4g} with a "
@@ -225,7 +221,8 @@ def _periodogram(
     if count <= low + 2:
         return None
     # Bins of a time that wraps after one over the step: exact at multiples of the step.
-    bins = 1 << int(np.ceil(np.log2(BINS * count)))
+    # Bins of time per period of the highest frequency: the quick search then loses 2 % there.
+    bins = 1 << int(np.ceil(np.log2(8 * count)))
     e = regression.left_within_runs
     e = np.where(regression.outlying, 0.0, e)
     power = np.empty((count - low, len(bounds)))

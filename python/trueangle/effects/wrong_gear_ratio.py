@@ -23,9 +23,6 @@ from .missing_order import MissingOrder
 from .search import Array, Fitted
 from .sidebands import Sidebands
 
-#: Lines of geared shafts that one ratio must explain at once: one alone is a missing order.
-LEAST_LINES = 2
-
 #: Share of the power of the assumed lines that may be left at their own places.
 ABSENT = 0.3
 
@@ -89,7 +86,8 @@ class WrongGearRatio(Effect):
     def propose(cls, regression: Regression) -> Extension | None:
         joint, pattern = regression.belief.joint, regression.belief.pattern
         geared = _geared(joint, pattern)
-        if geared.size < LEAST_LINES or regression.has(cls.kind) or cls._are_there(regression):
+        # Lines of geared shafts that one ratio must explain at once: one alone is a missing order.
+        if geared.size < 2 or regression.has(cls.kind) or cls._are_there(regression):
             return None
         gains = dict(zip(regression.lines.orders.tolist(), regression.line_gains(), strict=True))
         top = int(max(gains) / max(pattern.orders[geared] / joint.shafts["motor"]))

@@ -31,9 +31,6 @@ from .search import (
 from .thermal_drift import ThermalDrift
 from .torsional_compliance import TorsionalCompliance
 
-#: Kelvin from the coldest run of a level on from which a run is at the next one.
-LEVEL_KELVIN = 1.0
-
 
 @dataclass(frozen=True)
 class ZeroSlip(Effect):
@@ -120,7 +117,8 @@ class ZeroSlip(Effect):
         if temperature is not None and not any(ThermalDrift.kind in s.causes for s in found):
             levels: list[float] = []
             for mean in sorted(float(temperature[a:b].mean()) for a, b in bounds):
-                if not levels or mean >= levels[-1] + LEVEL_KELVIN:
+                # Kelvin from the coldest run of a level on from which a run is at the next one.
+                if not levels or mean >= levels[-1] + 1.0:
                     levels.append(mean)
             if signals.runs < len(levels) + RUNS_PER_LEVEL - 1:
                 yield cls.blind(

@@ -29,9 +29,6 @@ from .targets import export_target
 #: Most bytes of a table that is read: a Mechaduino's takes 200 kB as text.
 TABLE_BYTES = 16 << 20
 
-#: Bits of the readings on which sizes are compared before the one chosen is proven.
-_ROUGH_BITS = 14
-
 
 @told_kinds
 def export_model(
@@ -330,7 +327,8 @@ def _first(
             refused = error
             continue
         part = made.part._replace(continuous=False)
-        rough_bits = min(_ROUGH_BITS, made.bits or bits)
+        # Bits of the readings on which sizes are compared before the one chosen is proven.
+        rough_bits = min(14, made.bits or bits)
         looked = _proven(replace(made, part=part, bits=rough_bits), 1)
         # What lies between the few readings of a rough look is left to the closer one.
         rough = looked.max_arcsec - looked.margin_arcsec

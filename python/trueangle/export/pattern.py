@@ -19,9 +19,6 @@ from ..support.arrays import Array
 #: step leaves a share of the error equal to its relative curvature, a hundredth or less.
 _STEPS = 8
 
-#: Turns: the rounding of a double.
-_EXACT = 1e-15
-
 
 class TurnPattern:
     """The part of a model that follows the angle alone, with every angle in turns.
@@ -273,7 +270,8 @@ def inverse_rising(rising: Callable[[Array], Array], wanted: Array, points: int)
     for _ in range(_STEPS):
         found = low - below * ((high - low) / (above - below))
         left = rising(found) - wanted
-        if not np.any(np.abs(left) > _EXACT):
+        # Turns: the rounding of a double.
+        if not np.any(np.abs(left) > 1e-15):
             break
         short = left < 0.0
         low, below = np.where(short, found, low), np.where(short, left, below)

@@ -21,8 +21,6 @@ EVERY_INPUT_BITS = 24
 #: Readings evaluated at once: they fit the caches together with what is made of them.
 _BATCH = 1 << 16
 
-#: Turns within which the model's own correction is found.
-_INVERSE = 1e-12
 
 _THREADS = min(8, os.cpu_count() or 1)
 
@@ -94,11 +92,8 @@ def enough_bits(asked: int, entries: float) -> int:
     """
     if not 1 <= asked <= 32:
         raise ArgumentError(f"bits must be from 1 to 32, got {asked}")
-    return max(asked, math.ceil(math.log2(_POINTS_PER_LINE * entries)))
-
-
-#: Inputs that are evaluated on a line between two entries, at least.
-_POINTS_PER_LINE = 16
+    # Inputs that are evaluated on a line between two entries, at least.
+    return max(asked, math.ceil(math.log2(16 * entries)))
 
 
 def prove_export(
@@ -161,8 +156,9 @@ def prove_export(
     worst, at, _, _ = max(found, key=lambda part: part[0])
     squares = np.sum([part[2] for part in found], axis=0)
     margin = 0.0 if every else max(part[3] for part in found) / 2.0 + resolution
+    # Turns within which the model's own correction is found.
     return Proof(
-        max_arcsec=(worst + margin + _INVERSE) * ARCSEC_PER_TURN,
+        max_arcsec=(worst + margin + 1e-12) * ARCSEC_PER_TURN,
         rms_arcsec=math.sqrt(float(squares.max()) / inputs) * ARCSEC_PER_TURN,
         inputs=inputs,
         every_input=every,

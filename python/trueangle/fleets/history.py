@@ -24,8 +24,6 @@ _FEWEST: Final = 4
 #: Places of a turn at which a change of the pattern is looked at.
 _PLACES: Final = 360
 
-#: Quantile of the normal distribution for a one-sided bound of 95 %.
-_BOUND: Final = 1.6448536269514722
 
 #: Half of the shift that is looked for, in standard deviations of a calibration.
 _ALLOWANCE: Final = 0.5
@@ -248,7 +246,8 @@ def _days(dates: Sequence[str | None]) -> Array:
 def drift_bound(change: Array, std: Array, orders: Array, period: float) -> float:
     """That of 95 % of the greatest change over a turn."""
     places = order_columns(np.linspace(0.0, period, _PLACES, endpoint=False), orders, period)
-    return float((np.abs(places @ change) + _BOUND * np.sqrt(places**2 @ std**2)).max())
+    # Quantile of the normal distribution for a one-sided bound of 95 %.
+    return float((np.abs(places @ change) + 1.6448536269514722 * np.sqrt(places**2 @ std**2)).max())
 
 
 def next_calibration(

@@ -12,9 +12,6 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 R = TypeVar("R")
 
-#: Items in hand or waiting for each worker.
-_WAITING = 2
-
 
 def read_ahead(items: Iterable[T], depth: int = 1) -> Iterator[T]:
     """The same items in the same order, made by another thread up to ``depth`` ahead.
@@ -84,7 +81,8 @@ def side_by_side(work: Callable[[T], R], items: Iterable[T], workers: int) -> It
         try:
             for item in items:
                 waiting.append(pool.submit(work, item))
-                if len(waiting) >= _WAITING * workers:
+                # Items in hand or waiting for each worker.
+                if len(waiting) >= 2 * workers:
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()

@@ -17,19 +17,12 @@ from . import budget
 from .format import check_lengths, row_labels
 from .stored import stored_values
 
-#: Places of HDF5's table of chunks in memory; a prime.
-_SLOTS = 521
-#: Share of a data set beyond the budget that must be stored.
-_LEAST_STORED = 0.5
-
 _NBIT: Final = 5
 _SCALE_OFFSET: Final = 6
 #: Parameters of a plain number: their count, whether nothing is packed, values in a chunk, its
 #: class, bytes, order, bits and the first of them.
 _PLAIN: Final = 8
 _NUMBER: Final = 1
-#: Parameters of scale and offset: the third is the values in a chunk, the fifth their bytes.
-_SCALED: Final = 20
 
 #: Rows of a chunk from which it is worth while to ask where it lies.
 _LEAST_CHUNK = 1 << 13
@@ -85,7 +78,8 @@ def _check_stored(path: Path, data: h5py.Dataset, name: str) -> None:
         _check_filters(path, data, name)
         most = math.prod(-(-n // c) for n, c in zip(data.shape, data.chunks, strict=True))
         share = data.id.get_num_chunks() / most if size > budget.DECODED_BYTES else 1.0
-    if size > budget.DECODED_BYTES and share < _LEAST_STORED:
+    # Share of a data set beyond the budget that must be stored.
+    if size > budget.DECODED_BYTES and share < 0.5:
         raise FileError(
             path,
             f"declares {data.size} values, but {100.0 * share:.2g} % of them are stored, the "
@@ -109,7 +103,8 @@ def cached(file: h5py.File, name: str) -> h5py.Dataset:
     chunk = math.prod(data.chunks) * data.dtype.itemsize
     packed = data.id.get_create_plist().get_nfilters() > 0
     access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
-    access.set_chunk_cache(_SLOTS, chunk if packed else 0, 1.0)
+    # Places of HDF5's table of chunks in memory; a prime.
+    access.set_chunk_cache(521, chunk if packed else 0, 1.0)
     del data  # one that is open keeps the cache that it has
     return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access))
 
@@ -170,7 +165,9 @@ def _check_filters(path: Path, data: Any, name: str) -> None:
             fits = fits and given[3] == _NUMBER and given[4] == size
             fits = fits and given[6] > 0 and given[6] + given[7] <= 8 * size
         elif number == _SCALE_OFFSET:
-            fits = len(given) == _SCALED and given[2] == count and given[4] == size
+            # Parameters of scale and offset: the third is the values in a chunk, the fifth their
+            # bytes.
+            fits = len(given) == 20 and given[2] == count and given[4] == size
         if not fits:
             kind = "n-bit" if number == _NBIT else "scale-offset"
             raise FileError(

@@ -290,8 +290,6 @@ Bytes = NDArray[np.uint8]
 #: publishing; and where the message begins.
 _LENGTH, _CHANNEL, _NUMBER = slice(1, 9), slice(9, 11), slice(11, 15)
 _LOGGED, _PUBLISHED = slice(15, 23), slice(23, 31)
-#: What of the head the length does not count.
-_UNCOUNTED = 9
 #: Rows that are given at a time: some megabytes.
 _MOST = 16_384
 
@@ -343,7 +341,8 @@ class RecordRows:
         """
         if len(data) < _HEAD.size or data[0] != _MESSAGE:
             return None
-        width = _UNCOUNTED + int.from_bytes(data[_LENGTH], "little")
+        # What of the head the length does not count.
+        width = 9 + int.from_bytes(data[_LENGTH], "little")
         if width < _HEAD.size or len(data) % width:
             return None
         records = np.frombuffer(data, dtype=np.uint8).reshape(-1, width)

@@ -22,8 +22,6 @@ from .openmdf import HAS_MARKS, OF_TEXTS, opened_mdf
 _BLOCK = 1 << 19
 #: Acquisition name of the groups of corrected channels.
 _GROUP = "trueangle"
-#: Channels of values of any length are elsewhere in the file.
-_ELSEWHERE = 1
 #: Compression argument of asammdf by the type of data block found.
 _COMPRESSIONS = {0: 0, 1: 1, 2: 2, 3: 5, 4: 6, 5: 3, 6: 4}
 
@@ -148,7 +146,8 @@ def _parts(path: Path, mdf: MDF, places: Sequence[tuple[int, int]]) -> Iterator[
     group = mdf.groups[places[0][0]]
     for _, index in places:
         channel = group.channels[index]
-        if channel.channel_type == _ELSEWHERE or group.channel_dependencies[index]:
+        # Channels of values of any length are elsewhere in the file.
+        if channel.channel_type == 1 or group.channel_dependencies[index]:
             raise FileError(path, "numbers are needed, one to a record", column=channel.name)
     head = group.channel_group
     record = int(head.samples_byte_nr) + int(head.invalidation_bytes_nr)

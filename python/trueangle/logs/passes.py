@@ -40,10 +40,6 @@ from .accumulation import (
 from .keeping import SAMPLE
 from .report import Progress
 
-#: Orders per order of the table that sums of segments hold to a part in 1e10.
-_REACH = 2.89
-#: With more logs, each with its sums, the scan beyond the low orders is omitted.
-_MOST_SCANNED = 64
 #: Places across a segment at which the model is looked at.
 _ACROSS = np.linspace(0.0, 1.0, 5)
 #: Passes, at most, in which outliers are rejected and looked for anew.
@@ -214,10 +210,12 @@ def _is_beyond(moments: Moments, outliers: OutlierLimits) -> bool:
 def _table(cycles: Mapping[str, float], joint: Mapping[str, Any], logs: int) -> dict[str, Any]:
     """Orders of sums that serve every candidate of a selection."""
     ratio, declared = joint["gear_ratio"], (joint["shafts"] or {}).values()
-    highest = HIGHEST_SCANNED if logs <= _MOST_SCANNED else HIGHEST_FREE_ORDER
+    # With more logs, each with its sums, the scan beyond the low orders is omitted.
+    highest = HIGHEST_SCANNED if logs <= 64 else HIGHEST_FREE_ORDER
     gear = [] if ratio is None else gear_orders(ratio, joint["fixed_member"])
     most = max(highest, *map(float, gear), *(SHAFT_HARMONICS[-1] * float(f) for f in declared), 0.0)
-    return dict.fromkeys(cycles, (1,)) | {"output": (1, math.ceil(most / _REACH))}
+    # Orders per order of the table that sums of segments hold to a part in 1e10.
+    return dict.fromkeys(cycles, (1,)) | {"output": (1, math.ceil(most / 2.89))}
 
 
 def _summed(found: Accumulated, argument: Argument) -> SummedReadings:

@@ -22,11 +22,6 @@ _STEP: Final = 0.1
 #: Turns from which whole numbers or angles of one turn at most are likelier another unit.
 _MANY: Final = 10.0
 
-#: Standard deviation of a channel that goes round, relative to its amplitude.
-_ROUND: Final = 0.5
-
-#: Times that exchanged channels are nearer to the curve, in squares, from which on they are.
-_NEARER: Final = 4.0
 
 #: Mismatch of two tracks, in periods, from which a reading is nearer to a wrong period than to
 #: none.
@@ -134,11 +129,13 @@ class ChannelStatistics:
         known, (y, x) = self.channels, (sine / n, cosine / n)
         moments = np.array([[squares[0] / n - y * y, product / n - x * y], [0.0, 0.0]])
         moments[1] = moments[0, 1], squares[1] / n - x * x
-        if math.sqrt(max(moments.diagonal().max(), 0.0)) > _ROUND * known.amplitude:
+        # Standard deviation of a channel that goes round, relative to its amplitude.
+        if math.sqrt(max(moments.diagonal().max(), 0.0)) > 0.5 * known.amplitude:
             problem = no_curve((y + known.offset_sine, x + known.offset_cosine), moments)
             if problem:
                 return problem
-        if off > _NEARER * exchanged:
+        # Times that exchanged channels are nearer to the curve, in squares, from which on they are.
+        if off > 4.0 * exchanged:
             return (
                 "the channels are nearer to the curve of the model with sine and cosine exchanged: "
                 "they are swapped; name them anew, `signals={'sine': 'NAME', 'cosine': 'NAME'}`"

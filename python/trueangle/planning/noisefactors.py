@@ -27,11 +27,6 @@ TOLERATED_FACTOR: Final = 2.0
 #: Steps in which offsets are searched, per pitch (0.01 deg for 36 facets).
 _STEPS: Final = 1000
 
-#: Rounding of a factor that is ideal, 1.
-_IDEAL: Final = 1e-9
-
-#: Sets of facet shifts that are all tried: four mounts of 48 facets.
-_SHIFTS: Final = 17_000
 
 _STARTS: Final = 4000  # random starts of the search for three mounts and more
 _REFINED: Final = 8  # of these, the best are refined
@@ -196,7 +191,8 @@ def search_offsets(positions: int, mounts: int, orders: Sequence[float]) -> list
         return [0.0]
     pitch = 360.0 / positions
     even = np.arange(mounts, dtype=np.float64) * (pitch / mounts)
-    if float(_worst(positions, even[None], orders)[0]) <= 1.0 + _IDEAL:
+    # Rounding of a factor that is ideal, 1.
+    if float(_worst(positions, even[None], orders)[0]) <= 1.0 + 1e-9:
         return [round(float(o), 9) for o in even]
     steps = np.arange(1, _STEPS, dtype=np.float64) * (pitch / _STEPS)
     # Mirror images are equally good: the smaller offset of two is taken.
@@ -232,7 +228,8 @@ def search_shifts(positions: int, mounts: int) -> tuple[tuple[int, ...], float]:
     """Facet shifts with the least worst factor: all of a few mounts, then one by one."""
     if mounts == 1:
         return (0,), math.inf
-    head = max(h for h in (2, 3, 4) if h == 2 or math.comb(positions - 1, h - 1) <= _SHIFTS)
+    # Sets of facet shifts that are all tried: four mounts of 48 facets.
+    head = max(h for h in (2, 3, 4) if h == 2 or math.comb(positions - 1, h - 1) <= 17_000)
     head = min(head, mounts, positions)
     combinations = itertools.combinations(range(1, positions), head - 1)
     trial = np.array([(0, *rest) for rest in combinations], dtype=np.int64)

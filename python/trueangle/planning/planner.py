@@ -30,9 +30,6 @@ from .worth import NOTHING, Worth, barely
 #: Readings whose diagnosis may take as much work by default as a plan may.
 WORK = 20_000
 
-#: Runs in a row that open nothing, after which no further one is tried; by themselves the first
-#: open nothing, whatever they are.
-_IN_VAIN = 3
 
 #: Passes over all choices of a run: the last one rarely changes anything.
 _PASSES = 3
@@ -235,7 +232,9 @@ class RunSearch:
             # Separate zeros of the runs are determined by several at once: one that decides nothing
             # may help.
             done = self._tells_all(best) and (best.foretold or start is not None)
-            if done or len(designs) - len(kept) == _IN_VAIN:
+            # Runs in a row that open nothing, after which no further one is tried; by themselves
+            # the first open nothing, whatever they are.
+            if done or len(designs) - len(kept) == 3:
                 break
         return kept, best
 

@@ -49,8 +49,6 @@ SEARCHED = 3
 #: holds out one at a time.
 SHOWN, PARTS = 3.0, 5
 
-#: Most designs whose evidence is computed: some ten seconds.
-MOST_WEIGHED = 250
 
 #: Earlier readings that are looked at, at most: of more, evenly spaced ones.
 MOST_READINGS = 2000
@@ -92,7 +90,8 @@ class DesignScales:
 
     def afresh(self) -> None:
         """Begin a separate search: as many designs may be weighed again."""
-        self._left = MOST_WEIGHED
+        # Most designs whose evidence is computed: some ten seconds.
+        self._left = 250
 
     @property
     def over(self) -> bool:

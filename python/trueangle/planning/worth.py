@@ -41,10 +41,6 @@ _DRAWS = 4
 #: Draws of an effect before a cause counts as one that such a joint cannot have.
 _TRIES = 4
 
-#: Share of the wanted size below which a cause of bounded size is too small to explain what the
-#: readings show.
-_REACHED = 0.5
-
 
 @dataclass(frozen=True)
 class Question:
@@ -95,8 +91,10 @@ def question_of(spot: Ambiguity, rich: Signals, around: JointPattern, rms: float
             draws += drawn[1:]
         if effects:
             found.append(Hypothesis(cause, effects))
+    # Share of the wanted size below which a cause of bounded size is too small to explain what the
+    # readings show.
     large = {
-        one.cause for one in found if one.cause in known or _rms(one, rich, around) > _REACHED * rms
+        one.cause for one in found if one.cause in known or _rms(one, rich, around) > 0.5 * rms
     }
     if large:  # the others cannot be it, as the argument's error of a joint with small lines
         found, draws = ([one for one in some if one.cause in large] for some in (found, draws))

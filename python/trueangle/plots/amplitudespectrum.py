@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,16 +30,10 @@ if TYPE_CHECKING:
 
 #: Aliases and explanations written at a dot; the table has them all.
 _MOST_ALIASES = 3
-#: Orders named on a page, the largest.
-_MOST_NAMED = 8
 #: Dots that get their aliases written, the largest first, and inches that each needs.
 _MOST_ANNOTATED = 12
 _LABEL_INCHES = 0.17
 
-#: A gap of this many orders in which none was tested separates two groups.
-_BREAK: Final = 12.0
-#: Groups side by side at most; more would leave no width for each.
-_MOST_GROUPS: Final = 6
 #: Width of a group of one order, and the gap between two, in the unit of `_width`.
 _LEAST, _GAP = 2.5, 1.0
 #: Inches that a tick needs, and each digit at it.
@@ -145,7 +139,8 @@ def draw_spectrum(
     tall = _apart([i for i in largest if lines[i].aliases], place, axis.room(ax, _LABEL_INCHES))
     tall = tall[:_MOST_ANNOTATED]
     if name is not None:
-        for i in largest[:_MOST_NAMED]:
+        # Orders named on a page, the largest.
+        for i in largest[:8]:
             text = name(lines[i].order).removeprefix("output ")
             ax.annotate(text, (place[i], amplitude[i]))
         tall = []
@@ -207,7 +202,9 @@ def _order_groups(orders: Sequence[float]) -> list[tuple[float, float]]:
     """
     ascending = np.unique(np.asarray(orders, dtype=np.float64))
     gaps = np.diff(ascending)
-    wide = [int(i) for i in np.argsort(-gaps) if gaps[i] > _BREAK][: _MOST_GROUPS - 1]
+    # A gap of this many orders in which none was tested separates two groups.
+    # Six groups side by side at most; more would leave no width for each.
+    wide = [int(i) for i in np.argsort(-gaps) if gaps[i] > 12.0][:5]
     edges = [0, *sorted(i + 1 for i in wide), ascending.size]
     return [(float(ascending[a]), float(ascending[b - 1])) for a, b in pairwise(edges)]
 

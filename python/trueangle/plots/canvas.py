@@ -38,8 +38,6 @@ _ROW: float = 0.09
 #: Steps of ticks on an axis of angles in degrees, and about how many there are to an inch.
 _ANGLES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 1800.0)
 _TICKS_PER_INCH: float = 1.2
-#: Share of the width for axes that are alone in a figure.
-_ALONE: float = 0.9
 #: Letters of an entry, of which longer ones lose the middle.
 _LONGEST: int = 48
 
@@ -213,7 +211,8 @@ def legend(ax: Axes, title: str | None = None) -> None:
         )
         _opaque(made)
         return
-    room = ax.bbox.width if shared else _ALONE * figure.bbox.width
+    # Share of the width for axes that are alone in a figure.
+    room = ax.bbox.width if shared else 0.9 * figure.bbox.width
     for columns in range(min(len(handles), _COLUMNS if shared else _MANY), 0, -1):
         rows = -(-len(handles) // columns)
         made = ax.legend(

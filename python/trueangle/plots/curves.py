@@ -30,8 +30,6 @@ _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 #: Points of a curve for each cycle of its highest order, and the least and most of them.
 _PER_CYCLE, _FEWEST, _MOST_SAMPLES = 20, 361, 12001
 
-#: Degrees without a reading that make a travel partial, where no model states its span.
-_WIDE_GAP: Final = 90.0
 
 #: Periods from which on a curve fills the picture: it is plotted as an envelope...
 _DENSE: Final = 40.0
@@ -176,7 +174,8 @@ def travelled_degrees(runs: Sequence[CalibrationRun]) -> tuple[float, float]:
     angle = np.sort(np.concatenate([reference_degrees(run) for run in runs]))
     gaps = np.diff(np.append(angle, angle[0] + 360.0))
     widest = int(np.argmax(gaps))
-    if gaps[widest] < _WIDE_GAP:
+    # Degrees without a reading that make a travel partial, where no model states its span.
+    if gaps[widest] < 90.0:
         return 0.0, 360.0
     low, high = float(angle[(widest + 1) % angle.size]), float(angle[widest])
     return _about_zero(low, high if high >= low else high + 360.0)

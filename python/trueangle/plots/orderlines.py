@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 #: Orders stated in words.
 _TOLD: Final = 6
-#: Least amplitude of the logarithmic axis, as part of the smallest that must be visible.
-_FLOOR: Final = 0.4
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,8 @@ def seen_sizes(lines: Sequence[OrderLine]) -> tuple[float, float]:
     kept = [line for line in lines if line.kept] or list(lines)
     seen = [size for line in lines if (size := line.limit) > 0.0]
     seen += [line.amplitude for line in kept if line.amplitude > 0.0]
-    low = _FLOOR * min(seen, default=1.0)
+    # Least amplitude of the logarithmic axis, as part of the smallest that must be visible.
+    low = 0.4 * min(seen, default=1.0)
     return low, max([*(line.amplitude + line.half for line in lines), *seen, low])
 
 

@@ -34,9 +34,6 @@ ON_PAGE: Final = {
     WARNING: "warning",
 }
 
-#: Mean of red, green and blue below which paper is dark.
-_DARK: Final = 0.5
-
 
 def run_colour(number: int) -> str:
     """Colour of run ``number`` (from 0)."""
@@ -52,4 +49,5 @@ def ink(ax: Axes) -> str:
     """Black, or white on dark axes: models, limits and grids."""
     from matplotlib.colors import to_rgb
 
-    return "#FFFFFF" if sum(to_rgb(ax.get_facecolor())) < 3.0 * _DARK else "#000000"
+    # Mean of red, green and blue below which paper is dark.
+    return "#FFFFFF" if sum(to_rgb(ax.get_facecolor())) < 1.5 else "#000000"

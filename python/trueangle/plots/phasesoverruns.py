@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 #: Orders plotted by default, the largest first: beyond that colours repeat too often.
 _MOST_ORDERS = 12
 _TITLE = "Phase and amplitude of every order, run by run"
-#: Half of what a chart of one order shows, degrees, at least: nothing is made to look like scatter.
-_LEAST_HALF = 15.0
 
 
 def phases_over_runs(
@@ -102,7 +100,9 @@ def draw_phase_of_order(ax: Axes, order: Phases, numbers: dict[str, int], unit: 
     mean = np.angle(np.mean(order.amplitude * np.exp(1j * order.phase)))
     around = np.degrees(np.angle(np.exp(1j * (order.phase - mean))))
     middle = float(np.degrees(mean)) % 360.0
-    half = min(max(1.3 * float(np.abs(around).max()), _LEAST_HALF), 190.0)
+    # Half of what a chart of one order shows, degrees, at least: nothing is made to look like
+    # scatter.
+    half = min(max(1.3 * float(np.abs(around).max()), 15.0), 190.0)
     for place, label in enumerate(order.labels):
         number = numbers[label]
         phase = middle + around[place]

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 #: Small pictures side by side.
 _COLUMNS = 4
-#: Numbers at a size axis.
-_TICKS = 4
 
 
 def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
@@ -168,7 +166,8 @@ def _draw(ax: Axes, cause: RehearsedCause) -> None:
         ax.set_xlim(size[0] / 2.0, size[0] * 2.0)
     if not cause.grows:
         ax.invert_xaxis()
-    plain_logarithms(ax, "x", _TICKS)
+    # Numbers at a size axis.
+    plain_logarithms(ax, "x", 4)
     ax.set_ylim(-0.05, 1.05)
     ax.set_title(cause.cause, fontsize="small")
     ax.set_xlabel(cause.size_name, fontsize="small")

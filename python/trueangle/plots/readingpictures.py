@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from ..fitting.result import FitResult
     from ..simulation import Simulation
 
-#: Part of a turn in degrees from which on the axis shows a whole one.
-_MOST_OF_A_TURN: Final = 300.0
 #: Part of the way between two directions over which the runs are next to each other.
 _BESIDE: Final = 0.8
 
@@ -272,7 +270,8 @@ def comparison_picture(
         rest.append(Cloud(Points(measured.label, measured.x, left), number))
     low = min(float(cloud.points.x.min()) for cloud in rest)
     high = max(float(cloud.points.x.max()) for cloud in rest)
-    span = (0.0, 360.0) if high - low > _MOST_OF_A_TURN else (low, high)
+    # Part of a turn in degrees from which on the axis shows a whole one.
+    span = (0.0, 360.0) if high - low > 300.0 else (low, high)
     whole = Panel(ANGLE, f"error / {unit.name}", tuple(both), span)
     panels = [whole]
     if known is not None and (strong := _gear_order(known, span[1] - span[0])) is not None:

@@ -48,10 +48,6 @@ _MOST_POINTS: Final = 3_000
 _MOST_RUNS: Final = 12
 #: Width of a chart that has the page, and of one next to another, inches.
 _WIDE, _NARROW = 7.5, 3.4
-#: Orders whose phases are shown, the largest.
-_MOST_PHASES: Final = 12
-#: Factors that are shown, the strongest.
-_MOST_FACTORS: Final = 9
 #: Part of the measured error that a simulation must expect to be plotted with it.
 _FLAT: Final = 1e-3
 
@@ -196,7 +192,8 @@ def figures_of_diagnosis(
 def _factors(diagnosis: Diagnosis, scale: ErrorScale) -> Figure:
     """One chart for each factor: its function with the band."""
     charts, told = [], []
-    for factor in diagnosis.factors[:_MOST_FACTORS]:
+    # Factors that are shown, the strongest.
+    for factor in diagnosis.factors[:9]:
         ax = page_axes(_NARROW, 2.0)
         draw_factor(ax, factor, scale.unit)
         told.append(ax.get_label())
@@ -240,7 +237,8 @@ def spectrum_figure(
 def phase_figure(fit: FitResult, name: LineNames, scale: ErrorScale) -> Figure | None:
     """Phase of every order in every run; None where no run holds them, or there is one."""
     try:
-        found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:_MOST_PHASES]
+        # Orders whose phases are shown, the largest.
+        found = sorted(run_phases(fit), key=lambda p: -float(p.amplitude.mean()))[:12]
     except RankError:
         return None
     if not found or len(found[0].labels) < 2:

@@ -20,8 +20,6 @@ from .page import Page, filled_template
 
 #: Units whose patterns are plotted at most, those that need something first.
 _DRAWN: Final = 24
-#: Orders whose phasors are plotted: those in which units differ most.
-_PHASORS: Final = 3
 #: Width of a chart, inches.
 _WIDTH: Final = 2.8
 
@@ -85,7 +83,8 @@ class FleetReport(Page):
 
     def _spread_most(self) -> list[int]:
         order = np.argsort([-row.std for row in self.fleet.between], kind="stable")
-        return [int(k) for k in order[:_PHASORS]]
+        # Orders whose phasors are plotted: those in which units differ most.
+        return [int(k) for k in order[:3]]
 
     def _latest(self) -> list[HistoryRow]:
         """The last date of each unit, the first due first."""

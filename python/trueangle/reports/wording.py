@@ -29,8 +29,6 @@ _CONDITIONS: Final = (
 _CONDITION_DIGITS: Final = 3
 _PLAIN: Final = ErrorUnit("", 1.0)
 
-#: Orders that are not retained in the table of evidence.
-_OTHERS: Final = 20
 
 #: Reduction, in percent, from which a correction is worth having.
 _WORTH: Final = 1.0
@@ -150,7 +148,8 @@ def listed_orders(rows: list[dict[str, Any]]) -> list[int]:
     """
     others = [i for i, row in enumerate(rows) if not row["retained"]]
     others.sort(key=lambda i: -(rows[i]["amplitude_arcsec"] or 0.0))
-    return sorted({i for i, row in enumerate(rows) if row["retained"]} | set(others[:_OTHERS]))
+    # Orders that are not retained in the table of evidence.
+    return sorted({i for i, row in enumerate(rows) if row["retained"]} | set(others[:20]))
 
 
 def gain_paths(findings: list[dict[str, Any]]) -> list[str]:

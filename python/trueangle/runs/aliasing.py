@@ -32,8 +32,6 @@ POSITION_TOLERANCE: Final = 1.0 / 36_000.0
 _HIGHEST_ALIAS: Final = 404
 _SAME_PHASE: Final = 0.2
 
-#: Places visited again lie nearer to each other than to the next, by this factor.
-_CLEAR: Final = 5.0
 
 #: Cells of a turn for each order: within one it turns by a fifth of a radian at most.
 _CELLS_PER_ORDER: Final = 32
@@ -48,8 +46,6 @@ _MISSING: Final = 20.0 / 360.0
 #: Readings that a turn takes at least, in steps below half of it.
 _LEAST_OF_A_TURN: Final = 3
 
-#: Most shifted uniform grids that a union of mounts is searched for.
-_MOST_GRIDS: Final = 24
 
 #: Up to this many positions their spectrum is summed exactly, beyond by a histogram.
 _EXACT_SPECTRUM: Final = 4096
@@ -266,7 +262,8 @@ def _places(ascending: Array) -> NDArray[np.intp] | None:
     first = ascending[np.append(0, bounds + 1)]
     last = ascending[np.append(bounds, ascending.size - 1)]
     widest = float((last - first).max())
-    if widest > width or float(gaps[bounds].min()) < _CLEAR * widest:
+    # Places visited again lie nearer to each other than to the next, by this factor.
+    if widest > width or float(gaps[bounds].min()) < 5.0 * widest:
         return None
     return np.concatenate([[0], np.cumsum(starts)]).astype(np.intp)
 
@@ -287,7 +284,8 @@ def _clusters(ascending: Array, width: float) -> NDArray[np.intp]:
 
 def _grids(turns: Array, width: float) -> tuple[int | None, tuple[float, ...]]:
     """Divisions and offsets of the uniform grids that make up the positions."""
-    for grids in range(1, min(_MOST_GRIDS, turns.size // 2) + 1):
+    # Most shifted uniform grids that a union of mounts is searched for.
+    for grids in range(1, min(24, turns.size // 2) + 1):
         if turns.size % grids:
             continue
         divisions = turns.size // grids

@@ -14,9 +14,6 @@ from ..support.arrays import Array
 from ..support.roles import ANGLE_UNITS, unit_in_name, wanted_columns
 from .readings import named_source, readings_of
 
-#: How far a nominal angle may be off its facet, as a share of the closest two facets' distance.
-_OFF = 0.01
-
 
 class Facets(NamedTuple):
     """Facets of a polygon.
@@ -47,7 +44,9 @@ class Facets(NamedTuple):
         here = np.mod(turns - self.places[0], 1.0)
         nearest = np.searchsorted((places[1:] + places[:-1]) / 2.0, here)
         off = np.abs(places[np.minimum(nearest, places.size - 1)] - here)
-        far = np.flatnonzero(off > _OFF * np.diff(places).min())
+        # How far a nominal angle may be off its facet, as a share of the closest two facets'
+        # distance.
+        far = np.flatnonzero(off > 0.01 * np.diff(places).min())
         if far.size:
             row = int(far[0])
             facet = self.places[int(nearest[row]) % len(self.places)]

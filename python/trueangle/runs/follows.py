@@ -43,8 +43,6 @@ _REMEDIED = 0.95
 #: How near a measured ratio is to that of two units.
 _NEAR = 0.01
 
-#: Step of the indicated angle (degrees) that may be a turn more or less.
-_FAST = 120.0
 
 #: Radians beyond which a reference may as well be degrees: ten turns.
 _MANY_TURNS = 10.0
@@ -213,7 +211,8 @@ def _ratio(run: CalibrationRun) -> float | None:
     if ratio is None or ratio == 0.0:
         return None
     reference, indicated = record.unwrapped
-    fast = float(quantile(np.abs(np.diff(indicated)), 0.9)) > _FAST
+    # Step of the indicated angle (degrees) that may be a turn more or less.
+    fast = float(quantile(np.abs(np.diff(indicated)), 0.9)) > 120.0
     agree = _core.resultant(indicated / ratio, reference, 360.0) > _REMEDIED
     return ratio if agree and not fast else None
 

@@ -27,10 +27,6 @@ _LOOKED_AT = 65_536
 CONDITION = 30.0
 
 
-#: Angles are a sweep when they jump over a turn's border in fewer than this share of steps.
-_JUMPS = 0.1
-
-
 #: An end of a span nearer to zero than this share of the span is reported as zero.
 _TOLD = 1e-4
 
@@ -45,9 +41,6 @@ _CORRELATED = 0.3
 
 #: Degree of what is slow over a short travel.
 _SLOW = 5
-
-#: Readings whose neighbours are compared.
-_COMPARED = 20_000
 
 
 class Span(NamedTuple):
@@ -130,7 +123,8 @@ def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> fl
     if not 0.0 < travel < _SHORT or passed > _ONE_PASS * travel:
         return 0.0
     held = [k for k in declared if k * travel >= _PERIODS]
-    part = slice(0, _COMPARED)
+    # Readings whose neighbours are compared.
+    part = slice(0, 20_000)
     x = (reference[part] - reference[0]) / (travel * run.period)
     columns = [x**power for power in range(4)]
     for k in held:
@@ -177,7 +171,8 @@ def over_turns(run: CalibrationRun) -> CalibrationRun:
     array([200., 300., 400., 500.])
     """
     jumps = np.count_nonzero(np.abs(np.diff(run.reference)) > 0.5 * run.period)
-    if np.ptp(run.reference) > run.period or not 0 < jumps <= max(1.0, _JUMPS * len(run)):
+    # Angles are a sweep when they jump over a turn's border in fewer than this share of steps.
+    if np.ptp(run.reference) > run.period or not 0 < jumps <= max(1.0, 0.1 * len(run)):
         return run
     reference = run.unwrapped_reference
     return replace(run, reference=reference, indicated=reference + run.centred_error)

@@ -35,9 +35,6 @@ _GRID: Final = 8192
 _HIGHEST_CUT: Final = 0.15
 _LEAST_BAND: Final = 10.0
 
-#: Zeros that are appended to a series: noise further apart is uncorrelated.
-_BEYOND: Final = 1024
-
 
 @dataclass(frozen=True)
 class Correlation:
@@ -78,7 +75,8 @@ class Correlation:
         """``R X``: rows of one series, along which the noise correlates."""
         if self.is_white:
             return rows
-        n = 1 << (len(rows) + min(len(rows), _BEYOND) - 1).bit_length()
+        # Zeros that are appended to a series: noise further apart is uncorrelated.
+        n = 1 << (len(rows) + min(len(rows), 1024) - 1).bit_length()
         power = self.spectrum(np.fft.rfftfreq(n))[:, None]
         found = np.fft.irfft(power * np.fft.rfft(rows, n, axis=0), n, axis=0)
         return np.asarray(found[: len(rows)])

@@ -16,11 +16,6 @@ from .correlation import Correlation
 #: readings do not show on, two a decade.
 _SIZES: Final = np.logspace(-1.0, 12.0, 27)
 
-#: Variances less probable than this share of the most probable one are omitted.
-_IMPROBABLE: Final = 1e-2
-
-#: No variance at all: a prior so tight that the term is nothing.
-_NO_VARIANCE: Final = 1e-24
 
 #: Singular values of patterns below this share of the largest count as zero.
 _RANK: Final = 1e-9
@@ -142,7 +137,8 @@ def possible_variances(
     log = np.array([evidence(float(variance)) for variance in tried])
     log[1:] -= math.log(_SIZES.size)
     weights = np.exp(log - log.max())
-    weights[weights < _IMPROBABLE] = 0.0
+    # Variances less probable than this share of the most probable one are omitted.
+    weights[weights < 1e-2] = 0.0
     weights /= weights.sum()
     return [(float(v), float(w)) for v, w in zip(tried, weights, strict=True) if w > 0.0]
 
@@ -165,7 +161,8 @@ def _evidence(
     freedom = max(count - seen.size, 1.0)
 
     def evidence(variance: float) -> float:
-        variance = max(variance, _NO_VARIANCE)
+        # No variance at all: a prior so tight that the term is nothing.
+        variance = max(variance, 1e-24)
         prior = np.eye(len(last), len(last) + 1) / math.sqrt(variance)
         r: Array = np.asarray(np.linalg.qr(np.concatenate([small, prior]), mode="r"))
         squares = float(np.sum(r[len(last) :, -1] ** 2))

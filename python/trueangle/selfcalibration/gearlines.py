@@ -22,8 +22,6 @@ SLIP: Final = 0.05
 #: Steps whose mean gives the direction.
 _WIDTH: Final = 5
 
-#: Readings to either side from which the speed is estimated.
-_SPREAD: Final = 10
 
 #: Speed is a separate regressor where it varies by this share of the highest.
 _VARIED: Final = 0.2
@@ -141,7 +139,8 @@ def gear_motion(theta: Array, time: Array | None) -> tuple[Array, Array]:
     way = sign[last]
     if time is None:
         return np.asarray(way), np.zeros(theta.size)
-    spread = max(2, min(_SPREAD, theta.size // 10))
+    # Readings to either side from which the speed is estimated.
+    spread = max(2, min(10, theta.size // 10))
     if theta.size < 2 * spread + 1:
         return np.asarray(way), np.zeros(theta.size)
     # A cubic has the slope of a swing where a difference over as many readings is too small.

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,21 +39,9 @@ _BEHIND = 2
 #: A combination of common columns of which motion leaves less is the motion's own.
 _GONE = 1e-13
 
-#: Close knots may show a rougher drift than distant ones by this factor at most (drift with a
-#: correlation time): coloured noise would need more, and is not motion.
-_ROUGHER = 100.0
 
 #: Correlation times of the acceleration that are tried, as shares of the longest segment.
 _MEMORIES = (0.1, 0.01)
-
-#: Stiffnesses of evidence within this of the best are still possible (log likelihood).
-_DOUBT = 4.0
-
-#: Waves of a log that its smooth trends and lines take.
-_ENDS: Final = 4.0
-
-#: Stiffness is found to this power of ten: standard errors change by less than 1 %.
-_STIFFNESS_STEP = 0.2
 
 
 @dataclass(frozen=True)
@@ -90,7 +77,8 @@ class MotionFit:
         intervals = sum(self.knots.intervals)
         weight = self.readings / max(intervals, 1) / self.stiffness
         turned = math.pow(10.0 * weight, 1.0 / 6.0) / self.knots.spacing
-        slowest = _ENDS / (intervals * self.knots.spacing)
+        # Waves of a log that its smooth trends and lines take.
+        slowest = 4.0 / (intervals * self.knots.spacing)
         return max(min(turned / (2.0 * math.pi), 0.5 / self.knots.spacing), slowest)
 
 
@@ -199,7 +187,10 @@ class MotionSearch:
                 continue
             found, possible = self._stiffness(here, roughest, self.memory)
             if here == level:
-                roughest = possible * _ROUGHER
+                # Close knots may show a rougher drift than distant ones by this factor at most
+                # (drift with a correlation time): coloured noise would need more, and is not
+                # motion.
+                roughest = possible * 100.0
             worth = best is None or found.evidence > best.evidence + _WORTH
             behind = 0 if worth else behind + 1
             if best is None or found.evidence > best.evidence:
@@ -233,7 +224,8 @@ class MotionSearch:
         low, high = powers[max(k - 1, 0)], powers[min(k + 1, 6)]
         ratio = 0.5 * (math.sqrt(5.0) - 1.0)
         a, b = high - ratio * (high - low), low + ratio * (high - low)
-        while high - low > _STIFFNESS_STEP:
+        # Stiffness is found to this power of ten: standard errors change by less than 1 %.
+        while high - low > 0.2:
             if at(a) > at(b):
                 high, b = b, a
                 a = high - ratio * (high - low)
@@ -241,7 +233,8 @@ class MotionSearch:
                 low, a = a, b
                 b = low + ratio * (high - low)
         best = tried[max(tried, key=at)]
-        possible = [f.roughness for f in tried.values() if f.evidence > best.evidence - _DOUBT]
+        # Stiffnesses of evidence within this of the best are still possible (log likelihood).
+        possible = [f.roughness for f in tried.values() if f.evidence > best.evidence - 4.0]
         return best, max(possible)
 
     def fit(self, level: int, stiffness: float, memory: float) -> MotionFit:

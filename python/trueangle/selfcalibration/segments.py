@@ -16,17 +16,12 @@ from ..support.arrays import Array
 from .recording import Recording
 from .splines import Knots
 
-#: Motion slower than this share of the median speed is omitted, as are reversals.
-SLOWEST: Final = 0.2
-
 #: Steps between readings beyond this part of a turn may as well go the other way round.
 _LARGEST_STEP: Final = 0.4
 
 #: A segment shorter than this does not show a pattern (turns, readings).
 _SHORTEST: Final = (0.8, 48)
 
-#: Turns in all without which motion and pattern cannot be separated.
-TURNS_NEEDED: Final = 2.0
 
 _BLOCKS: Final = 400  # pieces into which a log is divided, about
 
@@ -133,7 +128,8 @@ def cut_stretches(recordings: Iterable[Recording]) -> list[Segment]:
     for recording in recordings:
         found += _cut(recording)
     turns = sum(s.turns for s in found)
-    if not found or turns < TURNS_NEEDED - 0.01:
+    # Turns in all without which motion and pattern cannot be separated.
+    if not found or turns < 1.99:
         held = f"{turns:.2g} turn{'' if abs(turns - 1.0) < 0.05 else 's'}" if found else "no turn"
         raise NoModelError(
             f"{recordings[0].named}: {held} of steady motion: what happened once may be the "
@@ -180,7 +176,8 @@ def _cut(recording: Recording) -> list[Segment]:
     speeds = np.concatenate([np.zeros(0), *(np.abs(v) for _, v in moving)])
     if speeds.size == 0:
         return []
-    slow = SLOWEST * float(np.median(speeds))
+    # Motion slower than this share of the median speed is omitted, as are reversals.
+    slow = 0.2 * float(np.median(speeds))
     found = []
     for (_, b), (starts, speed) in zip(pieces, moving, strict=True):
         state = np.where(np.abs(speed) > slow, np.sign(speed), 0.0)

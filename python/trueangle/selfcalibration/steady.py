@@ -17,9 +17,6 @@ from .projected import Projected, Unknown, harmonic_rows, harmonic_sum, harmonic
 from .segments import PER_KNOT, SegmentReadings
 from .splines import Knots, ordered_motion_sums, spline_basis, spline_values
 
-#: Readings that the first iterations look at: enough to come close.
-_FIRST_LOOK: Final = 40_000
-
 #: Intervals of the first grid; a finer one is used where the evidence needs it.
 _INTERVALS: Final = 512
 
@@ -27,15 +24,6 @@ _INTERVALS: Final = 512
 _STILL: Final = 0.02
 _ROUNDS: Final = 12
 _SEARCHES: Final = 3
-
-#: Turns between knots of a motion that leaves order 1 alone (to 1 %).
-_TURNS_PER_KNOT: Final = 2.0
-
-#: A residual beyond this many standard deviations (by the median) is an outlier.
-_WILD: Final = 7.0
-
-#: Slope of the error that no step goes beyond: at 1 an angle would be read twice.
-_STEEPEST: Final = 0.97
 
 
 @dataclass(frozen=True)
@@ -117,7 +105,8 @@ def fit_steady(
     near_to = start.motion if like is None and start is not None else like
     intervals = _INTERVALS if near_to is None else max(_INTERVALS, sum(near_to.knots.intervals))
     work = GaussNewtonSteps(readings, orders, ripple, groups, columns)
-    stride = max(1, readings.size // _FIRST_LOOK)
+    # Readings that the first iterations look at: enough to come close.
+    stride = max(1, readings.size // 40_000)
     fit, valid = None, np.ones(readings.size, dtype=bool)
     if start is not None:
         valid = start.valid
@@ -134,7 +123,8 @@ def fit_steady(
         return SteadyFit(orders, ripple, unknowns, fit, readings, left, valid)
     # Knots so far apart that no order fits between them, until the true angles are known:
     # at wrong ones, the residual repeats every turn and would be fitted as motion.
-    stiff = _TURNS_PER_KNOT / readings.mean_speed
+    # Turns between knots of a motion that leaves order 1 alone (to 1 %).
+    stiff = 2.0 / readings.mean_speed
     while True:
         knots = readings.knots(intervals)
         spline = readings.first_spline(knots)
@@ -162,7 +152,8 @@ def fit_steady(
     assert fit is not None
     left = work.residuals(knots, spline, unknowns)
     spread = 1.4826 * float(np.median(np.abs(left)))
-    valid = np.abs(left) <= _WILD * max(spread, 1e-12)
+    # A residual beyond this many standard deviations (by the median) is an outlier.
+    valid = np.abs(left) <= 7.0 * max(spread, 1e-12)
     last = 1 if thorough else stride
     like = fit if smooth or stride == 1 or last > 1 else None
     for _ in range(3):
@@ -306,7 +297,8 @@ class GaussNewtonSteps:
         """
         for _ in range(12):
             parts = (unknowns + step)[: self.sets * self.per_set].reshape(self.sets, -1)
-            if all(pattern_steepness(self.orders, part) < _STEEPEST for part in parts):
+            # Slope of the error that no step goes beyond: at 1 an angle would be read twice.
+            if all(pattern_steepness(self.orders, part) < 0.97 for part in parts):
                 break
             step = 0.5 * step
         return unknowns + step

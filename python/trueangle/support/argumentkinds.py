@@ -11,8 +11,6 @@ from ..errors import KindError, TrueAngleError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-#: How many items of a collection are looked at: one may be longer than there is time for.
-MOST_ITEMS = 1000
 
 #: What code raises that meets an object it cannot use.
 _FAILURES = (TypeError, AttributeError, ValueError, LookupError, ArithmeticError)
@@ -154,7 +152,8 @@ def _fits(value: Any, kind: Any) -> bool:
         return False
     if isinstance(value, Iterator) or not inner:
         return True
-    return all(_fits(item, inner[0]) for item in islice(value, MOST_ITEMS))
+    # How many items of a collection are looked at: one may be longer than there is time for.
+    return all(_fits(item, inner[0]) for item in islice(value, 1000))
 
 
 def _is_numbers(value: Any, kinds: str = "iuf") -> bool:

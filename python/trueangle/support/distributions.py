@@ -22,8 +22,6 @@ _NEGLIGIBLE: Final = 4e-16
 #: Steps at most. Fractions take about sqrt(max(a, b)) of them: enough up to 1e10.
 _MOST_STEPS: Final = 200_000
 
-#: Steps of the search for a quantile at most; ten are usual.
-_MOST_HALVINGS: Final = 200
 
 #: Replaces a zero denominator in a continued fraction (Lentz).
 _TINY: Final = 1e-300
@@ -264,7 +262,8 @@ def _root(tail: Callable[[float], float], probability: float) -> float:
         low, at_low, high = high, at_high, 2.0 * high
         at_high = missing(high)
     side = 0
-    for _ in range(_MOST_HALVINGS):
+    # Steps of the search for a quantile at most; ten are usual.
+    for _ in range(200):
         x = (low * at_high - high * at_low) / (at_high - at_low)
         if not low < x < high:
             x = 0.5 * (low + high)

@@ -22,8 +22,6 @@ _WORD: Final = re.compile(r"\S+")
 #: Cells of a line from which it belongs to a table; two are a name and what it is.
 _CELLS: Final = 3
 
-#: Indentation, in em, for each blank at the beginning of a line.
-_EM: Final = 0.5
 
 _NUMBER: Final = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?|[-\N{EN DASH}]")
 
@@ -67,7 +65,8 @@ def _counts(lines: Sequence[str]) -> list[int]:
 def _line(line: str) -> str:
     """A line of words with its indentation; a blank line becomes empty space."""
     indent = len(line) - len(line.lstrip())
-    style = f' style="padding-left:{_EM * indent:g}em"' if indent else ""
+    # Indentation, in em, for each blank at the beginning of a line.
+    style = f' style="padding-left:{0.5 * indent:g}em"' if indent else ""
     return f"<div{style}>{escape(line.strip()) or '&nbsp;'}</div>"
 
 

@@ -141,13 +141,11 @@ def test_a_cause_is_confirmed_where_the_interval_of_its_gain_excludes_zero(inter
 @pytest.mark.parametrize("verdict", ["confirmed", "absent"])
 def test_a_simulation_is_enough_where_nothing_is_left(unexplained, verdict, complete):
     made = SimpleNamespace(
-        complete=complete,
-        findings=[],
-        unexplained=SimpleNamespace(found=unexplained),
+        complete=complete, findings=[], unexplained=SimpleNamespace(found=unexplained),
         beliefs=[SimpleNamespace(verdict=verdict)],
-    )
+    )  # fmt: skip
     made.wrong = Diagnosis.wrong.fget(made)
-    enough = Diagnosis.is_enough.fget(made)
-    assert enough == (complete and not unexplained and verdict == "confirmed")
+    enough = complete and not unexplained and verdict == "confirmed"
+    assert Diagnosis.is_enough.fget(made) == enough
     made.findings = ["something"]
     assert not Diagnosis.is_enough.fget(made)

@@ -41,8 +41,6 @@ UNIT_SPREAD = 0.35
 #: Part of the greatest angle up to which others may be in radians among degrees.
 OTHER_UNIT = math.pi / 180.0 * (1.0 + UNIT_SPREAD)
 
-#: Noise of the reference against that of the joint from which on the two may be swapped.
-NOISIER = 10.0
 
 #: Departure of steps, in shares of one, that are all alike.
 EVEN = 1e-3
@@ -53,8 +51,6 @@ EXACT = 1e-6
 #: Degrees of a jump of the reference against the joint, at least.
 LEAST_JUMP = 20.0
 
-#: Part of a jump by which the angles may close up again: their error, and none of the jump.
-STAYS = 0.3
 
 #: Part of an error, all but a line, that a straight one may have.
 STRAIGHT = 0.03
@@ -255,7 +251,8 @@ def _stays(record: Record, jumps: NDArray[np.intp], slip: Array) -> bool:
         levels.append(apart[a] + float(median(part - 360.0 * np.round(part / 360.0))))
     off = np.diff(levels) - slip
     off -= 360.0 * np.round(off / 360.0)
-    return bool((np.abs(off) <= STAYS * np.abs(slip)).all())
+    # Part of a jump by which the angles may close up again: their error, and none of the jump.
+    return bool((np.abs(off) <= 0.3 * np.abs(slip)).all())
 
 
 #: Tests of the angles, after whose faults nothing may be fitted.
@@ -278,7 +275,8 @@ def swapped_channels(records: list[Record]) -> Iterator[DataFault]:
         even = float(np.mean(np.abs(steps - typical) <= EVEN * typical)) > 0.5
         if own > least and not even:
             ratios.append(own / max(other, least, 1e-300))
-    if ratios and float(median(ratios)) > NOISIER:
+    # Noise of the reference against that of the joint from which on the two may be swapped.
+    if ratios and float(median(ratios)) > 10.0:
         yield DataFault.of(
             "swapped_channels",
             [record.label for record in records],

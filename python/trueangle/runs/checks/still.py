@@ -28,9 +28,6 @@ _FAR: Final = 6.0
 _COUNTS: Final = 1.5
 _STEPS: Final = 2.5
 
-#: Rows from which on stale readings are a fault of the data and no coincidence, where they
-#: come more than once; at one place a command that is held would do.
-_LEAST_STALE: Final = 3
 
 #: Readings in a row at an end of the range that are a limit.
 _LEAST_STUCK: Final = 5
@@ -43,8 +40,6 @@ _HELD: Final = 10
 _ALIKE: Final = 0.3
 _MADE_UP: Final = 0.15
 
-#: Share of the travel that no joint runs on after its command has stopped.
-_RUN_ON: Final = 0.5
 
 #: Share of its range that a channel must have gone onward, and not to and fro.
 _ONWARD: Final = 0.7
@@ -127,7 +122,9 @@ def _stuck(record: Record, name: str, own: Array, other: Array) -> Iterator[Data
             f"range, in {rows.size} rows (first: row {rows[0]}) while the joint moves on",
             "leave these rows out, or measure inside the range",
         )
-    if len(stale) >= (_LEAST_STALE if times > 1 else _HELD):
+    # Rows from which on stale readings are a fault of the data and no coincidence, where they come
+    # more than once; at one place a command that is held would do.
+    if len(stale) >= (3 if times > 1 else _HELD):
         rows = record.rows[np.array(stale)]
         yield DataFault.of(
             "stale_samples",
@@ -246,7 +243,8 @@ def _moves_on(c: _AnglePair, a: int, b: int) -> bool:
     beyond = apart < low - c.least or apart > high + c.least
     near = slice(b, b + _BESIDE) if a == 0 else slice(a - _BESIDE if a > _BESIDE else 0, a)
     moving = _alike(float(c.speed[far].mean()), float(c.speed[near].mean()))
-    return (beyond and moving) or passed >= _RUN_ON * float(np.ptp(c.other))
+    # Share of the travel that no joint runs on after its command has stopped.
+    return (beyond and moving) or passed >= 0.5 * float(np.ptp(c.other))
 
 
 def _passes(c: _AnglePair, at: int, length: int, end: int) -> bool:

@@ -14,8 +14,6 @@ from .stream import Stream
 
 #: Points of the grid on which the coarse offset is searched, at most.
 _GRID = 1 << 20
-#: Share of the shorter stream that must overlap.
-_OVERLAP = 0.25
 #: Offsets fit equally well up to this multiple of the least misfit, and this much more.
 _AS_WELL = 1.5
 _TIE = 1e-3
@@ -137,7 +135,8 @@ def _coarse(indicated: Stream, reference: Stream) -> tuple[float, list[float] | 
     count = correlation(one_a, one_b)
     power = correlation(faa, one_b) + correlation(one_a, fbb)
     total = power - 2.0 * correlation(fa, fb)
-    enough = (count > _OVERLAP * min(a.size, b.size)) & (power > _ONE_SPEED * float(power.max()))
+    # Share of the shorter stream that must overlap.
+    enough = (count > 0.25 * min(a.size, b.size)) & (power > _ONE_SPEED * float(power.max()))
     cost = np.where(enough, total / np.where(enough, power, 1.0), np.inf)
     shift = np.roll(cost, n // 2)
     least = np.flatnonzero((shift < np.roll(shift, 1)) & (shift <= np.roll(shift, -1)))

@@ -28,8 +28,6 @@ BY = ("time", "angle")
 SAME_MOTION = 0.05
 #: Share of a run's readings that the log must cover in time.
 COVERED = 0.5
-#: Factor by which another offset of the clocks must reduce the difference to be used.
-NEARER = 2.0
 #: Multiple of the median of second differences, 6 standard deviations, that noise does not reach.
 _USUAL = 6.0 / 0.6745
 
@@ -261,7 +259,8 @@ def _in_time(run: CalibrationRun, log: CalibrationRun, is_asked: bool) -> _Expec
             clocks = None
         if clocks is not None and clocks.offset_std is not None:
             nearer = _apart(own, other, clocks.offset)
-            if NEARER * nearer < apart:
+            # Factor by which another offset of the clocks must reduce the difference to be used.
+            if 2.0 * nearer < apart:
                 offset, apart = clocks.offset, nearer
     if apart > SAME_MOTION * size and not (is_asked and math.isfinite(apart)):
         if not is_asked:

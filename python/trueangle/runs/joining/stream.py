@@ -19,10 +19,6 @@ GAP = 5.0
 #: Deviation from a line, in units of the readings' roughness, up to which a line suffices; times
 #: at which it is tested, at most; and windows, at least.
 _ROUGH, _LOOKED_AT, _WINDOWS = 3.0, 4096, 16
-#: Part of a step by which a time may lie outside.
-EDGE = 1e-3
-#: Share of neighbours that may be equal in a log on change (time stamps collide).
-EQUAL = 0.01
 #: Longest pause over the typical step from which on a log without repeats is one on change.
 PAUSE = 3.0
 
@@ -65,7 +61,8 @@ class Stream:
             return False
         change, pause = np.diff(self.angle), np.diff(self.time)
         repeats = float(np.mean(change == 0.0))
-        return repeats < EQUAL and float(pause.max()) > PAUSE * self.step and self.is_stepped
+        # Share of neighbours that may be equal in a log on change (time stamps collide).
+        return repeats < 0.01 and float(pause.max()) > PAUSE * self.step and self.is_stepped
 
     @cached_property
     def is_stepped(self) -> bool:
@@ -133,7 +130,8 @@ class Stream:
 
     def covers(self, time: Array, longest: float | None = None) -> NDArray[np.bool_]:
         """Which times lie within the stream and in none of its gaps."""
-        edge = EDGE * self.step  # times are rounded on the way from one clock to the other
+        # Part of a step by which a time may lie outside.
+        edge = 1e-3 * self.step  # times are rounded on the way from one clock to the other
         inside = (time >= self.time[0] - edge) & (time <= self.time[-1] + edge)
         for start, end in self.gaps(longest):
             inside &= (time <= start) | (time >= end)

@@ -12,8 +12,6 @@ from ...support.arrays import Array
 
 #: Multiple of the typical step in angle above which a step is a gap.
 GAP = 5.0
-#: Part of a turn that may be missing in a log of a whole turn.
-CLOSED = 0.02
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,8 @@ class TravelledError:
         angle = angle + self._turns(angle)
         low, high = float(self.angle.min()) - self.step, float(self.angle.max()) + self.step
         is_outside = bool(angle.min() < low or angle.max() > high)
-        is_turn = is_outside and high - low >= 360.0 * (1.0 - CLOSED)
+        # Part of a turn that may be missing in a log of a whole turn.
+        is_turn = is_outside and high - low >= 0.98 * 360.0
         curves = self._curves(is_turn)
         error = np.zeros(angle.size)
         known = np.zeros(angle.size, dtype=bool)

@@ -24,8 +24,6 @@ RUNS_BYTES: Final = 1 << 30
 #: Bytes read at a time where the size is not known before.
 _CHUNK: Final = 1 << 20
 
-#: Milliseconds between two looks for Ctrl-C while a pipe is waited for.
-_LOOK_MS: Final = 100
 
 #: Mark of a missing value.
 _NOTHING: Final = "__HIVE_DEFAULT_PARTITION__"
@@ -131,7 +129,8 @@ def _wait_for(file: io.FileIO) -> io.FileIO:
     if hasattr(select, "poll"):  # Windows waits for sockets only
         poll = select.poll()
         poll.register(file, select.POLLIN)
-        while not poll.poll(_LOOK_MS):
+        # Milliseconds between two looks for Ctrl-C while a pipe is waited for.
+        while not poll.poll(100):
             pass
     return file
 
