@@ -19,9 +19,6 @@ from .latency import UNTIMED, Latency
 from .scale_error import ScaleError
 from .search import Array
 
-#: Arcsec that one degree per second makes of a second's millionth.
-ARCSEC_PER_PPM = 3600.0 * 1e-6
-
 #: By how much its BIC must beat that of a ramp in angle to be distinguished from one in runs whose
 #: design does not promise to: "very strong" on the scale of Kass and Raftery.
 TOLD = 10.0
@@ -71,7 +68,8 @@ class ClockDrift(Effect):
     @classmethod
     def columns(cls, signals: Signals, around: JointPattern, shape: dict[str, Any]) -> Array:
         speed = signals.turns_per_s * 360.0
-        return np.asarray((ARCSEC_PER_PPM * speed * signals.clock)[:, None])
+        # Arcsec that one degree per second makes of a second's millionth.
+        return np.asarray((3.6e-3 * speed * signals.clock)[:, None])
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:

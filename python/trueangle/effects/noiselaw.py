@@ -18,9 +18,6 @@ WIDEST = 2.0 * float(np.log(1e3))
 #: largest change in one step.
 STEPS, SETTLED, LARGEST_STEP = 30, 1e-8, 2.0
 
-#: Ratios of the variance that grows to the other one, to start from.
-GROWTHS = (0.3, 10.0, 1e3)
-
 
 @dataclass(frozen=True)
 class NoiseLaw:
@@ -72,7 +69,8 @@ def noise_law(square: Array, columns: Array, growing: Array | None = None) -> No
     mean = float(np.log(np.minimum(square, SQUARE_CLIP).mean()))
     if growing is None:
         return _of_columns(square, columns, mean)
-    found = [_with_growth(square, columns, growing**2, mean, start) for start in GROWTHS]
+    # Ratios of the variance that grows to the other one, to start from.
+    found = [_with_growth(square, columns, growing**2, mean, start) for start in (0.3, 10.0, 1e3)]
     return max(found, key=lambda law: law.log_likelihood)
 
 

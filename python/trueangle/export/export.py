@@ -26,9 +26,6 @@ from .proof import Proof, lost_orders, prove_export, rounded_up
 from .target import CommentBlock, Made, Target
 from .targets import export_target
 
-#: Most bytes of a table that is read: a Mechaduino's takes 200 kB as text.
-TABLE_BYTES = 16 << 20
-
 
 @told_kinds
 def export_model(
@@ -209,7 +206,8 @@ def import_model(
     """
     found = export_target(target)
     given = found.checked(options)
-    raw = read_whole(path, TABLE_BYTES, f"a table of {target}")
+    # Most bytes of a table that is read: a Mechaduino's takes 200 kB as text.
+    raw = read_whole(path, 16 << 20, f"a table of {target}")
     try:
         text = found.decoded(raw)
     except UnicodeDecodeError:

@@ -26,8 +26,6 @@ _SAMPLE: Final = 32
 _HIGHEST: Final = 110
 _READINGS_EACH: Final = 6
 
-#: Orders that stay, significant or not: eccentricity and tilt, where damage shows.
-_ALWAYS: Final = (1, 2)
 
 #: Least eigenvalue of the normal matrix, its columns scaled, from which orders are separable.
 _TOLD: Final = 1e-3
@@ -224,7 +222,8 @@ def worth_keeping(
     present = set(estimate.present)
     found = []
     for shaft in shafts:
-        kept = {*present, *_ALWAYS} if shaft.name == "output" else present
+        # Orders that stay, significant or not: eccentricity and tilt, where damage shows.
+        kept = {*present, 1, 2} if shaft.name == "output" else present
         own = [k for k in shaft.orders if k * shaft.cycles_per_turn in kept]
         if own:
             found.append(shaft._replace(orders=tuple(own)))

@@ -27,8 +27,6 @@ from .budget import check_part
 from .unpacking import unpacked, unpacked_folder
 
 _MESSAGE, _CHUNK, _MESSAGE_INDEX = 0x05, 0x06, 0x07
-#: Start of a chunk without messages.
-_NEVER = (1 << 63) - 1
 #: Record: kind and length; of a message also channel, number, times of logging and publishing.
 _RECORD = struct.Struct("<BQ")
 _HEAD = struct.Struct("<BQHIQQ")
@@ -247,7 +245,8 @@ class _ChunkWriter(McapWriter):  # type: ignore[misc]
         told.write(b"".join(places) + struct.pack("<Q", self.bio.tell() - end))
         told.write(_text(self.compression) + struct.pack("<QQ", len(packed), len(data)))
         self.chunks.append(told)
-        self.chunk = PendingChunk(_NEVER, 0, BytesIO(), defaultdict(list))
+        # Start of a chunk without messages.
+        self.chunk = PendingChunk((1 << 63) - 1, 0, BytesIO(), defaultdict(list))
 
 
 def _text(text: str) -> bytes:

@@ -21,8 +21,6 @@ from .damage import damage_told
 _MOST_COMPRESSED = 2000
 #: Bytes of a data block read at once: for each part of a block asammdf reads the whole block.
 _PIECE = 1 << 22
-#: Types of channels that have no place in a record: virtual master and data.
-_VIRTUAL = (3, 6)
 #: Flag of a channel whose readings may be marked invalid.
 HAS_MARKS = 2
 #: Flag of a group of records of any length: texts of a channel of another group, no channels. The
@@ -109,7 +107,8 @@ def _check_sizes(path: Path, mdf: MDF) -> None:
             raise FileError(path, f"is damaged: {size} bytes, but it declares records of {record}")
         marks = 8 * int(group.channel_group.invalidation_bytes_nr)
         for channel in group.channels:
-            if channel.channel_type not in _VIRTUAL:
+            # Types of channels that have no place in a record: virtual master and data.
+            if channel.channel_type not in (3, 6):
                 bits = 8 * int(channel.byte_offset) + int(channel.bit_offset) + channel.bit_count
                 if bits > 8 * int(group.channel_group.samples_byte_nr):
                     raise FileError(

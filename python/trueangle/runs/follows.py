@@ -48,8 +48,6 @@ _NEAR = 0.01
 _MANY_TURNS = 10.0
 _MANY = 2.0 * math.pi * _MANY_TURNS
 
-#: Turns up to which a place within one is known to far more than is looked at.
-_RESOLVED = 2.0**30
 
 #: How far beyond the spread of the errors a line may go that half of them are near.
 _LINE = 1.0 + 2.0 * STRAIGHT
@@ -151,7 +149,8 @@ def _are_plain(runs: Sequence[CalibrationRun], strides: Sequence[int]) -> bool:
             return False
         if least <= size * OTHER_UNIT and steps >= 4 * BLOCKS - 1:
             return False
-        if size > (_MANY_TURNS if run.period == _TURNS["radians"] else _RESOLVED):
+        # Turns up to which a place within one is known to far more than is looked at.
+        if size > (_MANY_TURNS if run.period == _TURNS["radians"] else 2.0**30):
             return False
         sizes.append(size)
     return len(sizes) == 1 or min(sizes) > max(sizes) * OTHER_UNIT

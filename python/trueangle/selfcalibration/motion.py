@@ -40,10 +40,6 @@ _BEHIND = 2
 _GONE = 1e-13
 
 
-#: Correlation times of the acceleration that are tried, as shares of the longest segment.
-_MEMORIES = (0.1, 0.01)
-
-
 @dataclass(frozen=True)
 class MotionFit:
     """Motion and common columns at one knot spacing and stiffness."""
@@ -198,7 +194,8 @@ class MotionSearch:
             if behind == _BEHIND:
                 break
         assert best is not None
-        for share in _MEMORIES:
+        # Correlation times of the acceleration that are tried, as shares of the longest segment.
+        for share in (0.1, 0.01):
             if share * self.memory < best.knots.spacing:
                 break
             found, _ = self._stiffness(best.level, roughest, share * self.memory)

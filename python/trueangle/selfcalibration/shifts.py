@@ -46,9 +46,6 @@ _LEAST: Final = 1e-3
 #: Directions of columns below this share of the greatest are none.
 _RANK: Final = 1e-8
 
-#: Orders of a coupling that changes with the clamping.
-_COUPLING: Final = (1.0, 2.0)
-
 
 def shift_patterns(
     recordings: Sequence[Recording],
@@ -189,7 +186,8 @@ def _rows(
     nuisances = np.zeros((a.size, width))
     nuisances[:, i] = 1.0
     if coupling:
-        nuisances[:, runs + 4 * i : runs + 4 * i + 4] = harmonic_rows(place, _COUPLING).T
+        # Orders of a coupling that changes with the clamping.
+        nuisances[:, runs + 4 * i : runs + 4 * i + 4] = harmonic_rows(place, (1.0, 2.0)).T
     target = zero + wrap(a - b - zero)
     return DenseRows(np.concatenate([mine, theirs]).T, nuisances, np.asarray(target))
 

@@ -21,8 +21,6 @@ _UNFOLDED: Final = ContextVar("unfolded", default=False)
 #: Fewest columns for the words behind a label; with fewer they are put below it.
 _ROOM: Final = 20
 
-#: How lines begin that are meant to be copied and are not folded.
-_COPIED: Final = ("--", "trueangle ")
 
 #: The character that replaces a blank at which no line is cut.
 _JOINED: Final = "\0"
@@ -104,7 +102,8 @@ def laid_out(lines: Iterable[str]) -> str:
     width = text_columns()
     found: list[str] = []
     for line in lines:
-        if len(line) <= width or line.lstrip().startswith(_COPIED):
+        # How lines begin that are meant to be copied and are not folded.
+        if len(line) <= width or line.lstrip().startswith(("--", "trueangle ")):
             found.append(line)
             continue
         lead = _LEAD.match(line)
