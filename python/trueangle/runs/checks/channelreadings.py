@@ -69,9 +69,8 @@ class ChannelReadings:
         moments = np.cov(sine[kept], cosine[kept]) if n > 1 else np.zeros((2, 2))
         problem = ""
         if sine.size < _LEAST:
-            problem = (
-                f"{sine.size} readings of the channels, and {_LEAST} are needed: record a turn"
-            )
+            got = counted(sine.size, "reading")
+            problem = f"{got} of the channels, and {_LEAST} are needed: record a turn"
         elif any(wraps):
             name, codes = next(pair for pair in zip(_RAILS, wraps, strict=True) if pair[1])
             problem = (
