@@ -76,7 +76,7 @@ def pulls_by_reference(arc, seed, runs):
     channels = TRUE.replace(period=360.0, harmonics=((3, 0.01, 0.02, 0.0), (-3, 0.0, 0.01, 0.0)))
     signals = []
     for _ in range(runs):
-        theta = arc * rng.uniform(size=600 // runs) ** 1.5
+        theta = rng.uniform(0.0, 360.0) + arc * rng.uniform(size=600 // runs) ** 1.5
         pair = channels.curve(np.radians(theta)) if arc >= 360 else TRUE.curve(np.radians(theta))
         noise = 2e-3 * rng.normal(size=(2, theta.size))
         signals.append((*(pair + noise), theta + rng.uniform(0.0, 360.0)))
