@@ -7,9 +7,10 @@ n columns: every other limit here is a stated condition on the readings.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,10 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..support.arrays import Array
+from ..support.distributions import digamma, trigamma, trigamma_inverse
+
+#: Variances over those of white noise that all coefficients may have in common.
+LEVELS: Final = 10.0 ** np.arange(-2.0, 4.25, 0.25)
 
 
 def least_squares(design: Array, target: Array, weights: Array | None = None) -> Array:
@@ -236,18 +241,78 @@ def cluster_covariance(
     return ClusterCovariance(*_core.cluster_covariance(*_stacked(clusters), penalty))
 
 
-def scatter_statistic(clusters: Sequence[NormalEquations], variance: float) -> tuple[float, float]:
-    """Chi-squared of the clusters' own coefficients about the common ones, and its freedom.
+def moderated_covariance(
+    scatter: ClusterCovariance, white: Array, freedom: float
+) -> ClusterCovariance:
+    """Covariance of coefficients by their scatter, by that of white noise, and by one another.
 
-    Near its degrees of freedom where the residuals are white with this variance.
+    With the symmetric root of the covariance of white noise the coefficients are combinations of
+    as many that it makes independent, of variance 1. Their variances are ``κ_j``, which the scatter
+    measures as ``s_j²`` with n degrees of freedom, and which have a distribution:
+
+    ::
+
+        s_j² ~ κ_j χ²_n / n,    κ_j ~ κ d / χ²_d    given d and κ
+        κ_j | s_j² ~ κ̃_j (d + n) / χ²_(d+n),    κ̃_j = (d κ + n s_j²) / (d + n)
+
+    (Smyth 2004). Noise may be white, κ = 1 with d of the residual, or have any of `LEVELS` for
+    κ and 1, 2, 4 ... 128 for d, each d being as probable. The result is the mixture over them:
+    variances and their degrees of freedom have its mean and variance of ``log κ_j``. Those of the
+    coefficients follow (Satterthwaite).
+
+    Parameters
+    ----------
+    scatter : ClusterCovariance
+        By clusters, of coefficients without the constant.
+    white : ndarray
+        Covariance of the same coefficients under white noise.
+    freedom : float
+        Degrees of freedom of the residual.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The covariance of white noise is singular.
+
+    Examples
+    --------
+    >>> scatter = ClusterCovariance(np.diag([8.0, 12.0]), np.array([2.0, 2.0]))
+    >>> found = moderated_covariance(scatter, np.eye(2), 200.0)
+    >>> np.diag(found.covariance).round(1).tolist(), found.freedom.round(1).tolist()
+    ([9.5, 10.5], [3.4, 3.5])
     """
-    models = [cluster.solved() for cluster in clusters]
-    explained = sum(
-        float(model.coefficients[:, 0] @ cluster.moment)
-        for model, cluster in zip(models, clusters, strict=True)
-    )
-    freedom = sum(model.rank for model in models) - clusters[0].moment.size
-    return explained / variance, max(float(freedom), 1.0)
+    levels, alike = (grid.ravel() for grid in np.meshgrid(LEVELS, 2.0 ** np.arange(8.0)))
+    level, d = np.append(levels, 1.0)[:, None], np.append(alike, freedom)[:, None]
+    chance = np.append(np.full(levels.size, 1.0 / len(LEVELS)), 1.0)
+
+    powers, axes = np.linalg.eigh(white)
+    if not powers[0] > 0.0:
+        raise np.linalg.LinAlgError("the covariance of white noise is singular")
+    root = axes * np.sqrt(powers) @ axes.T
+    apart = np.linalg.solve(root, np.linalg.solve(root, scatter.covariance).T)
+    own, n = np.maximum(np.diag(apart), 1e-300), float(scatter.freedom.mean())
+
+    known = d + n
+    logs = 0.5 * n * np.log(n * own / (d * level)) - 0.5 * known * np.log1p(n * own / (d * level))
+    score = np.log(chance) + (logs + _log_gamma(0.5 * known) - _log_gamma(0.5 * d)).sum(axis=1)
+    weight = np.exp(score - score.max())
+    weight /= weight.sum()
+
+    value = (d * level + n * own) / known
+    # Of the logarithm of kappa.
+    mean = np.log(0.5 * known * value) - digamma(0.5 * known)
+    middle = weight @ mean
+    told = 2.0 * trigamma_inverse(weight @ ((mean - middle) ** 2 + trigamma(0.5 * known)))
+    variance = np.exp(middle + digamma(0.5 * told)) / (0.5 * told)
+    share = weight @ (n * own / (known * value))
+    scale = np.sqrt(share * variance / own)
+    inside = apart * np.outer(scale, scale) + np.diag((1.0 - share) * variance)
+    parts = root**2 * variance
+    own_freedom = parts.sum(axis=1) ** 2 / (parts**2 / told).sum(axis=1)
+    return ClusterCovariance(root @ inside @ root, own_freedom)
+
+
+_log_gamma = np.vectorize(math.lgamma, otypes=[float])
 
 
 def _stacked(groups: Sequence[NormalEquations]) -> tuple[Array, Array]:

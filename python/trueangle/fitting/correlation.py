@@ -1,4 +1,4 @@
-"""Whether residuals correlate in time or scatter between runs, and their correlation time."""
+"""Whether residuals correlate in time, their correlation time, and clusters of them."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ import numpy as np
 
 import trueangle._core as _core
 
-from ..estimation.linear import NormalEquations, scatter_statistic, total
+from ..estimation.linear import NormalEquations, total
 from ..support.arrays import Array
-from ..support.distributions import chi_squared_tail
 from .problem import Problem, SolvedProblem
 from .residualform import ResidualSpace, Share
 
@@ -24,15 +23,13 @@ FEWEST_RUNS: Final = 3
 
 #: Fewest runs that show by themselves how coefficients scatter.
 ENOUGH_RUNS: Final = 8
-#: Share of white noise's variances below which runs are copies, or their residual a pattern.
-_COPIES: Final = 0.01
 
 #: Readings in a row whose correlation is looked at.
 _LOOKED_AT: Final = 65_536
 
 #: Standard errors from which a correlation counts; white noise reaches it once in 1000.
 _FOUND: Final = 3.1
-#: p-value of the scatter between runs below which it is not that of white noise.
+#: p-value of a scatter below which it is not that of white noise.
 SCATTER: Final = 1e-3
 
 #: Readings in a row that are averaged when slow correlation is looked for.
@@ -96,12 +93,8 @@ def correlation_found(
     fitted: SolvedProblem,
     weights: Sequence[Array | None],
     used: Sequence[int],
-    between: tuple[float, float] | None,
 ) -> str:
-    """What speaks against white noise, in words; empty where nothing does.
-
-    ``between``: of `scatter_between`.
-    """
+    """What speaks against white noise, in words; empty where nothing does."""
     solution = fitted.solution
     if not (solution.residual_variance > 0.0 and solution.degrees_of_freedom > problem.unknowns):
         return ""
@@ -131,36 +124,7 @@ def correlation_found(
             return (
                 f"means of {length} neighbours in time scatter {math.sqrt(ratio):.2g} times as much"
             )
-    if between is not None and chi_squared_tail(*between) < SCATTER:
-        times = math.sqrt(between[0] / between[1])
-        return f"coefficients scatter {times:.2g} times as much between runs"
     return ""
-
-
-def scatter_between(
-    problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], used: Sequence[int]
-) -> tuple[float, float] | None:
-    """Chi-squared of the runs' own coefficients and its freedom; None for fewer than three."""
-    solution = fitted.solution
-    if len(used) < FEWEST_RUNS or not solution.residual_variance > 0.0:
-        return None
-    clusters = runs_together([clusters_of(problem, fitted, weights, i, 1)[0] for i in used])
-    return scatter_statistic(clusters, solution.residual_variance)
-
-
-def white_variance_share(between: tuple[float, float] | None, runs: int) -> float:
-    """Part of white noise's variances that many runs show; 1 where they show no less.
-
-    The residual contains more than what moves the coefficients if it is not white, for example
-    one fast line in time: the runs then repeat better than the residual suggests.
-    """
-    if between is None or runs < ENOUGH_RUNS:
-        return 1.0
-    statistic, freedom = between
-    share = statistic / freedom
-    if share < _COPIES or 1.0 - chi_squared_tail(statistic, freedom) >= SCATTER:
-        return 1.0
-    return share
 
 
 def residual_memory(

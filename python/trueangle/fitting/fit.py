@@ -97,10 +97,9 @@ def fit(
     covariance : {"auto", "white", "cluster", "hac"}
         ``"white"``: independent readings; ``"cluster"``: by the scatter between whole runs,
         right for any correlation within them; ``"hac"``: by segments of readings, right
-        where the correlation dies out. ``"auto"``: white unless the residuals correlate in
-        time or the runs scatter by more, then clusters (three runs and more) or segments; eight
-        runs and more that scatter by less give the noise by that scatter; see the notes. Intervals:
-        `FitResult.interval`.
+        where the correlation dies out. ``"auto"``: by the scatter between three runs and more,
+        that of each coefficient moderated by the others; of one or two runs white unless the
+        residuals correlate in time, then segments. Intervals: `FitResult.interval`.
     nuisance : {"none", "auto"} or iterable of str
         What is fitted jointly with the pattern and kept out of the model (`FitResult.nuisance`):
         ``"ramp"`` in the angle, ``"direction"``, ``"velocity"``, ``"drift"`` in time.

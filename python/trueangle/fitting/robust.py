@@ -1,4 +1,4 @@
-"""Outliers: robust losses, spikes and readings rejected, weights, and where both break down.
+"""Outliers: robust losses, spikes and readings rejected, weights, variances, where both break down.
 
 A bit flip or a slipped tooth leaves one reading degrees off, and least squares spreads
 it over every coefficient.
@@ -248,6 +248,65 @@ def _huber(distance: Array) -> Array:
 
 def _tukey(distance: Array) -> Array:
     return np.square(np.maximum(0.0, 1.0 - np.square(distance / TUKEY)))
+
+
+class Sandwich(NamedTuple):
+    """Factors for variances that were computed with the loss's weights as those of the readings.
+
+    Treated so, a reading far off counts in the noise by its distance, though it moves the
+    coefficients by a bounded step.
+
+    ``white``: of covariances of white noise; ``bread``: of those by how scores scatter.
+    """
+
+    white: float = 1.0
+    bread: float = 1.0
+
+
+def sandwich(
+    problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], loss: str
+) -> Sandwich:
+    """The factors of an M-estimate; 1 for least squares, whether readings were rejected or not.
+
+    With ``ψ = w r`` and the weights b as given, its covariance is
+
+    ::
+
+        K² [Σ b ψ² / (n - p)] / m² (X' B X)⁻¹,    m = Σ b ψ' / Σ b,
+        K = 1 + (p / n) var(ψ') / m²
+
+    and ``X' W X ≈ w̄ X' B X``. Source: Huber, Robust Statistics (1981), section 7.6.
+    """
+    if loss not in ("huber", "tukey"):
+        return Sandwich()
+    parts = problem.residuals(fitted)
+    rest = np.concatenate(parts)
+    base, both = (
+        np.concatenate(
+            [np.ones(r.size) if w is None else w for w, r in zip(of, parts, strict=True)]
+        )
+        for of in (problem.base, weights)
+    )
+    used = base > 0.0
+    rest, base, both = rest[used], base[used], both[used]
+    weight, squares = both / base, float(both @ rest**2)
+    slope = _slope(weight, loss)
+    mean, bend = float(np.average(weight, weights=base)), float(np.average(slope, weights=base))
+    if not (squares > 0.0 and bend > 0.0):
+        return Sandwich()
+    spread = float(np.average((slope - bend) ** 2, weights=base)) / bend**2
+    few = 1.0 + (problem.unknowns + len(problem.runs)) / rest.size * spread
+    scores = float((both * weight) @ rest**2) / squares / mean
+    bread = (few * mean / bend) ** 2
+    return Sandwich(scores * bread, bread)
+
+
+def _slope(weight: Array, loss: str) -> Array:
+    """``ψ'`` of readings of these weights."""
+    if loss == "huber":
+        return np.where(weight >= 1.0 - SETTLED, 1.0, 0.0)
+    root = np.sqrt(weight)
+    return np.asarray(root * (5.0 * root - 4.0))
 
 
 def robust_breakdown_sentence(problem: Problem, weighted: RobustFit) -> str:

@@ -1,4 +1,4 @@
-"""Which covariance holds: white noise, or noise that is correlated within the runs."""
+"""Which covariance holds: white noise, what differs between runs, or correlation within them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.linear import NormalEquations, cluster_covariance, total
+from ..estimation.linear import (
+    LEVELS,
+    NormalEquations,
+    cluster_covariance,
+    moderated_covariance,
+    total,
+)
 from ..support.arrays import Array
 from ..support.quantiles import median
 from ..support.suggestions import check_choice
@@ -22,12 +28,10 @@ from .correlation import (
     correlation_found,
     residual_memory,
     runs_together,
-    scatter_between,
     weight_sum,
-    white_variance_share,
 )
 from .problem import Problem, SolvedProblem
-from .sandwich import Sandwich, sandwich
+from .robust import Sandwich, sandwich
 
 if TYPE_CHECKING:
     from .nuisance import Nuisance
@@ -107,15 +111,15 @@ def coefficient_uncertainty(
     nuisance: Nuisance | None = None,
     loss: str = "linear",
 ) -> Uncertainty:
-    """Covariance of this kind; ``"auto"``: white unless correlation is found.
+    """Covariance of this kind; ``"auto"``: by the scatter of three runs and more.
 
     A ``nuisance`` that was taken out of the runs is fitted jointly with the pattern
     (`trueangle.fitting.beside`). A robust ``loss`` gives readings less weight,
-    which does not make them less precise (`trueangle.fitting.sandwich`).
+    which does not make them less precise (`trueangle.fitting.robust.Sandwich`).
 
-    If eight runs or more repeat better than the residual as white noise suggests, their scatter,
-    pooled over the coefficients, is the noise. Whole runs are the clusters where there are
-    three or more. With fewer, the clusters are segments eight correlation times of the residuals
+    The scatter of few runs is moderated by white noise and by what the coefficients have in common
+    (`trueangle.estimation.linear.moderated_covariance`). One or two runs are white noise unless
+    correlation is found: then the clusters are segments eight correlation times of the residuals
     long: right where the correlation decays within a run, which one run cannot prove, so that a
     note states it. The bias of a penalty is added to either
     (`trueangle.fitting.ridge`).
@@ -150,50 +154,41 @@ def _noise(
     if kind == "white" or not np.isfinite(white).all() or len(white) == 1:
         return Uncertainty("white", white, freedom)
     used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
-    if kind == "auto":
-        between = scatter_between(problem, fitted, weights, used)
-        if between is not None:
-            between = between[0] / bent.scores, between[1]
-        found = correlation_found(problem, fitted, weights, used, between)
-        if not found:
-            share = white_variance_share(between, len(used))
-            if between is None or share == 1.0:
-                return Uncertainty("white", white, freedom, _untold(problem, used))
-            told = np.full(len(white) - 1, between[1])
-            pooled = _with_constant(white, share * white[1:, 1:], told)
-            return Uncertainty("cluster", *pooled, _repeated(share, len(used)))
-        kind = "cluster" if len(used) >= FEWEST_RUNS else "hac"
-        said = _said(found)
-    else:
-        said = ""
-    if kind == "cluster":
-        clusters = runs_together([clusters_of(problem, fitted, weights, i, 1)[0] for i in used])
-        note = said + _between(len(clusters), len(used))
-    else:
+    said = note = ""
+    if kind == "auto" and len(used) < FEWEST_RUNS:
+        said = correlation_found(problem, fitted, weights, used)
+        if not said:
+            return Uncertainty("white", white, freedom, _untold(problem, used))
+        kind, said = "hac", f"the residuals are not white noise ({said}): "
+    if kind == "hac":
         memory, stretches = residual_memory(problem, fitted, weights, used)
         if problem.summed or min(stretches) < FEWEST_STRETCHES:
             why = _SUMMED if problem.summed else _SHORT
             unknowns = problem.unknowns + len(used)
             return _thinned(white, problem.readings / memory, unknowns, memory, said, why)
-        clusters = [
-            cluster
-            for i, count in zip(used, stretches, strict=True)
-            for cluster in clusters_of(problem, fitted, weights, i, count)
-        ]
+        parts = zip(used, stretches, strict=True)
+        clusters = [one for i, n in parts for one in clusters_of(problem, fitted, weights, i, n)]
         note = (
             f"{said}standard errors by the scatter of {len(clusters)} segments of the readings, "
             f"correlated over about {memory:.0f} readings. A slower drift cannot be estimated from "
             f"{'one run' if len(used) == 1 else f'{len(used)} runs'}: measure "
             f"{ENOUGH_RUNS} runs and more"
         )
+    else:
+        clusters = runs_together([clusters_of(problem, fitted, weights, i, 1)[0] for i in used])
     try:
-        weight = sum(
-            weight_sum(w, len(problem.runs[i])) for i, w in enumerate(weights) if i in used
-        )
-        covariance, freedom = cluster_covariance(clusters, penalty * weight)
+        weight = sum(weight_sum(weights[i], len(problem.runs[i])) for i in used)
+        scatter = cluster_covariance(clusters, penalty * weight)
+        scatter = scatter._replace(covariance=bent.bread * scatter.covariance)
+        if kind == "auto":
+            kind = "cluster"
+            # Runs that scatter by nothing are copies, or what they leave is a pattern.
+            if not (np.diag(scatter.covariance) > LEVELS[0] * np.diag(white)[1:]).any():
+                return Uncertainty("white", white, freedom)
+            scatter = moderated_covariance(scatter, white[1:, 1:], solution.degrees_of_freedom)
     except np.linalg.LinAlgError:
         return Uncertainty("white", white, freedom, _CANCEL)
-    return Uncertainty(kind, *_with_constant(white, bent.bread * covariance, freedom), note)
+    return Uncertainty(kind, *_with_constant(white, *scatter), note)
 
 
 _SHORT: Final = "The runs are too short for their correlation time"
@@ -257,28 +252,6 @@ def _untold(problem: Problem, used: Sequence[int]) -> str:
         f"{count} readings in {len(used)} run{'s' if len(used) > 1 else ''} cannot show whether "
         "neighbours correlate: the standard errors hold only if they do not; "
         f"measure {ENOUGH_RUNS} runs and more"
-    )
-
-
-def _said(found: str) -> str:
-    return f"the residuals are not white noise ({found}): "
-
-
-def _between(clusters: int, runs: int) -> str:
-    """Standard errors by whole runs, in words."""
-    note = f"standard errors by the scatter between {clusters} "
-    note += "runs" if clusters == runs else f"groups of the {runs} runs"
-    if clusters < ENOUGH_RUNS:
-        note += f"; so few give rough values only, {ENOUGH_RUNS} runs or more give good ones"
-    return note
-
-
-def _repeated(share: float, runs: int) -> str:
-    """Standard errors by runs that repeat better than their residual suggests, in words."""
-    return (
-        f"the {runs} runs repeat better than the residual suggests (scatter "
-        f"{math.sqrt(share):.2g} times that of white noise): standard errors by that scatter, "
-        "pooled over the coefficients"
     )
 
 

@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from ..joint.shafts import ShaftOrders
 from ..support.arrays import Array
-from ..support.distributions import chi_squared_quantile, chi_squared_tail
+from ..support.distributions import (
+    chi_squared_quantile,
+    chi_squared_tail,
+    digamma,
+    trigamma,
+    trigamma_inverse,
+)
 from .calibration import Calibration, order_columns, output_orders
 from .outliers import Deviates, deviates, level_by_order
 from .variance import BetweenUnits, held_out_score, reml
@@ -197,42 +203,11 @@ def noise_of(squares: Array, freedom: Array) -> UnitNoise:
     few = (float((1.0 / freedom).sum()) - 1.0 / float(freedom.sum())) / (3.0 * (len(own) - 1.0))
     if chi_squared_tail(max(statistic / (1.0 + few), 0.0), len(own) - 1.0) >= _LEVEL:
         return UnitNoise(np.full(len(own), pooled), pooled, math.inf)
-    logs = np.log(own) - np.array([_digamma(0.5 * v) - math.log(0.5 * v) for v in freedom])
-    spread = float(logs.var(ddof=1)) - float(np.mean([_trigamma(0.5 * v) for v in freedom]))
-    prior = 2.0 * _trigamma_inverse(spread) if spread > 0.0 else math.inf
-    if math.isinf(prior):
+    logs = np.log(own) - digamma(0.5 * freedom) + np.log(0.5 * freedom)
+    spread = float(logs.var(ddof=1) - trigamma(0.5 * freedom).mean())
+    if not spread > 0.0:
         return UnitNoise(np.full(len(own), pooled), pooled, math.inf)
-    common = math.exp(float(logs.mean()) + _digamma(0.5 * prior) - math.log(0.5 * prior))
+    prior = float(2.0 * trigamma_inverse(spread))
+    common = math.exp(float(logs.mean() + digamma(0.5 * prior)) - math.log(0.5 * prior))
     held = (prior * common + freedom * own) / (prior + freedom)
     return UnitNoise(np.asarray(held), common, prior)
-
-
-def _digamma(x: float) -> float:
-    """By recurrence to 10 and the asymptotic series, to 1e-12."""
-    found = 0.0
-    while x < 10.0:
-        found -= 1.0 / x
-        x += 1.0
-    square = 1.0 / (x * x)
-    series = square * (1 / 12 - square * (1 / 120 - square * (1 / 252 - square / 240)))
-    return found + math.log(x) - 0.5 / x - series
-
-
-def _trigamma(x: float) -> float:
-    """By recurrence to 10 and the asymptotic series, to 1e-12."""
-    found = 0.0
-    while x < 10.0:
-        found += 1.0 / (x * x)
-        x += 1.0
-    square = 1.0 / (x * x)
-    series = square * (1 / 6 - square * (1 / 30 - square * (1 / 42 - square / 30)))
-    return found + (1.0 + 0.5 / x + series) / x
-
-
-def _trigamma_inverse(value: float) -> float:
-    """The x whose trigamma is ``value``, by halving."""
-    low, high = 1e-6, 1e8
-    for _ in range(200):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if _trigamma(middle) > value else (low, middle)
-    return math.sqrt(low * high)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trueangle.estimation.linear import NormalEquations, scatter_statistic, total
+from trueangle.estimation.linear import NormalEquations, total
 
 
 def rows(seed: int, n: int = 30) -> tuple[np.ndarray, np.ndarray]:
@@ -47,19 +47,3 @@ def test_products_about_a_given_mean() -> None:
     np.testing.assert_allclose(found.gram, direct.gram, atol=1e-12)
     np.testing.assert_allclose(found.moment, direct.moment, atol=1e-12)
     assert (found.squares, found.readings) == pytest.approx((direct.squares, 30.0))
-
-
-def test_the_scatter_of_clusters_is_chi_squared() -> None:
-    """About the common fit of white noise: mean its freedom, variance twice that."""
-    statistics = []
-    for seed in range(200):
-        parts = [rows(1000 * seed + k) for k in range(5)]
-        whole = total([NormalEquations.of_rows(*part) for part in parts])
-        common = whole.solved().coefficients[:, 0]
-        clusters = [NormalEquations.of_rows(*part).about(common) for part in parts]
-        found, freedom = scatter_statistic(clusters, 4.0)
-        assert freedom == 12.0
-        statistics.append(found * 4.0)
-    assert np.mean(statistics) == pytest.approx(12.0, abs=4 * (24.0 / 200) ** 0.5)
-    assert np.var(statistics) == pytest.approx(24.0, rel=0.45)
-    assert scatter_statistic(clusters[:1], 1.0)[1] == 1.0

@@ -202,7 +202,8 @@ def test_p_of_scattered_runs_is_that_of_the_order_that_differs_most():
 def test_the_freedom_of_a_scatter_is_saved_and_read_back(tmp_path):
     rng = np.random.default_rng(SEED + 4)
     model = scattered(rng, 4, [1], 2.0)
-    assert 1.0 <= model.fit.freedom <= 3.0 + 1e-9
+    # Three of each coefficient's scatter, and what the two have in common.
+    assert 3.0 <= model.fit.freedom <= 6.0
     model.save(tmp_path / "m.json")
     assert ta.load_model(tmp_path / "m.json").fit.freedom == model.fit.freedom
     table = json.loads((tmp_path / "m.json").read_text())

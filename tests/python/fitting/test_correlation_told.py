@@ -7,24 +7,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
-import trueangle as ta
 from trueangle.estimation.linear import NormalEquations
 from trueangle.fitting import correlation
-from trueangle.fitting.correlation import correlation_found, scatter_between
+from trueangle.fitting.correlation import correlation_found
 from trueangle.fitting.unlikeruns import far_runs
 
 SEED = 47_700
 
 
-def said(monkeypatch, parts, between=None):
+def said(monkeypatch, parts):
     """What is said of residuals in the order of time, of a fit that took nothing from them."""
     monkeypatch.setattr(correlation, "_in_time", lambda *_: parts)
     count = sum(part.size for part in parts)
     solution = SimpleNamespace(residual_variance=1.0, degrees_of_freedom=float(count))
     fitted, problem = SimpleNamespace(solution=solution), SimpleNamespace(unknowns=0)
-    return correlation_found(problem, fitted, [], [], between)
+    return correlation_found(problem, fitted, [], [])
 
 
 def test_white_noise_is_told_to_correlate_once_in_some_hundred(monkeypatch):
@@ -73,40 +71,6 @@ def test_neighbours_count_from_their_standard_deviations_on(times, monkeypatch):
         assert text.startswith("neighbours") == (times > 1.0)
         if times > 1.0:
             assert text == f"neighbours in time correlate by {near:.2f}"
-
-
-@pytest.mark.parametrize("freedom", [4.0, 30.0])
-def test_scatter_between_runs_counts_at_a_chance_of_one_in_a_thousand(freedom, monkeypatch):
-    """And is told as a ratio of standard deviations."""
-    rest = [np.tile([1.0, -1.0], 400)]
-    limit = chi2.isf(1e-3, freedom)
-    for statistic, seen in ((1.001 * limit, True), (0.999 * limit, False), (25 * freedom, True)):
-        text = said(monkeypatch, rest, (statistic, freedom))
-        wanted = f"{np.sqrt(statistic / freedom):.2g}"
-        assert text == (f"coefficients scatter {wanted} times as much between runs" if seen else "")
-
-
-def test_the_scatter_of_runs_under_white_noise_is_chi_squared():
-    """Of twelve runs two coefficients each, about those of all: p is uniform."""
-    print("seed", SEED + 1)
-    rng = np.random.default_rng(SEED + 1)
-    theta, unit = np.arange(40) / 40.0, 2.0 * np.pi
-    chances = []
-    for _ in range(100):
-        wave = 1e-3 * np.sin(2.0 * np.pi * theta)
-        runs = [
-            ta.CalibrationRun(
-                unit * theta, unit * (theta + wave + 1e-4 * rng.normal(size=40)), unit
-            )
-            for _ in range(12)
-        ]
-        fit = ta.fit(runs, orders=[1], covariance="white", loss="linear")
-        statistic, freedom = scatter_between(fit.problem, fit.fitted, [None] * 12, range(12))
-        assert freedom == 22.0
-        chances.append(chi2.sf(statistic, freedom))
-    ordered = np.sort(chances)
-    places = (np.arange(100) + 0.5) / 100.0
-    assert np.max(np.abs(ordered - places)) < 1.95 / np.sqrt(100.0)  # Kolmogorov, 0.1 %
 
 
 def sums_of(pairs, count=90, noise=None):

@@ -12,7 +12,7 @@ from scipy.stats import t
 import trueangle as ta
 from trueangle.fitting.phases import run_phases
 from trueangle.fitting.robust import _between_neighbours
-from trueangle.fitting.uncertainty import Uncertainty, _repeated, _thinned, _with_constant
+from trueangle.fitting.uncertainty import Uncertainty, _thinned, _with_constant
 
 SEED = 64_000
 UNITS = (1.0, 2.0 * np.pi, 4096.0)
@@ -223,7 +223,6 @@ def test_thinned_readings_lose_their_unknowns() -> None:
     np.testing.assert_allclose(found.covariance, 2.0 * np.eye(3) * 5.0 * 100.0 / 90.0)
     assert found.freedom.tolist() == [90.0] * 3
     assert "5 readings carry the information of one" in found.note
-    assert "the 8 runs repeat better than the residual suggests (scatter 0.5" in _repeated(0.25, 8)
 
 
 @pytest.mark.parametrize("covariance", ["white", "cluster"])

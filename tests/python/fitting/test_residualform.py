@@ -92,7 +92,7 @@ def test_many_orders_leave_white_noise_white(count, runs, orders):
         rng = np.random.default_rng([SEED + count, seed])
         fit = ta.fit(white(rng, places, runs), orders=[1, *(k for k in orders if k > 1)])
         used = range(runs)
-        told += bool(correlation_found(fit.problem, fit.fitted, fit.problem.base, used, None))
+        told += bool(correlation_found(fit.problem, fit.fitted, fit.problem.base, used))
         values = np.ravel(np.column_stack([fit.model.shafts[0].cosine, fit.model.shafts[0].sine]))
         values[0] -= 0.01
         pulls.append(values / np.sqrt(np.diag(fit.covariance))[1:])
@@ -115,7 +115,7 @@ def test_low_orders_hide_no_correlation():
             runs.append(ta.CalibrationRun(places, places + noise / 3600.0, 360.0))
         for most in found:
             fit = ta.fit(runs, orders=range(1, most + 1))
-            said = correlation_found(fit.problem, fit.fitted, fit.problem.base, range(2), None)
+            said = correlation_found(fit.problem, fit.fitted, fit.problem.base, range(2))
             found[most] += said.startswith("neighbours")
     assert found[1] >= 38
     assert found[8] >= 34

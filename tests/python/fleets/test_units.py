@@ -5,7 +5,7 @@ import pytest
 from scipy.special import digamma, polygamma
 from scipy.stats import bartlett, chi2, kstest
 
-from trueangle.fleets.units import _digamma, _trigamma, _trigamma_inverse, noise_of
+from trueangle.fleets.units import noise_of
 
 SEED = 52_300
 
@@ -67,10 +67,3 @@ def test_further_noise_is_as_its_degrees_of_freedom_say():
     found = noise_of(true * rng.chisquare(30.0, 4000), np.full(4000, 30.0))
     assert found.freedom == pytest.approx(5.0, rel=0.15)
     assert kstest(found.freedom * found.variance / true, chi2(found.freedom).cdf).pvalue > 1e-3
-
-
-@pytest.mark.parametrize("x", [0.05, 0.5, 1.0, 3.7, 20.0, 400.0])
-def test_the_functions_of_gamma_are_scipys(x):
-    assert _digamma(x) == pytest.approx(float(digamma(x)), rel=1e-11, abs=1e-12)
-    assert _trigamma(x) == pytest.approx(float(polygamma(1, x)), rel=1e-11)
-    assert _trigamma_inverse(_trigamma(x)) == pytest.approx(x, rel=1e-9)

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import special, stats
 
 from trueangle.errors import ArgumentError
 from trueangle.support import distributions as ours
@@ -92,3 +92,10 @@ def test_a_binomial_tail_is_the_sum_of_its_terms(chance: Fraction) -> None:
             told = ours.binomial_tail(count, of, float(chance))
             assert told == pytest.approx(float(sum(terms[count:])), rel=1e-9)
     assert [ours.binomial_tail(3, 3, p) for p in (0.0, 1.0)] == [0.0, 1.0]
+
+
+def test_the_functions_of_gamma_are_scipys() -> None:
+    x = np.array([0.05, 0.5, 1.0, 3.7, 20.0, 400.0])
+    np.testing.assert_allclose(ours.digamma(x), special.digamma(x), rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(ours.trigamma(x), special.polygamma(1, x), rtol=1e-11)
+    np.testing.assert_allclose(ours.trigamma_inverse(ours.trigamma(x)), x, rtol=1e-9)
