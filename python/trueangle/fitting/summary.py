@@ -36,14 +36,16 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
         head.append(("indicated", "minus what the sensor reads"))
     before, after = _sizes(fit)
     sizes = f"{shown.number(before)} -> {shown.text(after)} rms in the readings fitted"
-    lines = [f"{counted(model.orders, 'order')} fitted: error {sizes}.", ""]
+    lines = [f"{counted(model.orders, 'order')} fitted: error {sizes}."]
+    lines += [*(note for note in fit.notes if note.startswith("One sweep ")), ""]
     lines += [f"  {label:<10} {text}" for label, text in head]
     if model.channels is not None:
         lines += ["", *(f"  {line}" for line in model.channels.constant_lines())]
     if model.shafts or model.channels is None:
         lines += ["", *_table(fit, shown)]
-    if fit.notes:
-        lines += ["", *(f"  [{i}] {note}" for i, note in enumerate(fit.notes, 1))]
+    notes = [note for note in fit.notes if note not in lines]
+    if notes:
+        lines += ["", *(f"  [{i}] {note}" for i, note in enumerate(notes, 1))]
     return laid_out(lines)
 
 

@@ -99,6 +99,21 @@ def travelled_span(angles: Sequence[Array], period: float, periodic: bool) -> Sp
     return Span(low, high, False)
 
 
+def is_swept_once(run: CalibrationRun) -> bool:
+    """Whether a run passed every place once: drift in time is a function of its angle.
+
+    Examples
+    --------
+    >>> theta = np.linspace(0.0, 200.0, 500)
+    >>> both = np.concatenate([theta, theta[::-1]])
+    >>> [is_swept_once(CalibrationRun(x, x, period=360.0)) for x in (theta, both)]
+    [True, False]
+    """
+    turns = run.unwrapped_reference / run.period
+    travel = float(np.ptp(turns))
+    return 0.0 < travel <= 1.0 and float(np.abs(np.diff(turns)).sum()) <= _ONE_PASS * travel
+
+
 def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> float:
     """Order from which on a line is distinguished from drift, over a short single pass.
 
@@ -119,8 +134,7 @@ def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> fl
     (run,) = runs
     reference = run.unwrapped_reference
     travel = float(np.ptp(reference)) / run.period
-    passed = float(np.abs(np.diff(reference)).sum()) / run.period
-    if not 0.0 < travel < _SHORT or passed > _ONE_PASS * travel:
+    if travel >= _SHORT or not is_swept_once(run):
         return 0.0
     held = [k for k in declared if k * travel >= _PERIODS]
     # Readings whose neighbours are compared.

@@ -140,3 +140,22 @@ def test_intervals_hold_what_runs_differ_by(count):
         held.append((low < size.ravel()) & (size.ravel() < high))
     print(np.mean(held))
     assert 0.91 <= np.mean(held) <= 0.99
+
+
+def test_one_sweep_states_what_it_took_as_drift() -> None:
+    """A curve of the angle that no few orders are, read once from 10 to 210 deg; then back too."""
+    rng = np.random.default_rng(97)
+    theta = np.linspace(10.0, 210.0, 400)
+    runs = []
+    for size, wide in ((0.3, 60), (0.3, 1)):
+        curve = np.convolve(np.cumsum(rng.normal(size=399 + wide)), np.ones(wide) / wide, "valid")
+        error = size * curve / curve.std() + 0.004 * rng.normal(size=(2, 400))
+        runs.append([ta.CalibrationRun(x, x + e, 360.0)
+                     for x, e in ((theta, error[0]), (theta[::-1], error[1, ::-1]))])  # fmt: skip
+    (one, back), (rough, _) = runs
+    found, both = ta.fit(one), ta.fit([one, back])
+    (note,) = [note for note in found.notes if note.startswith("One sweep cannot distinguish")]
+    assert note.startswith(found.summary().splitlines()[1])
+    assert not any("One sweep" in note for note in both.notes)
+    with pytest.raises(ta.errors.NoOrderError, match="one sweep cannot distinguish"):
+        ta.fit(rough)

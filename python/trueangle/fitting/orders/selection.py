@@ -24,7 +24,7 @@ from .noise import ReadingVariance
 from .phases import circular_range_deg, unit_phases
 from .result import OrderSelection
 from .table import IN_MODEL, OrderRow
-from .verdicts import row_with_verdict, selection_notes, verdict_reason
+from .verdicts import drift_of_a_sweep, row_with_verdict, selection_notes, verdict_reason
 from .zerogroups import folds_of_run, some_angles, some_readings, zero_groups
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ class EvidenceSelection:
         selection = OrderSelection(
             orders=orders,
             table=tuple(rows),
-            reason="" if orders else self._refusal(rows),
+            reason="" if orders else self._refusal(rows, estimate),
             method="evidence",
             period=self.period,
             positions=self.positions,
@@ -224,7 +224,7 @@ class EvidenceSelection:
         )
         return selection.with_notes(selection_notes(selection, self.candidates, self.runs))
 
-    def _refusal(self, rows: Sequence[OrderRow]) -> str:
+    def _refusal(self, rows: Sequence[OrderRow], estimate: EvidenceEstimate) -> str:
         """Why nothing was retained."""
         if not rows:
             return (
@@ -237,9 +237,10 @@ class EvidenceSelection:
             return "the only significant orders are the reference's own"
         if best.verdict not in ("noise", "alias"):
             return f"{beside} {verdict_reason(best.verdict)}"
-        return (
+        told = (
             f"{beside} is not significant (probability {brief_number(100.0 * best.probability)} %)"
         )
+        return "; ".join([told, *drift_of_a_sweep(self.runs, estimate.noise)])
 
     def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> tuple[Array, float]:
         """Part by which each order lowers the held-out mean square; that of the chosen orders."""

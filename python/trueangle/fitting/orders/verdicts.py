@@ -25,8 +25,10 @@ from ...runs.aliasing import (
     fold,
 )
 from ...runs.run import CalibrationRun, as_runs
+from ...runs.travel import is_swept_once
 from ...support.angles import arcsec
-from ...support.display_units import brief_number
+from ...support.arrays import Array
+from ...support.display_units import brief_number, error_unit, sine_of_rms
 from .candidates import Candidates, choose_candidates
 from .result import OrderSelection
 from .table import OrderRow
@@ -137,6 +139,20 @@ def _separating_offset(divisions: int, ratio: float | None, member: str) -> floa
     return plan.mount_offsets_deg[1]
 
 
+def drift_of_a_sweep(runs: Sequence[CalibrationRun], noise: Array) -> list[str]:
+    """What a single sweep took as drift, where it is most of the variances of the noise."""
+    drift = math.sqrt(noise[1:].sum())
+    if len(runs) > 1 or drift**2 <= noise[0] or not is_swept_once(runs[0]):
+        return []
+    period = runs[0].period
+    size = arcsec(drift, period)
+    text = error_unit("auto", sine_of_rms(size), period).text(size)
+    return [
+        f"one sweep cannot distinguish drift from a function of the angle: {text} rms was "
+        "taken as drift and is not corrected; sweep back as well, and fit both runs"
+    ]
+
+
 def selection_notes(
     selection: OrderSelection, candidates: Candidates, runs: Sequence[CalibrationRun]
 ) -> tuple[str, ...]:
@@ -151,6 +167,8 @@ def selection_notes(
             f"closure: the last reading repeats the first position in {count}, and differs by "
             f"{worst:.3g} arcsec at most"
         )
+    if selection.estimate is not None:
+        notes += drift_of_a_sweep(runs, selection.estimate.noise)
     retained = [row for row in selection.table if row.retained]
     aliased = [row for row in retained if row.aliases]
     grid = positions.divisions is not None and len(positions.offsets) == 1
