@@ -97,11 +97,12 @@ def named_causes(
     """
     found = _named(chosen, spots, gain, sigma)
     decided = [spot for spot in found.spots if is_decided_by_factors(spot, found.factors)]
-    if not (found.lost or decided) or current_deadline().over:
+    strangers = [k for k in forms_of_no_factor(chosen, found.factors) if k not in found.lost]
+    if not (found.lost or decided or strangers) or current_deadline().over:
         return found
     alike = {cause for spot in decided for cause in spot.causes}
     doubted = [k for k, term in enumerate(chosen.terms) if term.cause in alike]
-    again = chosen_by_factor(chosen, [*found.lost, *doubted], found.factors)
+    again = chosen_by_factor(chosen, [*found.lost, *doubted], strangers, found.factors)
     if again is None:
         return found
     open_spots = [spot for spot in spots if not any({*spot.causes} <= {*t.causes} for t in decided)]
@@ -137,19 +138,38 @@ def _forms_of(spot: Ambiguity, factor: Factor) -> list[str]:
     return [cause for cause in spot.causes if known & {*EFFECTS[cause].form_of}]
 
 
+def forms_of_no_factor(regression: Regression, factors: Sequence[Factor]) -> list[int]:
+    """Terms that are forms of no factor, where the readings follow one without a name.
+
+    Such a cause may stand for several forms of that factor: a walk in time for a ramp and two
+    orders over a part of a turn.
+    """
+    if all(factor.named_by for factor in factors):
+        return []
+    known = {name for f in factors for name in (f.factor, *f.not_distinguished_from)}
+    own = [EFFECTS[term.cause].form_of for term in regression.terms]
+    return [k for k, forms in enumerate(own) if not known & {*forms}]
+
+
 def chosen_by_factor(
-    regression: Regression, lost: Sequence[int], factors: Sequence[Factor]
+    regression: Regression,
+    lost: Sequence[int],
+    strangers: Sequence[int],
+    factors: Sequence[Factor],
 ) -> Regression | None:
     """The causes without some terms, and for each factor without a name those that are forms of it.
 
     The strongest factor comes first: what one form took of several is named by each of its own.
+    Strangers, forms of no factor, come last.
     """
-    rest = regression_without(regression, lost, settled=True)
+    rest = regression_without(regression, [*lost, *strangers], settled=True)
     found = rest
     for factor in factors:
         if not factor.named_by:
             forms = [k for k, effect in EFFECTS.items() if factor.factor in effect.form_of[:1]]
             found = select_again(found, forms)
+    if strangers:
+        found = select_again(found, [regression.terms[k].cause for k in strangers])
     return None if len(found.terms) <= len(rest.terms) else found
 
 
