@@ -10,7 +10,7 @@ from __future__ import annotations
 from ..effects import EFFECTS
 from ..estimation.regression import Regression
 from ..support.deadline import current_deadline
-from .candidates import CandidateScores, candidate_extensions, propose_candidates
+from .candidates import propose_candidates
 from .overlap import finding_overlaps
 from .penalty import finding_groups, regression_without, total_penalty
 from .selection import is_flexible, select_again
@@ -89,13 +89,8 @@ def _better(regression: Regression) -> Regression | None:
         others = [
             name for name, effect in EFFECTS.items() if not (name == own or is_flexible(effect))
         ]
-        scores = CandidateScores()
-        best = scores.best(candidate_extensions(rest, others, scores.least))
-        if best is None or current_deadline().over:
-            continue
-        extension, start, _ = best[1]
-        tried = start.with_terms([*start.terms, extension])
-        if total_penalty(tried) < limit:
+        tried = select_again(rest, others)
+        if total_penalty(tried) < limit and not current_deadline().over:
             return tried
     return None
 

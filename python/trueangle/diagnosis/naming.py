@@ -97,12 +97,14 @@ def named_causes(
     """
     found = _named(chosen, spots, gain, sigma)
     decided = [spot for spot in found.spots if is_decided_by_factors(spot, found.factors)]
-    strangers = [k for k in forms_of_no_factor(chosen, found.factors) if k not in found.lost]
-    if not (found.lost or decided or strangers) or current_deadline().over:
+    # The factors were found under a noise of their own: what is noise may stand for their forms.
+    noise = [k for k, t in enumerate(chosen.terms) if EFFECTS[t.cause].describes_noise(t)]
+    taken = noise if any(not factor.named_by for factor in found.factors) else []
+    if not (found.lost or decided or taken) or current_deadline().over:
         return found
     alike = {cause for spot in decided for cause in spot.causes}
     doubted = [k for k, term in enumerate(chosen.terms) if term.cause in alike]
-    again = chosen_by_factor(chosen, [*found.lost, *doubted], strangers, found.factors)
+    again = chosen_by_factor(chosen, [*found.lost, *doubted], taken, found.factors)
     if again is None:
         return found
     open_spots = [spot for spot in spots if not any({*spot.causes} <= {*t.causes} for t in decided)]
@@ -114,9 +116,10 @@ def is_decided_by_factors(spot: Ambiguity, factors: Sequence[Factor]) -> bool:
     """Whether only one of the causes that a design does not separate is a form of a factor.
 
     A zero of each run and a drift with the temperature may have the same columns in a few runs;
-    of more, the evidence decides for the one that needs fewer of them.
+    of more, the evidence decides for the one that needs fewer of them. A factor that is not
+    distinguished from another decides nothing.
     """
-    unnamed = [factor for factor in factors if not factor.named_by]
+    unnamed = [f for f in factors if not (f.named_by or f.not_distinguished_from)]
     forms = {cause for factor in unnamed for cause in _forms_of(spot, factor)}
     return spot.supported and len(forms) == 1
 
@@ -138,38 +141,26 @@ def _forms_of(spot: Ambiguity, factor: Factor) -> list[str]:
     return [cause for cause in spot.causes if known & {*EFFECTS[cause].form_of}]
 
 
-def forms_of_no_factor(regression: Regression, factors: Sequence[Factor]) -> list[int]:
-    """Terms that are forms of no factor, where the readings follow one without a name.
-
-    Such a cause may stand for several forms of that factor: a walk in time for a ramp and two
-    orders over a part of a turn.
-    """
-    if all(factor.named_by for factor in factors):
-        return []
-    known = {name for f in factors for name in (f.factor, *f.not_distinguished_from)}
-    own = [EFFECTS[term.cause].form_of for term in regression.terms]
-    return [k for k, forms in enumerate(own) if not known & {*forms}]
-
-
 def chosen_by_factor(
     regression: Regression,
     lost: Sequence[int],
-    strangers: Sequence[int],
+    noise: Sequence[int],
     factors: Sequence[Factor],
 ) -> Regression | None:
     """The causes without some terms, and for each factor without a name those that are forms of it.
 
     The strongest factor comes first: what one form took of several is named by each of its own.
-    Strangers, forms of no factor, come last.
+    Terms of the noise come last: over a part of a turn a walk in time may stand for a ramp and two
+    orders.
     """
-    rest = regression_without(regression, [*lost, *strangers], settled=True)
+    rest = regression_without(regression, [*lost, *noise], settled=True)
     found = rest
     for factor in factors:
         if not factor.named_by:
             forms = [k for k, effect in EFFECTS.items() if factor.factor in effect.form_of[:1]]
             found = select_again(found, forms)
-    if strangers:
-        found = select_again(found, [regression.terms[k].cause for k in strangers])
+    if noise:
+        found = select_again(found, [regression.terms[k].cause for k in noise])
     return None if len(found.terms) <= len(rest.terms) else found
 
 
