@@ -82,9 +82,9 @@ def _better(regression: Regression) -> Regression | None:
         reshaped = _reshaped(rest)
         if reshaped is not rest and total_penalty(reshaped) < limit:
             return reshaped
-        if len(groups) > LOOKED_AT:
-            continue
         own = regression.terms[group[0]].cause
+        if len(groups) > LOOKED_AT and not is_flexible(EFFECTS[own]):
+            continue
         # A flexible cause explains more than any law, and is none.
         others = [
             name for name, effect in EFFECTS.items() if not (name == own or is_flexible(effect))

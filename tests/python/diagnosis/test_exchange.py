@@ -9,10 +9,9 @@ import pytest
 
 import trueangle as ta
 from trueangle.diagnosis import exchange
-from trueangle.diagnosis.candidates import Candidate, candidate_extensions
 from trueangle.diagnosis.exchange import exchanged_causes
 from trueangle.diagnosis.penalty import total_penalty
-from trueangle.diagnosis.selection import _made_specific, is_flexible
+from trueangle.diagnosis.selection import is_flexible, select_again
 from trueangle.effects import EFFECTS, MissingOrder
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs
@@ -73,11 +72,11 @@ def test_others_are_tried_in_the_place_of_two_findings_at_most(
     )
     tried: list[Sequence[str]] = []
 
-    def watched(rest: Regression, causes: Sequence[str], *more: object) -> list[Candidate]:
+    def watched(rest: Regression, causes: Sequence[str]) -> Regression:
         tried.append(causes)
-        return candidate_extensions(rest, causes)
+        return select_again(rest, causes)
 
-    monkeypatch.setattr(exchange, "candidate_extensions", watched)
+    monkeypatch.setattr(exchange, "select_again", watched)
     assert exchanged_causes(chosen) is chosen
     assert bool(tried) is asked
     # Of the specific causes all but the one in whose place they are tried.
@@ -87,8 +86,8 @@ def test_others_are_tried_in_the_place_of_two_findings_at_most(
 
 
 def test_a_drift_gives_way_to_a_cause_that_explains_more(signals: Signals) -> None:
-    found = _made_specific(with_terms(signals, 3.0 * signals.direction, ["drift_within_run"]))
+    found = exchanged_causes(with_terms(signals, 3.0 * signals.direction, ["drift_within_run"]))
     assert [term.cause for term in found.terms] == ["backlash"]
     ramps = np.array([0.3, -0.2, 0.4, -0.5])[signals.run] * signals.clock
     chosen = with_terms(signals, ramps, ["drift_within_run"])
-    assert _made_specific(chosen) is chosen
+    assert exchanged_causes(chosen) is chosen

@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 import trueangle as ta
+from trueangle.diagnosis.exchange import exchanged_causes
 from trueangle.diagnosis.penalty import total_penalty
-from trueangle.diagnosis.selection import _with_declared_lines, _with_lines_for_bumps
+from trueangle.diagnosis.selection import _with_declared_lines
 from trueangle.effects import LocalDefect, MissingOrder
 from trueangle.estimation.extension import Extension
 from trueangle.estimation.regression import Regression
@@ -43,10 +44,7 @@ def bump(start: Regression) -> Extension:
 @pytest.mark.parametrize("lines", [3, 5, 0])
 @pytest.mark.parametrize("turns", [2.2, 1.2])
 def test_lines_take_the_place_of_a_bump_that_imitates_them(lines: int, turns: float) -> None:
-    """Several at once, which one by one save less than it; a bump that is one stays.
-
-    Over a part of a turn other paths do that.
-    """
+    """Several at once, which one by one save less than it; a bump that is one stays."""
     runs = tuple(replace(run, turns=turns, reversals=(0.5,)) for run in SIM.runs)
     signals = join_runs(ta.simulate(replace(SIM, runs=runs), 3))
     error = line_sum(signals.theta, tuple((k + 1.0, 8.0 / lines, 90.0) for k in range(lines)))
@@ -55,8 +53,8 @@ def test_lines_take_the_place_of_a_bump_that_imitates_them(lines: int, turns: fl
         error = 9.0 * LocalDefect.columns(signals, SIM.surroundings, shape)[:, 0]
     start = started(signals, error)
     chosen = start.with_terms([bump(start)])
-    found = _with_lines_for_bumps(chosen)
-    if not lines or turns < 2.0:
+    found = exchanged_causes(chosen)
+    if not lines:
         assert found is chosen
         return
     assert total_penalty(found) < total_penalty(chosen)
