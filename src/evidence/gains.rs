@@ -11,7 +11,7 @@
 //! without a group `k` that is in, `s_k = S_kk^-1 - I / tau` of itself, and of another
 //! `s_j + P_kj' S_kk^-1 P_kj`.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::gram::{Gram, Sums};
 use super::model::Model;
@@ -54,24 +54,21 @@ impl Candidate {
 
     /// What the group fits with this variance, which grows with it, and what its volume costs.
     fn parts(&self, tau: f64) -> (f64, f64) {
-        let m = self.q.len();
-        let (mut lower, mut z) = (self.s.clone(), self.q.clone());
-        lower *= tau;
-        // Cholesky and solution at once: groups have a few columns.
+        let (mut upper, mut z) = (self.s.clone(), self.q.clone());
+        upper *= tau;
+        // Cholesky and solution at once, by columns, which lie in one piece.
         let (mut log_root, mut square) = (0.0, 0.0);
-        for i in 0..m {
-            for k in 0..=i {
-                let known: f64 = (0..k).map(|l| lower[(i, l)] * lower[(k, l)]).sum();
-                if i > k {
-                    lower[(i, k)] = (lower[(i, k)] - known) / lower[(k, k)];
-                } else {
-                    // At least 1 but for rounding.
-                    lower[(i, i)] = (1.0 + lower[(i, i)] - known).max(f64::EPSILON).sqrt();
-                }
+        for i in 0..self.q.len() {
+            for k in 0..i {
+                let known = dot(&upper, k, i, k);
+                upper[(k, i)] = (upper[(k, i)] - known) / upper[(k, k)];
             }
-            let known: f64 = (0..i).map(|l| lower[(i, l)] * z[l]).sum();
-            z[i] = (z[i] - known) / lower[(i, i)];
-            log_root += lower[(i, i)].ln();
+            // At least 1 but for rounding.
+            let left = 1.0 + upper[(i, i)] - dot(&upper, i, i, i);
+            upper[(i, i)] = left.max(f64::EPSILON).sqrt();
+            let known = upper.column(i).rows(0, i).dot(&z.rows(0, i));
+            z[i] = (z[i] - known) / upper[(i, i)];
+            log_root += upper[(i, i)].ln();
             square += z[i] * z[i];
         }
         (0.5 * tau * square, log_root)
@@ -93,6 +90,24 @@ impl Candidate {
         }
         Some(self.best(sizes)).filter(|best| best.1 > least)
     }
+}
+
+/// Product of the first `n` values of two columns.
+fn dot(matrix: &DMatrix<f64>, n: usize, i: usize, k: usize) -> f64 {
+    matrix
+        .column(i)
+        .rows(0, n)
+        .dot(&matrix.column(k).rows(0, n))
+}
+
+/// Columns above which a group is wide.
+const WIDE: usize = 16;
+
+/// `I + tau s` of a wide group that is out, factorised.
+#[derive(Clone, Debug)]
+pub struct Wide {
+    root: Cholesky<f64, Dyn>,
+    tau: f64,
 }
 
 /// A model under one noise with all that gains need.
@@ -146,6 +161,9 @@ impl Solved {
         let outside = bounds.iter().map(|&(from, to)| {
             let own = sums.products.view((from, from), (to - from, to - from));
             let (beside, reached) = (cross.columns_range(from..to), reach.columns_range(from..to));
+            if to - from > WIDE {
+                return own - beside.transpose() * reached;
+            }
             own - beside.tr_mul(&reached)
         });
         Some(Self {
@@ -168,6 +186,16 @@ impl Solved {
             s: self.outside[j].clone(),
             q: self.moments.rows(from, to - from).into_owned(),
         }
+    }
+
+    /// A group that is out with a variance, if it is so wide that its exchanges share a factor.
+    pub fn wide(&self, j: usize, tau: f64) -> Option<Wide> {
+        let own = &self.outside[j];
+        if own.nrows() <= WIDE {
+            return None;
+        }
+        let root = Cholesky::new(DMatrix::identity(own.nrows(), own.nrows()) + own * tau)?;
+        Some(Wide { root, tau })
     }
 
     /// What differs of each group in each run from the shared coefficients.
@@ -225,6 +253,28 @@ pub struct Without<'a> {
 }
 
 impl Without<'_> {
+    /// What another, wide group can gain at most: what it fits with its variance, by Woodbury.
+    ///
+    /// ```text
+    /// 1/2 tau q' (A + tau U U')^-1 q,   A = I + tau s_j = L L',   U U' = P_kj' S_kk^-1 P_kj
+    /// ```
+    pub fn at_most(&self, j: usize, wide: &Wide) -> Option<f64> {
+        let (solved, tau) = (self.solved, wide.tau);
+        let ((from, to), place) = (solved.bounds[j], solved.places[self.k]);
+        let reach = solved
+            .reach
+            .view((place, from), (self.precision.nrows(), to - from));
+        let lower = wide.root.l_dirty();
+        let q = solved.moments.rows(from, to - from) + reach.tr_mul(&self.own.q);
+        let z = lower.solve_lower_triangular(&q)?;
+        let halves = reach.tr_mul(&Cholesky::new(self.precision.clone())?.l());
+        let w = lower.solve_lower_triangular(&halves)?;
+        let known = w.tr_mul(&z);
+        let inner = DMatrix::identity(known.len(), known.len()) + w.tr_mul(&w) * tau;
+        let less = tau * known.dot(&Cholesky::new(inner)?.solve(&known));
+        Some(0.5 * tau * (z.norm_squared() - less))
+    }
+
     /// Another group that is out, in a model without this one.
     pub fn other(&self, j: usize) -> Candidate {
         let Self {

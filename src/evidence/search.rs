@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use super::gains::Solved;
+use super::gains::{Solved, Wide};
 use super::gram::{Gram, Sums};
 use super::model::Model;
 use super::prior::Prior;
@@ -169,10 +169,15 @@ impl<'a> Search<'a> {
         for &j in &outside {
             self.enter(now, j, score, &mut best);
         }
+        let greatest = self.prior.sizes.iter().copied().fold(0.0, f64::max);
+        let others: Vec<_> = outside
+            .iter()
+            .map(|&j| (j, now.wide(j, greatest)))
+            .collect();
         for &k in &inside {
             self.resize(now, k, score, &mut best)?;
             if now.model.omega[k] == 0.0 {
-                self.leave(now, k, &outside, score, &mut best)?;
+                self.leave(now, k, &others, score, &mut best)?;
             }
         }
         best
@@ -260,10 +265,19 @@ impl<'a> Search<'a> {
 
     /// A group in.
     fn enter(&mut self, now: &Solved, j: usize, score: f64, best: &mut Option<Found>) {
-        let (tau, gain) = now.outside(j).best(&self.prior.sizes);
-        let model = || with(&now.model, &[(j, tau, now.model.omega[j])]);
-        let coming = self.coming(&now.model, j, tau);
-        self.offer(model, score + gain + coming, best);
+        // All sizes are equally probable.
+        let coming = self.coming(&now.model, j, self.prior.sizes[0]);
+        let least = self.least(best) - score - coming;
+        if let Some((tau, gain)) = now.outside(j).best_above(&self.prior.sizes, least) {
+            let model = || with(&now.model, &[(j, tau, now.model.omega[j])]);
+            self.offer(model, score + gain + coming, best);
+        }
+    }
+
+    /// Score below which a model is neither the best of these nor within the window.
+    fn least(&self, best: &Option<Found>) -> f64 {
+        let known = best.as_ref().map_or(f64::NEG_INFINITY, |b| b.score);
+        known.min(self.best - self.window)
     }
 
     /// What the prior gives group `j` of a model that comes in and keeps its effect of runs.
@@ -293,7 +307,7 @@ impl<'a> Search<'a> {
         &mut self,
         now: &Solved,
         k: usize,
-        outside: &[usize],
+        others: &[(usize, Option<Wide>)],
         score: f64,
         best: &mut Option<Found>,
     ) -> Option<()> {
@@ -301,11 +315,14 @@ impl<'a> Search<'a> {
         let rest = with(&now.model, &[(k, 0.0, 0.0)]);
         let left = score - without.loss - self.coming(&rest, k, now.model.tau[k]);
         self.offer(|| rest.clone(), left, best);
-        for &j in outside {
-            // All sizes are equally probable.
+        for (j, wide) in others {
+            let j = *j;
             let coming = self.coming(&rest, j, self.prior.sizes[0]);
-            let known = best.as_ref().map_or(f64::NEG_INFINITY, |b| b.score);
-            let least = known.min(self.best - self.window) - left - coming;
+            let least = self.least(best) - left - coming;
+            let most = wide.as_ref().and_then(|wide| without.at_most(j, wide));
+            if most.is_some_and(|most| most <= least) {
+                continue;
+            }
             if let Some((tau, gain)) = without.other(j).best_above(&self.prior.sizes, least) {
                 let model = || with(&rest, &[(j, tau, rest.omega[j])]);
                 self.offer(model, left + gain + coming, best);

@@ -189,8 +189,9 @@ def _diagnosis(
     curves = named.curves
     judged = _as_extended(chosen, findings, curves, sim) if curves else chosen
     beliefs, corrected = judged_beliefs(judged, sim, account.believed, spots, gain)
-    # What has lost its name may be what scatters.
-    in_doubt = bool(named.lost) or any(spot.supported and not spot.common for spot in spots)
+    # What has no name may be what scatters.
+    in_doubt = any(not factor.named_by for factor in factors)
+    in_doubt |= any(spot.supported and not spot.common for spot in spots)
     faults = data_faults(records_of(measured))
     spoilt = next((fault for fault in faults if fault.spoils_readings), None)
     for item in account.choice.scatter:

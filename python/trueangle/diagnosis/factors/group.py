@@ -33,6 +33,12 @@ FACTORS: Final = (
     "frequency",
 )
 
+#: Orders of the output, each a group.
+LOW: Final = 12
+
+#: Least ratio of the power of a line to the mean: of noise alone about one of 500 exceeds it.
+STANDS_OUT: Final = 8.0
+
 #: Values of a factor at which its function is stated.
 GRID: Final = 25
 

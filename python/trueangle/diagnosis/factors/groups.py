@@ -13,19 +13,27 @@ from numpy.typing import NDArray
 from ...effects.orderspectrum import OrderSpectrum
 from ...joint.lines import line_columns
 from ...joint.signals import Signals
+from ...runs.aliasing import count_positions
 from ...support.arrays import Array
 from .events import late_readings, step_events
-from .group import GRID, Group
-from .jumps import LOW, STANDS_OUT, jumps, less_low_orders
+from .group import GRID, LOW, STANDS_OUT, Group
+from .jumps import jumps, less_lines
 
 #: Bands of orders above the low ones, a group each.
-BANDS: Final = ((13, 24), (25, 48))
+BANDS: Final = ((13, 24), (25, 48), (49, 96))
+
+#: Harmonics of a shaft's turn by which any function of its place is represented: a bump, a worn
+#: sector, a row of them.
+HARMONICS: Final = 48
 
 #: Orders whose products with a factor are always tried.
 ALWAYS: Final = (1.0, 2.0)
 
 #: Lines of a spectrum that are tried in addition.
 PEAKS: Final = 5
+
+#: Standard deviations of noise by which many lines must have more power together.
+SHOWN: Final = 3.0
 
 #: Highest order of a spectrum, and readings for each order.
 ORDERS: Final = 400
@@ -89,6 +97,7 @@ def factor_groups(
     drawn: Sequence[float] = (),
     frequencies: Sequence[float] = (),
     events: Sequence[tuple[int, int]] = (),
+    shafts: Iterable[float] = (),
 ) -> list[Group]:
     """Groups of columns at these readings.
 
@@ -105,12 +114,21 @@ def factor_groups(
         Lines in Hz that every run has anew.
     events : sequence of (int, int)
         Run and row at which something happened once.
+    shafts : iterable of float
+        Cycles of the other shafts in an output turn.
     """
     theta = signals.theta
     left = _without_low(theta, error, signals.run)
     known = [m for m in dict.fromkeys(lines) if m > 0.0]
     spectrum = _PeakSpectrum(theta, signals.places)
-    groups = [*_place(signals, error, [*known, *spectrum.peaks(left, LOW)])]
+    peaks = [*known, *spectrum.peaks(left, LOW)]
+    groups = [*_place(signals, error, peaks)]
+    # Hundreds of columns, which would cost most of the search where single lines take all.
+    at, others = groups[0].at, less_lines(theta, left, peaks)
+    wide = [*_bands(signals, at), *_patterns(signals, [1.0], at)]
+    groups += [group for group in wide if spectrum.shows(others, group.orders)]
+    wide = _patterns(signals, dict.fromkeys(map(abs, shafts)), at)
+    groups += [group for group in wide if spectrum.shows(left, group.orders)]
     for axis, product in _axes(signals):
         groups += axis.alone()
         if product is not None:
@@ -134,7 +152,7 @@ def factor_groups(
 
 
 class _PeakSpectrum:
-    """The strongest lines of values at angles in radians."""
+    """The strongest lines of values at angles in radians, and whether some have power."""
 
     def __init__(self, theta: Array, places: int) -> None:
         self.count = int(min(ORDERS, theta.size / SAMPLED, 0.5 * places))
@@ -151,39 +169,39 @@ class _PeakSpectrum:
         best = np.argsort(spectrum)[::-1][:PEAKS]
         return [float(k + 1) for k in best if spectrum[k] > STANDS_OUT]
 
+    def shows(self, values: Array, orders: Iterable[float]) -> bool:
+        """Lines have more power together than noise leaves them; so where none can be looked at."""
+        if self.sums is None:
+            return True
+        at = [round(order) - 1 for order in orders if LOW < round(order) <= self.count]
+        spectrum = np.abs(self.sums.sums(values).sum(axis=1)) ** 2
+        level = float(np.median(spectrum)) / np.log(2.0)
+        return not at or float(spectrum[at].mean()) > level * (1.0 + SHOWN / np.sqrt(len(at)))
+
 
 def _without_low(theta: Array, error: Array, run: NDArray[np.int64]) -> Array:
     """The error less what its mean by run and the low orders take of it."""
-    left = less_low_orders(theta, error)
+    left = less_lines(theta, error, range(1, LOW + 1))
     counts = np.maximum(np.bincount(run), 1)
     return np.asarray(left - (np.bincount(run, left) / counts)[run])
 
 
 def _place(signals: Signals, error: Array, lines: Iterable[float]) -> Iterator[Group]:
-    """Lines, bands of lines, a jump, and over an arc a smooth function of the place."""
+    """Lines, jumps, and over an arc a smooth function of the place."""
     theta = signals.theta
     start, span = float(theta.min()), float(np.ptp(theta))
     turns = span / (2.0 * np.pi)
     whole = turns >= ARC
     at = np.linspace(0.0, 360.0, 73) if whole else np.degrees(np.linspace(start, start + span, 49))
     degrees = signals.degrees
-    ramps = jumps(degrees, less_low_orders(theta, error)) if whole else []
+    ramps = jumps(degrees, less_lines(theta, error, range(1, LOW + 1))) if whole else []
     at = np.union1d(at, [end % 360.0 for ramp in ramps for end in (ramp.before, ramp.after)])
-
-    def waves(orders: Sequence[float]) -> Basis:
-        return lambda x: np.hstack([line_columns(np.radians(x), m) for m in orders])
 
     low = [float(k) for k in range(1, LOW + 1) if 2 * k <= signals.places]
     for m in dict.fromkeys([*low, *lines]):
-        group = Group.of_function("place", degrees, waves([m]), at, "deg", (m,))
+        group = Group.of_function("place", degrees, _waves([m]), at, "deg", (m,))
         if group is not None:
             yield group
-    for first, last in BANDS:
-        if last * SAMPLED < theta.size and 2 * last <= signals.places:
-            band = tuple(float(k) for k in range(first, last + 1))
-            group = Group.of_function("place", degrees, waves(band), at, "deg", band)
-            if group is not None:
-                yield group
     for ramp in ramps:
         group = Group.of_function("place", degrees, ramp.values, at, "deg")
         if group is not None:
@@ -197,6 +215,39 @@ def _place(signals: Signals, error: Array, lines: Iterable[float]) -> Iterator[G
     # Over several turns this is a ramp of the travel, which no pattern is.
     travel = at if not whole else np.degrees(np.linspace(start, start + span, GRID))
     group = Group.of_function("place", degrees, smooth, travel, "deg")
+    if group is not None:
+        yield group
+
+
+def _waves(orders: Sequence[float], sizes: Sequence[float] | None = None) -> Basis:
+    """Lines of an angle in degrees, expected to be as large as ``sizes``."""
+    each = list(zip(orders, sizes or [1.0] * len(orders), strict=True))
+    return lambda x: np.hstack([size * line_columns(np.radians(x), m) for m, size in each])
+
+
+def _bands(signals: Signals, at: Array) -> Iterator[Group]:
+    """Lines of the output that are next to one another."""
+    for first, last in BANDS:
+        if last * SAMPLED < len(signals) and 2 * last <= signals.places:
+            orders = tuple(float(k) for k in range(first, last + 1))
+            yield from _pattern(signals, at, orders)
+
+
+def _patterns(signals: Signals, shafts: Iterable[float], at: Array) -> Iterator[Group]:
+    """Any function of a shaft's place: of smaller harmonics the higher they are."""
+    for cycles in shafts:
+        places = count_positions(signals.theta * cycles / (2.0 * np.pi))
+        parts = [k for k in range(1, HARMONICS + 1) if 2 * k <= places]
+        if len(parts) > 1:
+            orders = tuple(k * cycles for k in parts)
+            yield from _pattern(signals, at, orders, [1.0 / k for k in parts])
+
+
+def _pattern(
+    signals: Signals, at: Array, orders: tuple[float, ...], sizes: Sequence[float] | None = None
+) -> Iterator[Group]:
+    waves = _waves(orders, sizes)
+    group = Group.of_function("place", signals.degrees, waves, at, "deg", orders)
     if group is not None:
         yield group
 
@@ -245,14 +296,22 @@ def _signed(
         yield Axis(factor, x, lambda x: x[:, None] / top, grid, unit), lambda x: x[:, None] / top
         return
 
-    def lines(x: Array) -> Array:
-        return np.column_stack([x / top, np.abs(x) / top])
-
     def curves(x: Array) -> Array:
-        return np.hstack([lines(x), lines(x) * np.abs(x)[:, None] / top])
+        lines = np.column_stack([x / top, np.abs(x) / top])
+        return np.hstack([lines, lines * np.abs(x)[:, None] / top])
 
-    yield Axis(factor, x, curves, grid, unit), lines
-    yield Axis(factor, x, _hats(knots), grid, unit), None
+    yield Axis(factor, x, curves, grid, unit), curves
+    if not float(x.min()) < 0.0 < float(x.max()):
+        yield Axis(factor, x, _hats(knots), grid, unit), None
+        return
+    sizes = _hats(knots_of(np.abs(x)))
+
+    def both(x: Array) -> Array:
+        # One sign may differ from the other at any size, at the smallest too.
+        even = sizes(np.abs(x))
+        return np.hstack([even, np.sign(x)[:, None] * np.hstack([np.ones((x.size, 1)), even])])
+
+    yield Axis(factor, x, both, grid, unit), None
 
 
 def knots_of(x: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -9,12 +10,7 @@ import numpy as np
 
 from ...joint.lines import line_columns
 from ...support.arrays import Array
-
-#: Orders of the output, each a group.
-LOW: Final = 12
-
-#: Least ratio of the power of a line to the mean: of noise alone about one of 500 exceeds it.
-STANDS_OUT: Final = 8.0
+from .group import LOW, STANDS_OUT
 
 #: Places that are tried at once, and jumps: a facet has two.
 TRIED: Final = 360
@@ -47,10 +43,10 @@ class Sawtooth:
         return np.mod(degrees - self.where, 360.0)[:, None]
 
 
-def less_low_orders(theta: Array, values: Array) -> Array:
-    """Columns of values less what the low orders and a constant take of them."""
-    inside = [line_columns(theta, float(k)) for k in range(1, LOW + 1)]
-    columns = np.column_stack([np.ones(theta.size), *inside])
+def less_lines(theta: Array, values: Array, orders: Iterable[float]) -> Array:
+    """Columns of values less what lines and a constant take of them."""
+    lines = [line_columns(theta, float(m)) for m in orders]
+    columns = np.column_stack([np.ones(theta.size), *lines])
     return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=1e-9)[0])
 
 
@@ -89,5 +85,5 @@ def jumps(degrees: Array, left: Array) -> list[Sawtooth]:
 def _unit_ramps(degrees: Array, gaps: list[Sawtooth]) -> Array:
     """Ramps less their own low orders, of length 1."""
     ramps = np.hstack([gap.values(degrees) for gap in gaps])
-    ramps = less_low_orders(np.radians(degrees), ramps)
+    ramps = less_lines(np.radians(degrees), ramps, range(1, LOW + 1))
     return np.asarray(ramps / np.maximum(np.linalg.norm(ramps, axis=0), 1e-6))

@@ -221,7 +221,7 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
         follows = [f for f in EFFECTS[found[k].cause].form_of if f != TRANSITION]
         follows += names.same(k)
         freed, free = names.beside([j for j in sure if j != k], tau, follows)
-        if follows and freed > score:
+        if follows and freed > score - ALIKE:
             what = _followed(names, free, tau)
             return {k: f"a function of {what} explains the readings as well"}
     for k in sure:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...effects import EFFECTS
 from ...effects.missed_counts import MissedCounts
 from ...estimation.regression import Regression
+from ...estimation.segments import short_segments
 from ...joint.signals import Signals
 from ...support.arrays import Array
 from ..finding import Finding
@@ -66,6 +67,7 @@ def stated_factors(
         _orders(chosen, drawn=True),
         _frequencies(chosen),
         [*_events(chosen), *_steps(signals, error)][:MOST_EVENTS],
+        [cycles for cycles in chosen.belief.joint.shafts.values() if abs(cycles) > 1.0],
     )
     places: dict[int, int] = {}
     named: list[Group] = []
@@ -111,8 +113,8 @@ def _less_what_no_factor_is(regression: Regression) -> Array:
 
 
 def account_rows(regression: Regression) -> NDArray[np.int64]:
-    """Readings that take part: no outliers, and of many only every n-th."""
-    rows = np.flatnonzero(~regression.outlying)
+    """Readings that take part: no glitches (what lasts is none), and of many only every n-th."""
+    rows = np.flatnonzero(~short_segments(regression.outlying, regression.bounds))
     if rows.size <= MOST_READINGS:
         return rows
     edges = np.linspace(0, rows.size, MOST_READINGS + 1).astype(np.int64)
