@@ -29,12 +29,6 @@ from .remainder import remainder_of
 #: Terms at most.
 MOST_TERMS = 14
 
-#: Correlations of the noise that are one.
-SAME_CORRELATION = 0.02
-
-#: Standard errors within which a correlation is looked for, and below which it stays.
-WITHIN, MOST_CORRELATED = 2, 0.999
-
 #: Times the gain of a step that the further ones may bring on average. Gains fall but where
 #: causes show together only: of 240 walks 1 in 100 rose by more than 2.6, none of them to
 #: another account.
@@ -96,17 +90,17 @@ def _under_its_noise(regression: Regression) -> Regression:
     """
     noise = estimate_noise(remainder_of(regression))
     tried = [regression]
-    if noise.correlation > regression.whiten.rho + SAME_CORRELATION:
+    # Correlations nearer to each other are one.
+    if noise.correlation > regression.whiten.rho + 0.02:
         tried.append(_pruned(regression.with_terms(regression.terms, noise.correlation)))
     plain = [t for t in regression.terms if not _takes_up(t)]
     if len(plain) < len(regression.terms):
         rest = regression.with_terms(plain)
         noise = estimate_noise(remainder_of(rest))
-        # Each run's own mean is fitted too, so a larger correlation is possible as well.
-        trials = [noise.correlation + k * noise.std for k in range(1 + WITHIN)]
-        tried += [
-            _pruned(rest.with_terms(plain, rho)) for rho in trials if 0.0 < rho < MOST_CORRELATED
-        ]
+        # Each run's own mean is fitted too, so a larger correlation is possible as well: by two
+        # standard errors, but less than 1.
+        trials = [noise.correlation + k * noise.std for k in range(3)]
+        tried += [_pruned(rest.with_terms(plain, rho)) for rho in trials if 0.0 < rho < 0.999]
     return min(tried, key=total_penalty)
 
 

@@ -32,9 +32,6 @@ ALWAYS: Final = (1.0, 2.0)
 #: Lines of a spectrum that are tried in addition.
 PEAKS: Final = 5
 
-#: Standard deviations of noise by which many lines must have more power together.
-SHOWN: Final = 3.0
-
 #: Highest order of a spectrum, and readings for each order.
 ORDERS: Final = 400
 SAMPLED: Final = 2.5
@@ -176,7 +173,8 @@ class _PeakSpectrum:
         at = [round(order) - 1 for order in orders if LOW < round(order) <= self.count]
         spectrum = np.abs(self.sums.sums(values).sum(axis=1)) ** 2
         level = float(np.median(spectrum)) / np.log(2.0)
-        return not at or float(spectrum[at].mean()) > level * (1.0 + SHOWN / np.sqrt(len(at)))
+        # Three standard deviations of their mean power above that of noise.
+        return not at or float(spectrum[at].mean()) > level * (1.0 + 3.0 / np.sqrt(len(at)))
 
 
 def _without_low(theta: Array, error: Array, run: NDArray[np.int64]) -> Array:
