@@ -89,7 +89,7 @@ def _better(regression: Regression) -> Regression | None:
         others = [
             name for name, effect in EFFECTS.items() if not (name == own or is_flexible(effect))
         ]
-        tried = select_again(rest, others)
+        tried = select_again(rest, others, limit)
         if total_penalty(tried) < limit and not current_deadline().over:
             return tried
     return None

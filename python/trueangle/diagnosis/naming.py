@@ -150,17 +150,21 @@ def chosen_by_factor(
     """The causes without some terms, and for each factor without a name those that are forms of it.
 
     The strongest factor comes first: what one form took of several is named by each of its own.
-    Terms of the noise come last: over a part of a turn a walk in time may stand for a ramp and two
-    orders.
+    Terms of the noise come after the forms of the place: over a part of a turn a walk in time may
+    stand for a ramp and two orders.
     """
     rest = regression_without(regression, [*lost, *noise], settled=True)
     found = rest
-    for factor in factors:
-        if not factor.named_by:
-            forms = [k for k, effect in EFFECTS.items() if factor.factor in effect.form_of[:1]]
-            found = select_again(found, forms)
-    if noise:
-        found = select_again(found, [regression.terms[k].cause for k in noise])
+    in_time = {"run", "run_time"}
+    asked = [factor.factor for factor in factors if not factor.named_by]
+    forms = [
+        [kind for kind, effect in EFFECTS.items() if factor in effect.form_of[:1]]
+        for factor in sorted(asked, key=lambda factor: factor in in_time)
+    ]
+    # Before steps and zeros of the runs, which imitate noise that drifts.
+    forms.insert(sum(f not in in_time for f in asked), [regression.terms[k].cause for k in noise])
+    for causes in forms:
+        found = select_again(found, causes)
     return None if len(found.terms) <= len(rest.terms) else found
 
 

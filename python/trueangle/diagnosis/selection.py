@@ -9,11 +9,12 @@ import numpy as np
 
 from ..effects import EFFECTS, Effect
 from ..effects.effect import ALWAYS
+from ..effects.local_defect import LocalDefect
 from ..effects.missing_order import MissingOrder
 from ..effects.zero_slip import ZeroSlip
 from ..estimation.regression import BEYOND_SHOWN, Extension, Regression
 from ..support.deadline import current_deadline
-from .candidates import Candidate, CandidateScores, candidate_extensions
+from .candidates import Candidate, CandidateScores, candidate_extensions, propose_candidates
 from .formerrors import beside_form_errors, share_beside_form_errors
 from .goodness import estimate_noise
 from .penalty import (
@@ -54,7 +55,9 @@ def select_causes(regression: Regression, known: Sequence[Extension] = ()) -> Re
     if known:
         known_too = _pruned(_forward(regression.with_terms(known), list(EFFECTS)))
         return _priced_with_noise(known_too)
+    ahead = _specific_first(regression)
     direct = _pruned(_forward(regression, list(EFFECTS)))
+    direct = min([*ahead, direct], key=total_penalty)
     noisy = _under_its_noise(direct)
     if noisy is not direct:
         # Once something else was chosen, a correlation absorbs what a law would explain.
@@ -67,9 +70,12 @@ def select_causes(regression: Regression, known: Sequence[Extension] = ()) -> Re
     return _priced_with_noise(_by_other_paths(regression, direct))
 
 
-def select_again(regression: Regression, causes: Sequence[str]) -> Regression:
-    """With the best of some causes in addition to the terms, less what they make superfluous."""
-    return _pruned(_forward(regression, causes))
+def select_again(regression: Regression, causes: Sequence[str], goal: float = np.inf) -> Regression:
+    """With the best of some causes in addition to the terms, less what they make superfluous.
+
+    As it is where these cannot come down to a penalty of ``goal``.
+    """
+    return _pruned(_forward(regression, causes, goal))
 
 
 def _priced_with_noise(regression: Regression) -> Regression:
@@ -115,8 +121,9 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     Where forward selection with every candidate takes a flexible cause (which can
     imitate any effect of a run) or, over a part of a turn, a bump, further paths take
     those only after the specific ones were tried, without and with a separate zero of each
-    run (or with the lines of shafts that the joint declares). All are pruned backward; the best by
-    BIC is kept.
+    run (or with what acts on whole runs, fitted jointly with an error that repeats at the same
+    angle, or with the lines of shafts that the joint declares). All are pruned
+    backward; the best by BIC is kept.
     """
     if current_deadline().over:
         return direct
@@ -130,7 +137,10 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
     specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
     goal = total_penalty(direct)
     starts = [_forward(regression, acts_on_runs(), goal)]
-    if any(is_flexible(EFFECTS[cause]) for cause in found):
+    settled = _beside_repeats(regression)
+    if settled is not regression:
+        starts.append(settled)
+    elif any(is_flexible(EFFECTS[cause]) for cause in found):
         slip = ZeroSlip.propose(regression)
         if slip is not None and slip.bic_gain > NEW_CAUSE:
             starts.append(regression.with_terms([slip]))
@@ -143,6 +153,44 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
         flexible = [cause for cause, effect in EFFECTS.items() if is_flexible(effect)]
         paths.append(_pruned(_forward(_forward(declared, flexible), list(EFFECTS))))
     return min([direct, *paths], key=total_penalty)
+
+
+def _specific_first(regression: Regression) -> list[Regression]:
+    """Over a part of a turn: the choice by a path that takes flexible causes last; else none.
+
+    There a bump can imitate several lines, and a drift, whose search takes longest, most else.
+    """
+    if regression.signals.run_turns().max() >= LocalDefect.flexible_below:
+        return []
+    specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
+    start = _beside_repeats(regression)
+    if start is regression:
+        start = _forward(regression, acts_on_runs())
+    return [_in_form(_pruned(_forward(_forward(start, specific), list(EFFECTS))))]
+
+
+def _in_form(regression: Regression) -> Regression:
+    """With the forms that causes of whole runs have given all that was chosen since."""
+    for term in regression.terms:
+        effect = EFFECTS[term.cause]
+        alone = sum(other.cause == term.cause for other in regression.terms) == 1
+        if not (effect.acts_on_runs and alone):
+            continue
+        rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
+        again = propose_candidates(effect, rest)
+        if again is not None and again.shape != term.shape:
+            other = rest.with_terms([*rest.terms, again])
+            regression = min(regression, other, key=total_penalty)
+    return regression
+
+
+def _beside_repeats(regression: Regression) -> Regression:
+    """With what acts on whole runs, fitted jointly with an unknown pattern that repeats."""
+    beyond = regression.without_repeats()
+    if beyond is regression:
+        return regression
+    settled = _forward(_forward(beyond, acts_on_runs()), (ZeroSlip.kind,))
+    return regression.with_terms(settled.terms)
 
 
 def _with_declared_lines(regression: Regression) -> Regression:

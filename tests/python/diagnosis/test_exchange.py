@@ -72,9 +72,9 @@ def test_others_are_tried_in_the_place_of_two_findings_at_most(
     )
     tried: list[Sequence[str]] = []
 
-    def watched(rest: Regression, causes: Sequence[str]) -> Regression:
+    def watched(rest: Regression, causes: Sequence[str], goal: float) -> Regression:
         tried.append(causes)
-        return select_again(rest, causes)
+        return select_again(rest, causes, goal)
 
     monkeypatch.setattr(exchange, "select_again", watched)
     assert exchanged_causes(chosen) is chosen
