@@ -83,7 +83,7 @@ def _better(regression: Regression) -> Regression | None:
         if reshaped is not rest and total_penalty(reshaped) < limit:
             return reshaped
         own = regression.terms[group[0]].cause
-        if len(groups) > LOOKED_AT and not is_flexible(EFFECTS[own]):
+        if len(groups) > LOOKED_AT and not EFFECTS[own].flexible_below:
             continue
         # A flexible cause explains more than any law, and is none.
         others = [

@@ -10,6 +10,7 @@ import numpy as np
 from ..effects import EFFECTS, Curve
 from ..effects.ambiguity import Ambiguity
 from ..estimation.regression import Regression
+from ..support.arrays import Array
 from ..support.deadline import current_deadline
 from .factors.factor import Factor
 from .factors.statement import account_rows, stated_factors
@@ -163,9 +164,20 @@ def chosen_by_factor(
     ]
     # Before steps and zeros of the runs, which imitate noise that drifts.
     forms.insert(sum(f not in in_time for f in asked), [regression.terms[k].cause for k in noise])
-    for causes in forms:
+    for causes in filter(None, forms):
         found = select_again(found, causes)
     return None if len(found.terms) <= len(rest.terms) else found
+
+
+def _less_left(factors: Sequence[Factor], error: Array) -> list[Factor]:
+    """Without curves that only cancel one another or the zeros of these runs, largest first."""
+    kept = list(factors)
+    while curves := [f for f in kept if f.effects and not f.named_by and f.fitted is not None]:
+        if np.var(error - np.sum([f.fitted for f in curves], axis=0)) < np.var(error):
+            break
+        most = max(curves, key=lambda factor: factor.rms)
+        kept = [factor for factor in kept if factor is not most]
+    return kept
 
 
 def _named(
@@ -185,10 +197,9 @@ def _named(
     # Causes that are not distinguished, or were not tried, predict different errors in other
     # runs: no curve represents them.
     seen = [spot for spot in spots if spot.supported]
-    factors = [
-        replace(f, effects=()) if at.cut or any(_is_either(spot, f) for spot in seen) else f
-        for f in factors
-    ]
+    kept = [] if at.cut else [f for f in factors if not any(_is_either(spot, f) for spot in seen)]
+    kept = _less_left(kept, chosen.readings.residual[account_rows(chosen)])
+    factors = [f if any(f is other for other in kept) else replace(f, effects=()) for f in factors]
     both = zip(findings, held, strict=True)
     lost = [k for one, other in both if one.confirmed and not other.confirmed for k in one.group]
     return NamedCauses(chosen, rest, held, spots, factors, lost)

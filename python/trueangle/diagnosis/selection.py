@@ -21,7 +21,10 @@ from .penalty import (
     NEW_CAUSE,
     deviance_lost,
     finding_groups,
+    form_misfit,
+    forms_before,
     net_deviance_lost,
+    penalty_of,
     regression_without,
     total_penalty,
 )
@@ -54,7 +57,7 @@ def select_causes(regression: Regression, known: Sequence[Extension] = ()) -> Re
     """
     if known:
         known_too = _pruned(_forward(regression.with_terms(known), list(EFFECTS)))
-        return _priced_with_noise(known_too)
+        return _priced_with_noise(_made_specific(known_too))
     ahead = _specific_first(regression)
     direct = _pruned(_forward(regression, list(EFFECTS)))
     direct = min([*ahead, direct], key=total_penalty)
@@ -67,7 +70,7 @@ def select_causes(regression: Regression, known: Sequence[Extension] = ()) -> Re
         direct = min(noisy, _pruned(_forward(regression, list(EFFECTS))), key=total_penalty)
     if current_deadline().over:
         return direct
-    return _priced_with_noise(_by_other_paths(regression, direct))
+    return _priced_with_noise(_by_other_paths(regression, _with_lines_for_bumps(direct)))
 
 
 def select_again(regression: Regression, causes: Sequence[str], goal: float = np.inf) -> Regression:
@@ -76,6 +79,44 @@ def select_again(regression: Regression, causes: Sequence[str], goal: float = np
     As it is where these cannot come down to a penalty of ``goal``.
     """
     return _pruned(_forward(regression, causes, goal))
+
+
+def _specific_first(regression: Regression) -> list[Regression]:
+    """Over a part of a turn: the choice by a path that takes flexible causes last; else none.
+
+    There a bump can imitate several lines, and a drift, whose search takes longest, most else.
+    """
+    if regression.signals.run_turns().max() >= LocalDefect.flexible_below:
+        return []
+    specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
+    start = _beside_repeats(regression)
+    if start is regression:
+        start = _forward(regression, acts_on_runs())
+    return [_in_form(_pruned(_forward(_forward(start, specific), list(EFFECTS))))]
+
+
+def _in_form(regression: Regression) -> Regression:
+    """With the forms that causes of whole runs have given all that was chosen since."""
+    for term in regression.terms:
+        effect = EFFECTS[term.cause]
+        alone = sum(other.cause == term.cause for other in regression.terms) == 1
+        if not (effect.acts_on_runs and alone):
+            continue
+        rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
+        again = propose_candidates(effect, rest)
+        if again is not None and again.shape != term.shape:
+            other = rest.with_terms([*rest.terms, again])
+            regression = min(regression, other, key=total_penalty)
+    return regression
+
+
+def _beside_repeats(regression: Regression) -> Regression:
+    """With what acts on whole runs, fitted jointly with an unknown pattern that repeats."""
+    beyond = regression.without_repeats()
+    if beyond is regression:
+        return regression
+    settled = _forward(_forward(beyond, acts_on_runs()), (ZeroSlip.kind,))
+    return regression.with_terms(settled.terms)
 
 
 def _priced_with_noise(regression: Regression) -> Regression:
@@ -152,45 +193,24 @@ def _by_other_paths(regression: Regression, direct: Regression) -> Regression:
         # With the declared lines fitted, a drift does not imitate other slow curves.
         flexible = [cause for cause, effect in EFFECTS.items() if is_flexible(effect)]
         paths.append(_pruned(_forward(_forward(declared, flexible), list(EFFECTS))))
-    return min([direct, *paths], key=total_penalty)
+    return _made_specific(min([direct, *paths], key=total_penalty))
 
 
-def _specific_first(regression: Regression) -> list[Regression]:
-    """Over a part of a turn: the choice by a path that takes flexible causes last; else none.
+def _with_lines_for_bumps(regression: Regression) -> Regression:
+    """With lines in place of bumps where lines explain more: a wide bump imitates several.
 
-    There a bump can imitate several lines, and a drift, whose search takes longest, most else.
+    One after the other each line saves less than a bump that imitates all of them at once.
     """
-    if regression.signals.run_turns().max() >= LocalDefect.flexible_below:
-        return []
-    specific = [cause for cause, effect in EFFECTS.items() if not effect.flexible_below]
-    start = _beside_repeats(regression)
-    if start is regression:
-        start = _forward(regression, acts_on_runs())
-    return [_in_form(_pruned(_forward(_forward(start, specific), list(EFFECTS))))]
-
-
-def _in_form(regression: Regression) -> Regression:
-    """With the forms that causes of whole runs have given all that was chosen since."""
-    for term in regression.terms:
-        effect = EFFECTS[term.cause]
-        alone = sum(other.cause == term.cause for other in regression.terms) == 1
-        if not (effect.acts_on_runs and alone):
-            continue
-        rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
-        again = propose_candidates(effect, rest)
-        if again is not None and again.shape != term.shape:
-            other = rest.with_terms([*rest.terms, again])
-            regression = min(regression, other, key=total_penalty)
-    return regression
-
-
-def _beside_repeats(regression: Regression) -> Regression:
-    """With what acts on whole runs, fitted jointly with an unknown pattern that repeats."""
-    beyond = regression.without_repeats()
-    if beyond is regression:
+    plain = [term for term in regression.terms if term.cause != LocalDefect.kind]
+    travel = regression.signals.run_turns().max()
+    # Over a part of a turn other paths take lines first (`_by_other_paths`).
+    if len(plain) == len(regression.terms) or travel < LocalDefect.flexible_below:
         return regression
-    settled = _forward(_forward(beyond, acts_on_runs()), (ZeroSlip.kind,))
-    return regression.with_terms(settled.terms)
+    lines = _forward(regression.with_terms(plain), [MissingOrder.kind])
+    if len(lines.terms) < len(plain) + 2:
+        return regression
+    tried = _pruned(_forward(lines, list(EFFECTS)))
+    return min(regression, tried, key=total_penalty)
 
 
 def _with_declared_lines(regression: Regression) -> Regression:
@@ -204,6 +224,30 @@ def _with_declared_lines(regression: Regression) -> Regression:
         return regression
     orders = [joint.output_order(name, k) for name, k in joint.gear_orders() if name in known]
     return regression.with_terms([MissingOrder.at(regression, order) for order in orders])
+
+
+def _made_specific(regression: Regression) -> Regression:
+    """With a specific cause in place of a flexible one where that explains more.
+
+    What the form of a law leaves, the flexible one explains in its place: this counts in the
+    evidence, and no additional allowance for it is charged.
+    """
+    for term in [t for t in regression.terms if is_flexible(EFFECTS[t.cause])]:
+        left = form_misfit(regression)
+
+        def price(account: Regression, left: float = left) -> float:
+            return account.bic + penalty_of(account.terms, left, forms_before(account))
+
+        rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
+        tried = [
+            start.with_terms([*start.terms, extension])
+            for extension, start, gain in candidate_extensions(rest, acts_on_runs())
+            if price(rest) - gain < price(regression)
+        ]
+        best = min(tried, key=price, default=regression)
+        if price(best) < price(regression):
+            regression = _pruned(_forward(best, list(EFFECTS)))
+    return regression
 
 
 def _forward(regression: Regression, causes: Sequence[str], goal: float = np.inf) -> Regression:

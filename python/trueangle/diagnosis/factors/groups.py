@@ -121,11 +121,14 @@ def factor_groups(
     peaks = [*known, *spectrum.peaks(left, LOW)]
     groups = [*_place(signals, error, peaks)]
     # Hundreds of columns, which would cost most of the search where single lines take all.
-    at, others = groups[0].at, less_lines(theta, left, peaks)
-    wide = [*_bands(signals, at), *_patterns(signals, [1.0], at)]
-    groups += [group for group in wide if spectrum.shows(others, group.orders)]
-    wide = _patterns(signals, dict.fromkeys(map(abs, shafts)), at)
-    groups += [group for group in wide if spectrum.shows(left, group.orders)]
+    others = less_lines(theta, left, peaks)
+    wide = [orders for orders in _bands(signals) if orders and spectrum.shows(others, orders)]
+    patterns = (_pattern(signals, cycles) for cycles in dict.fromkeys(map(abs, shafts)))
+    wide += [orders for orders in patterns if orders and spectrum.shows(left, orders)]
+    for orders in wide:
+        waves, at = _waves(orders), groups[0].at
+        group = Group.of_function("place", signals.degrees, waves, at, "deg", orders)
+        groups += [group] if group is not None else []
     for axis, product in _axes(signals):
         groups += axis.alone()
         if product is not None:
@@ -217,37 +220,23 @@ def _place(signals: Signals, error: Array, lines: Iterable[float]) -> Iterator[G
         yield group
 
 
-def _waves(orders: Sequence[float], sizes: Sequence[float] | None = None) -> Basis:
-    """Lines of an angle in degrees, expected to be as large as ``sizes``."""
-    each = list(zip(orders, sizes or [1.0] * len(orders), strict=True))
-    return lambda x: np.hstack([size * line_columns(np.radians(x), m) for m, size in each])
+def _waves(orders: Sequence[float]) -> Basis:
+    """Lines of an angle in degrees, expected to be the smaller the higher their order is."""
+    return lambda x: np.hstack([line_columns(np.radians(x), m) * orders[0] / m for m in orders])
 
 
-def _bands(signals: Signals, at: Array) -> Iterator[Group]:
-    """Lines of the output that are next to one another."""
+def _bands(signals: Signals) -> Iterator[tuple[float, ...]]:
+    """Orders of the output that are next to one another, and those of any function of its place."""
     for first, last in BANDS:
         if last * SAMPLED < len(signals) and 2 * last <= signals.places:
-            orders = tuple(float(k) for k in range(first, last + 1))
-            yield from _pattern(signals, at, orders)
+            yield tuple(float(k) for k in range(first, last + 1))
+    yield _pattern(signals, 1.0)
 
 
-def _patterns(signals: Signals, shafts: Iterable[float], at: Array) -> Iterator[Group]:
-    """Any function of a shaft's place: of smaller harmonics the higher they are."""
-    for cycles in shafts:
-        places = count_positions(signals.theta * cycles / (2.0 * np.pi))
-        parts = [k for k in range(1, HARMONICS + 1) if 2 * k <= places]
-        if len(parts) > 1:
-            orders = tuple(k * cycles for k in parts)
-            yield from _pattern(signals, at, orders, [1.0 / k for k in parts])
-
-
-def _pattern(
-    signals: Signals, at: Array, orders: tuple[float, ...], sizes: Sequence[float] | None = None
-) -> Iterator[Group]:
-    waves = _waves(orders, sizes)
-    group = Group.of_function("place", signals.degrees, waves, at, "deg", orders)
-    if group is not None:
-        yield group
+def _pattern(signals: Signals, cycles: float) -> tuple[float, ...]:
+    """Orders of any function of a shaft's place."""
+    places = count_positions(signals.theta * cycles / (2.0 * np.pi))
+    return tuple(k * cycles for k in range(1, min(HARMONICS, places // 2) + 1))
 
 
 def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:

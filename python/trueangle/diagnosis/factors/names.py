@@ -166,6 +166,10 @@ class NamedForms:
                 found.append(groups[k].factor)
         return found
 
+    def factors(self, tau: Sequence[float]) -> set[str]:
+        """Factors of the free functions of a model."""
+        return {self.account.groups[k].factor for k in self.free if tau[k] > 0.0}
+
     def is_of(self, k: int, factors: Sequence[str]) -> bool:
         """A group is of one of the factors."""
         return self.account.groups[k].factor in factors
@@ -221,7 +225,9 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
         follows = [f for f in EFFECTS[found[k].cause].form_of if f != TRANSITION]
         follows += names.same(k)
         freed, free = names.beside([j for j in sure if j != k], tau, follows)
-        if follows and freed > score - ALIKE:
+        # What is there without a name may be all of it.
+        as_well = ALIKE * (names.factors(free) <= names.factors(tau))
+        if follows and freed > score - as_well:
             what = _followed(names, free, tau)
             return {k: f"a function of {what} explains the readings as well"}
     for k in sure:

@@ -330,3 +330,29 @@ def test_a_slip_that_settles_is_an_event_of_its_run_and_no_lost_counts(rng, stay
     assert abs(row - 0.35 * 350) < 12
     assert not found.unexplained.found
     assert f"an event in run {hit + 1}" in " ".join(found.summary().split())
+
+
+def load(t, r):
+    return (2.0 + r) * np.sin(0.21 * t + r) + 1.5 * r
+
+
+FORMS = {
+    "chirp": ("place", lambda x, d, v, t, r: 9.0 * np.sin(2.0 * np.pi * (3.0 * x + 9.0 * x**2))),
+    "edges on a pole": ("place", lambda x, d, v, t, r: 9.0 * ((30.0 * x + 0.2) % 1.0 < 0.3)),
+    "root of the speed": ("speed", lambda x, d, v, t, r: 1.5 * d * np.sqrt(v)),
+    "a cam under load": (
+        "load_place",
+        lambda x, d, v, t, r: 0.2 * load(t, r) ** 2 * np.sin(6.0 * np.pi * x + 1.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_form_without_a_name_is_stated_by_its_factor_and_gets_none(rng, form):
+    """They had been named: rows of bumps and orders, play, a line that varies."""
+    factor, error = FORMS[form]
+    runs = measured(rng, lambda theta, *of: error((theta / 360.0) % 1.0, *of), torque=load)
+    joint = Joint(30.0, "none") if "pole" in form else EMPTY.joint
+    found = ta.diagnose(runs, Simulation(joint, sigma_arcsec=NOISE))
+    assert confirmed(found) == []
+    assert found.factors[0].factor == factor
