@@ -172,8 +172,9 @@ def chosen_by_factor(
 def _less_left(factors: Sequence[Factor], error: Array) -> list[Factor]:
     """Without curves that only cancel one another or the zeros of these runs, largest first."""
     kept = list(factors)
-    while curves := [f for f in kept if f.effects and not f.named_by and f.fitted is not None]:
-        if np.var(error - np.sum([f.fitted for f in curves], axis=0)) < np.var(error):
+    while curves := [f for f in kept if f.effects and not f.named_by]:
+        fitted = [f.fitted for f in curves if f.fitted is not None]
+        if np.var(error - np.sum(fitted, axis=0)) < np.var(error):
             break
         most = max(curves, key=lambda factor: factor.rms)
         kept = [factor for factor in kept if factor is not most]
