@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from .diagnosis.diagnose import diagnose as diagnose
     from .errors import TrueAngleError as TrueAngleError
     from .estimation.moments import Moments as Moments
-    from .export import compare as compare
     from .export import export_model as export_model
     from .export import import_model as import_model
+    from .export.comparison import compare as compare
     from .fitting.fit import fit as fit
     from .fitting.orders.select import OrderSelection as OrderSelection
     from .fitting.orders.select import select_orders as select_orders
@@ -86,7 +86,7 @@ _PUBLIC = {
     "check_channels": "selfcalibration.channelcheck",
     "correct": "logs.frames",
     "correct_logs": "logs.batch",
-    "compare": "export",
+    "compare": "export.comparison",
     "export_model": "export",
     "import_model": "export",
     "join": "runs.joining",

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the difference."""
-    from ..export import compare
+    from ..export.comparison import compare
 
     refuse_joint(args.joint, (args.first, args.second))
     first, second = (model_asked(path, args.joint) for path in (args.first, args.second))

@@ -3,9 +3,8 @@
 A target is one file in this package and one line in `trueangle.export.targets`.
 """
 
-from .comparison import Comparison, compare
 from .export import export_model, import_model
 from .exported import Exported
 from .targets import TARGETS
 
-__all__ = ["TARGETS", "Comparison", "Exported", "compare", "export_model", "import_model"]
+__all__ = ["TARGETS", "Exported", "export_model", "import_model"]

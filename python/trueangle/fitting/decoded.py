@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import ArgumentError
-from ..estimation.channels import referenced_channels
-from ..estimation.tracks import joined
 from ..runs.channelangle import following
 from ..runs.rawchannels import TRACKS
 from ..runs.run import CalibrationRun
@@ -29,6 +27,8 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
     given = [run.channels for run in runs]
     if all(channels is None for channels in given):
         return list(runs)
+    from ..estimation.channels import referenced_channels  # few runs have channels
+
     first = given[0]
     kinds = {c and (c.direction, c.periods_per_turn, c.period) for c in given}
     if first is None or len(kinds) > 1:
@@ -43,6 +43,8 @@ def decoded(runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
         others = [(run.signals["sine2"], run.signals["cosine2"], run.reference) for run in runs]
         named = f"{_named(runs[0])}, second track"
         second = referenced_channels(others, first.second, named)
+        from ..estimation.tracks import joined
+
         channels = joined(channels, second, track_readings(runs), _named(runs[0]))
     return [
         replace(

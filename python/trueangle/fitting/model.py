@@ -11,7 +11,6 @@ import numpy as np
 
 from .._core import __version__
 from ..errors import ArgumentError
-from ..estimation.tracks import Mismatch
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
@@ -56,6 +55,8 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         dropouts = "" if channels is None else "off the channels' curve or "
         yield f"{fit.missing} {rows} {dropouts}with an empty cell omitted."
     if channels is not None and channels.second is not None:
+        from ..estimation.tracks import Mismatch  # a fit without a second track does not need it
+
         yield _sentence(Mismatch.of(channels, track_readings(fit.problem.runs)).says)
     yield from (_sentence(remark) for remark in fit.remarks)
     records = records_of(fit.runs) if fit.moments is None else []

@@ -15,7 +15,6 @@ from ..support.angles import UNIT_PERIODS, circular_mean, wrap
 from ..support.arrays import Array
 from ..support.roles import RoleColumn, role_code
 from .angles import PERIOD
-from .checks.channelreadings import ChannelReadings
 from .rawchannels import TRACKS, Channels
 from .readings import FileReadings
 from .run import CalibrationRun
@@ -69,6 +68,8 @@ def with_channel_angle(
                 f"{listed_columns(list(table.columns))}",
                 line=1,
             )
+    from .checks.channelreadings import ChannelReadings  # a fit of an angle needs none of it
+
     reference = roles["reference"]
     unit = reference.unit or table.format.unit or "deg"
     period = UNIT_PERIODS.get(unit, PERIOD)

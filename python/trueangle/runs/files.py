@@ -18,8 +18,6 @@ from ..support.signals import FIELDS
 from ..support.times import local_day
 from .angles import PERIOD, find_run_angles
 from .channelangle import with_channel_angle
-from .checks.channelreadings import dropout_words
-from .excitation import demodulated
 from .facets import Facets, read_facets
 from .rawchannels import Channels
 from .readings import FileReadings
@@ -218,6 +216,8 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
         return _entries(table, given.counts)
     channels = dropouts = None
     if given.periods is not None or {"sine", "cosine"} & table.roles.keys():
+        from .excitation import demodulated  # most tables have no channels
+
         table, excitation = demodulated(table)
         table, channels, dropouts = with_channel_angle(table, given.periods, given.reference_counts)
         if channels is not None and excitation is not None:
@@ -312,6 +312,8 @@ def _runs_of_readings(table: FileReadings, given: Conversion) -> list[Calibratio
     found = _columns(table, given)
     signals, table = found.signals, found.table
     if found.dropouts is not None and (off := np.flatnonzero(found.dropouts)).size:
+        from .checks.channelreadings import dropout_words
+
         fault = "; ".join(dropout_words(int(off.size), int(off[0]) + 1))
         warnings.warn(f"{table.path}: {fault}", EmptyCellsWarning, stacklevel=level_of_caller())
     used = {c.name for role, c in table.roles.items() if c.is_asked or role in _USED}

@@ -117,7 +117,7 @@ def test_wherever_it_is_ended_the_account_says_so_and_confirms_nothing_unmeasure
     names = {finding.cause for finding in full.findings if finding.confirmed}
     assert names, "the full account must name something for the others to be held against"
     named = set()
-    for within in np.unique(np.geomspace(3, 1.8 * steps, 8).astype(int)):
+    for within in np.unique(np.geomspace(3, 1.8 * steps, 16).astype(int)):
         with under_deadline(Deadline(float(within), clock=Ticks())):
             result = ta.diagnose(runs, BELIEVED)
         told = result.to_dict()

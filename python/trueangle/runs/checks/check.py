@@ -17,7 +17,6 @@ from .angles import (
     swapped_channels,
     told_ratio,
 )
-from .channelreadings import ChannelReadings
 from .fault import DataFault
 from .record import Record, read_records, records_of
 from .rows import duplicate_rows, duplicate_runs, missed_counts, outliers
@@ -126,6 +125,8 @@ def channel_faults(records: list[Record]) -> Iterator[DataFault]:
     given = [(record.label, record.channels) for record in records if record.channels is not None]
     if not given:
         return
+    from .channelreadings import ChannelReadings  # most records have no channels
+
     parts = [channels for _, channels in given]
     sine, cosine, rows = (np.concatenate([part[i] for part in parts]) for i in range(3))
     labels = [record.label for record in records]
