@@ -85,7 +85,7 @@ def confirmation_status(
         if gain.interval[0] > 0.0:
             scattered = _of_scattered_zeros(regression, group, unexplained) if regression else ""
             return (NOT_CONFIRMED, scattered) if scattered else (CONFIRMED, "")
-        return NOT_CONFIRMED, "its gain on the readings held out does not exclude zero"
+        return NOT_CONFIRMED, "the 95 % interval of its gain on held-out data includes zero"
     if regression is not None and group and regression.terms[group[0]].run_effect is not None:
         if _explains_runs(regression, group):
             return CONFIRMED, ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,16 +18,6 @@ from .levels import LevelGain
 #: Difference of BIC below which two fit equally well: nothing worth more than a bare mention.
 ALIKE = 2.0
 
-#: The negative control of a finding, by the factor that it follows.
-_SHUFFLED = {
-    "direction": "directions exchanged at random between runs",
-    "velocity": "speeds turned round at random",
-    "temperature": "temperatures exchanged between runs",
-    "torque": "loads exchanged between runs",
-    "mount": "mounts exchanged between runs",
-    "coupled": "motions of the other joint moved in time and turned round at random",
-}
-
 #: Numbers that are no errors, which `ErrorUnit.pair` rounds as well.
 _PLAIN = ErrorUnit("", 1.0)
 
@@ -39,6 +30,7 @@ _SIZED: dict[str, tuple[float, str]] = {
     },
     "amplitudes": (1.0, ""),
     "arcsec_per_run": (1.0, ""),
+    "zero_arcsec_per_K": (1.0, "arcsec per K"),
     "delay_s": (1e3, "ms"),
     "sigma_s": (1e3, "ms"),
     "relative_error": (1e6, "ppm"),
@@ -51,10 +43,10 @@ _SIZED: dict[str, tuple[float, str]] = {
 
 #: Place or object of a finding, by its parameters.
 _PLACES = {
-    "order": "order {:g}",
-    "carrier": "of order {:g}",
-    "frequency_hz": "{:.5g} Hz",
-    "place_deg": "at {:.4g} deg",
+    "order": "order {}",
+    "carrier": "of order {}",
+    "frequency_hz": "{} Hz",
+    "place_deg": "at {} deg",
 }
 
 
@@ -130,17 +122,28 @@ def _is_number(quantity: Quantity) -> bool:
     return isinstance(quantity.value, int | float)
 
 
-def finding_lines(number: str, finding: Finding, unit: ErrorUnit) -> list[str]:
-    """A finding as readable text behind its number."""
+def finding_lines(
+    number: str, finding: Finding, unit: ErrorUnit, before: Sequence[Finding] = ()
+) -> list[str]:
+    """A finding as readable text behind its number, without what those ``before`` have stated."""
     n = unit.number
     lines = [number + finding.cause]
     if not finding.confirmed:
         lines[0] += f" (NOT CONFIRMED: {unit.spoken(finding.reason)})"
         lines = wrapped_lines(lines[0], 3)
-    lines += wrapped_lines(finding.sentence, 3, first=3)
+    if finding.cause not in {other.cause for other in before}:
+        lines += wrapped_lines(finding.sentence, 3, first=3)
+    origins = [f.parameters["explanations"] for f in before if "explanations" in f.parameters]
+    stated = {text for origin in origins for text in origin.value}
     for name, entry in finding.parameters.items():
-        lines += wrapped_lines(": ".join(named_quantity(name, entry, unit)), 7, first=5)
-    text = f"Evidence: BIC better by {finding.evidence['bic_gain']:.1f} than without it"
+        if name == "explanations":
+            for text in entry.value:
+                short, colon, _ = text.partition(":")
+                text = f"{short} (see above)" if colon and text in stated else text
+                lines += wrapped_lines(f"may be: {text}", 7, first=5)
+        elif name != "output_order" or entry.value != finding.parameters["order"].value:
+            lines += wrapped_lines(": ".join(named_quantity(name, entry, unit)), 7, first=5)
+    text = f"Evidence: BIC better by {finding.evidence['bic_gain']:.0f} than without it"
     if finding.rivals:
         text += "; in its place " + ", ".join(_rival(*rival) for rival in finding.rivals)
     lines += wrapped_lines(text + ".", 5, first=3)
@@ -152,13 +155,9 @@ def finding_lines(number: str, finding: Finding, unit: ErrorUnit) -> list[str]:
             f"{n(gain.after[1])}, max abs {n(gain.before[2])} -> {n(gain.after[2])}"
         )
         if gain.reducible_share is not None and gain.interval is not None:
-            text += (
-                f"; reducible share {gain.reducible_share:.2f} "
-                f"(95 % interval {gain.interval[0]:.2f} to {gain.interval[1]:.2f})"
-            )
+            text += f"; it removes {_share(gain.reducible_share, gain.interval)}"
         if gain.control_share is not None:
-            control = _SHUFFLED.get(EFFECTS[finding.cause].factor, "runs turned to other angles")
-            text += f", control with {control} {gain.control_share:.2f}"
+            text += f"; control with shuffled labels: {100.0 * max(gain.control_share, 0.0):.0f} %"
         if gain.note:
             text += f"; {gain.note}"
         lines += wrapped_lines(text + ".", 5, first=3)
@@ -171,20 +170,22 @@ def _rival(cause: str, gap: float) -> str:
     """Another cause in the place of a finding, by the difference of their BIC."""
     if abs(gap) < ALIKE:
         return f"{cause} fits as well"
-    return f"{cause} fits {'worse' if gap > 0.0 else 'better'} by {abs(gap):.1f}"
+    return f"{cause} fits {'worse' if gap > 0.0 else 'better'} by {abs(gap):.0f}"
+
+
+def _share(share: float, interval: tuple[float, float]) -> str:
+    """What is removed of the variance beyond the noise, with its 95 % interval."""
+    share, low, high = (100.0 * part for part in (share, *interval))
+    return f"{share:.0f} % of the variance beyond the noise (95 %: {low:.0f} to {high:.0f} %)"
 
 
 def _by_level(gain: LevelGain, unit: ErrorUnit) -> str:
     levels = ", ".join(f"{value:.4g}" for value in gain.held_out or gain.levels)
-    if gain.reducible_share is None or gain.interval is None:
-        return f"Gain by {gain.factor} ({levels} {gain.unit}): {gain.note}."
-    return (
-        f"Gain with each {gain.factor} held out in turn ({levels} {gain.unit}): rms "
-        f"{unit.number(gain.rms_before or 0.0)} -> {unit.text(gain.rms_after or 0.0)}; "
-        "reducible share "
-        f"{gain.reducible_share:.2f} ({gain.interval[0]:.2f} to {gain.interval[1]:.2f}); "
-        f"{gain.note}."
-    )
+    text = f"Gain with each {gain.factor} held out in turn ({levels} {gain.unit}): "
+    if gain.reducible_share is not None and gain.interval is not None:
+        text += f"rms {unit.number(gain.rms_before or 0.0)} -> {unit.text(gain.rms_after or 0.0)}"
+        text += f"; it removes {_share(gain.reducible_share, gain.interval)}; "
+    return f"{text}{gain.note}."
 
 
 def parameter_unit(name: str, unit: ErrorUnit) -> tuple[str, ErrorUnit]:
@@ -200,19 +201,16 @@ def named_quantity(name: str, entry: Quantity, unit: ErrorUnit) -> tuple[str, st
     shown, of = parameter_unit(name, unit)
     value, std = entry.value, entry.std
     if isinstance(value, list):
-        text = ", ".join(_number(item, of) for item in value[:12])
-        if len(value) > 12:
-            text += f" and {len(value) - 12} more"
-        if isinstance(std, list):
-            text += " +- " + ", ".join(_number(item, of) for item in std[:12])
-        return shown, text
+        stds = std if isinstance(std, list) else [None] * len(value)
+        text = ", ".join(_number(*item, of) for item in zip(value[:12], stds, strict=False))
+        return shown, text + (f" and {len(value) - 12} more" if len(value) > 12 else "")
+    return shown, _number(value, std, of)
+
+
+def _number(value: Any, std: Any, of: ErrorUnit) -> str:
     if isinstance(std, float) and isinstance(value, int | float):
         pair = of.pair(float(value), std)
-        return shown, " +- ".join(pair) if pair[1] != "-" else pair[0]
-    return shown, _number(value, of)
-
-
-def _number(value: Any, of: ErrorUnit) -> str:
+        return " +- ".join(pair) if pair[1] != "-" else pair[0]
     if isinstance(value, float) and not (of is _PLAIN and value.is_integer()):
         return of.number(value)
     return f"{value:.0f}" if isinstance(value, float) else str(value)
@@ -226,7 +224,9 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
         name += f" {known['shaft'].replace('_', ' ')}"
     for parameter, words in _PLACES.items():
         if isinstance(known.get(parameter), int | float):
-            name += f" {words.format(known[parameter])}"
+            std = finding.parameters[parameter].std
+            at = _number(known[parameter], std, _PLAIN) if std else f"{known[parameter]:.5g}"
+            name += f" {words.format(at)}"
     for parameter, (factor, word) in _SIZED.items():
         found = known.get(parameter)
         numbers = found if isinstance(found, list) else [found]
@@ -235,8 +235,11 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
             continue
         std = finding.parameters[parameter].std
         stds = std if isinstance(std, list) else [std] * len(sizes)
-        shown = map((ErrorUnit(word, factor) if word else unit).text, sizes[:4], stds)
-        return f"{name} ({', '.join(shown)}{' ...' * (len(sizes) > 4)})"
+        shown = [*map((ErrorUnit(word, factor) if word else unit).text, sizes[:3], stds)]
+        shown += [f"{len(sizes) - 3} more"] if len(sizes) > 3 else []
+        if parameter == "delay_s":
+            shown.append(f"the {'joint' if sizes[0] > 0.0 else 'reference'} is late")
+        return f"{name} ({', '.join(shown)})"
     if finding.gain is None:
         return name
     before, after = finding.gain.before[0], finding.gain.after[0]

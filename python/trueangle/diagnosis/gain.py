@@ -152,7 +152,7 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
         found.append(
             Gain(
                 f"{what} ({parts} parts)"
-                + (", zero of each held-out run taken from itself" if within else ""),
+                + (", each held-out run with its own zero" if within else ""),
                 error_numbers(before),
                 error_numbers(after),
                 share,
@@ -249,13 +249,12 @@ def _note(share: float | None) -> str:
     """What is to be thought of a share on held-out readings."""
     if share is None:
         return (
-            "every run has another one, so that no correction can take it off; it is a part of the "
-            "uncertainty of a single run"
+            "it differs in every run, so no correction can remove it: add it to the uncertainty "
+            "of a single run"
         )
     if share <= 0.0:
         return (
-            "the readings held out are no better with it: it describes these runs, and a "
-            "correction should not contain it before more runs confirm it"
+            "held-out readings are no better with it: do not correct it before more runs confirm it"
         )
     return ""
 

@@ -210,13 +210,13 @@ def gains_by_level(
 def _reach(levels: list[float], held_out: list[float]) -> str:
     """How far the law of a cause was carried."""
     if len(levels) == 2:
-        reach = "the form fitted at one level was carried to the other"
+        reach = "fitted at one level, tested at the other"
     elif {levels[0], levels[-1]} & {*held_out}:
-        reach = "the form was carried to levels between and beyond those it was fitted at"
+        reach = "tested at levels between and beyond those fitted"
     else:
-        reach = "the form was carried to levels between those it was fitted at"
+        reach = "tested at levels between those fitted"
     if len(held_out) < len(levels):
-        reach += "; it cannot be fitted without the levels that were kept"
+        reach += "; the other levels are needed for the fit"
     return reach
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from ..effects.ambiguity import Ambiguity
 from ..effects.missing_order import MissingOrder
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
-from ..support.layout import laid_out
+from ..support.layout import counted, laid_out
 from ..support.layout import wrapped_lines as _wrapped
 from .beliefs import Belief
 from .diagnosisdata import DiagnosisData
@@ -18,6 +18,9 @@ from .goodness.scatter import AGAINST_STATED
 
 #: Share by which the noise must differ from what the simulation states to be reported first.
 MATERIAL = 0.1
+
+#: Causes not confirmed that are listed, strongest first.
+LISTED = 3
 
 #: What adds an entry to a text: how far its further lines are set in, and the first one.
 Entry = tuple[str, int, int]
@@ -33,34 +36,34 @@ def diagnosis_summary(
     d = diagnosis.discrepancy
     unit = error_unit(errors_in, sine_of_rms(d.rms))
     n = unit.number
-    neighbours = f", correlation between neighbours {diagnosis.correlation:.2f}"
-    correlated = neighbours if diagnosis.correlation else ""
     lines = [
         *_headline(diagnosis, unit),
         *_wrapped(diagnosis.simulated.summary() if diagnosis.simulated else "", 0),
         f"Measured minus simulated: rms {unit.text(d.rms)}, peak-to-peak "
         f"{n(d.peak_to_peak)}, max abs {n(d.max_abs)} ({diagnosis.readings} readings).",
-        f"Noise of one reading: {unit.text(diagnosis.noise)}{correlated}.",
     ]
-    if diagnosis.structure:
-        shares = [f"{cause} {100.0 * s:.0f} %" for cause, s in diagnosis.structure.items()]
-        lines += _wrapped(f"Variance explained by each alone: {', '.join(shares[:6])}.", 2)
     if diagnosis.readings_used < diagnosis.readings:
-        used = f"{diagnosis.readings_used} of the readings were used: spread evenly, and none"
-        lines += _wrapped(f"{used} at a turning point, where the direction is not known.", 0)
-    for k, finding in enumerate(diagnosis.findings, 1):
-        lines += ["", *finding_lines(f"{k}. ", finding, unit)]
+        used = f"{diagnosis.readings_used} of {diagnosis.readings} readings were used"
+        lines += _wrapped(f"{used}: evenly spaced, without turning points.", 0)
+    sure = sum(finding.confirmed for finding in diagnosis.findings)
+    shown = diagnosis.findings if verbose else diagnosis.findings[: sure + LISTED]
+    for k, finding in enumerate(shown):
+        lines += ["", *finding_lines(f"{k + 1}. ", finding, unit, shown[:k])]
+    if more := len(diagnosis.findings) - len(shown):
+        lines += ["", f"{counted(more, 'further finding')} not confirmed (`verbose=True`)."]
     if diagnosis.wrong:
         lines += ["", "Wrong in the simulation:"]
         for belief in diagnosis.wrong:
             lines += _wrapped(f"- {_belief(belief, unit)}", 2)
     g = diagnosis.gain
     together = (
-        f"All together: rms {n(g['rms_before_arcsec'])} -> {unit.text(g['rms_after_arcsec'])}, "
-        f"peak-to-peak {n(g['peak_to_peak_before_arcsec'])} -> "
-        f"{n(g['peak_to_peak_after_arcsec'])}, max abs {n(g['max_abs_before_arcsec'])} -> "
-        f"{n(g['max_abs_after_arcsec'])} (in the readings that were fitted)."
+        f"Extended simulation, in the readings that were fitted: rms {n(g['rms_before_arcsec'])} "
+        f"-> {unit.text(g['rms_after_arcsec'])}, peak-to-peak "
+        f"{n(g['peak_to_peak_before_arcsec'])} -> {n(g['peak_to_peak_after_arcsec'])}, max abs "
+        f"{n(g['max_abs_before_arcsec'])} -> {n(g['max_abs_after_arcsec'])}."
     )
+    if sure < len(diagnosis.findings):
+        together += " Causes that are not confirmed are not in it."
     lines += ["", *_wrapped(together, 2)]
     if diagnosis.torque is not None:
         lines.append("")
@@ -83,19 +86,27 @@ def _if_it_is(spot: Ambiguity, unit: ErrorUnit) -> Iterator[str]:
         yield f"If {cause}: {shown}."
 
 
+def _noise(diagnosis: DiagnosisData, unit: ErrorUnit) -> str:
+    """The noise of one reading, next to that of the simulation."""
+    text = f"Noise of one reading: {unit.text(diagnosis.noise)}"
+    if diagnosis.extended.sigma_arcsec:
+        text += f" ({unit.number(diagnosis.extended.sigma_arcsec)} in the simulation)"
+    if diagnosis.correlation:
+        text += f", correlation between neighbours {diagnosis.correlation:.2f}"
+    return f"{text}."
+
+
 def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
     """What a reader must know first: what is found, how large it is, and what to do."""
     entries = [*_found(diagnosis, unit)]
     rest = diagnosis.unexplained
     noise = [] if rest is None else [item for item in rest.noise_firing if _is_material(item)]
-    if entries:
-        told = (unit.spoken(item.says) for item in noise if item.test == AGAINST_STATED)
-        entries += [(f"{text[0].upper()}{text[1:]}.", 2, 0) for text in told]
-    elif noise:
-        entries.append(("No pattern beyond the simulation, but the noise differs:", 0, 0))
-        entries += _items(noise, unit)
-    else:
+    if noise and not entries:
+        entries.append(("No pattern beyond the simulation, but the noise differs.", 0, 0))
+        entries += _items((item for item in noise if item.test != AGAINST_STATED), unit)
+    elif not entries:
         entries.append(("Nothing beyond the simulation: no test is significant.", 0, 0))
+    entries.append((_noise(diagnosis, unit), 2, 0))
     steps = "; ".join(diagnosis.next_steps)
     entries += [(f"What to do: {steps}.", 2, 0)] if steps else []
     return [*(line for entry in entries for line in _wrapped(*entry)), ""]
@@ -118,17 +129,23 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     for title, status in (("Confirmed", True), ("Not confirmed", False)):
         named = [brief_finding(f, unit) for f in diagnosis.findings if f.confirmed is status]
         if named:
-            yield f"{title}: {_by_cause(named)}.", 2, 0
+            most = len(named) if status else LISTED
+            more = f", and {len(named) - most} more" if len(named) > most else ""
+            yield f"{title}: {_by_cause(named[:most])}{more}.", 2, 0
     lacking = () if diagnosis.torque is None else diagnosis.torque.findings
     torque = "; ".join(f.summary() for f in lacking if f.confirmed)
     if torque:
         yield f"Confirmed in the drive's torque: {torque}.", 2, 0
-    yield from ((f"Follows {factor.sentence(unit)}.", 2, 0) for factor in diagnosis.factors)
+    sure = {factor.factor for factor in diagnosis.factors if factor.named_by}
+    for factor in diagnosis.factors:
+        beyond = not factor.named_by and factor.factor in sure
+        yield f"{'Beyond that, follows' if beyond else 'Follows'} {factor.sentence(unit)}.", 2, 0
     wrong = "; ".join(f"{b.what} {b.verdict.replace('_', ' ')}" for b in diagnosis.wrong[:4])
     if wrong:
         yield f"Wrong in the simulation: {wrong}.", 2, 0
     for spot in diagnosis.in_question:
-        yield f"Detected, not distinguished: {_seen(spot, unit)}.", 2, 0
+        detected = "not distinguished" if len(spot.causes) > 1 else "not confirmed"
+        yield f"Detected, {detected}: {_seen(spot, unit)}.", 2, 0
 
 
 def _by_cause(named: Iterable[str]) -> str:
@@ -152,18 +169,15 @@ def _seen(spot: Ambiguity, unit: ErrorUnit) -> str:
 
 
 def _belief(belief: Belief, unit: ErrorUnit) -> str:
-    measured, believed, std = belief.measured, belief.believed, belief.std
-    text = f"{belief.what}: {belief.verdict.replace('_', ' ')}; "
-    parts = [
-        f"{shown.replace('_', ' ')} {' +- '.join(of.pair(measured[name], std[name]))}, "
-        f"assumed {of.number(value)}"
-        for name, value in believed.items()
-        for shown, of in [parameter_unit(name, unit)]
-    ]
-    text += "; ".join(parts)
+    text = f"{belief.what}: {belief.verdict.replace('_', ' ')}"
+    for name, value in belief.believed.items():
+        shown, of = parameter_unit(name, unit)
+        what, _, its_unit = shown.partition("_")
+        size = " +- ".join(of.pair(belief.measured[name], belief.std[name]))
+        text += f"; {what} {size} {its_unit}".rstrip() + f", assumed {of.number(value)}"
     gain = belief.gain
     if gain is not None:
-        text += f"; held out, rms {unit.number(gain.before[0])} -> {unit.text(gain.after[0])}"
+        text += f"; held-out rms {unit.number(gain.before[0])} -> {unit.text(gain.after[0])}"
     return text
 
 
@@ -195,10 +209,9 @@ def _ambiguity_entries(diagnosis: DiagnosisData, verbose: bool, unit: ErrorUnit)
         yield f"- {_head(spot)}: {spot.because}.{how}", 2, 0
         yield from ((text, 6, 4) for text in _if_it_is(spot, unit))
     named = {finding.cause for finding in diagnosis.findings}
-    others = (cause for spot in spots if spot not in shown for cause in spot.causes)
-    rest = [cause for cause in others if cause not in named]
-    if rest:
-        names = ", ".join(dict.fromkeys(rest))
+    rest = dict.fromkeys(cause for spot in spots if spot not in shown for cause in spot.causes)
+    names = ", ".join(cause for cause in rest if cause not in named)
+    if names:
         again = " either" if shown else ""
         yield f"Not detectable in these runs{again}: {names} (why: `verbose=True`).", 2, 0
 

@@ -154,7 +154,7 @@ def run_steps(design: RunDesign) -> Iterator[str]:
     if design.speed_end_deg_s is not None:
         speed = f"coasting from {speed} to {design.speed_end_deg_s:g}"
     yield f"move {way} deg at {speed} ({run_seconds(design):.0f} s)"
-    free = {"jittered": "at free angles, one in each equal step", "uniform": "at equal steps"}
+    free = {"jittered": "once at a random angle in each equal step", "uniform": "at equal steps"}
     yield f"read {design.samples} times, {free.get(design.spacing, design.spacing)}"
     if design.temperature_end_C is not None:
         yield f"warm from {design.temperature_C:g} to {design.temperature_end_C:g} C meanwhile"

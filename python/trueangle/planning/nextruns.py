@@ -108,7 +108,11 @@ class NextRuns(PlainResult):
             lines.append(
                 f"Next: {counted(self.runs, 'run')} of {self.readings} readings in all, "
                 f"{_spoken_time(self.seconds)} of motion"
-                + ("; diagnose by themselves" if self.alone else "; diagnose with those there are")
+                + (
+                    "; diagnose them alone"
+                    if self.alone
+                    else "; diagnose them with the earlier runs"
+                )
             )
             for steps, same in groupby(self.runs, lambda design: [*run_steps(design)]):
                 labels = [str(design.label) for design in same]
@@ -120,23 +124,19 @@ class NextRuns(PlainResult):
             if entry.told and not entry.seen and len(entry.causes) == 1:
                 shown += entry.causes
                 continue
-            names = " or ".join(entry.causes)
-            if not entry.told:
-                text = f"  not distinguished: {names}"
-            elif len(entry.causes) > 1:
-                text = f"  distinguishes {names}"
-            else:
-                text = f"  shows {names}"
+            kind = "shows" if len(entry.causes) == 1 else "distinguishes"
+            kind = kind if entry.told else "not distinguished:"
+            text = f"  {kind} {(' from ' if entry.told else ' or ').join(entry.causes)}"
             if entry.seen and entry.expected_bic is not None and entry.chance_named is not None:
-                text += f": BIC better by {entry.expected_bic:.0f} expected for the true one"
                 by = f" ({entry.trials} simulated)" if entry.trials else ""
-                text += f", named in {100.0 * entry.chance_named:.0f} %{by}"
+                text += f": expected BIC gain {entry.expected_bic:.0f}, true cause named in "
+                text += f"{100.0 * entry.chance_named:.0f} % of the cases{by}"
             if text not in lines:  # two lines of the pattern may give the same text
                 lines.append(text)
         if shown:
             lines.append(f"  shows {', '.join(dict.fromkeys(shown))}")
         if self.beyond:
-            lines.append(f"  beyond what was measured so far: {', '.join(self.beyond)}")
+            lines.append(f"  conditions not measured so far: {', '.join(self.beyond)}")
         lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)
 

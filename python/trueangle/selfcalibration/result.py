@@ -14,7 +14,7 @@ from ..runs.rawchannels import Channels
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
-from ..support.layout import counted, laid_out, wrapped_lines
+from ..support.layout import counted, laid_out, order_ranges, wrapped_lines
 from ..support.plainresult import PlainResult, plain_fields
 from .channelcauses import ChannelDiagnosis
 
@@ -289,23 +289,3 @@ def _table(orders: tuple[OrderEstimate, ...], unit: ErrorUnit) -> list[str]:
             f"{o.std_factor:7.2f}" + (f"  {o.of}" if names else "")
         )
     return lines
-
-
-def order_ranges(orders: Sequence[float]) -> str:
-    """Orders in words: ``1-4, 8``.
-
-    Examples
-    --------
-    >>> order_ranges([1, 2, 3, 4, 8, 7.3])
-    '1-4, 7.3, 8'
-    """
-    parts: list[str] = []
-    run: list[float] = []
-    for order in [*sorted(orders), math.inf]:
-        if run and (order != run[-1] + 1.0):
-            parts.append(
-                f"{run[0]:g}-{run[-1]:g}" if len(run) > 2 else ", ".join(f"{k:g}" for k in run)
-            )
-            run = []
-        run.append(order)
-    return ", ".join(parts)

@@ -20,6 +20,7 @@ from ..errors import NoModelError
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import f_tail
+from ..support.layout import order_ranges
 from .dense import DenseFit, dense_fixed_point, fit_dense
 from .densetriangle import DenseRows
 from .model import ENCODER, pattern_model, reference_free_calibration
@@ -32,7 +33,6 @@ from .result import (
     HeldOutPattern,
     SelfCalibration,
     order_estimates,
-    order_ranges,
 )
 
 OTHER: Final = "the other encoder"

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import NoModelError
 from ..support.arrays import Array
-from ..support.layout import counted
+from ..support.layout import counted, order_ranges
 from .loop import followed_orders, followed_share, widened_by_loop
 from .model import ENCODER, reference_free_calibration
 from .orderchoice import choose_selfcal_orders, highest_order, noise_spectrum_at
@@ -25,7 +25,6 @@ from .result import (
     OrderEstimate,
     SelfCalibration,
     order_estimates,
-    order_ranges,
 )
 from .ripple import LARGEST_COST, averaged_over_ripple, cost_of_ripple
 from .segments import SegmentReadings, cut_stretches

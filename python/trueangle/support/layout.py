@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator, Sized
+from collections.abc import Iterable, Iterator, Sequence, Sized
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Final
@@ -141,3 +142,23 @@ def counted(things: Sized | int, one: str, several: str = "") -> str:
     """
     n = things if isinstance(things, int) else len(things)
     return f"{n} {one if n == 1 else several or one + 's'}"
+
+
+def order_ranges(orders: Sequence[float]) -> str:
+    """Orders in words: ``1 to 4, 8``.
+
+    Examples
+    --------
+    >>> order_ranges([1, 2, 3, 4, 8, 7.3])
+    '1 to 4, 7.3, 8'
+    """
+    parts: list[str] = []
+    run: list[float] = []
+    for order in [*sorted(orders), math.inf]:
+        if run and (order != run[-1] + 1.0):
+            parts.append(
+                f"{run[0]:g} to {run[-1]:g}" if len(run) > 2 else ", ".join(f"{k:g}" for k in run)
+            )
+            run = []
+        run.append(order)
+    return ", ".join(parts)

@@ -163,7 +163,7 @@ def test_a_finding_has_its_own_gain_and_none_is_confirmed_without(
     assert asked == [groups]
     assert all(finding.gain is gain for finding, gain in zip(found, gains, strict=True))
     assert [finding.confirmed for finding in found] == [True, True, False, True, True, True]
-    assert found[2].reason == "its gain on the readings held out does not exclude zero"
+    assert found[2].reason == "the 95 % interval of its gain on held-out data includes zero"
     assert doubtful == [2]
     monkeypatch.setattr(made, "measure_gain", lambda regression, named: None)
     found, _, doubtful = findings_of(fitted, [], True, CALM)

@@ -23,5 +23,5 @@ def test_an_order_that_is_the_error_of_every_run_has_its_share(bits, zeros):
     (finding,) = [f for f in result.findings if f.cause == "missing_order"]
     assert finding.confirmed
     assert finding.gain.reducible_share == pytest.approx(1.0, abs=0.05)
-    assert finding.gain.holdout.endswith("zero of each held-out run taken from itself")
+    assert finding.gain.holdout.endswith("each held-out run with its own zero")
     assert finding.gain.after[0] < 0.6 * finding.gain.before[0]

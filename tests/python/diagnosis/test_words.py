@@ -45,7 +45,6 @@ def test_a_headline_says_which_line_and_how_large(geared):
 def test_shares_are_of_the_variance_of_the_readings(geared):
     # Order 1 alone takes 42.6 arcsec rms to 4.1.
     assert geared.structure["missing_order"] == pytest.approx(1.0 - (4.06 / 42.6) ** 2, abs=0.003)
-    assert "missing_order 99 %" in geared.summary()
 
 
 def test_the_noise_is_what_is_left(geared):
@@ -81,11 +80,11 @@ def test_every_kind_of_size_has_its_unit():
     result = ta.diagnose(ta.simulate(sim.with_effects(hidden), 3), sim)
     first = " ".join(result.summary().split("\n\n")[0].split())
     (bump,) = [f.parameters["place_deg"].value for f in result.findings if "local" in f.cause]
-    for cause in ("backlash (", "zero_slip (", f"local_defect output at {bump:.4g}"):
+    for cause in ("backlash (", "zero_slip (", f"local_defect output at {bump:.1f}"):
         assert cause in first, first
     assert first.count("arcsec)") == 3
     text = result.summary()
-    assert "no correction can take it off" in " ".join(text.split())
+    assert "no correction can remove it" in " ".join(text.split())
     assert "fits worse by" in text
     assert "would explain" not in text
     assert diagnosis_summary(result) == text

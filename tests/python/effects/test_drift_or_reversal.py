@@ -103,4 +103,4 @@ def test_a_run_that_drifts_keeps_a_zero_of_its_own_where_it_is_held_out() -> Non
         assert told[0] == pytest.approx(float(np.sqrt(np.mean(left**2))), rel=0.01)
         assert told[1] == pytest.approx(float(np.ptp(left)), rel=0.02)
         assert told[2] == pytest.approx(float(np.abs(left).max()), rel=0.02)
-    assert "zero of each held-out run taken from itself" in gains[0].holdout
+    assert "each held-out run with its own zero" in gains[0].holdout

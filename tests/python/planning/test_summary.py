@@ -89,8 +89,8 @@ def test_of_the_next_runs(told_apart, trials):
     designs = (RunDesign(label="next-1", samples=120), RunDesign(label="next-2", samples=80))
     plan = NextRuns(designs, (entry,), False, (), 150.0, Simulation())
     text = " ".join(plan.summary().split())
-    assert "2 runs of 200 readings in all, 2 min of motion; diagnose with" in text
-    verb = "distinguishes backlash or latency" if told_apart else "not distinguished: backlash or"
+    assert "2 runs of 200 readings in all, 2 min of motion; diagnose them with" in text
+    verb = "distinguishes backlash from latency" if told_apart else "not distinguished: backlash or"
     assert verb in text
     counted = f" ({trials} simulated)" if trials else ""
-    assert f"BIC better by 23 expected for the true one, named in 87 %{counted}" in text
+    assert f"expected BIC gain 23, true cause named in 87 % of the cases{counted}" in text

@@ -31,10 +31,10 @@ from trueangle.selfcalibration.result import (
     SelfCalibration,
     blind_words,
     order_estimates,
-    order_ranges,
 )
 from trueangle.selfcalibration.ripple import averaged_over_ripple, cost_of_ripple
 from trueangle.selfcalibration.verification import chance_of_difference, judged_patterns
+from trueangle.support.layout import order_ranges
 
 ARCSEC = 1_296_000.0 / (2.0 * math.pi)
 
@@ -328,9 +328,9 @@ def test_a_pattern_that_no_encoder_has_is_refused_without_an_advice_for_fits() -
 def test_a_summary_tells_every_number() -> None:
     assert order_ranges([]) == ""
     assert order_ranges([5, 1, 2]) == "1, 2, 5"
-    assert order_ranges([1, 2, 3, 7.3, 8, 9, 10]) == "1-3, 7.3, 8-10"
+    assert order_ranges([1, 2, 3, 7.3, 8, 9, 10]) == "1 to 3, 7.3, 8 to 10"
     assert blind_words([0.0]) == "zero"
-    assert blind_words([1.0, 2.0, 3.0]) == "orders 1-3"
+    assert blind_words([1.0, 2.0, 3.0]) == "orders 1 to 3"
     tests = {"a": HeldOutPattern("odd turns", "even turns", 9.0, 2.0, 0.5),
              "b": HeldOutPattern("forward", "backward", 9.0, 2.0, 0.0005)}  # fmt: skip
     result = SelfCalibration(

@@ -9,7 +9,8 @@ from typing import Any
 from ...effects.curve import Curve
 from ...support.arrays import Array
 from ...support.display_units import ErrorUnit
-from ...support.plainresult import PlainResult
+from ...support.layout import order_ranges
+from ...support.plainresult import PlainResult, plain_fields
 
 #: Factors in words.
 WORDS = {
@@ -33,8 +34,8 @@ WORDS = {
     "frequency": "a line in time",
 }
 
-#: Orders that are listed.
-LISTED = 6
+#: Orders that are listed, and decimals of those that are not whole.
+LISTED, DECIMALS = 6, 2
 
 
 @dataclass(frozen=True)
@@ -58,13 +59,7 @@ class FactorCurve:
 
     def to_dict(self) -> dict[str, Any]:
         """The entry ``curve``."""
-        return {
-            "at": self.at.tolist(),
-            "unit": self.unit,
-            "value_arcsec": self.value.tolist(),
-            "low_arcsec": self.low.tolist(),
-            "high_arcsec": self.high.tolist(),
-        }
+        return plain_fields(self, "at unit value_arcsec=value low_arcsec=low high_arcsec=high")
 
 
 @dataclass(frozen=True)
@@ -119,29 +114,23 @@ class Factor(PlainResult):
 
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``factors``."""
-        return {
-            "factor": self.factor,
-            "shaft": self.shaft,
-            "orders": None if self.orders is None else list(self.orders),
-            "rms_arcsec": self.rms,
-            "low_arcsec": self.low,
-            "high_arcsec": self.high,
-            "share": self.share,
-            "log_bayes_factor": self.log_bayes_factor,
-            "named_by": list(self.named_by),
-            "not_distinguished_from": list(self.not_distinguished_from),
-            "curve": self.curve.to_dict(),
-        }
+        sizes = "rms_arcsec=rms low_arcsec=low high_arcsec=high share log_bayes_factor"
+        return plain_fields(
+            self, f"factor shaft orders {sizes} named_by not_distinguished_from curve"
+        )
 
     def sentence(self, unit: ErrorUnit) -> str:
         """The factor in words: what is followed, how much, and whether it has a name."""
         also = [WORDS[other] for other in self.not_distinguished_from]
         text = " or ".join([WORDS[self.factor], *also])
+        if self.curve.unit == "deg":
+            text = text.replace(WORDS["reversal_time"], "the travel since the last reversal")
         if self.orders:
-            shown = ", ".join(f"{order:.6g}" for order in self.orders[:LISTED])
-            more = " ..." if len(self.orders) > LISTED else ""
             of = "" if self.shaft in (None, "output") else f" of the {self.shaft}"
-            text += f" (order{'s' if len(self.orders) > 1 else ''} {shown}{more}{of})"
+            shown = order_ranges([*dict.fromkeys(round(m, DECIMALS) for m in self.orders)])
+            more = " ..." if shown.count(",") >= LISTED else ""
+            shown = ", ".join(shown.split(", ")[:LISTED]) + more + of.replace("_", " ")
+            text += f" (order{'s' if len(self.orders) > 1 else ''} {shown})"
         n = unit.number
         if self.jumps:
             sizes = [f"{n(size)} {unit.name} at {at:.1f} deg" for at, size in self.jumps]
@@ -149,12 +138,13 @@ class Factor(PlainResult):
         if self.events:
             shown = " and ".join(f"run {run + 1} at row {row + 1}" for run, row in self.events)
             text += f" ({'events' if len(self.events) > 1 else 'an event'} in {shown})"
-        text += f", {n(self.rms)} {unit.name} rms ({n(self.low)} to {n(self.high)})"
+        range_ = f"{n(self.low)} to" if self.low else "at most"
+        text += f", {n(self.rms)} {unit.name} rms ({range_} {n(self.high)})"
         names = ", ".join(self.named_by)
         if names:
             return f"{text}: {names}"
-        held = "; the extended simulation holds its curve" if self.effects else ""
-        return f"{text}: no named form fits{held}"
+        held = "; the extended simulation contains its curve" if self.effects else ""
+        return f"{text}: no known cause fits{held}"
 
     def _brief(self) -> str:
         return f"{self.factor}, {self.rms:.3g} arcsec rms, {', '.join(self.named_by) or 'no name'}"

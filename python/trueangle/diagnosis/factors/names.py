@@ -236,7 +236,7 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
         own, left = names.taken(sure, [k], tau, EFFECTS[found[k].cause].form_of)
         if own < TAKES * (own + left):
             share = 100.0 * own / (own + left)
-            return {k: f"its form takes {share:.0f} % of what its factors take"}
+            return {k: f"its formula explains {share:.0f} % of what its factors explain"}
     return {}
 
 
