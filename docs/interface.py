@@ -25,7 +25,8 @@ from trueangle.fleets import file as fleetfile
 from trueangle.fleets import result as fleets
 from trueangle.formats.formats import FORMATS
 from trueangle.model import file as modelfile
-from trueangle.model import robotfile, writing
+from trueangle.model import robot as robotfile
+from trueangle.model import writing
 from trueangle.model.term import TERMS, Term
 from trueangle.reports import composition
 from trueangle.runs.source import ReadingOptions

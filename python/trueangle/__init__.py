@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from .model.model import HarmonicModel as HarmonicModel
     from .model.monitor import Monitor as Monitor
     from .model.robot import Robot as Robot
-    from .model.robotfile import load_robot as load_robot
+    from .model.robot import load_robot as load_robot
     from .model.terms import Backlash as Backlash
     from .model.terms import FilterLag as FilterLag
     from .model.terms import Latency as Latency
@@ -96,7 +96,7 @@ _PUBLIC = {
     "fleet": "fleets",
     "load_fleet": "fleets",
     "load_model": "model.file",
-    "load_robot": "model.robotfile",
+    "load_robot": "model.robot",
     "Moments": "estimation.moments",
     "Monitor": "model.monitor",
     "read_runs": "runs.files",

@@ -30,7 +30,7 @@ MORE = {"white": nothing, "that drift": drift, "that remember": memory}
 CAREFUL = "the smaller of two tests, times two"
 
 
-def sines(order: ta.fleets.unit.UnitOrder) -> Array:
+def sines(order: ta.fleets.result.UnitOrder) -> Array:
     """Cosine and sine of an order, arcsec."""
     phase = np.radians(order.phase_deg)
     return np.array([np.sin(phase), np.cos(phase)]) * order.amplitude / made.ARCSEC

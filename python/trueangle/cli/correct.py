@@ -128,7 +128,7 @@ def _columns_of_joints(
     models: dict[Any, Any], args: argparse.Namespace
 ) -> tuple[dict[str, Any] | None, bool]:
     """Columns of the log's joints, and whether it has one; ``models`` lose joints that it lacks."""
-    from ..model.robotfile import is_robot_file, load_robot
+    from ..model.robot import is_robot_file, load_robot
 
     single = None in models
     whole = single and is_robot_file(models[None])

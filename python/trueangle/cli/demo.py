@@ -328,6 +328,8 @@ def reduction(
     """
     import numpy as np
 
+    from ..estimation.linear import least_squares
+
     training, last = (runs, held) if held else (runs[:-1], runs[-1])
 
     def columns(degrees: Array) -> Array:
@@ -337,7 +339,7 @@ def reduction(
     zeros = np.repeat(np.eye(len(training)), [len(run) for run in training], axis=0)
     lines = columns(np.concatenate([run.reference for run in training]))
     read = np.concatenate([3600.0 * run.centred_error for run in training])
-    found = np.linalg.lstsq(np.concatenate([lines, zeros], axis=1), read, rcond=None)[0]
+    found = least_squares(np.concatenate([lines, zeros], axis=1), read)
     coefficients = found[: 2 * len(orders)]
     measured = 3600.0 * last.centred_error
     after = measured - columns(last.reference) @ coefficients

@@ -252,8 +252,7 @@ def _believed(args: argparse.Namespace, empty: bool = False) -> Simulation | Non
     ArgumentError
         Neither, and no log; or both.
     """
-    from ..joint.declared import DeclaredShaft
-    from ..joint.joint import Joint
+    from ..joint.joint import DeclaredShaft, Joint
     from ..simulation import Simulation, load_simulation
 
     stated = args.gear_ratio is not None or args.shaft

@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..export import export_model
     from ..export.targets import TARGETS
-    from ..model.robotfile import is_robot_file
+    from ..model.robot import is_robot_file
     from ..support.files import check_output
 
     options = target_options(args)

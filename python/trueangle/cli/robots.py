@@ -227,7 +227,7 @@ def refuse_joint(joint: str | None, paths: Sequence[str]) -> None:
     ArgumentError
         Every file holds the model of one joint, which has no name.
     """
-    from ..model.robotfile import is_robot_file
+    from ..model.robot import is_robot_file
 
     if joint is not None and not any(map(is_robot_file, paths)):
         raise ArgumentError(f"--joint {joint}: {paths[0]} is the model of one joint")
@@ -242,7 +242,7 @@ def joint_asked(path: str, joint: str | None) -> tuple[HarmonicModel, dict[str, 
         The file holds several joints and none is named, or one that it does not have.
     """
     from ..model.file import load_model
-    from ..model.robotfile import is_robot_file, load_robot
+    from ..model.robot import is_robot_file, load_robot
 
     if not is_robot_file(path):
         return load_model(path), {}

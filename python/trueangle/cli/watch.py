@@ -28,9 +28,9 @@ from .signal_options import (
 from .values import turns
 
 if TYPE_CHECKING:
-    from ..model.alarm import WatchedWindow
     from ..model.batches import ReadingBatch
     from ..model.model import HarmonicModel
+    from ..model.monitor import WatchedWindow
 
 HELP = "watch a running joint against its model; status 3 where an alarm was raised"
 EXAMPLE = "trueangle watch joint.csv -m joint_a.json --every 1turn"

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ..estimation.linear import wald_statistic
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, normal_tail
 from ..support.plainresult import ShownResult, plain_fields
@@ -82,7 +83,7 @@ def judge_line(what: str, believed: Sequence[float], change: Array, covariance: 
     across = np.array([along[1], -along[0]])
     std = float(np.sqrt(max(float(along @ covariance @ along), 0.0)))
     turn = np.degrees(np.sqrt(max(float(across @ covariance @ across), 0.0)) / max(found, 1e-300))
-    deviance = float(change @ np.linalg.pinv(covariance) @ change)
+    deviance = wald_statistic(change, covariance)
     off = float(np.hypot(*change))
     phases = [float(np.degrees(np.arctan2(v[0], v[1])) % 360.0) for v in (old, new)]
     away = abs((phases[1] - phases[0] + 180.0) % 360.0 - 180.0)

@@ -11,10 +11,9 @@ from ..effects.drift_within_run import DriftWithinRun
 from ..effects.non_integer_order import NonIntegerOrder
 from ..effects.time_periodic import FREQUENCY_DRIFT, TimePeriodic
 from ..estimation.regression import Extension, Regression
-from ..joint.lines import line_columns
-from ..support.arrays import Array
+from ..joint.pattern import line_columns
+from ..support.arrays import Array, quantile
 from ..support.display_units import brief_number
-from ..support.quantiles import quantile
 from .gain import Gain
 from .goodness import FREE_PATH, Unexplained
 from .goodness.periodogram import order_test, time_test

@@ -21,12 +21,12 @@ import numpy as np
 from ..effects import EFFECTS
 from ..effects.latency import Latency
 from ..estimation.extension import Extension
-from ..estimation.factor import least_squares, orthonormal_basis
+from ..estimation.factor import orthonormal_basis
+from ..estimation.linear import least_squares
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.earlier import earlier_signals
-from ..joint.lines import lines_columns
-from ..joint.pattern import ARCSEC_PER_RAD, Pattern
+from ..joint.pattern import ARCSEC_PER_RAD, Pattern, lines_columns
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_DEG, ARCSEC_PER_TURN

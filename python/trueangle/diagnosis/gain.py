@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import EFFECTS
+from ..estimation.linear import least_squares
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array
@@ -292,8 +293,7 @@ def _control(
         # What the training half does not show (a bump that it never passes) has no size.
         seen = np.linalg.norm(columns[~test], axis=0) > 1e-6 * np.linalg.norm(columns, axis=0)
         columns = columns[:, seen]
-        coefficients = np.linalg.lstsq(columns[~test], y[~test], rcond=None)[0]
-        after = y[test] - columns[test] @ coefficients
+        after = y[test] - columns[test] @ least_squares(columns[~test], y[~test])
         gained = float(np.mean(y[test] ** 2 - after**2))
         shares.append(max(gained / max(reducible, least), -1.0))
     return float(np.mean(shares))

@@ -20,8 +20,8 @@ from functools import cached_property
 import numpy as np
 
 from ..effects.search import golden_maximum
-from ..joint.lines import line_columns
-from ..joint.pattern import Harmonic, Pattern
+from ..estimation.linear import least_squares, linear_residual
+from ..joint.pattern import Harmonic, Pattern, line_columns
 from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array
@@ -149,7 +149,7 @@ class GearedLines:
         columns = self._centred(np.hstack(lines))
         found = np.zeros(len(lines))
         for start, stop in self.bounds:
-            fit = np.linalg.lstsq(columns[start:stop], self._error[start:stop], rcond=None)[0]
+            fit = least_squares(columns[start:stop], self._error[start:stop])
             power = fit[0::2] ** 2 + fit[1::2] ** 2
             found += (stop - start) * np.minimum(power / self._believed, 1.0)
         return found / self.y.size
@@ -188,8 +188,7 @@ class GearedLines:
             moved[part] = lines[part, 0::2] @ b - lines[part, 1::2] @ a
         column = self._centred(angle * moved)
         for part in parts:
-            known = beside[part]
-            column[part] -= known @ np.linalg.lstsq(known, column[part], rcond=None)[0]
+            column[part] = linear_residual(beside[part], column[part])
         power = float(column @ column)
         if power == 0.0 or freedom <= 0:
             return 0.0, 0.0
@@ -227,8 +226,7 @@ class GearedLines:
         known, error = self._centred(columns), self._error
         left = 0.0
         for start, stop in self._parts(common):
-            x, y = known[start:stop], error[start:stop]
-            rest = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
+            rest = linear_residual(known[start:stop], error[start:stop])
             left += float(rest @ rest)
         return left
 

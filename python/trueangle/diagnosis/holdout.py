@@ -13,9 +13,8 @@ from ..estimation.regression import Extension, Regression
 from ..estimation.whitening import RunEffect
 from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
-from ..support.arrays import Array
+from ..support.arrays import Array, quantile
 from ..support.deadline import current_deadline
-from ..support.quantiles import quantile
 
 Rows = NDArray[np.bool_]
 

@@ -12,6 +12,7 @@ from ..effects import EFFECTS, Effect
 from ..effects.ambiguity import Ambiguity
 from ..effects.missing_order import MissingOrder
 from ..estimation.extension import Extension
+from ..estimation.linear import wald_statistic
 from ..estimation.regression import ROUNDING, Regression
 from ..joint.pattern import Harmonic, JointPattern
 from ..joint.signals import Signals
@@ -229,7 +230,7 @@ def _doubt(
     origins = open_origins(extension, regression, spots) if doubt is None else [doubt]
     if not origins:
         return False
-    deviance = float(change @ np.linalg.pinv(spread) @ change)
+    deviance = wald_statistic(change, spread)
     evidence = deviance - 2.0 * regression.log_n - 2.0 * log_grid
     if evidence > NEW_CAUSE:
         spots[:] = with_open_origins(spots, origins, evidence)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import EFFECTS
+from ..estimation.linear import pseudo_inverse
 from ..estimation.regression import Regression
 from ..joint.signals import Signals
 from ..support.arrays import Array, distinct
@@ -239,5 +240,5 @@ def _is_tested_by(regression: Regression, group: Sequence[int], test: Rows) -> b
     fitted = regression.fitted()
     there = np.hstack([fitted[k][0].columns[test] for k in group])
     size = float(np.sum((there @ np.concatenate([fitted[k][1] for k in group])) ** 2))
-    carried = np.einsum("ij,jk,ik->", there, np.linalg.pinv(own.T @ own), there)
+    carried = np.einsum("ij,jk,ik->", there, pseudo_inverse(own.T @ own), there)
     return bool(size > max(LEAST_CARRIED * carried, LEAST_SHOWN) * regression.variance)

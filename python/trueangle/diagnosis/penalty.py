@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from ..effects import EFFECTS
 from ..effects.missing_order import MissingOrder
+from ..estimation.linear import wald_statistic
 from ..estimation.regression import Extension, Regression
 from .formerrors import FORM
 
@@ -140,6 +142,4 @@ def deviance_lost(regression: Regression, group: Sequence[int]) -> float:
     columns = np.concatenate([regression.place(k) for k in group])
     coefficients = regression.coefficients[columns]
     spread = regression.unscaled_covariance[np.ix_(columns, columns)]
-    return regression.n * float(
-        np.log1p(coefficients @ np.linalg.pinv(spread) @ coefficients / regression.rss)
-    )
+    return regression.n * math.log1p(wald_statistic(coefficients, spread) / regression.rss)

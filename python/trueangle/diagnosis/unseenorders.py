@@ -9,7 +9,7 @@ from ..effects.missing_order import MissingOrder
 from ..effects.scale_error import ScaleError
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.lines import lines_columns
+from ..joint.pattern import lines_columns
 from ..support.arrays import Array
 
 #: Cycles over the travel up to which an order takes part of its neighbours'.

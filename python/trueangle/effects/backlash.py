@@ -11,8 +11,7 @@ import numpy as np
 from ..estimation.extension import Extension
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
-from ..joint.lines import line_sum
-from ..joint.pattern import JointPattern
+from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.travel import BacklashTerm

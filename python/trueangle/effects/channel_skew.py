@@ -9,11 +9,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
+from ..estimation.linear import pseudo_inverse
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.joint import Joint
-from ..joint.lines import line_columns
-from ..joint.pattern import JointPattern
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import ChannelSkewTerm
@@ -125,7 +125,7 @@ class ChannelSkew(Effect):
         order = skewed_order(regression.around.joint)
         rest = regression.with_terms(t for t in regression.terms if t is not extension)
         pair = rest.projected(cls.columns(regression.signals, regression.around, {}))[0]
-        spread = np.asarray(regression.variance * np.linalg.pinv(pair.T @ pair), dtype=np.float64)
+        spread = regression.variance * pseudo_inverse(pair.T @ pair)
         _, _, _, phase_std = line_parameters(
             abs(float(delay)) * np.array([np.sin(np.radians(phase)), np.cos(np.radians(phase))]),
             spread,

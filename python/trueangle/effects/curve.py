@@ -10,8 +10,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from ..errors import ArgumentError
-from ..joint.lines import line_sum
-from ..joint.pattern import JointPattern
+from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.curve import CurveTerm

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..estimation.linear import linear_residual
 from ..joint.signals import Signals
 from ..support.arrays import Array
 
@@ -49,17 +50,12 @@ def departure_columns(signals: Signals, factor: str, signal: Array) -> Array:
     loop = np.abs(signal) * np.sign(signal - late)
     curved = signal[:, None] * np.column_stack([x, np.abs(x), x**2, np.abs(x) ** 3])
     # A part along the error itself is more of that error, not a departure from its form.
-    return np.column_stack([departure_beyond(curved, signal[:, None]), late - signal, loop])
+    return np.column_stack([linear_residual(signal[:, None], curved), late - signal, loop])
 
 
 def spring_transitions(signals: Signals) -> Array:
     """States of springs of several lengths, relaxed and run in at the start of a run."""
     return np.column_stack([signals.presliding(x, start) for start in (0.0, 1.0) for x in LENGTHS])
-
-
-def departure_beyond(columns: Array, own: Array) -> Array:
-    """The part of ``columns`` outside the span of the columns ``own``."""
-    return np.asarray(columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0])
 
 
 def _late(signals: Signals, values: Array) -> Array:

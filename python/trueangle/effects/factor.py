@@ -9,8 +9,7 @@ import numpy as np
 
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
-from ..joint.lines import line_columns
-from ..joint.pattern import JointPattern
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from .effect import Effect
 from .search import Array, Fitted, line_parameters

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 import trueangle._core as _core
 
 from ..estimation.extension import Extension
+from ..estimation.linear import pseudo_inverse
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern, Pattern
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.motion import FilterLagTerm
-from ..support.quantiles import quantile
+from ..support.arrays import quantile
 from .ambiguity import Ambiguity
 from .drawing import Drawing
 from .effect import Effect, Reported, Spots
@@ -195,7 +196,7 @@ class FilterLag(Effect):
         slopes = _slopes(waves, frequency, cutoff, damping)
         others = regression.with_terms(term for term in regression.terms if term is not extension)
         x, _ = others.projected(slopes)
-        covariance = regression.variance * np.linalg.pinv(x.T @ x)
+        covariance = regression.variance * pseudo_inverse(x.T @ x)
         # Far below the cutoff both delay by 1/(2 pi f_c) and 2 zeta/(2 pi f_n).
         delay = np.array([1.0] if damping is None else [1.0, -1.0])
         equivalent = cutoff if damping is None else cutoff / (2.0 * damping)

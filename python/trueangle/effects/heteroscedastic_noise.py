@@ -8,6 +8,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from ..estimation.linear import linear_residual
 from ..estimation.projection import EXCITED
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
@@ -196,4 +197,4 @@ def _chosen(square: Array, blocks: Mapping[str, NoiseBlock]) -> tuple[float, lis
         total += best[0]
         chosen.append(best[1])
         design = best[2]
-        rest = square - design @ np.linalg.lstsq(design, square, rcond=None)[0]
+        rest = linear_residual(design, square)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..estimation.linear import pseudo_inverse
 from ..estimation.regression import Regression
 from ..support.distributions import chi_squared_tail
 from .search import Array
@@ -85,7 +86,7 @@ def log_likelihood(square: Array, log_variance: Array) -> float:
 def _of_columns(square: Array, columns: Array, mean: float) -> NoiseLaw:
     gamma = np.zeros(columns.shape[1])
     gamma[0] = mean
-    inverse = np.linalg.inv(columns.T @ columns)
+    inverse = pseudo_inverse(columns.T @ columns)
     for _ in range(STEPS):
         away = clipped_squares(square, np.exp(columns @ gamma)) - 1.0
         step = inverse @ (columns.T @ away)
@@ -96,8 +97,7 @@ def _of_columns(square: Array, columns: Array, mean: float) -> NoiseLaw:
             break
     log_variance = columns @ gamma
     likely = log_likelihood(square, log_variance)
-    covariance = np.asarray(CLIPPED_VARIANCE * inverse, dtype=np.float64)
-    return NoiseLaw(gamma, -np.inf, covariance, log_variance, likely)
+    return NoiseLaw(gamma, -np.inf, CLIPPED_VARIANCE * inverse, log_variance, likely)
 
 
 def _with_growth(
@@ -120,18 +120,18 @@ def _with_growth(
     for _ in range(STEPS):
         log_variance, tangents = parts(found)
         away = clipped_squares(square, np.exp(log_variance)) - 1.0
-        step = np.linalg.pinv(tangents.T @ tangents) @ (tangents.T @ away)
+        step = pseudo_inverse(tangents.T @ tangents) @ (tangents.T @ away)
         moved = np.clip(found + np.clip(step, -LARGEST_STEP, LARGEST_STEP), least, most)
         settled = float(np.abs(moved - found).max()) < SETTLED
         found = moved
         if settled:
             break
     log_variance, tangents = parts(found)
-    covariance = CLIPPED_VARIANCE * np.linalg.pinv(tangents.T @ tangents)
+    covariance = CLIPPED_VARIANCE * pseudo_inverse(tangents.T @ tangents)
     return NoiseLaw(
         found[:-1],
         float(found[-1]),
-        np.asarray(covariance, dtype=np.float64),
+        covariance,
         log_variance,
         log_likelihood(square, log_variance),
     )

@@ -11,9 +11,8 @@ import numpy as np
 from ..estimation.extension import Extension
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
-from ..joint.grid import aliases_of
-from ..joint.lines import line_columns, lines_columns
-from ..joint.pattern import JointPattern
+from ..joint.lattice import aliases_of
+from ..joint.pattern import JointPattern, line_columns, lines_columns
 from ..joint.signals import Signals
 from ..support.deadline import current_deadline
 from .ambiguity import (

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..estimation.linear import least_squares
 from ..estimation.regression import Regression
 from ..support.arrays import Array
 
@@ -30,7 +31,7 @@ class RandomPhaseLine:
         found = []
         for start, stop in regression.bounds:
             wave = waves[start:stop] - waves[start:stop].mean(axis=0)
-            found.append(np.linalg.lstsq(wave, left[start:stop], rcond=None)[0])
+            found.append(least_squares(wave, left[start:stop]))
         #: Cosine and sine of each run, shape (R, 2).
         self._drawn = np.array(found)
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..estimation.extension import Extension
+from ..estimation.linear import pseudo_inverse
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
 from ..joint.pattern import JointPattern
@@ -151,8 +152,8 @@ def tangent_covariance(regression: Regression, terms: Sequence[Fitted], tangents
     information = x.T @ x
     count = sum(len(coefficients) for _, coefficients, _ in terms)
     given = sum(float(np.trace(covariance)) for _, _, covariance in terms)
-    own = np.linalg.pinv(information[:count, :count]) / np.outer(sizes[:count], sizes[:count])
-    joint = np.linalg.pinv(information) / np.outer(sizes, sizes)
+    own = pseudo_inverse(information[:count, :count]) / np.outer(sizes[:count], sizes[:count])
+    joint = pseudo_inverse(information) / np.outer(sizes, sizes)
     found = np.asarray(given / float(np.trace(own)) * joint, dtype=np.float64)
     found[~seen, ~seen] = UNKNOWN
     return found

@@ -12,8 +12,7 @@ from ..errors import ArgumentError
 from ..estimation.extension import Extension
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
-from ..joint.lines import line_columns, line_sum
-from ..joint.pattern import JointPattern
+from ..joint.pattern import JointPattern, line_columns, line_sum
 from ..joint.signals import Signals
 from .ambiguity import Ambiguity
 from .drawing import Drawing

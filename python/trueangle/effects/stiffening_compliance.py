@@ -9,17 +9,16 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..estimation.extension import Extension
+from ..estimation.linear import linear_residual
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
-from ..joint.lines import line_columns
-from ..joint.pattern import JointPattern
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..model.term import Term
 from ..model.terms.load import StiffeningComplianceTerm
 from ..support.angles import from_arcsec
 from ..support.arrays import distinct
 from .ambiguity import OWN_POWER, Ambiguity, share_left
-from .departures import departure_beyond
 from .drawing import Drawing
 from .effect import Effect, Reported
 from .search import Array, Fitted, golden_maximum, tangent_covariance
@@ -181,7 +180,7 @@ class StiffeningCompliance(Effect):
             moment = cls.moment(signals, term.shape["gravity_deg"])
             top = float(np.abs(moment).max())
             knees = [cls.beyond(moment, share * top) for share in KNEES]
-            columns.append(departure_beyond(np.column_stack([*knees, moment**3]), term.columns))
+            columns.append(linear_residual(term.columns, np.column_stack([*knees, moment**3])))
         return np.hstack(columns)
 
     @classmethod

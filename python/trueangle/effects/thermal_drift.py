@@ -10,8 +10,7 @@ import numpy as np
 
 from ..estimation.quantity import Parameters, quantity
 from ..estimation.regression import Regression
-from ..joint.lines import line_sum
-from ..joint.pattern import JointPattern
+from ..joint.pattern import JointPattern, line_sum
 from ..joint.signals import Signals
 from ..model.term import Term, line_values
 from ..model.terms.place import ThermalDriftTerm

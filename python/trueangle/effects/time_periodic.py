@@ -15,10 +15,9 @@ import trueangle._core as _core
 from ..estimation.extension import Extension
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
-from ..joint.lines import line_columns
-from ..joint.pattern import JointPattern
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
-from ..support.quantiles import quantile
+from ..support.arrays import quantile
 from .ambiguity import Ambiguity
 from .drawing import Drawing
 from .drift_within_run import DriftWithinRun

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from ..estimation.extension import Extension
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
-from ..joint.lines import line_columns
-from ..joint.pattern import JointPattern
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from .ambiguity import OWN_POWER, Ambiguity, share_left
 from .backlash import Backlash

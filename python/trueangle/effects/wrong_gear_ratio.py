@@ -13,8 +13,7 @@ from ..estimation.extension import Extension
 from ..estimation.quantity import quantity
 from ..estimation.regression import Regression
 from ..joint.joint import Joint
-from ..joint.lines import line_columns
-from ..joint.pattern import JointPattern, Pattern
+from ..joint.pattern import JointPattern, Pattern, line_columns
 from ..joint.shafts import shaft_cycles
 from ..joint.signals import Signals
 from .drawing import Drawing

@@ -15,15 +15,6 @@ def orthonormal_basis(x: Array) -> Array:
     return _core.Factor(Whitener([(0, len(x))]), x).q
 
 
-def least_squares(x: Array, y: Array) -> Array:
-    """Coefficients of columns; those of one that hardly differs from the others are zero.
-
-    LAPACK's least squares by singular values (`numpy.linalg.lstsq`) did not converge for sound
-    columns of thirty orders over half a turn.
-    """
-    return _core.Factor(Whitener([(0, len(x))]), x).coefficients(np.ascontiguousarray(y))
-
-
 class BandedFactor:
     """Cholesky factor ``L Lᵀ`` of a matrix of four diagonals: O(n) work and memory.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +68,22 @@ def pseudo_inverse(gram: Array) -> Array:
     [0.25, 0.0, 1.0]
     """
     return _core.LinearModel.of_sums(gram, np.empty((len(gram), 0)), []).inverse
+
+
+def wald_statistic(gap: Array, covariance: Array) -> float:
+    """``g' V⁺ g``: chi-squared of as many degrees of freedom as numbers where the truth is 0.
+
+    Examples
+    --------
+    >>> round(wald_statistic(np.array([1.0, 2.0]), np.diag([1.0, 4.0])), 12)
+    2.0
+    """
+    return float(gap @ pseudo_inverse(covariance) @ gap)
+
+
+def inverse_and_log_determinant(covariances: Array) -> tuple[Array, Any]:
+    """Of every matrix of a stack that is positive: what the density of normal errors needs."""
+    return np.asarray(np.linalg.inv(covariances)), np.linalg.slogdet(covariances)[1]
 
 
 @dataclass(frozen=True)

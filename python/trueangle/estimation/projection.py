@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..joint.lines import VANISHES
+from ..joint.pattern import VANISHES
 from ..support.arrays import Array
 from ..support.deadline import current_deadline
 from .blocks import BlockProducts, Blocks

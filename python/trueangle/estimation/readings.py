@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint.lines import line_columns
-from ..joint.pattern import JointPattern
+from ..joint.pattern import JointPattern, line_columns
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from .extension import penalty_of_parameter

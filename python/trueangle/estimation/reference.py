@@ -20,9 +20,6 @@ from ..support.arrays import Array
 if TYPE_CHECKING:
     from ..model.model import HarmonicModel
 
-#: Newton steps allowed; the iteration is quadratic and starts within half a turn.
-_STEPS = 50
-
 
 def design_matrix(
     theta: ArrayLike,
@@ -88,7 +85,8 @@ def correct(model: HarmonicModel, indicated: ArrayLike) -> Array:
     if model.argument == "indicated":
         return reading - error(model, reading)
     theta = reading - model.constant
-    for _ in range(_STEPS):
+    # Newton steps allowed; the iteration is quadratic and starts within half a turn.
+    for _ in range(50):
         step = (theta + error(model, theta) - reading) / (1.0 + slope(model, theta))
         theta = theta - step
         if not (np.abs(step) > 4.0 * np.finfo(float).eps * np.abs(theta)).any():

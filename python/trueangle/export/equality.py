@@ -7,6 +7,7 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
+from ..estimation.linear import wald_statistic
 from ..model.model import HarmonicModel
 from ..support.arrays import Array
 from ..support.distributions import f_tail
@@ -89,7 +90,7 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
     if float(np.linalg.eigvalsh(scaled)[0]) < _TOLD:
         return None
     apart = (values[1] - values[0]) / scale
-    statistic = float(apart @ np.linalg.solve(scaled, apart))
+    statistic = wald_statistic(apart, scaled)
     every = sum(trace for trace, _ in weights) ** 2
     doubt = sum(trace**2 / freedom for trace, freedom in weights)
     freedom = every / doubt if doubt > 0.0 else math.inf
@@ -105,7 +106,7 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
             rows, pair = places[order]
             spread = np.asarray(model.covariance)[np.ix_(rows, rows)]
             if float(np.linalg.det(spread)) > 0.0:
-                alone = float(np.array(pair) @ np.linalg.solve(2.0 * spread, np.array(pair)))
+                alone = wald_statistic(np.array(pair), 2.0 * spread)
                 chance = _pair_tail if scattered else _known_tail
                 p = min(p, _LOOKED_AT * chance(alone, freedom))
     return Equality("changed" if p <= FALSE_ALARMS else "same", p, statistic, len(common))
@@ -113,12 +114,9 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
 
 def _by_orders(apart: Array, scaled: Array, freedom: float) -> float:
     """P-value of the order that differs most, with a covariance of unknown size and shape."""
-    least = 1.0
-    for i in range(0, apart.size, 2):
-        pair = apart[i : i + 2]
-        alone = float(pair @ np.linalg.solve(scaled[i : i + 2, i : i + 2], pair))
-        least = min(least, _pair_tail(alone, freedom))
     orders = apart.size // 2
+    pairs = [slice(2 * i, 2 * i + 2) for i in range(orders)]
+    least = min(_pair_tail(wald_statistic(apart[p], scaled[p, p]), freedom) for p in pairs)
     return -math.expm1(orders * math.log1p(-least)) if least < 1.0 else 1.0
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..estimation.linear import least_squares
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
@@ -229,7 +230,7 @@ def solved_knots(values: Array) -> tuple[Whole, int]:
     equations[rows, bucket] = 1.0 - share
     equations[rows, (bucket + 1) % KNOTS] = share
     wanted = rows * (TURN / steps) - np.where(bucket + 1 >= KNOTS, share * TURN, 0.0)
-    solution = np.linalg.lstsq(equations, wanted, rcond=None)[0]
+    solution = least_squares(equations, np.asarray(wanted, dtype=np.float64))
     whole = np.trunc(solution + 0.5).astype(np.int64)
     return np.append(whole, whole[0] + TURN), int(order[0])
 

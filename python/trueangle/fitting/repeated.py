@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..estimation.reference import design_matrix
-from ..joint.grid import UniformGrid, uniform_grid
+from ..joint.lattice import UniformGrid, uniform_grid
 from ..runs.aliasing import Positions, distinct_positions
 from ..runs.run import CalibrationRun
 from ..support.arrays import Array

@@ -16,8 +16,7 @@ from ..estimation.linear import (
     moderated_covariance,
     total,
 )
-from ..support.arrays import Array
-from ..support.quantiles import median
+from ..support.arrays import Array, median
 from ..support.suggestions import check_choice
 from .beside import BesideProblem
 from .correlation import (

@@ -13,8 +13,7 @@ import trueangle._core as _core
 from ..estimation.linear import NormalEquations, least_squares, total
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean
-from ..support.arrays import Array
-from ..support.quantiles import median
+from ..support.arrays import Array, median
 from .problem import Problem, SolvedProblem
 
 #: Readings of a run that are looked at, and runs.

@@ -21,9 +21,17 @@ from ..support.decoding import Decoder, Entries, json_value, read_text
 from ..support.files import RUNS_BYTES
 from ..support.plainresult import declared_fields
 from .history import HistoryOrder, HistoryRow
-from .result import FORMAT, VERSION, BetweenOrder, CommonOrder, Fleet
+from .result import (
+    FORMAT,
+    VERDICTS,
+    VERSION,
+    BetweenOrder,
+    CommonOrder,
+    Fleet,
+    FleetUnit,
+    UnitOrder,
+)
 from .tolerance import Tolerance
-from .unit import VERDICTS, FleetUnit, UnitOrder
 
 __all__ = ["FORMAT", "load_fleet"]
 

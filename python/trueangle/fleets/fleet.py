@@ -20,10 +20,9 @@ from ..support.suggestions import check_choice
 from .calibration import Calibration
 from .history import Change, changes_of
 from .outliers import Deviates
-from .result import BetweenOrder, CommonOrder, Fleet
+from .result import VERDICTS, BetweenOrder, CommonOrder, Fleet, FleetUnit, UnitOrder, Verdict
 from .sums import FleetSums
 from .tolerance import check_shares, tolerance_of
-from .unit import VERDICTS, FleetUnit, UnitOrder, Verdict
 from .units import FEWEST, SharedPattern, Units, shared_pattern
 
 

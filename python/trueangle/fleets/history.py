@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from ..estimation.linear import wald_statistic
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import f_quantile
@@ -18,18 +19,8 @@ from ..support.times import parsed_time
 from .calibration import Calibration, order_columns
 from .outliers import LEVEL, Deviates, deviates, level_by_order
 
-#: Fewest units with a second date whose changes define an ordinary change.
-_FEWEST: Final = 4
-
-#: Places of a turn at which a change of the pattern is looked at.
-_PLACES: Final = 360
-
-
 #: Half of the shift that is looked for, in standard deviations of a calibration.
 _ALLOWANCE: Final = 0.5
-
-#: Dates until a unit's charts together alarm where nothing moves, on average (h = 5 for one chart).
-_LENGTH: Final = 465.44
 
 
 class HistoryOrder(NamedTuple):
@@ -115,7 +106,8 @@ def changes_of(
     permitted : float or None
         Error from which a calibration is due.
     """
-    if len(dated) < _FEWEST:
+    # Fewest units with a second date whose changes define an ordinary change.
+    if len(dated) < 4:
         return []
     values, own, zeros, zero_own = _differences(dated, period)
     pattern = deviates(values, own, False, 0.5 * LEVEL, level_by_order(orders))
@@ -123,7 +115,9 @@ def changes_of(
     zero = deviates([zeros], [zero_own], aligned=True, level=0.5 * LEVEL)
     limit = f_quantile(1.0 - 0.5 * LEVEL / pattern.chance.size, 2.0, 2.0 * (len(dated) - 1.0)) * 2.0
     zero_limit = f_quantile(1.0 - 0.5 * LEVEL / len(dated), 1.0, len(dated) - 2.0)
-    sum_limit = chart_limit(_ALLOWANCE, _LENGTH * 2 * orders.size)
+    # Dates until a unit's charts together alarm where nothing moves, on average (h = 5 for one
+    # chart).
+    sum_limit = chart_limit(_ALLOWANCE, 465.44 * 2 * orders.size)
     found = []
     for u, calibrations in enumerate(dated):
         moved, zero_moved = bool(pattern.outlying[u]), bool(zero.outlying[u])
@@ -211,7 +205,7 @@ def _statistic(
     apart = later.coefficients[order] - first.coefficients[order]
     spread = noise * (later.blocks()[place] + first.blocks()[place])
     spread = spread + (variance + 1e-300) * np.eye(2)
-    return float(apart @ np.linalg.solve(spread, apart))
+    return wald_statistic(apart, spread)
 
 
 def _grows(
@@ -245,7 +239,7 @@ def _days(dates: Sequence[str | None]) -> Array:
 
 def drift_bound(change: Array, std: Array, orders: Array, period: float) -> float:
     """That of 95 % of the greatest change over a turn."""
-    places = order_columns(np.linspace(0.0, period, _PLACES, endpoint=False), orders, period)
+    places = order_columns(np.linspace(0.0, period, 360, endpoint=False), orders, period)
     # Quantile of the normal distribution for a one-sided bound of 95 %.
     return float((np.abs(places @ change) + 1.6448536269514722 * np.sqrt(places**2 @ std**2)).max())
 

@@ -23,12 +23,6 @@ _HIDDEN: Final = 0.2
 #: Shares of the level of those orders of the output in which damage shows: eccentricity and tilt.
 _DAMAGE: Final = {1.0: 0.4, 2.0: 0.2}
 
-#: This share of the units and one more can be outliers: they are judged by the others.
-_MOST: Final = 0.25
-
-#: Degrees of freedom of the scale that an order needs.
-_FEWEST: Final = 4.0
-
 
 class Deviates(NamedTuple):
     """How far each unit is from the others.
@@ -129,7 +123,8 @@ def deviates(
     inside = np.ones(n, dtype=bool)
     aside: list[int] = []
     last, first = 0, None
-    for step in range(1 + int(_MOST * n)):
+    # This share of the units and one more can be outliers: they are judged by the others.
+    for step in range(1 + int(0.25 * n)):
         chance, size = _chances(values, weights, inside, aligned)
         unit = _combined(chance, share_of)
         first = (chance, size, unit) if first is None else first
@@ -182,7 +177,8 @@ def _chances(
         free = np.where(inside, freedom - d, freedom)
         scale = np.maximum(rest, 0.0) / np.maximum(free, 1.0)
         f = np.where(apart > 0.0, apart / d / np.maximum(scale, 1e-300), 0.0)
-        told = free >= _FEWEST
+        # Degrees of freedom of the scale that an order needs.
+        told = free >= 4.0
         chances.append(np.where(told, _f_tail(f, d, np.maximum(free, 1.0)), 1.0))
         sizes.append(np.sqrt(f * d))
     return np.column_stack(chances), np.column_stack(sizes)

@@ -22,14 +22,6 @@ from .calibration import Calibration, CalibrationSums, normal_matrix, output_ord
 #: Number of units, the first ones, by which orders are chosen.
 _SAMPLE: Final = 32
 
-#: Orders of the output that are looked at, at most, and readings for each.
-_HIGHEST: Final = 110
-_READINGS_EACH: Final = 6
-
-
-#: Least eigenvalue of the normal matrix, its columns scaled, from which orders are separable.
-_TOLD: Final = 1e-3
-
 
 class _Unnamed(NamedTuple):
     """A run whose unit no column names: its label and its file."""
@@ -171,7 +163,8 @@ def candidate_orders(
 ) -> list[ShaftOrders]:
     """Orders of the output as the readings allow, and the lines that the gear is known to leave."""
     fewest = min(_distinct(run) for run in runs)
-    highest = max(1, min(_HIGHEST, fewest // _READINGS_EACH))
+    # Orders of the output that are looked at, at most, and readings for each.
+    highest = max(1, min(110, fewest // 6))
     wanted: dict[str, list[float]] = {"output": list(range(1, highest + 1))}
     if gear_ratio is not None:
         for shaft, order in Joint(gear_ratio, fixed_member).gear_orders():
@@ -246,6 +239,8 @@ def _told_apart(
         if len(run) <= 2 * own.size + 1:
             continue
         products = normal_matrix(run.reference, own, run.period)
-        if float(np.linalg.eigvalsh(products)[0]) * 2.0 / len(run) >= _TOLD:
+        # Least eigenvalue of the normal matrix, its columns scaled, from which orders are
+        # separable.
+        if float(np.linalg.eigvalsh(products)[0]) * 2.0 / len(run) >= 1e-3:
             return [s for s in part if s.orders]
     return [s._replace(orders=s.orders[:1]) for s in shafts if s.name == "output"]

@@ -15,7 +15,6 @@ from ..support.plainresult import AngleOrNaN
 
 #: Nodes of Gauss and Legendre's rule on each of the pieces of an integral.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-_PIECES: Final = 24
 
 #: Standard deviations beyond which the normal density is nothing to rounding.
 _FAR: Final = 9.0
@@ -97,7 +96,7 @@ def tolerance_factor(n: int, share: float, confidence: float, sides: int = 2) ->
 
 def _normal_rule(n: int, share: float, sides: int) -> tuple[Array, Array]:
     """Places of the mean's deviation (or half widths about them), and weights of the density."""
-    edges = np.linspace(-_FAR, _FAR, _PIECES + 1)
+    edges = np.linspace(-_FAR, _FAR, 24 + 1)
     half = 0.5 * np.diff(edges)[:, None]
     places = (half * (_NODES + 1.0) + edges[:-1, None]).ravel()
     weights = (half * _WEIGHTS).ravel() * np.exp(-0.5 * places**2) / math.sqrt(2.0 * math.pi)

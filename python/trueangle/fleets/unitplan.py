@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..estimation.linear import pseudo_inverse
 from ..fitting.prior import Prior, fleet_prior
 from ..joint.shafts import limited_orders
 from ..planning.arc import COVERAGE, check_arc, plan_arc
@@ -330,7 +331,7 @@ class Spread:
         # A coefficient that all units share is known: so precisely that no reading changes it.
         precision = np.clip(precision, _FREE * one, one / _FREE)
         rows = self.rows[places]
-        return np.asarray(np.linalg.inv(np.diag(precision) + one * (rows.T @ rows)))
+        return pseudo_inverse(np.diag(precision) + one * (rows.T @ rows))
 
     def _exchanged(self, places: _Places) -> _Places:
         """Each reading moved to where the curve is known least without it, while that gains."""

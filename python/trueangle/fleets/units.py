@@ -29,9 +29,6 @@ FEWEST: Final = 5
 #: Largest share of the units that is rejected as outliers (one may always be).
 FEW: Final = 0.05
 
-#: Places of a turn for each cycle of the highest order.
-_PLACES: Final = 16
-
 
 class Units:
     """The last calibration of every unit, and all dates of those with several."""
@@ -66,7 +63,8 @@ class Units:
         blocks = np.array([noise * one.blocks() for one, noise in self.last])
         self.own = [np.ascontiguousarray(blocks[:, k]) for k in range(self.orders.size)]
         highest = max(8.0, float(self.orders.max()))
-        places = np.linspace(0.0, period, int(_PLACES * highest), endpoint=False)
+        # Places of a turn for each cycle of the highest order.
+        places = np.linspace(0.0, period, int(16 * highest), endpoint=False)
         curves = coefficients @ order_columns(places, self.orders, period).T
         self.peak_to_peak = np.ptp(curves, axis=1)
         self.left = np.sqrt([max(one.squares / one.freedom, 0.0) for one, _ in self.last])

@@ -6,12 +6,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ..support.arrays import Array
-from ..support.quantiles import median
-
-#: Relative change at which the iteration ends, and steps at most.
-_SETTLED: Final = 1e-12
-_STEPS: Final = 200
+from ..estimation.linear import inverse_and_log_determinant
+from ..support.arrays import Array, median
 
 #: Median of the chi-squared distribution of two degrees of freedom, by its half.
 _HALF_MEDIAN: Final = float(np.log(2.0))
@@ -69,11 +65,12 @@ def reml(values: Array, own: Array, aligned: bool) -> BetweenUnits:
     """
     tau = max(robust_variance(values, own, aligned), 1e-12 * float(np.mean(values**2)) + 1e-300)
     best = _score(values, own, aligned, tau)
-    for _ in range(_STEPS):
+    # Steps at most; it ends by their relative change.
+    for _ in range(200):
         step = best.score / best.information
         # A step never crosses zero: half the way to it is taken.
         further = tau + step if tau + step > 0.5 * tau else 0.5 * tau
-        if abs(further - tau) <= _SETTLED * tau:
+        if abs(further - tau) <= 1e-12 * tau:
             break
         tau = further
         best = _score(values, own, aligned, tau)
@@ -92,24 +89,24 @@ class _Likelihood(NamedTuple):
 
 
 def _score(values: Array, own: Array, aligned: bool, tau: float) -> _Likelihood:
-    inverse = np.linalg.inv(own + tau * np.eye(2))
+    inverse, logs = inverse_and_log_determinant(own + tau * np.eye(2))
     with np.errstate(over="ignore"):  # of units without noise
         squared = inverse @ inverse
     mean, covariance = np.zeros(2), np.zeros((2, 2))
+    likelihood = -0.5 * float(logs.sum())
     if aligned:
-        covariance = np.linalg.inv(inverse.sum(axis=0))
+        covariance, log = inverse_and_log_determinant(inverse.sum(axis=0))
+        likelihood -= 0.5 * float(log)
         mean = covariance @ np.einsum("uij,uj->i", inverse, values)
     apart = np.einsum("uij,uj->ui", inverse, values - mean)
     trace = float(np.einsum("uii->", inverse))
     second = float(np.einsum("uij,uji->", inverse, inverse))
-    likelihood = 0.5 * float(np.linalg.slogdet(inverse)[1].sum())
     likelihood -= 0.5 * float(np.einsum("ui,ui->", apart, values - mean))
     if aligned:
         both = covariance @ squared.sum(axis=0)
         trace -= float(np.trace(both))
         second -= 2.0 * float(np.trace(covariance @ (squared @ inverse).sum(axis=0)))
         second += float(np.trace(both @ both))
-        likelihood += 0.5 * float(np.linalg.slogdet(covariance)[1])
     score = 0.5 * (float((apart**2).sum()) - trace)
     return _Likelihood(score, max(0.5 * second, 1e-300), likelihood, mean, covariance)
 
@@ -123,12 +120,12 @@ def held_out_score(values: Array, own: Array, variance: float, aligned: bool) ->
     spread = own + variance * np.eye(2)
     mean = np.zeros_like(values)
     if aligned:
-        inverse = np.linalg.inv(spread)
+        inverse, _ = inverse_and_log_determinant(spread)
         every = inverse.sum(axis=0)
         pulls = np.einsum("uij,uj->ui", inverse, values)
-        others = np.linalg.inv(every - inverse)
+        others, _ = inverse_and_log_determinant(every - inverse)
         mean = np.einsum("uij,uj->ui", others, pulls.sum(axis=0) - pulls)
         spread = spread + others
     apart = values - mean
-    weighed = np.einsum("ui,uij,uj->u", apart, np.linalg.inv(spread), apart)
-    return np.asarray(-0.5 * (weighed + np.linalg.slogdet(spread)[1]))
+    inverse, logs = inverse_and_log_determinant(spread)
+    return np.asarray(-0.5 * (np.einsum("ui,uij,uj->u", apart, inverse, apart) + logs))

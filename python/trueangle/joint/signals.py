@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 from ..runs.aliasing import count_positions
 from ..runs.run import CalibrationRun
 from ..support.angles import unwrapped
-from ..support.arrays import Array
-from ..support.quantiles import median
+from ..support.arrays import Array, median
 from ..support.signals import coupled_joint
-from .grid import UniformGrid, uniform_grid
-from .lattice import CLOSES, even_rate, sensor_lattice
+from .lattice import CLOSES, UniformGrid, even_rate, sensor_lattice, uniform_grid
 from .turning import direction_at_turns, velocity_at_turns
 
 Index = NDArray[np.int64]
@@ -118,7 +116,7 @@ class Signals:
 
     @cached_property
     def even_rate(self) -> float:
-        """Equal steps in a turn that every run keeps to, or 0 (`trueangle.joint.grid`)."""
+        """Equal steps in a turn that every run keeps to, or 0 (`trueangle.joint.lattice`)."""
         return even_rate([self.theta[a:b] / (2.0 * np.pi) for a, b in self.run_bounds()])
 
     def take(self, rows: NDArray[np.bool_] | Index) -> Signals:

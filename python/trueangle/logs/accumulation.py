@@ -27,8 +27,7 @@ from ..formats.format import Format as LogFormat
 from ..formats.format import Labels, Selection, row_labels
 from ..formats.formats import find_format
 from ..model.model import Argument, HarmonicModel
-from ..runs.angles import RunAngles, find_run_angles
-from ..runs.facets import Facets
+from ..runs.angles import Facets, RunAngles, find_run_angles
 from ..runs.follows import check_usable
 from ..runs.paths import unit_of_path
 from ..runs.run import CalibrationRun

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError, FileError, OutsideSpanWarning
 from ..model.file import load_model
 from ..model.model import HarmonicModel
-from ..model.robot import Robot
-from ..model.robotfile import is_robot_file, load_robot
+from ..model.robot import Robot, is_robot_file, load_robot
 from ..support.files import sha256_of
 from ..support.roles import RoleColumn, role_code, wanted_columns
 from .columns import (

@@ -286,7 +286,5 @@ def _uncertainty(
     if noise is None:
         return None
     shares = np.full(turns.size, 1.0 / turns.size)
-    rows = columns.at(columns.grid)
-    inverse = np.linalg.inv(columns.information(turns, shares))
-    worst = float(np.einsum("ij,ij->i", rows @ inverse, rows).max())
+    worst = columns.worst_variance(turns, shares)
     return COVERAGE * noise * math.sqrt(worst / (turns.size * per_step))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError
+from ..estimation.linear import least_squares, pseudo_inverse
 from ..support.arrays import Array, first_largest
 
 #: Places of the grid, to a cycle of the highest order and at least.
@@ -117,6 +118,11 @@ class OrthonormalColumns:
         sign, value = np.linalg.slogdet(self.information(places, weights))
         return float(value) + self.log_scale if sign > 0 else -math.inf
 
+    def worst_variance(self, places: Array, weights: Array) -> float:
+        """Of the curve over the arc, for one reading of variance 1 shared out by the weights."""
+        covariance = pseudo_inverse(self.information(places, weights))
+        return float(_variances(self.at(self.grid), covariance).max())
+
 
 def d_optimal(columns: OrthonormalColumns) -> ArcDesign:
     """The design whose information has the largest determinant.
@@ -140,7 +146,7 @@ def d_optimal(columns: OrthonormalColumns) -> ArcDesign:
     weights = np.full(grid.size, 1.0 / grid.size)
     excess = math.inf
     for _ in range(_GRID_STEPS):
-        variances = _variances(rows, rows.T @ (weights[:, None] * rows))
+        variances = _variances(rows, pseudo_inverse(rows.T @ (weights[:, None] * rows)))
         excess = float(variances.max()) / p - 1.0
         if excess < _GRID_EXCESS:
             break
@@ -156,9 +162,9 @@ def d_optimal(columns: OrthonormalColumns) -> ArcDesign:
     return ArcDesign(places, shares, excess, columns.log_det(places, shares))
 
 
-def _variances(rows: Array, information: Array) -> Array:
-    """Variance of the curve at every row, for one reading of variance 1."""
-    return np.asarray(np.einsum("ij,ij->i", rows @ np.linalg.inv(information), rows))
+def _variances(rows: Array, covariance: Array) -> Array:
+    """Variance of the curve at every row."""
+    return np.asarray(np.einsum("ij,ij->i", rows @ covariance, rows))
 
 
 def _merged(grid: Array, weights: Array, least: int) -> tuple[Array, Array]:
@@ -188,7 +194,7 @@ def _settled(columns: OrthonormalColumns, places: Array) -> tuple[Array, Array, 
         places = tried
         if moved < _MOVES:
             break
-    return places, shares, _excess(columns, places, shares)
+    return places, shares, columns.worst_variance(places, shares) / columns.count - 1.0
 
 
 def _swept(columns: OrthonormalColumns, places: Array) -> Array:
@@ -196,9 +202,9 @@ def _swept(columns: OrthonormalColumns, places: Array) -> Array:
     places = places.copy()
     for k in range(places.size):
         # The determinant is that of the other rows times the distance of this row from them.
-        others = np.linalg.qr(columns.at(np.delete(places, k)).T, mode="complete")[0][:, -1]
+        normal = least_squares(columns.at(places), np.eye(places.size)[k])
 
-        def apart(x: Array, normal: Array = others) -> Array:
+        def apart(x: Array, normal: Array = normal) -> Array:
             return np.asarray(np.abs(columns.at(x) @ normal))
 
         below = places[k - 1] if k else columns.grid[0]
@@ -214,7 +220,7 @@ def _newton(columns: OrthonormalColumns, places: Array) -> Array:
     ``(F'' F⁻¹)_ii - A_ii²`` and ``-A_ij A_ji``. Ends of the arc stay.
     """
     start, stop = float(columns.grid[0]), float(columns.grid[-1])
-    inverse = np.linalg.inv(columns.at(places))
+    inverse = least_squares(columns.at(places), np.eye(places.size))
     first, second = (slope @ inverse for slope in columns.slopes(places))
     inner = (places > start) & (places < stop)
     curvature = -(first * first.T)
@@ -237,11 +243,6 @@ def _highest(height: Callable[[Array], Array], low: float, high: float) -> float
     return best
 
 
-def _excess(columns: OrthonormalColumns, places: Array, weights: Array) -> float:
-    variances = _variances(columns.at(columns.grid), columns.information(places, weights))
-    return float(variances.max()) / columns.count - 1.0
-
-
 def exchanged(columns: OrthonormalColumns, places: Array) -> Array:
     """Places of single readings, each exchanged for a better one of the grid while one is.
 
@@ -254,10 +255,10 @@ def exchanged(columns: OrthonormalColumns, places: Array) -> Array:
         before = columns.log_det(places, np.ones(places.size))
         for i in range(places.size):
             rows = columns.at(places)
-            inverse = np.linalg.inv(rows.T @ rows)
+            inverse = pseudo_inverse(rows.T @ rows)
             mixed = grid @ (inverse @ rows[i])
             own = float(rows[i] @ inverse @ rows[i])
-            gains = (1.0 + np.einsum("ij,ij->i", grid @ inverse, grid)) * (1.0 - own) + mixed**2
+            gains = (1.0 + _variances(grid, inverse)) * (1.0 - own) + mixed**2
             k = first_largest(gains)
             if gains[k] > 1.0 + _GAIN:
                 places[i] = columns.grid[k]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,19 +63,10 @@ def noise_factors(
     for k in orders:
         columns += [np.cos(k * x), np.sin(k * x)]
     design = np.stack(columns, axis=1)
-    values, vectors = np.linalg.eigh(design.T @ design)
-    singular = values <= _SINGULAR * x.size
-    inverse = (vectors[:, ~singular] / values[~singular]) @ vectors[:, ~singular].T
-    lost = (vectors[:, singular] ** 2).sum(axis=1)
-    factors = np.empty(len(orders))
-    for i in range(len(orders)):
-        pair = slice(first + 2 * i, first + 2 * i + 2)
-        if lost[pair].max(initial=0.0) > _SINGULAR:
-            factors[i] = math.inf
-        else:
-            top = float(np.linalg.eigvalsh(inverse[pair, pair])[-1])
-            factors[i] = math.sqrt(0.5 * x.size * top)
-    return factors
+    inverse, lost = _inverse(design)
+    at = first + np.arange(2 * len(orders)).reshape(-1, 2)
+    greatest = _greatest_of_pairs(inverse[at[:, :, None], at[:, None, :]])
+    return np.where((lost[at] > _SINGULAR).any(axis=1), math.inf, np.sqrt(0.5 * x.size * greatest))
 
 
 def mount_noise_factors(divisions: int, offsets_deg: ArrayLike, orders: Sequence[float]) -> Array:
@@ -116,33 +107,35 @@ def mount_noise_factors(divisions: int, offsets_deg: ArrayLike, orders: Sequence
                 continue
             factors[..., members] = _half_factors(phase)
         else:
-            factors[..., members] = np.sqrt(mounts * _inverse_diagonal(np.exp(1j * phase)))
+            inverse, lost = _inverse(np.exp(1j * phase))
+            diagonal = np.diagonal(inverse, axis1=-2, axis2=-1).real
+            factors[..., members] = np.where(lost > 0.0, math.inf, np.sqrt(mounts * diagonal))
     return factors
 
 
-def _inverse_diagonal(design: NDArray[np.generic]) -> Array:
-    """Diagonal of ``(X^H X)^-1``, infinite where singular."""
-    gram = np.conj(np.swapaxes(design, -1, -2)) @ design
-    values, vectors = np.linalg.eigh(gram)
-    values = np.where(values <= _SINGULAR * design.shape[-2], 0.0, values)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        parts = np.abs(vectors) ** 2 / values[..., None, :]
-    return np.asarray(np.nan_to_num(parts, nan=0.0, posinf=math.inf).sum(axis=-1))
+def _inverse(design: NDArray[Any]) -> tuple[NDArray[Any], Array]:
+    """``(X^H X)^+``, and the share of each column that lies in singular directions."""
+    values, vectors = np.linalg.eigh(np.conj(np.swapaxes(design, -1, -2)) @ design)
+    singular = (values <= _SINGULAR * design.shape[-2])[..., None, :]
+    parts = vectors / np.where(singular, math.inf, values[..., None, :])
+    lost = np.where(singular, np.abs(vectors) ** 2, 0.0).sum(axis=-1)
+    return parts @ np.conj(np.swapaxes(vectors, -1, -2)), lost
+
+
+def _greatest_of_pairs(pairs: Array) -> Array:
+    """Greatest eigenvalue of each symmetric matrix of two rows."""
+    cosine, sine, mixed = pairs[..., 0, 0], pairs[..., 1, 1], pairs[..., 0, 1]
+    return np.asarray(0.5 * (cosine + sine) + np.hypot(0.5 * (cosine - sine), mixed))
 
 
 def _half_factors(phase: Array) -> Array:
     """Factors of orders that fold onto N/2, where a mount gives one real number each."""
     *_, mounts, orders = phase.shape
     design = np.concatenate([np.cos(phase), -np.sin(phase)], axis=-1)
-    values, vectors = np.linalg.eigh(np.swapaxes(design, -1, -2) @ design)
-    regular = values[..., 0] > _SINGULAR * mounts
-    values = np.where(regular[..., None], values, 1.0)
-    inverse = (vectors / values[..., None, :]) @ np.swapaxes(vectors, -1, -2)
-    factors = np.empty((*phase.shape[:-2], orders))
-    for i in range(orders):
-        pair = inverse[..., [[i], [orders + i]], [[i, orders + i]]]
-        factors[..., i] = np.sqrt(0.5 * mounts * np.linalg.eigvalsh(pair)[..., -1])
-    return np.where(regular[..., None], factors, math.inf)
+    inverse, lost = _inverse(design)
+    at = np.arange(2 * orders).reshape(2, -1).T
+    factors = np.sqrt(0.5 * mounts * _greatest_of_pairs(inverse[..., at[:, :, None], at[:, None]]))
+    return np.where((lost > 0.0).any(axis=-1, keepdims=True), math.inf, factors)
 
 
 def facet_noise_factor(divisions: int, shifts: ArrayLike, highest: int | None = None) -> Array:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..fleets.result import Fleet
-    from ..model.alarm import WatchedWindow
+    from ..model.monitor import WatchedWindow
 
 #: Limits beyond which a chart has a scale of logarithms.
 _FAR: Final = 10.0

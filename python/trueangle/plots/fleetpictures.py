@@ -21,8 +21,7 @@ from .controlcharts import fleet_history
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..fleets.result import CommonOrder, Fleet
-    from ..fleets.unit import FleetUnit, UnitOrder
+    from ..fleets.result import CommonOrder, Fleet, FleetUnit, UnitOrder
 
 #: Radius that holds 95 % of a plane normal distribution, in standard deviations of a coordinate.
 RADIUS_OF_95: Final = math.sqrt(-2.0 * math.log(0.05))

@@ -9,8 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from ..fleets.history import HistoryRow
-from ..fleets.result import CommonOrder, Fleet
-from ..fleets.unit import FleetUnit
+from ..fleets.result import CommonOrder, Fleet, FleetUnit
 from ..plots.controlcharts import draw_sums
 from ..plots.fleetpictures import draw_pattern, draw_phasor_plane, turn_pattern
 from ..plots.pagechart import LOW, page_axes, page_chart

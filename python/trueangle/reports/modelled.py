@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import NoModelError, TrueAngleError
 from ..fitting.heldout import HeldOut, hold_out
-from ..joint.declared import DeclaredShaft
-from ..joint.joint import Joint
+from ..joint.joint import DeclaredShaft, Joint
 from ..model.model import HarmonicModel
 from ..plots.curves import fitted_degrees
 from ..runs.run import CalibrationRun

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ..errors import ArgumentError
-from ..model.alarm import WatchedWindow
+from ..model.monitor import WatchedWindow
 from ..plots import palette
 from ..plots.controlcharts import draw_sums
 from ..plots.pagechart import LOW, page_axes, page_chart

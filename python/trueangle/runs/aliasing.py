@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError
 from ..support.angles import power_sums
-from ..support.arrays import Array
-from ..support.quantiles import median
+from ..support.arrays import Array, median
 from .run import CalibrationRun, as_runs
 
 #: Positions closer than this (turns) count as one: 0.01 degree, which turns the phase

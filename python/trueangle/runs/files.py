@@ -16,9 +16,8 @@ from ..support.layout import counted
 from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, unit_in_name
 from ..support.signals import FIELDS
 from ..support.times import local_day
-from .angles import PERIOD, find_run_angles
+from .angles import PERIOD, Facets, find_run_angles, read_facets
 from .channelangle import with_channel_angle
-from .facets import Facets, read_facets
 from .rawchannels import Channels
 from .readings import FileReadings
 from .run import CalibrationRun, as_runs, runs_or_data

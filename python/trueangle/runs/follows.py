@@ -12,8 +12,7 @@ import trueangle._core as _core
 
 from ..errors import ArgumentError, UnitWarning
 from ..support.angles import wrap
-from ..support.arrays import Array
-from ..support.quantiles import quantile
+from ..support.arrays import Array, quantile
 from ..support.roles import role_code
 from .checks.angles import (
     BLOCKS,

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 import trueangle._core as _core
 
-from ..support.arrays import Array
-from ..support.quantiles import median, quantile
+from ..support.arrays import Array, median, quantile
 
 #: Median absolute deviation to standard deviation, for the normal distribution.
 MAD_TO_SIGMA: Final = 1.4826

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from ..estimation.factor import orthonormal_basis
 from ..support.arrays import Array
 from .correlation import Correlation
 
@@ -55,9 +56,13 @@ def triangle_of(parts: Iterable[DenseRows]) -> Array:
         block = np.concatenate([part.nuisances, part.patterns, part.target[:, None]], axis=1)
         if triangle is not None:
             block = np.concatenate([triangle, block])
-        triangle = np.asarray(np.linalg.qr(block, mode="r"))
+        triangle = _triangle(block)
     assert triangle is not None
     return triangle
+
+
+def _triangle(rows: Array) -> Array:
+    return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,7 @@ class SolvedTriangle:
 
         Others may come from the noise of the angles alone, and would be fitted to the residual.
         """
-        basis = np.linalg.qr(self.root @ seen)[0]
+        basis = orthonormal_basis(self.root @ seen)
         lost = self.right - basis @ (basis.T @ self.right)
         return self.beyond + float(lost @ lost)
 
@@ -98,7 +103,7 @@ def solved_triangle(
     scaled[:, :p] *= scale
     prior = np.zeros((len(random), triangle.shape[1]))
     prior[np.arange(len(random)), list(random)] = 1.0
-    r: Array = np.asarray(np.linalg.qr(np.concatenate([scaled, prior]), mode="r"))
+    r = _triangle(np.concatenate([scaled, prior]))
     left = r[p + m :, -1]
     inverse: Array = np.asarray(np.linalg.pinv(r[:p, :p], 1e-12), dtype=np.float64)
     return SolvedTriangle(
@@ -154,7 +159,7 @@ def _evidence(
     """
     last = list(random)
     first = np.delete(np.arange(p + m), last)
-    turned: Array = np.asarray(np.linalg.qr(triangle[:, [*first, *last, p + m]], mode="r"))
+    turned = _triangle(triangle[:, [*first, *last, p + m]])
     at = first.size
     seen, lost = _split(turned[:at, :at], turned[:at, at:])
     small = np.concatenate([lost, turned[at:, at:]])
@@ -164,7 +169,7 @@ def _evidence(
         # No variance at all: a prior so tight that the term is nothing.
         variance = max(variance, 1e-24)
         prior = np.eye(len(last), len(last) + 1) / math.sqrt(variance)
-        r: Array = np.asarray(np.linalg.qr(np.concatenate([small, prior]), mode="r"))
+        r = _triangle(np.concatenate([small, prior]))
         squares = float(np.sum(r[len(last) :, -1] ** 2))
         diagonal = np.abs(np.diagonal(r)[: len(last)])
         twice = freedom * math.log(max(squares, 1e-300) / freedom)

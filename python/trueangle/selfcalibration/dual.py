@@ -20,6 +20,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from ..errors import ArgumentError, NoModelError
+from ..estimation.linear import linear_residual
 from ..runs.travel import Span, travelled_span
 from ..support.arrays import Array
 from .dense import patterns_apart
@@ -215,7 +216,7 @@ def _ratio(
 def _eccentricity(channels: GearedChannels, ratio: float, turns: float) -> float:
     """Amplitude, in radians, of orders 1 and 2 that a ratio needs."""
     lines = [line for line in lines_of_gear(BESIDE_RATIO, ratio, turns) if not line.motor]
-    return float(np.linalg.norm(fit_dual_lines(channels, ratio, lines).dense.patterns))
+    return math.hypot(*fit_dual_lines(channels, ratio, lines).dense.patterns)
 
 
 def _at_output(o: OrderEstimate, line: SharedLine, zero: float) -> OrderEstimate:
@@ -319,8 +320,7 @@ def _held_out(channels: GearedChannels, ratio: float, fit: DualFit) -> dict[str,
     plain = np.concatenate([p.target for p in rows])[judged]
     predicted = plain - np.concatenate([p.patterns @ first for p in rows])[judged]
     before, after = (
-        math.sqrt(float(np.mean((y - nuisances @ np.linalg.lstsq(nuisances, y, 1e-12)[0]) ** 2)))
-        for y in (plain, predicted)
+        math.sqrt(float(np.mean(linear_residual(nuisances, y) ** 2))) for y in (plain, predicted)
     )
     names = ("the first half", "the second half") if halves else ("odd blocks", "even blocks")
     return {

@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.linear import linear_residual, wald_statistic
 from ..support.distributions import chi_squared_quantile
 from .dense import DenseFit, fit_dense, low_frequency_inflation
 from .densetriangle import DenseRows
@@ -176,8 +177,7 @@ def choose_dual_lines(
     def squares(kept: Sequence[int]) -> float:
         columns = [*range(beside), *(beside + 2 * i + j for i in (*motor, *kept) for j in (0, 1))]
         columns += [triangle.shape[1] - 2] * slope
-        design, target = triangle[:, columns], triangle[:, -1]
-        left = target - design @ np.linalg.lstsq(design, target, rcond=1e-12)[0]
+        left = linear_residual(triangle[:, columns], triangle[:, -1])
         return float(left @ left)
 
     everything = squares(own)
@@ -210,8 +210,7 @@ _LEAST: Final = 0.02
 
 
 def _statistic(fit: DenseFit, pair: slice) -> float:
-    value, block = fit.patterns[pair], fit.covariance[pair, pair]
-    return float(value @ np.linalg.pinv(block, hermitian=True) @ value)
+    return wald_statistic(fit.patterns[pair], fit.covariance[pair, pair])
 
 
 def estimate_dual_ratio(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import NoModelError
+from ..estimation.linear import least_squares
 from ..support.arrays import Array
 from .recording import Recording
 
@@ -145,7 +146,7 @@ def gear_motion(theta: Array, time: Array | None) -> tuple[Array, Array]:
         return np.asarray(way), np.zeros(theta.size)
     # A cubic has the slope of a swing where a difference over as many readings is too small.
     powers = np.vander(np.arange(-spread, spread + 1.0), 4, increasing=True)
-    slope = np.linalg.pinv(powers)[1]
+    slope = least_squares(powers, np.eye(len(powers)))[1]
     turned, passed = (np.correlate(values, slope, "valid") for values in (theta, time))
     inner = turned / np.where(passed > 0.0, passed, np.inf)
     speed = np.pad(inner, spread, mode="edge")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..estimation.factor import BandedFactor
 from ..support.arrays import Array
-from .projected import Projected, Unknown
+from .projected import Projected, Unknown, combinations
 from .splines import (
     DriftPenalty,
     Knots,
@@ -256,10 +256,8 @@ class MotionSearch:
         eliminated = factor.solve(grid.cross)
         information = grid.common - grid.cross.T @ eliminated
         information = 0.5 * (information + information.T)
-        scale = np.sqrt(np.maximum(np.diagonal(grid.common), 1e-300))
-        values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-        kept = values > _GONE
-        half = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
+        scale, values, vectors, _ = combinations(information, np.diagonal(grid.common), _GONE)
+        half = scale[:, None] * vectors / np.sqrt(values)
 
         def step(spline_right: Array, common_right: Array) -> tuple[Array, Array]:
             first = factor.solve(spline_right)
@@ -295,13 +293,13 @@ class MotionSearch:
             + float(found @ sums.common @ found)
         )
         penalised = max(squares, 1e-300) + stiffness * grid.drift.energy(spline, memory)
-        fixed = 2 * len(grid.sums.knots.intervals) + int(kept.sum())
+        fixed = 2 * len(grid.sums.knots.intervals) + values.size
         freedom = max(sums.weighty - fixed, 1.0)
         twice = (
             freedom * math.log(penalised / freedom)
             + factor.log_determinant
-            + float(np.log(values[kept]).sum())
-            + 2.0 * float(np.log(scale).sum())
+            + float(np.log(values).sum())
+            - 2.0 * float(np.log(scale).sum())
             - grid.drift.log_determinant(stiffness, memory)
         )
         projected = Projected(
@@ -322,11 +320,8 @@ def _without(information: Array, alone: Array, m: int) -> Array:
     """Information of the first ``m`` columns with the further ones eliminated."""
     if m == len(information):
         return information
-    scale = 1.0 / np.sqrt(np.maximum(alone[m:], 1e-300))
-    values, vectors = np.linalg.eigh(information[m:, m:] * np.outer(scale, scale))
-    kept = values > _GONE
-    half = (scale[:, None] * vectors[:, kept]) / np.sqrt(values[kept])
-    moved = information[:m, m:] @ half
+    scale, values, vectors, _ = combinations(information[m:, m:], alone[m:], _GONE)
+    moved = information[:m, m:] @ (scale[:, None] * vectors / np.sqrt(values))
     return np.asarray(information[:m, :m] - moved @ moved.T)
 
 

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.linear import wald_statistic
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_quantile, chi_squared_tail
 from .correlation import correlation_above
@@ -123,9 +124,7 @@ def significant_orders(
             for i, column in enumerate(projected.columns)
             if column.order == order and column.part and source in (None, column.source)
         ]
-        block, value = covariance[np.ix_(at, at)], coefficients[at]
-        size = float(value @ np.linalg.pinv(block, hermitian=True) @ value)
-        if size > limit:
+        if wald_statistic(coefficients[at], covariance[np.ix_(at, at)]) > limit:
             kept.append(order)
     return tuple(kept)
 

@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from ..estimation.linear import inverse_and_log_determinant, pseudo_inverse
 from ..support.arrays import Array
 
 #: Where separating the ripple multiplies the standard error by more, speeds are too much
@@ -62,9 +63,9 @@ def averaged_over_ripple(
         sizes = np.concatenate([[0.0], scale * _SIZES])
         prior = np.concatenate([[_NONE], np.full(_SIZES.size, (1.0 - _NONE) / _SIZES.size)])
         total = block[None] + sizes[:, None, None] ** 2 * np.eye(2)
-        inverse = np.linalg.inv(total)
+        inverse, determinant = inverse_and_log_determinant(total)
         chi = np.einsum("i,nij,j->n", estimate, inverse, estimate)
-        log = np.log(prior) - 0.5 * chi - 0.5 * np.linalg.slogdet(total)[1]
+        log = np.log(prior) - 0.5 * chi - 0.5 * determinant
         weight = np.exp(log - log.max())
         weight /= weight.sum()
         # Sizes below the standard error are as good as none.
@@ -80,9 +81,8 @@ def averaged_over_ripple(
             spread[a, a] += (weight[:, None] * moved).T @ moved
     # Ripple with variances ``precision`` a priori: one step of a Kalman filter.
     rows = slice(m, m + 2 * len(ripple))
-    gain = np.linalg.solve(
-        covariance[rows, rows] + np.diag(precision), covariance[rows, : rows.stop]
-    )
+    measured = covariance[rows, rows] + np.diag(precision)
+    gain = pseudo_inverse(measured) @ covariance[rows, : rows.stop]
     corrected = unknowns[: rows.stop] - gain.T @ unknowns[rows]
     after = covariance[: rows.stop, : rows.stop] - covariance[: rows.stop, rows] @ gain
     after[:m, :m] += spread

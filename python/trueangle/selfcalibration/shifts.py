@@ -270,8 +270,7 @@ def _held_out(
         # What the others cannot determine, and so not predict, is fitted here.
         seen = fit.projected.told
         here = np.concatenate([rows.patterns[:, ~seen], rows.nuisances], axis=1)
-        basis = np.linalg.svd(here, full_matrices=False)
-        basis_rows = basis[0][:, basis[1] > 1e-6 * basis[1].max()]
+        basis_rows = _basis(here, 1e-6)
         told = rows.patterns[:, seen]
 
         def clear(values: Array, basis_rows: Array = basis_rows) -> Array:

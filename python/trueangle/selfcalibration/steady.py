@@ -169,7 +169,7 @@ def fit_steady(
 
 def _settled(fit: MotionFit, orders: Sequence[float]) -> bool:
     """Whether a further step would be small: it is of second order, ``k δ²``."""
-    step = float(np.linalg.norm(fit.unknowns[: 2 * len(orders)]))
+    step = math.hypot(*fit.unknowns[: 2 * len(orders)])
     std = np.sqrt(np.maximum(np.diagonal(fit.projected.covariance), 0.0))
     return bool(
         max(orders, default=0.0) * step**2 < _STILL * std[: 2 * len(orders)].min(initial=1.0)

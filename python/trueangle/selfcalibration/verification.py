@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.linear import wald_statistic
 from ..support.arrays import Array
 from ..support.distributions import chi_squared_tail, f_tail
 from .dense import DenseFit
@@ -61,7 +62,7 @@ def chance_of_difference(gap: Array, covariance: Array, freedom: float = math.in
     with the degrees of freedom of the noise's variance, by which alone V is uncertain; chi-squared
     where they are infinite.
     """
-    size = float(gap @ np.linalg.pinv(covariance, hermitian=True) @ gap)
+    size = wald_statistic(gap, covariance)
     count = float(max(gap.size, 1))
     if math.isinf(freedom):
         return chi_squared_tail(size, count)

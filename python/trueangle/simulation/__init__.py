@@ -38,8 +38,7 @@ from ..effects import (
     WrongGearRatio,
     ZeroSlip,
 )
-from ..joint.declared import Head
-from ..joint.joint import Joint
+from ..joint.joint import Head, Joint
 from ..joint.pattern import Harmonic, Pattern
 from ..joint.signals import Signals, join_runs
 from .designs import RunDesign

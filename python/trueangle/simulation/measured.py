@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..estimation.linear import least_squares
 from ..joint.signals import Signals, join_runs
 from ..runs.run import CalibrationRun
 from ..support.arrays import Array
@@ -105,7 +106,7 @@ def _load(signals: Signals) -> tuple[float, float, float]:
     if power <= 1e-18 * max(mean * mean, 1e-300):
         return mean, 0.0, 0.0
     columns = np.column_stack([np.ones(len(signals)), np.sin(signals.theta), np.cos(signals.theta)])
-    (level, a, b), *_ = np.linalg.lstsq(columns, torque, rcond=None)
+    level, a, b = least_squares(columns, torque)
     left = torque - columns @ np.array([level, a, b])
     if float(np.var(left)) > (1.0 - _WEIGHT) * power:
         return mean, 0.0, 0.0

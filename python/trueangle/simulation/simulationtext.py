@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from ..effects import KINDS, Effect
 from ..errors import ArgumentError, FileError
-from ..joint.declared import Bearing, DeclaredShaft, Head
-from ..joint.joint import Joint
+from ..joint.joint import Bearing, DeclaredShaft, Head, Joint
 from ..joint.pattern import Harmonic
 from ..support.decoding import finite_float, read_text, shown_value
 from ..support.files import SIMULATION, SIMULATION_BYTES, refuse_own, written_atomically

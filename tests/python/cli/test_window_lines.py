@@ -9,7 +9,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.cli.watch import _line
-from trueangle.model.alarm import WatchedOrder, WatchedWindow
+from trueangle.model.monitor import WatchedOrder, WatchedWindow
 
 TURNS = {"deg": 360.0, "rad": 2.0 * np.pi, "turn": 1.0, "count": 8192.0}
 ARCSEC = 1_296_000.0

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import trueangle as ta
-from trueangle.joint.grid import aliases_of
+from trueangle.joint.lattice import aliases_of
 from trueangle.simulation import Harmonic, Joint, NonIntegerOrder, RunDesign, Simulation, simulate
 
 #: Standard errors within which an order is the hidden one.

@@ -13,7 +13,7 @@ from trueangle.diagnosis.gain import Gain
 from trueangle.diagnosis.goodness import Noise, Unexplained
 from trueangle.effects import TimePeriodic
 from trueangle.estimation.regression import Regression
-from trueangle.joint.lines import line_columns
+from trueangle.joint.pattern import line_columns
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.simulation import RunDesign, Simulation
 

@@ -11,7 +11,7 @@ from trueangle.estimation.blocks import Blocks
 from trueangle.estimation.projection import project
 from trueangle.estimation.regression import Regression
 from trueangle.estimation.whitening import LagCorrelation, RunEffect, Whitener
-from trueangle.joint.grid import UniformGrid, uniform_grid
+from trueangle.joint.lattice import UniformGrid, uniform_grid
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, join_runs, simulate
 
 #: Relative rounding of double precision sums over a few hundred readings.

@@ -20,7 +20,7 @@ from trueangle.diagnosis.goodness import Noise, Unexplained
 from trueangle.effects.ambiguity import Ambiguity
 from trueangle.estimation.extension import Extension
 from trueangle.estimation.regression import Regression
-from trueangle.joint.lines import line_columns
+from trueangle.joint.pattern import line_columns
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import RunDesign, Simulation
 

@@ -13,7 +13,7 @@ from trueangle.diagnosis.gearedlines import GearedLines
 from trueangle.diagnosis.gearratio import find_ratio
 from trueangle.effects.wrong_gear_ratio import WrongGearRatio
 from trueangle.estimation.regression import Regression
-from trueangle.joint.grid import UniformGrid
+from trueangle.joint.lattice import UniformGrid
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation, simulate
 

@@ -13,8 +13,8 @@ from trueangle.diagnosis.selection import _with_declared_lines
 from trueangle.effects import LocalDefect, MissingOrder
 from trueangle.estimation.extension import Extension
 from trueangle.estimation.regression import Regression
-from trueangle.joint.declared import DeclaredShaft
-from trueangle.joint.lines import line_sum
+from trueangle.joint.joint import DeclaredShaft
+from trueangle.joint.pattern import line_sum
 from trueangle.joint.signals import join_runs
 from trueangle.simulation import Joint, Simulation
 

@@ -24,7 +24,7 @@ from trueangle.diagnosis.selection import (
 from trueangle.effects import EFFECTS, Backlash, MissingOrder
 from trueangle.estimation.regression import Regression
 from trueangle.estimation.whitening import RunEffect
-from trueangle.joint.lines import line_columns, line_sum
+from trueangle.joint.pattern import line_columns, line_sum
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.simulation import RunDesign, Simulation
 

@@ -10,7 +10,7 @@ from trueangle.effects import MissingOrder, NonIntegerOrder, Sidebands, WrongGea
 from trueangle.effects.time_periodic import FREQUENCY_DRIFT, OVERSAMPLING, _drifting
 from trueangle.estimation.extension import Extension
 from trueangle.estimation.regression import Regression
-from trueangle.joint.lines import line_columns, line_sum
+from trueangle.joint.pattern import line_columns, line_sum
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 

@@ -10,7 +10,7 @@ from trueangle.effects import TimePeriodic
 from trueangle.effects.time_periodic import OVERSAMPLING, _fixed
 from trueangle.estimation.extension import Extension
 from trueangle.estimation.regression import Regression
-from trueangle.joint.lines import line_columns
+from trueangle.joint.pattern import line_columns
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.simulation import Joint, RunDesign, Simulation
 

@@ -9,8 +9,8 @@ import trueangle as ta
 from trueangle.effects import EFFECTS, Outliers
 from trueangle.effects.randomphase import RandomPhaseLine
 from trueangle.estimation.regression import Regression
-from trueangle.joint.declared import Bearing
-from trueangle.joint.lines import line_columns
+from trueangle.joint.joint import Bearing
+from trueangle.joint.pattern import line_columns
 from trueangle.joint.signals import join_runs
 
 from .test_stated_errors import NEAR, NOISE, SIM, signal_of, stated

@@ -11,7 +11,7 @@ from trueangle.effects.channel_skew import skewed_order
 from trueangle.effects.varying_line import _resolved
 from trueangle.estimation.lines import plausible_orders
 from trueangle.estimation.regression import Regression
-from trueangle.joint.lines import line_columns
+from trueangle.joint.pattern import line_columns
 from trueangle.joint.signals import Signals, join_runs
 from trueangle.simulation import Joint, RunDesign, Simulation
 

@@ -12,7 +12,7 @@ from trueangle.estimation.factor import orthonormal_basis
 from trueangle.estimation.projection import Projection, project
 from trueangle.estimation.solution import common_blocks
 from trueangle.estimation.whitening import RunEffect, Whitener
-from trueangle.joint.lines import line_columns
+from trueangle.joint.pattern import line_columns
 
 from .dense import BOUNDS, CASES, N, case, covariance
 

@@ -9,8 +9,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import FileError
-from trueangle.joint.declared import Bearing, DeclaredShaft
-from trueangle.joint.joint import Joint
+from trueangle.joint.joint import Bearing, DeclaredShaft, Joint
 
 FILE = """
 [[shaft]]

@@ -7,8 +7,7 @@ import math
 import pytest
 
 from trueangle.errors import ArgumentError
-from trueangle.joint.declared import Bearing, DeclaredShaft, Head
-from trueangle.joint.joint import Joint
+from trueangle.joint.joint import Bearing, DeclaredShaft, Head, Joint
 
 WORM = DeclaredShaft("worm", teeth=37)
 BELT = DeclaredShaft("belt", cycles_per_turn=0.37)

@@ -9,8 +9,14 @@ import pytest
 
 from trueangle.errors import ArgumentError
 from trueangle.joint.joint import Joint
-from trueangle.joint.lines import line_columns, line_sum, lines_columns
-from trueangle.joint.pattern import ARCSEC_PER_RAD, Harmonic, Pattern
+from trueangle.joint.pattern import (
+    ARCSEC_PER_RAD,
+    Harmonic,
+    Pattern,
+    line_columns,
+    line_sum,
+    lines_columns,
+)
 
 JOINT = Joint(50.0, "flexspline", "motor")
 THETA = np.linspace(-7.0, 9.0, 301)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from trueangle.errors import ArgumentError
-from trueangle.recording.lines import layout_of, layout_of_pattern
+from trueangle.recording.arrivals import layout_of, layout_of_pattern
 
 from .wires import arrived, recorded
 

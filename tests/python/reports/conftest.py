@@ -8,7 +8,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.effects import Backlash
-from trueangle.joint.declared import DeclaredShaft
+from trueangle.joint.joint import DeclaredShaft
 from trueangle.reports.demo import demo_simulation
 from trueangle.simulation import Harmonic, Joint, RunDesign
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.model.alarm import WatchedOrder, WatchedWindow
+from trueangle.model.monitor import WatchedOrder, WatchedWindow
 from trueangle.reports.diagnosed import unknown_content
 from trueangle.reports.figures import error_scale
 from trueangle.reports.robot import JointRank, ranking_text

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.joint.declared import Head
+from trueangle.joint.joint import Head
 from trueangle.simulation import (
     Harmonic,
     HeteroscedasticNoise,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trueangle.support.quantiles import median, quantile
+from trueangle.support.arrays import median, quantile
 
 SHARES = (0.0, 0.01, 0.25, 0.5, 0.8, 0.9, 1.0)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 import trueangle as ta
 from fleets.made import units
-from trueangle.model.alarm import WatchedOrder, WatchedWindow
+from trueangle.model.monitor import WatchedOrder, WatchedWindow
 from trueangle.reports.robot import RobotReport
 from trueangle.support.arrays import Array
 

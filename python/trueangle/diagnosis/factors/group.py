@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from ...joint.lines import line_columns
+from ...joint.pattern import line_columns
 from ...support.arrays import Array
 
 #: The factors, in the order in which equally strong ones are stated.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects.orderspectrum import OrderSpectrum
-from ...joint.lines import line_columns
+from ...joint.pattern import line_columns
 from ...joint.signals import Signals
 from ...runs.aliasing import count_positions
 from ...support.arrays import Array

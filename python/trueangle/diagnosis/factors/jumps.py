@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from ...joint.lines import line_columns
+from ...joint.pattern import line_columns
 from ...support.arrays import Array
 from .group import LOW, STANDS_OUT
 

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from ...errors import ArgumentError
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
-from ...support.arrays import Array
-from ...support.quantiles import median
+from ...support.arrays import Array, median
 from .candidates import Candidates
 from .lookalikes import find_lookalikes
 from .noise import ReadingVariance

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...estimation.factor import orthonormal_basis
 from ...estimation.rounded import fit_rounded, is_rounding_visible
-from ...joint.lines import lines_columns
+from ...joint.pattern import lines_columns
 from ...support.arrays import Array
 from .zerogroups import ZeroGroupReadings
 

@@ -9,8 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...support.arrays import Array
-from ...support.quantiles import median, quantile
+from ...support.arrays import Array, median, quantile
 from ...support.roles import role_code
 from .fault import DataFault
 from .record import Record

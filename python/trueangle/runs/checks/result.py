@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ...support.arrays import Array
+from ...support.arrays import Array, median, quantile
 from ...support.layout import counted, laid_out, wrapped_lines
 from ...support.plainresult import PlainResult, plain_fields
-from ...support.quantiles import median, quantile
 from .fault import DataFault
 from .record import LEAST_READINGS, Record
 

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...support.angles import wrap
-from ...support.arrays import Array, distinct
+from ...support.arrays import Array, distinct, median, quantile
 from ...support.display_units import brief_number
-from ...support.quantiles import median, quantile
 from ..outliers import WILD, robust_scale, spikes
 from .fault import REPEATS, DataFault
 from .record import LEAST_READINGS, Record

@@ -17,8 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...support.arrays import Array
-from ...support.quantiles import median, quantile
+from ...support.arrays import Array, median, quantile
 from .fault import DataFault
 from .record import Record
 

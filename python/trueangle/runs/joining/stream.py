@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...support.arrays import Array
-from ...support.quantiles import quantile
+from ...support.arrays import Array, quantile
 
 #: Readings that a run is made of, at least.
 LEAST = 4
