@@ -183,7 +183,7 @@ def _columns(entries: Sequence[str] | None, single: bool) -> Any:
         return None
     if single:
         if len(entries) > 1:
-            raise ArgumentError("--column: one model corrects one column")
+            raise ArgumentError("--column: one model corrects one column; give --column once")
         return entries[0]
     return by_joint(entries, "--column")
 

@@ -267,8 +267,8 @@ def _believed(args: argparse.Namespace, empty: bool = False) -> Simulation | Non
         if args.simulated is not None:
             return None
         raise ArgumentError(
-            "give --simulation FILE, or --simulated LOG, or both; without a simulation, "
-            "--gear-ratio R of the joint (--gear-ratio 1 --fixed-member none without a gear)"
+            "no simulation: give --simulation FILE, --simulated LOG or --gear-ratio R; without a "
+            f"gear, run: trueangle diagnose {args.runs[0]} --gear-ratio 1 --fixed-member none"
         )
     shafts = declared_shafts(args.shaft).items()
     ratio = args.gear_ratio

@@ -230,7 +230,7 @@ def refuse_joint(joint: str | None, paths: Sequence[str]) -> None:
     from ..model.robot import is_robot_file
 
     if joint is not None and not any(map(is_robot_file, paths)):
-        raise ArgumentError(f"--joint {joint}: {paths[0]} is the model of one joint")
+        raise ArgumentError(f"--joint {joint}: {paths[0]} is the model of one joint; omit --joint")
 
 
 def joint_asked(path: str, joint: str | None) -> tuple[HarmonicModel, dict[str, Any]]:

@@ -51,9 +51,7 @@ class ClockDrift(Effect):
     }
     measure: ClassVar[str] = "out and back in one run at two speeds, with a stop in between"
     acts_on_runs: ClassVar[bool] = True
-    not_at_run_time: ClassVar[str] = (
-        "it lies between two records, not in the joint: put both on one clock"
-    )
+    not_at_run_time: ClassVar[str] = "the clocks differ, not the joint; record both on one clock"
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return self.ppm * self.columns(signals, around, {})[:, 0]

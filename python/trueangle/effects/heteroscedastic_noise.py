@@ -61,7 +61,7 @@ class HeteroscedasticNoise(Effect):
     transfers: ClassVar[bool] = False
     confused_with: ClassVar[Mapping[type[Effect], str]] = {Outliers: "more readings"}
     weighs: ClassVar[bool] = True
-    not_at_run_time: ClassVar[str] = "scatter has no value to subtract, only a weight"
+    not_at_run_time: ClassVar[str] = "scatter has no value to subtract; average readings"
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         return np.zeros(len(signals))

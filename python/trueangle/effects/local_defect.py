@@ -287,7 +287,7 @@ class LocalDefect(Effect):
 
     def to_terms(self, period: float, shafts: Mapping[str, float]) -> tuple[Term, ...]:
         if self.shaft not in shafts:
-            raise ArgumentError(f"{self.kind}: how fast shaft {self.shaft!r} turns is not known")
+            raise ArgumentError(f"{self.kind}: declare the ratio of shaft {self.shaft!r}")
         degree = period / 360.0
         return (
             LocalDefectTerm(

@@ -88,7 +88,7 @@ class NonIntegerOrder(Effect):
     }
     located: ClassVar[bool] = True
     flexible_below: ClassVar[float] = ALWAYS
-    not_at_run_time: ClassVar[str] = "its phase is new in every run"
+    not_at_run_time: ClassVar[str] = "its phase is new in every run; average over runs"
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         phase = rng.uniform(0.0, 2.0 * np.pi, signals.runs)[signals.run]

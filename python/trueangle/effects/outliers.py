@@ -98,7 +98,7 @@ class Outliers(Effect):
     confused_with: ClassVar[Mapping[type[Effect], str]] = {
         LocalDefect: "a second pass over the same place",
     }
-    not_at_run_time: ClassVar[str] = "a single reading cannot distinguish a fault from a motion"
+    not_at_run_time: ClassVar[str] = "one reading may be motion; reject it in the data"
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         far_off = rng.random(len(signals)) < self.fraction

@@ -42,7 +42,7 @@ class Quantisation(Effect):
     measure: ClassVar[str] = "readings with the full resolution of the sensor"
     transfers: ClassVar[bool] = False
     rounds: ClassVar[bool] = True
-    not_at_run_time: ClassVar[str] = "what was rounded away is not in the reading"
+    not_at_run_time: ClassVar[str] = "rounded digits are lost; use more bits, or average readings"
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         # Rounding follows the noise (`written`): with enough of it its mean is zero.

@@ -62,7 +62,7 @@ class ReferenceLines(Effect):
     }
     located: ClassVar[bool] = True
     acts_on_runs: ClassVar[bool] = True
-    not_at_run_time: ClassVar[str] = "it is an error of the reference, not of the joint"
+    not_at_run_time: ClassVar[str] = "the reference has it, not the joint; calibrate the reference"
 
     def __post_init__(self) -> None:
         if not len(self.orders) == len(self.amplitudes_arcsec) == len(self.phases_deg):

@@ -44,7 +44,7 @@ class TimestampJitter(Effect):
     measure: ClassVar[str] = "at least 1000 readings over three speeds, one of them rest"
     transfers: ClassVar[bool] = False
     weighs: ClassVar[bool] = True
-    not_at_run_time: ClassVar[str] = "scatter has no value to subtract: trigger both at once"
+    not_at_run_time: ClassVar[str] = "scatter has no value to subtract; trigger both at once"
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         speed = ARCSEC_PER_DEG * 360.0 * signals.turns_per_s

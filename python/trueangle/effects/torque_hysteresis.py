@@ -78,7 +78,7 @@ class TorqueHysteresis(Effect):
     )
     located: ClassVar[bool] = True
     not_at_run_time: ClassVar[str] = (
-        "a corrector follows the history of travel, not that of the torque"
+        "a corrector keeps no history of the torque; `simulate` reproduces it"
     )
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:

@@ -62,9 +62,7 @@ class WrongGearRatio(Effect):
     measure: ClassVar[str] = "free angles, dense enough for the orders of the gear"
     located: ClassVar[bool] = True
     changes_lines: ClassVar[bool] = True
-    not_at_run_time: ClassVar[str] = (
-        "put the ratio right in the joint's description: a fit then has its lines"
-    )
+    not_at_run_time: ClassVar[str] = "change the ratio in the simulation file, then fit again"
 
     def __post_init__(self) -> None:
         shaft_cycles(self.gear_ratio, "none")  # refuses what is no ratio

@@ -66,7 +66,7 @@ class ZeroSlip(Effect):
     draws_zeros: ClassVar[bool] = True
     has_exact_form: ClassVar[bool] = True
     not_at_run_time: ClassVar[str] = (
-        "the zero of a run is not known before the run is referenced: set it anew"
+        "the zero of a run is unknown until it is referenced; set the zero in every run"
     )
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:

@@ -313,7 +313,7 @@ def referenced_channels(
         phase = phase + (sums[:, -1] - sums[:, :-1] @ found)[run]
     freedom = target.size - found.size - len(signals) + 1
     if freedom < 1:
-        raise NoCurveError(f"{named}: {sine.size} readings are too few for the channels")
+        raise NoCurveError(f"{named}: {sine.size} readings are too few; record more")
     residuals = rows[:, -1] - rows[:, :-1] @ found
     variance = float(residuals @ residuals) / freedom
     correlated = max(inflation(residuals[: sine.size]), inflation(residuals[sine.size :]))

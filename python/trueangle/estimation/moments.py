@@ -226,7 +226,7 @@ class Moments(ShownResult):
         if not isinstance(other, Moments):
             raise ArgumentError(f"other must be Moments, got {type(other).__name__}")
         if (self._shafts, self.period) != (other._shafts, other.period):
-            raise ArgumentError(f"moments {verb} when their orders, shafts and period agree")
+            raise ArgumentError(f"moments {verb} only if their orders, shafts and period agree")
         if self._forgetting is not None or other._forgetting is not None:
             raise ArgumentError(forgets)
 

@@ -129,7 +129,7 @@ def export_model(
     if max_arcsec is not None and total > max_arcsec:
         raise ArgumentError(
             f"{target} differs by up to {total:.4g} arcsec with these options, and at "
-            f"most {max_arcsec:g} is allowed"
+            f"most {max_arcsec:g} is allowed; allow more, or make the table finer"
         )
     notes = [*made.notes, *_notes(found, pattern, made)]
     if found.at_sensor and loaded.indicated_sign < 0:
@@ -268,13 +268,13 @@ def _share(
     if beside >= max_arcsec:
         names = ", ".join(f"{row['term']} {row['size_arcsec']:.4g} arcsec" for row in rows)
         raise ArgumentError(
-            f"a table of the angle omits {names}, and at most {max_arcsec:g} is allowed"
+            f"a table of the angle omits {names}, and at most {max_arcsec:g} is allowed; allow more"
         )
     left = (max_arcsec - beside - rounding) / steep
     if left <= 0.0:
         raise ArgumentError(
             f"float arithmetic of the terms leaves {rounding:.4g} arcsec, and at most "
-            f"{max_arcsec:g} is allowed"
+            f"{max_arcsec:g} is allowed; allow more"
         )
     return left
 

@@ -150,7 +150,7 @@ def _values(pattern: TurnPattern, start: float, places: Array) -> tuple[Array, W
     best = linear_knots(pattern.correction, KNOTS)
     for _ in range(2):  # a reading moved over the turn's end makes another entry the first
         if np.any(np.diff(np.sort(values)) <= 0.0):
-            raise ArgumentError("klipper: two full steps have one reading: the error is too steep")
+            raise ArgumentError("klipper: two full steps have one reading; check the direction")
         first = solved_knots(values)[1]
         zero = start + places[first]
         ideal = (np.arange(KNOTS) / KNOTS - best - pattern.zero - zero) * TURN

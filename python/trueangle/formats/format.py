@@ -107,7 +107,7 @@ def check_lengths(path: Path, kind: str, sizes: Mapping[str, int]) -> None:
     """
     if len(set(sizes.values())) > 1:
         listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
-        raise FileError(path, f"{kind} that belong together differ in length: {listed}")
+        raise FileError(path, f"{kind} differ in length: {listed}; export the file again")
 
 
 class Selection(NamedTuple):

@@ -72,7 +72,7 @@ def copy(task: CopyTask) -> Contents:
         after = addition.correct(_values(column), signals)
         name = _variable(addition.added)
         if name in there or name in made:
-            raise FileError(task.source, "is there already: corrected before", column=name)
+            raise FileError(task.source, "exists already; correct the original", column=name)
         made[name] = after[:, None]
         rows = max(rows, len(column))
         task.watch(len(column), 1.0)

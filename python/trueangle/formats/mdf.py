@@ -165,7 +165,7 @@ def _parts(path: Path, mdf: MDF, places: Sequence[tuple[int, int]]) -> Iterator[
             break
     if found != said:
         name = group.channels[places[0][1]].name
-        raise FileError(path, f"is damaged: {found} of {said} records are there", column=name)
+        raise FileError(path, f"is damaged: {found} of {said} records; copy it again", column=name)
 
 
 def _part(path: Path, mdf: MDF, place: tuple[int, int], records: Any) -> Signal:

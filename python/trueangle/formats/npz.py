@@ -178,7 +178,7 @@ def _batches(path: Path, archive: zipfile.ZipFile, names: Sequence[str]) -> Iter
 def _part(path: Path, name: str, given: IO[bytes], column: _ArrayHeader, count: int) -> Any:
     data = given.read(count * column.kind.itemsize)
     if len(data) != count * column.kind.itemsize:
-        raise FileError(path, "is shorter than its header states: it is damaged", column=name)
+        raise FileError(path, "is damaged: it ends too early; copy it again", column=name)
     values: NDArray[Any] = np.frombuffer(data, column.kind)
     if column.kind.kind in "fiu":
         return values.astype(column.kind.newbyteorder("="), copy=False)

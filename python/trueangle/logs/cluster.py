@@ -39,7 +39,7 @@ def connected_client(scheduler: str) -> Iterator[Any]:
         client = distributed.Client(scheduler, timeout=_TIMEOUT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as cause:
         raise ArgumentError(
-            f"`scheduler={str(scheduler)!r}`: no Dask scheduler answers ({cause})"
+            f"`scheduler={str(scheduler)!r}`: no Dask scheduler answers ({cause}); start one"
         ) from (None)
     with client:
         yield client

@@ -223,7 +223,7 @@ def _readings(
         needed.append(columns.count * ratio * ratio)
     if max(needed) > MOST:
         raise ArgumentError(
-            f"with `noise={noise:g}` the wanted error takes more than {MOST} readings"
+            f"with `noise={noise:g}` more than {MOST} readings are needed; allow a larger error"
         )
     return math.ceil(max(needed))
 

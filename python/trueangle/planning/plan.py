@@ -77,7 +77,7 @@ def readings_needed(noise: float, standard_error: float, factor: float = 1.0) ->
     if count > _MOST:
         raise ArgumentError(
             f"`standard_error={standard_error:g}` takes more than {_MOST:g} readings with "
-            f"`noise={noise:g}`"
+            f"`noise={noise:g}`; allow a larger one"
         )
     return math.ceil(count)
 

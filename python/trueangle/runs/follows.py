@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
+from itertools import permutations
 
 import numpy as np
 
@@ -195,10 +196,10 @@ def _remedies(period: float) -> dict[str, float]:
     # A column is converted when it is read: its unit need not be that of the run, which
     # is only the likeliest.
     columns = sorted(_TURNS, key=lambda unit: not math.isclose(_TURNS[unit], period))
-    for column in columns:
-        for unit, turn in _TURNS.items():
-            if unit != column:
-                found[f"it looks like {unit} in a column of {column}"] = _TURNS[column] / turn
+    for column, unit in permutations(columns, 2):
+        code = role_code("indicated", "NAME", "turn" if unit == "turns" else unit[:3])
+        factor = _TURNS[column] / _TURNS[unit]
+        found[f"it looks like {unit} in a column of {column}: give {code}"] = factor
     return found
 
 
@@ -220,6 +221,5 @@ def _moves(ratio: float | None) -> str:
         return "check units, sign, gear ratio and that the rows belong together"
     return (
         f"it moves {ratio:.6g} times as far as the reference, which looks like "
-        f"{ratio_suggestion(ratio, 0.0)}; unwrap it and divide it by {ratio:.6g}, so that it is "
-        "reduced to the output"
+        f"{ratio_suggestion(ratio, 0.0)}; unwrap it and divide it by {ratio:.6g}"
     )

@@ -100,7 +100,7 @@ def channel_patterns(
         )
     except NotInvertibleError:
         raise NoCurveError(
-            f"{first.named}: the curve found is too far from an ellipse for one angle at each place"
+            f"{first.named}: the curve is too far from an ellipse; check the wiring of the channels"
         ) from None
     return SelfCalibration(
         method="channels",

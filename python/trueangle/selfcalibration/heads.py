@@ -70,7 +70,7 @@ def head_patterns(
         kept = significant_orders(fit.projected, fit.patterns, fit.covariance, kept)
     if not kept:
         raise NoModelError(
-            f"{recordings[0].named}: no order of the difference between the heads is significant"
+            f"{recordings[0].named}: the heads differ at no significant order; record longer"
         )
     fit = _fit(readings, kept)
     count = sum(h.size for h in readings)

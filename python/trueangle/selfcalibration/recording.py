@@ -220,7 +220,7 @@ def _split(
 ) -> list[Recording]:
     """One recording per unit and run, in the order of their first row, without empty rows."""
     if not channels:
-        raise ArgumentError(f"{file or 'the table'} holds no column that is known")
+        raise ArgumentError(f"{file or 'the table'} has no known column; name its columns")
     used = {name: values for name, values in channels.items() if name in _CHANNELS or _head(name)}
     size = next(iter(channels.values())).size
     present = np.ones(size, dtype=bool)

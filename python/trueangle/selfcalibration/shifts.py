@@ -64,7 +64,7 @@ def shift_patterns(
         raise NoModelError(
             f"{recordings[0].named}: {design.facets} facets show orders up to "
             f"{design.facets // 2}, order {max(wanted):g} looks like order "
-            f"{abs(max(wanted) - design.facets):g} there"
+            f"{abs(max(wanted) - design.facets):g} there; leave it out"
         )
     fit = _fit(design, wanted)
     lost = _lost(fit, wanted)

@@ -153,7 +153,7 @@ def rotor_angle(
             x += h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
             v += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
         if not abs(v) < 1e9:
-            raise ArgumentError("the shaft runs away: cogging, imbalance or loop are too strong")
+            raise ArgumentError("the shaft runs away: make cogging, imbalance and loop weaker")
         angle[i], speed[i] = x, v
         if band:
             driven[i] = loop(now, x, v)

@@ -86,7 +86,7 @@ def _decoded(path: str | Path, document: Mapping[str, Any]) -> StatedSimulation:
     )
     samples = sum(design.samples for design in designs)
     if samples > MAX_SAMPLES:
-        raise FileError(path, f"its runs have {samples} samples, more than {MAX_SAMPLES} in all")
+        raise FileError(path, f"{samples} samples in its runs; allowed are {MAX_SAMPLES} in all")
     noise = _table(path, document, "noise")
     for name in noise:
         if name != "sigma_arcsec":

@@ -341,14 +341,8 @@ def test_columns_of_a_simulators_log_are_named_by_an_option_that_works(
     for name, ref, enc in (("a.csv", "laser", "q 1"), ("b.csv", "true", "seen")):
         head = text.replace("reference_deg", ref, 1).replace("indicated_deg", enc, 1)
         Path(name).write_text(head)
-    words = [
-        "diagnose",
-        "a.csv",
-        "--signal",
-        "reference=laser:deg",
-        "--signal",
-        "indicated=q 1:deg",
-    ]
+    named = ["--signal", "reference=laser:deg", "--signal", "indicated=q 1:deg"]
+    words = ["diagnose", "a.csv", *named]
     assert main([*words, "--simulated", "b.csv"]) == 1
     said = capsys.readouterr().err
     assert "another named with --signal simulated.reference=NAME:UNIT)" in said
@@ -378,6 +372,11 @@ def test_a_unit_that_is_missing_is_told_as_an_option_that_works(
     option = shlex.split(said.split("give it: ")[1])
     assert option == ["--signal", f"reference={name}:deg"]
     assert main([*words, option[1]]) == 0
+    # A wrong one is refused with the right one.
+    words[-1:] = ["--signal", option[1], "--signal", "indicated=indicated_deg:rad"]
+    assert main(words) == 1
+    advice = capsys.readouterr().err.split("give --signal ")[1].strip()
+    assert main([*words[:-1], advice.replace("NAME", "indicated_deg")]) == 0
 
 
 @pytest.mark.parametrize("what", REFUSALS)
@@ -421,7 +420,9 @@ def test_nothing_believed_needs_a_joint_and_a_joint_no_file(
     desk: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["diagnose", "runs.csv"]) == 1
-    assert "--gear-ratio" in capsys.readouterr().err
+    advice = capsys.readouterr().err.split("run: trueangle ")[1]
+    assert main(shlex.split(advice)) == 0
+    capsys.readouterr()
     assert main(["diagnose", "runs.csv", "--simulation", "joint.toml", "--gear-ratio", "3"]) == 1
     assert "the simulation states the joint" in capsys.readouterr().err
     assert main(["diagnose", "runs.csv", "--gear-ratio", "100", "--json"]) == 0

@@ -100,8 +100,8 @@ def test_longer_windows(desk, capsys):
 
 def test_what_cannot_be_read_is_told_with_its_line(desk, capsys, monkeypatch):
     for text, told in (
-        ("", "no line is a row of numbers, 0 lines"),
-        ("reference_deg,indicated_deg\nx,1\nx,3\n", "no line is a row of numbers, 3 lines"),
+        ("", "0 lines, none of numbers"),
+        ("reference_deg,indicated_deg\nx,1\nx,3\n", "3 lines, none of numbers; check"),
         ("a,b\n1,2\n", "reference"),
     ):
         (desk / "typed.csv").write_text(text)

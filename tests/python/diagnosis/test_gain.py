@@ -226,11 +226,7 @@ def test_a_law_is_held_against_each_level_that_was_left_out() -> None:
         ((1.0, 2.0), (1.0, 2.0), "fitted at one level, tested at the other"),
         ((1.0, 2.0), (2.0,), "tested at the other; the other levels are needed for the fit"),
         ((1.0, 2.0, 3.0), (1.0, 2.0, 3.0), "tested at levels between and beyond"),
-        (
-            (1.0, 2.0, 3.0),
-            (3.0,),
-            "between and beyond those fitted; the other levels are",
-        ),
+        ((1.0, 2.0, 3.0), (3.0,), "between and beyond those fitted; the other levels are"),
         ((1.0, 2.0, 3.0), (2.0,), "tested at levels between those fitted; the other levels are"),
     ],
 )

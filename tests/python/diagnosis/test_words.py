@@ -80,7 +80,7 @@ def test_every_kind_of_size_has_its_unit():
     result = ta.diagnose(ta.simulate(sim.with_effects(hidden), 3), sim)
     first = " ".join(result.summary().split("\n\n")[0].split())
     (bump,) = [f.parameters["place_deg"].value for f in result.findings if "local" in f.cause]
-    for cause in ("backlash (", "zero_slip (", f"local_defect output at {bump:.1f}"):
+    for cause in ("backlash (", "zero_slip (", f"local_defect output at {bump:.3f} +- "):
         assert cause in first, first
     assert first.count("arcsec)") == 3
     text = result.summary()

@@ -126,7 +126,7 @@ def test_records_that_a_group_of_mdf_has_not(tmp_path):
     path = mdf_with(tmp_path, 8, "<Q", 50)
     error = corrected(path)
     assert isinstance(error, FileError)
-    assert "40 of 50 records are there" in str(error)
+    assert "40 of 50 records; copy it again" in str(error)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_a_text_of_matlab_in_the_place_of_the_corrected_angle(tmp_path):
     savemat(tmp_path / "log.mat", {"indicated_deg": THETA, "corrected_deg": "words"})
     error = corrected(tmp_path / "log.mat")
     assert isinstance(error, FileError)
-    assert "column 'corrected_deg': is there already" in str(error)
+    assert "column 'corrected_deg': exists already; correct the original" in str(error)
     savemat(tmp_path / "log.mat", {"note": "words"})
     with pytest.raises(FileError, match="no column reference_deg"):
         ta.read_runs(tmp_path / "log.mat")

@@ -125,5 +125,5 @@ def test_two_corrected_variables_of_one_name_are_refused(tmp_path):
     }
     report = ta.correct_logs(tmp_path / "rig.mat", joints, tmp_path / "out.mat", signals=signals)
     assert not report.is_done
-    assert "column 'elbow_corrected_deg': is there already" in str(report.logs[0].error)
+    assert "column 'elbow_corrected_deg': exists already" in str(report.logs[0].error)
     assert not (tmp_path / "out.mat").exists()

@@ -93,8 +93,8 @@ TOLD = {
                 "column 'reference_deg': its values are in other data sets or files (a virtual "
                 "or external data set), which are not read. Write them into "
                 "this file (h5repack or h5py)"),
-    "lengths": ("a.h5", lengths, "data sets that belong together differ in length: reference_deg "
-                "5, indicated_deg 4"),
+    "lengths": ("a.h5", lengths, "data sets differ in length: reference_deg 5, indicated_deg 4; "
+                "export the file again"),
     "square": ("a.h5", square, "column 'reference_deg': one angle after the other is needed, its "
                "shape is (3, 3)"),
 }  # fmt: skip

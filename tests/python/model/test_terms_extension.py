@@ -284,7 +284,7 @@ def test_every_cause_is_a_term_or_a_line_or_has_a_reason():
 
 
 def test_an_effect_of_an_unknown_shaft_is_refused():
-    with pytest.raises(errors.ArgumentError, match="shaft 'motor' turns is not known"):
+    with pytest.raises(errors.ArgumentError, match="declare the ratio of shaft 'motor'"):
         terms_from_effects([effect("local_defect")], 360.0)
 
 

@@ -49,7 +49,7 @@ def selected_orders(
     check_choice("method", method, ("evidence", "paper"))
     kept = [run for run in map(_without_zero_weights, found) if run is not None]
     if not kept:
-        raise ArgumentError("all readings have weight 0: nothing is left to select orders from")
+        raise ArgumentError("all readings have weight 0; give positive weights")
     said: tuple[str, ...] = ()
     lines = tuple(map(float, limited_orders(reference_orders, "reference_orders")))
     kinds: tuple[str, ...] | None = ()

@@ -114,7 +114,7 @@ def select_by_paper(
         )
     orders = [k for k in candidates.orders if k in candidates.main and k <= candidates.highest]
     if not orders:
-        raise ArgumentError("none of the candidates lies below the Nyquist limit of the positions")
+        raise ArgumentError("all orders are above the Nyquist limit; read at more positions")
     units, places = zero_groups(runs, candidates.whole)
     placed = positions.of_rows(places)
     training, held = units[:-1], units[-1]

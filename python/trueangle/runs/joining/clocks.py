@@ -112,7 +112,7 @@ def _coarse(indicated: Stream, reference: Stream) -> tuple[float, list[float] | 
     for stream in (indicated, reference):
         grid = np.arange(stream.time[0], stream.time[-1], step)
         if grid.size < 8:
-            raise ArgumentError("too few readings to bring two clocks together: at least 8 each")
+            raise ArgumentError("too few readings to align two clocks; record 8 in each log")
         curves.append(np.diff(stream.at(grid, cubic=False)[0]) / step)
     a, b = curves
     size = math.sqrt(float(np.mean(b**2)))

@@ -133,7 +133,7 @@ class _Log(NamedTuple):
         time = roles["time"].values(table.raw(roles["time"]), 360.0)
         known = np.isfinite(time) & np.isfinite(angle)
         if np.count_nonzero(known) < LEAST:
-            raise table.error(f"fewer than {LEAST} readings", column.name)
+            raise table.error(f"fewer than {LEAST} readings; record longer", column.name)
         signals = {
             name: found.values(table.raw(found), 360.0)[known]
             for name, found in roles.items()
