@@ -62,7 +62,7 @@ def test_an_error_is_one_line(line, models, monkeypatch, capsys):
     def broken(*_):
         raise TOLD[line]
 
-    monkeypatch.setattr("trueangle.export.compare", broken)
+    monkeypatch.setattr("trueangle.export.comparison.compare", broken)
     assert main(models) == (130 if line.startswith("interrupted") else 1)
     assert capsys.readouterr().err == f"trueangle: {line}\n"
 
@@ -113,7 +113,7 @@ def misnamed(number):
 )
 def test_a_signal_is_told_with_its_status(name, status, reach, models, monkeypatch, capsys):
     number = getattr(signal, name)
-    monkeypatch.setattr("trueangle.export.compare", lambda *_: reach(number))
+    monkeypatch.setattr("trueangle.export.comparison.compare", lambda *_: reach(number))
     before = signal.getsignal(number)
     if name != "SIGINT":
         signal.signal(number, signal.SIG_DFL)  # under nohup it is ignored
@@ -142,10 +142,10 @@ sys.meta_path.insert(0, Moment)
 #: One that comes in the work of `compare`.
 WORKING = """\
 import signal
-import trueangle.export
+import trueangle.export.comparison
 def compare(*_):
     {work}
-trueangle.export.compare = compare
+trueangle.export.comparison.compare = compare
 """
 FROM_TEXT = WORKING.format(work="exec('signal.raise_signal(signal.SIGTERM)')")
 TWICE = WORKING.format(

@@ -25,7 +25,7 @@ from trueangle.runs.run import CalibrationRun
 #: The doors of the package through which commands go.
 DOORS = (
     "cli.run_lists.read_runs", "runs.files.read_runs", "runs.checks.check.check", "fitting.fit.fit",
-    "fitting.orders.select.select_orders", "logs.fitting.fit_logs", "export.compare",
+    "fitting.orders.select.select_orders", "logs.fitting.fit_logs", "export.comparison.compare",
     "logs.fitting.select_log_orders", "logs.batch.correct_logs", "runs.joining.join",
     "runs.joining.minus_simulated", "planning.plan.plan_mounts", "planning.plan.plan_tilts",
     "planning.plan.plan_encoder", "planning.arc.plan_arc", "planning.selfplan.plan_self",
