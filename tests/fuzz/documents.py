@@ -20,8 +20,7 @@ from loader import Loader, seeds
 from mutation import mutated_bytes, mutated_document, mutated_words
 from trueangle.certificate.identity import load_identity
 from trueangle.effects import EFFECTS
-from trueangle.joint.description import load_description
-from trueangle.joint.urdf import robot_of_urdf
+from trueangle.joint.description import load_description, robot_of_urdf
 from trueangle.logs.manifest import Manifest
 from trueangle.planning.limits import load_limits
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from ..errors import ArgumentError
-from ..joint.members import FIXED_MEMBERS
+from ..joint import FIXED_MEMBERS
 from ..support.deadline import STYLES
 from ..support.display_units import ERROR_UNITS, ErrorsIn
 from ..support.files import MODEL, RUNS

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
-from ..selfcalibration.methods import PLANNED
+from ..selfcalibration import PLANNED
 from ..support.files import SIMULATION
 from .options import given, refuse_given
 from .parser import declare

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the robot file."""
-    from ..joint.urdf import robot_of_urdf
+    from ..joint.description import robot_of_urdf
 
     robot = robot_of_urdf(args.from_urdf)
     robot.save(args.output)

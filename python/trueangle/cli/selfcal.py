@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError
-from ..selfcalibration.methods import LOOPS, METHODS
+from ..selfcalibration import LOOPS, METHODS
 from .options import add_shared, show
 from .parser import declare
 from .paths import Input

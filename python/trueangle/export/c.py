@@ -8,9 +8,8 @@ import numpy as np
 
 from ..support.files import FileKind
 from .chain import Chain, source_identifier
-from .codetext import code_parts, filled_code, float_literal, number_rows
+from .codetext import code_parts, decoding, filled_code, float_literal, number_rows
 from .cstep import c_step
-from .decoding import decoding
 from .portable import PortableTarget, self_test, table_lines
 from .runtimeterms import RunTimeTerms
 from .table import PER_RADIAN, Table

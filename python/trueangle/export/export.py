@@ -19,7 +19,7 @@ from ..model.writing import model_text
 from ..support.argumentkinds import told_kinds
 from ..support.display_units import error_unit
 from ..support.files import check_output, read_whole, written_atomically
-from .decoding import check_choice
+from .codetext import check_choice
 from .exported import HEADER_DIGITS, Exported, run_time_bound, term_sizes
 from .pattern import TurnPattern
 from .proof import Proof, lost_orders, prove_export, rounded_up

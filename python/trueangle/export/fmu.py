@@ -26,9 +26,8 @@ from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..model.writing import model_text
 from ..support.files import FileKind
-from .codetext import code_file, code_parts, filled_code
+from .codetext import code_file, code_parts, decoding, filled_code
 from .cstep import DOUBLE, c_search, c_state, wave_tables
-from .decoding import decoding
 from .pattern import TurnPattern
 from .proof import Proof
 from .reading import table_error

@@ -13,8 +13,7 @@ from ..model import forms
 from ..model.forms import Form
 from ..support.files import FileKind
 from .chain import Chain, source_identifier
-from .codetext import code_parts, filled_code, float_literal, number_rows
-from .decoding import decoding
+from .codetext import code_parts, decoding, filled_code, float_literal, number_rows
 from .portable import PortableTarget, self_test, table_lines
 from .runtimeterms import RunTimeTerms, RunTimeWaves
 from .table import PER_RADIAN, TURN, Table, ratio_of_cycles

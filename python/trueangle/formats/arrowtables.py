@@ -13,8 +13,8 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .checksum import Checksum
 from .format import Addition, Batch, Contents, Labels, Selection, decoded_text, note
+from .stored import Checksum
 
 #: Key of the schema's metadata under which the provenance is kept.
 METADATA_KEY = b"trueangle"

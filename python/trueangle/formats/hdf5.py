@@ -14,7 +14,6 @@ import h5py
 import numpy as np
 
 from .budget import FileExtent
-from .checksum import Checksum
 from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, note
 from .hdf5sets import (
@@ -27,7 +26,7 @@ from .hdf5sets import (
     part,
     put,
 )
-from .stored import ROWS
+from .stored import ROWS, Checksum
 
 #: Readings taken together: what is read of them stays in the cache of the processor.
 _BLOCK = 1 << 17

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ..errors import FileError
 from .budget import FileExtent
-from .checksum import Checksum
 from .format import Addition, Batch, Contents, CopyTask, Selection, note
 from .openmdf import HAS_MARKS, OF_TEXTS, opened_mdf
+from .stored import Checksum
 
 #: Readings taken together.
 _BLOCK = 1 << 19

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
+from ..joint import FIXED_MEMBERS
 from ..support.argumentkinds import told_kinds
 from ..support.suggestions import check_choice
-from .members import FIXED_MEMBERS
 from .shafts import shaft_cycles
 
 #: Gear ratios of common strain wave gears, tried where none is declared.

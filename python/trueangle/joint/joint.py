@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ..errors import ArgumentError
+from ..joint import FIXED_MEMBERS
 from ..support.argumentkinds import all_of_type, told_kinds
 from ..support.suggestions import check_choice
-from .members import FIXED_MEMBERS
 from .shafts import shaft_cycles
 
 #: Names that belong to the output and its gear.

@@ -10,10 +10,10 @@ from typing import Final, NamedTuple, TypeVar
 import numpy as np
 
 from ..errors import ArgumentError
+from ..joint import FIXED_MEMBERS
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
-from .members import FIXED_MEMBERS
 
 __all__ = [
     "FIXED_MEMBERS",

@@ -14,7 +14,10 @@ from ..simulation.simulation import Simulation
 from ..support.blas import one_blas_thread
 from ..support.deadline import with_deadline
 from .evidence import ReadingNoise
-from .further import (
+from .limits import Limits
+from .nextruns import (
+    NextRuns,
+    RivalEvidence,
     count_of_changes,
     dialled_number,
     plainest_run,
@@ -22,8 +25,6 @@ from .further import (
     run_choices,
     run_seconds,
 )
-from .limits import Limits
-from .nextruns import NextRuns, RivalEvidence
 from .scales import DesignScales
 from .worth import NOTHING, Worth, barely
 

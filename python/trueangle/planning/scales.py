@@ -24,8 +24,8 @@ from .evidence import (
     evidence_between,
     is_doubted,
 )
-from .further import plainest_run, run_choices, run_seconds
 from .limits import Limits
+from .nextruns import plainest_run, run_choices, run_seconds
 from .worth import (
     ALIKE,
     MOST_EVIDENCE,

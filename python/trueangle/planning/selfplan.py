@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import ArgumentError
 from ..joint.shafts import limited_orders, shaft_cycles
-from ..selfcalibration.methods import PLANNED
+from ..selfcalibration import PLANNED
 from ..simulation.designs import RunDesign
 from ..simulation.simulation import Simulation
 from ..support.argumentkinds import told_kinds

@@ -20,10 +20,9 @@ from ..support.argumentkinds import of_type, told_kinds
 from ..support.deadline import Deadline, with_deadline
 from ..support.layout import counted
 from ..support.suggestions import check_choice
-from .detection import Chance
+from .detection import Chance, SizeRange, blind_causes, size_range
 from .result import Rehearsal, RehearsedCause, rehearsed_cause
 from .trial import FAILED, Trial, TrialOutcome, measured_signals
-from .visibility import SizeRange, blind_causes, size_range
 from .workers import LocalTrials, Workers, usable_cores
 
 #: Trials of a cause where not given.

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 from ..planning.nextruns import NextRuns
 from ..support.layout import counted, laid_out, wrapped_lines
 from ..support.plainresult import PlainResult, ShownResult, plain_fields, result_picture
-from .detection import Chance, binomial_interval
+from .detection import Chance, SizeRange, binomial_interval
 from .trial import TrialOutcome
-from .visibility import SizeRange
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -215,7 +215,7 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
         return _entries(table, given.counts)
     channels = dropouts = None
     if given.periods is not None or {"sine", "cosine"} & table.roles.keys():
-        from .excitation import demodulated  # most tables have no channels
+        from .channelangle import demodulated  # most tables have no channels
 
         table, excitation = demodulated(table)
         table, channels, dropouts = with_channel_angle(table, given.periods, given.reference_counts)

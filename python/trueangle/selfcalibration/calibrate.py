@@ -8,6 +8,7 @@ from typing import Any, Unpack
 from ..errors import ArgumentError, NoModelError
 from ..joint.shafts import MOST_ORDERS, limited_orders
 from ..runs.source import OtherReadingOptions
+from ..selfcalibration import METHODS
 from ..support.angles import check_period
 from ..support.argumentkinds import told_kinds
 from ..support.blas import one_blas_thread
@@ -16,7 +17,6 @@ from .channels import channel_patterns
 from .dual import dual
 from .heads import head_patterns
 from .loop import check_loop
-from .methods import METHODS
 from .recording import Recording, as_recordings
 from .result import SelfCalibration
 from .shifts import shift_patterns

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Final
 
 from ..errors import ArgumentError
+from ..selfcalibration import LOOPS
 from ..support.suggestions import check_choice
-from .methods import LOOPS
 from .result import Blind, OrderEstimate
 
 #: Below this multiple of its bandwidth a velocity loop follows more than a tenth of an error.

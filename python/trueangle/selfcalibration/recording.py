@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import ArgumentError, FileError, NoModelError
 from ..formats.columns import channels_code, listed_columns
-from ..runs.excitation import demodulated
+from ..runs.channelangle import demodulated
 from ..runs.rawchannels import TRACKS
 from ..runs.readings import FileReadings
 from ..runs.run import CalibrationRun, runs_or_data

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from trueangle.errors import FileError
-from trueangle.joint.description import JointDescription
-from trueangle.joint.urdf import robot_of_urdf
+from trueangle.joint.description import JointDescription, robot_of_urdf
 
 FILE = """\
 <robot name="arm">

@@ -10,7 +10,7 @@ import pytest
 
 from trueangle.planning import plan_arc, plan_encoder, plan_mounts, plan_tilts
 from trueangle.planning.doptimal import OrthonormalColumns
-from trueangle.planning.further import run_seconds, run_steps
+from trueangle.planning.nextruns import run_seconds, run_steps
 from trueangle.planning.noisefactors import (
     TOLERATED_FACTOR,
     facet_noise_factor,

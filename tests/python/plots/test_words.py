@@ -12,9 +12,9 @@ import trueangle as ta
 from trueangle import plots
 from trueangle.certificate.typesetting import certified_errors
 from trueangle.planning import wanted_orders
+from trueangle.rehearsal.detection import SizeRange
 from trueangle.rehearsal.result import rehearsed_cause
 from trueangle.rehearsal.trial import TrialOutcome
-from trueangle.rehearsal.visibility import SizeRange
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")

@@ -15,9 +15,9 @@ from trueangle.effects.ambiguity import Ambiguity
 from trueangle.errors import ArgumentError
 from trueangle.planning.evidence import ReadingNoise
 from trueangle.planning.nextruns import NextRuns, RivalEvidence
+from trueangle.rehearsal.detection import SizeRange
 from trueangle.rehearsal.rehearse import FORMS, rehearse
 from trueangle.rehearsal.trial import FAILED, NAMED, NOTHING, Trial, TrialOutcome
-from trueangle.rehearsal.visibility import SizeRange
 from trueangle.simulation import RunDesign, Simulation
 from trueangle.support.deadline import Deadline, current_deadline
 

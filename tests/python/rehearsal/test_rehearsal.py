@@ -26,10 +26,16 @@ from trueangle.effects.drawing import Drawing
 from trueangle.errors import ArgumentError
 from trueangle.rehearsal import rehearse
 from trueangle.rehearsal import trial as trials
-from trueangle.rehearsal.detection import Chance, binomial_interval
+from trueangle.rehearsal.detection import (
+    FIRST,
+    NEAR,
+    Chance,
+    binomial_interval,
+    blind_causes,
+    size_range,
+)
 from trueangle.rehearsal.rehearse import next_sizes
 from trueangle.rehearsal.trial import NOTHING, Trial, TrialOutcome, measured_signals, run_trial
-from trueangle.rehearsal.visibility import FIRST, NEAR, blind_causes, size_range
 from trueangle.rehearsal.workers import THREADS, WorkerError, Workers
 from trueangle.simulation import Backlash, Harmonic, Joint, RunDesign, Simulation
 

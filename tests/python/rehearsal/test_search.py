@@ -7,10 +7,9 @@ import pytest
 
 from trueangle.effects import EFFECTS
 from trueangle.effects.ambiguity import Ambiguity
-from trueangle.rehearsal.detection import Chance
+from trueangle.rehearsal.detection import Chance, SizeRange
 from trueangle.rehearsal.rehearse import SizeSearch, next_sizes
 from trueangle.rehearsal.trial import NAMED, NOTHING, Trial, TrialOutcome
-from trueangle.rehearsal.visibility import SizeRange
 
 SPOT = Ambiguity(("backlash", "latency"), "one way", "turn back")
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from trueangle.rehearsal.detection import binomial_interval
+from trueangle.rehearsal.detection import SizeRange, binomial_interval
 from trueangle.rehearsal.rehearse import SizeSearch, _notes
 from trueangle.rehearsal.result import (
     Rehearsal,
@@ -20,7 +20,6 @@ from trueangle.rehearsal.result import (
     rehearsed_cause,
 )
 from trueangle.rehearsal.trial import FAILED, TrialOutcome
-from trueangle.rehearsal.visibility import SizeRange
 
 PLAY = RehearsedCause(
     cause="backlash",

@@ -10,7 +10,7 @@ import pytest
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import FileError
-from trueangle.runs.excitation import demodulated
+from trueangle.runs.channelangle import demodulated
 from trueangle.runs.files import read_runs
 
 #: Readings in a period of the carrier, lag of the transformer, and ratio of its coils.
