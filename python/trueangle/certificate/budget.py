@@ -31,10 +31,6 @@ DISTRIBUTIONS: Final[Mapping[str, float]] = MappingProxyType(
     }
 )
 
-#: Step of a central difference in standard uncertainties: so far a measurement model has to
-#: be straight anyway for the law of propagation to hold (JCGM 100, 5.1.3 note 2).
-_STEP = 1e-3
-
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
@@ -105,7 +101,9 @@ class Estimates:
         """
         values = np.atleast_1d(np.asarray(model(self.values), dtype=np.float64))
         jacobian = np.zeros((values.size, self.values.size))
-        for j, step in enumerate(_STEP * self.standard):
+        # Step of a central difference in standard uncertainties: so far a measurement model has to
+        # be straight anyway for the law of propagation to hold (JCGM 100, 5.1.3 note 2).
+        for j, step in enumerate(1e-3 * self.standard):
             if step > 0.0:
                 shift = np.zeros(self.values.size)
                 shift[j] = step
@@ -250,10 +248,6 @@ class Budget:
         return (item.effect / self.standard) ** 2 if self.standard > 0.0 else 0.0
 
 
-#: Whole degrees of freedom that went through a sum of one stay whole.
-_ROUNDED: Final = 1.0 + 1e-12
-
-
 def coverage_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
     """Student's quantile for a two-sided interval; degrees of freedom cut to whole ones.
 
@@ -263,7 +257,8 @@ def coverage_factor(degrees_of_freedom: float, level: float = LEVEL) -> float:
     (2.92, 2.0)
     """
     whole = (
-        max(math.floor(degrees_of_freedom * _ROUNDED), 1)
+        # Whole degrees of freedom that went through a sum of one stay whole.
+        max(math.floor(degrees_of_freedom * (1.0 + 1e-12)), 1)
         if math.isfinite(degrees_of_freedom)
         else math.inf
     )

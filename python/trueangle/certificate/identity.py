@@ -21,9 +21,6 @@ from .budget import DISTRIBUTIONS, Contribution
 from .conformity import RULES, Specification
 from .language import LANGUAGES
 
-#: Largest identity file that is read; a real one has a few dozen lines.
-_MOST_BYTES: Final = 1 << 20
-
 #: Contributions at most.
 _MOST_CONTRIBUTIONS: Final = 200
 
@@ -123,7 +120,8 @@ def load_identity(path: str | PathLike[str]) -> Identity:
     OSError
         Nothing of this name, no permission.
     """
-    data = read_whole(path, _MOST_BYTES, "an identity file")
+    # Largest identity file that is read; a real one has a few dozen lines.
+    data = read_whole(path, 1 << 20, "an identity file")
     try:
         table = tomllib.loads(data.decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as reason:

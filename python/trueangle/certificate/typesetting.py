@@ -24,11 +24,6 @@ from .language import certificate_texts, note_in, translated
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Part of the span of the errors below which bars of U at them are too small to see.
-_SMALL: Final = 0.04
-
-#: Largest logo.
-_MOST_BYTES: Final = 4 << 20
 
 _TEMPLATE: Final = Path(__file__).parent / "certificate.typ"
 
@@ -58,10 +53,11 @@ def lay_out(content: dict[str, Any], folder: Path, logo: str | None = None) -> P
     said = certificate_texts(language)
     rows = content["positions"]
     span = max(r["error_arcsec"] for r in rows) - min(r["error_arcsec"] for r in rows)
-    small = max(r["expanded_arcsec"] for r in rows) < _SMALL * span
+    # Part of the span of the errors below which bars of U at them are too small to see.
+    small = max(r["expanded_arcsec"] for r in rows) < 0.04 * span
     picture = None if logo is None else Path(f"logo{Path(logo).suffix.lower()}")
     if logo is not None and picture is not None:
-        (folder / picture).write_bytes(read_whole(logo, _MOST_BYTES, "a logo"))
+        (folder / picture).write_bytes(read_whole(logo, 4 << 20, "a logo"))
     shown = content | {"small_u": small, "logo": None if picture is None else str(picture)}
     shown["notes"] = [note_in(language, note) for note in content["notes"]]
     shown["data_faults"] = [note_in(language, f"{f['says']}.") for f in content["data_faults"]]

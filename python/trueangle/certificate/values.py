@@ -35,10 +35,6 @@ _MOST_POSITIONS: Final = 720
 #: Places of a turn among which errors that the series lacks are looked for.
 _PLACES: Final = 360
 
-#: Standard errors beyond which a reversal is significant. Below it is noise, and adding
-#: noise to the budget would make every U too wide.
-_SEEN: Final = 3.0
-
 
 @dataclass(frozen=True, eq=False)
 class Values:
@@ -198,7 +194,9 @@ def reversal_halfwidth(fit: FitResult) -> Contribution | None:
     count = len(halves)
     error = float(np.std(halves, ddof=1) / np.sqrt(count)) if count > 2 else float(np.max(errors))
     name = "half the reversal error"
-    if abs(half) <= _SEEN * error:
+    # Standard errors beyond which a reversal is significant. Below it is noise, and adding noise to
+    # the budget would make every U too wide.
+    if abs(half) <= 3.0 * error:
         return Contribution(name, 0.0, "A", "two-point")
     freedom = 0.5 * (half / error) ** 2 if error > 0.0 else np.inf
     return Contribution(name, abs(half), "A", "two-point", freedom)

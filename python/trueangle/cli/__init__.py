@@ -24,9 +24,6 @@ from .wording import Wording
 
 __all__ = ["COMMANDS", "main", "process"]
 
-#: Objects made and kept between two searches for circles of them; Python's 700 are for programs
-#: that run long. What a command imports is kept to its end, and searching it took a tenth of it.
-_KEPT = 50_000
 
 #: Modules of this package that each define one command of the same name.
 COMMANDS: tuple[str, ...] = (
@@ -138,7 +135,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def process() -> NoReturn:
     """Run one command as a separate process, which ends with it."""
-    gc.set_threshold(_KEPT, *gc.get_threshold()[1:])
+    # Objects made and kept between two searches for circles of them; Python's 700 are for programs
+    # that run long. What a command imports is kept to its end, and searching it took a tenth of it.
+    gc.set_threshold(50_000, *gc.get_threshold()[1:])
     if sys.argv[1:2] != ["bench"]:
         # The core has its own threads (`trueangle.support.blas`); a bench lets numpy have its own.
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

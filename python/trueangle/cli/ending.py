@@ -14,7 +14,6 @@ _ENDINGS: Final = ("SIGINT", "SIGTERM", "SIGHUP")
 _AT_ONCE: Final = (signal.SIG_DFL, signal.default_int_handler)
 #: The signal of a timer, which Windows has none of, and seconds after which one is raised again.
 _ALARM: Final[int | None] = getattr(signal, "SIGALRM", None)
-_AGAIN: Final = 0.01
 
 
 def own_interrupts() -> None:
@@ -143,7 +142,7 @@ class Ending:
         many; libraries clear it in their imports. What catches it and goes on must keep it.
         """
         if self._works and _ALARM is not None:
-            signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+            signal.setitimer(signal.ITIMER_REAL, 0.01)
 
     def _tell(self, ignored: sys.UnraisableHookArgs) -> None:
         if not issubclass(ignored.exc_type, _Interrupted):

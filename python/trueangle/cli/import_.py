@@ -64,14 +64,11 @@ def run(args: argparse.Namespace) -> int:
     shown = error_unit(errors_in(args), largest, model.period)
     zero = zero_text(model.constant * 360.0 / model.period, 360.0)
     lines = [f"{args.output}: {counted(rows, 'order')}, zero {zero}"]
-    for row in sorted(rows, key=lambda row: -row["amplitude_arcsec"])[:_SHOWN]:
+    # Orders that are printed, the largest ones.
+    for row in sorted(rows, key=lambda row: -row["amplitude_arcsec"])[:12]:
         amplitude, phase = shown.text(row["amplitude_arcsec"]), row["phase_deg"]
         lines.append(f"  order {row['order']:g}: {amplitude} at {phase:.1f} deg")
     if model.fit and model.fit.note:
         lines.append(f"note: {model.fit.note}")
     print(laid_out(lines))
     return 0
-
-
-#: Orders that are printed, the largest ones.
-_SHOWN = 12

@@ -22,7 +22,6 @@ from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: Order: address of magnitude and phase on page 2, bits of the magnitude.
 REGISTERS = {1: (0x15, 0x16, 11), 2: (0x17, 0x18, 11), 3: (0x19, 0x1A, 8), 8: (0x1B, 0x1C, 8)}
-_PHASE_BITS = 12
 #: Degrees of a magnitude's unit before the gain of the CORDIC, and of a phase's.
 _MAGNITUDE = 360.0 / 65536.0
 _CORDIC = 0.6072
@@ -62,7 +61,7 @@ class Admt4000(Target):
                     f"admt4000: order {order} has {deg:.4g} deg, and its register "
                     f'holds {((1 << bits) - 1) * _MAGNITUDE / _CORDIC:.4g}; use `target="c"`'
                 )
-            phase = round(math.degrees(math.atan2(a, b)) / _PHASE) % (1 << _PHASE_BITS)
+            phase = round(math.degrees(math.atan2(a, b)) / _PHASE) % (1 << 12)
             codes[order] = magnitude, phase if magnitude else 0
         if not any(magnitude for magnitude, _ in codes.values()):
             raise ArgumentError(

@@ -58,7 +58,8 @@ class Chain:
         shared = 1
         for table in self.tables:
             ratio = Fraction(table.cycles).limit_denominator(_MOST_TURNS)
-            if abs(float(ratio) - table.cycles) > _SAME_RATIO * table.cycles:
+            # Of a ratio that is a fraction: its rounding in a double.
+            if abs(float(ratio) - table.cycles) > 1e-15 * table.cycles:
                 return _TURNS, False
             shared = math.lcm(shared, ratio.denominator)
         return (shared, True) if shared <= _MOST_TURNS else (_TURNS, False)
@@ -85,9 +86,6 @@ class Chain:
 #: Turns after which shafts may be back together, and those looked at of shafts that never are.
 _MOST_TURNS = 64
 _TURNS = 16
-
-#: Of a ratio that is a fraction: its rounding in a double.
-_SAME_RATIO = 1e-15
 
 
 def make_chain(

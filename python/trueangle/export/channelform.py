@@ -21,15 +21,9 @@ from .target import CommentBlock, Made, TablePart, Target
 #: Phase in radians of sine and cosine, as a firmware has it.
 Decode: TypeAlias = Callable[[Array, Array], Array]
 
-#: Places of a turn that are evaluated: 2^14 of it.
-_BITS: Final = 14
 
 #: Phases at which orders of the difference are found, and the highest order listed.
 _SAMPLES: Final = 512
-_HIGHEST: Final = 8
-
-#: Orders below this are not listed, arcsec.
-_LISTED: Final = 0.01
 
 
 class ChannelTarget(Target):
@@ -96,10 +90,11 @@ def made_of_channels(
         return np.asarray(at - angle(at, device))
 
     def lost() -> list[dict[str, float]]:
-        found = 2.0 * np.abs(np.fft.rfft(off - zero))[1 : _HIGHEST + 1] / _SAMPLES
+        found = 2.0 * np.abs(np.fft.rfft(off - zero))[1:9] / _SAMPLES
         rows = enumerate((found * ARCSEC_PER_TURN).tolist(), 1)
         periods = channels.periods_per_turn
-        return [{"order": float(k * periods), "arcsec": c} for k, c in rows if c > _LISTED]
+        # Orders below this are not listed, arcsec.
+        return [{"order": float(k * periods), "arcsec": c} for k, c in rows if c > 0.01]
 
     return Made(
         text=text,
@@ -110,7 +105,8 @@ def made_of_channels(
         zero_deg=zero * 360.0,
         lost=lost,
         decodes=True,
-        bits=_BITS,
+        # Places of a turn that are evaluated: 2^14 of it.
+        bits=14,
         notes=(
             *notes,
             *(

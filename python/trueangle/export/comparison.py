@@ -21,13 +21,8 @@ from ..support.plainresult import PlainResult
 from .equality import FALSE_ALARMS, Equality, pattern_equality
 from .pattern import TurnPattern
 
-#: Points per cycle of the fastest order over which the difference is taken.
-_POINTS = 32
-_MOST_POINTS = 1 << 22
 #: Orders that a summary lists.
 _LISTED = 12
-#: Part of an amplitude below which its standard error is that of rounded numbers.
-_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -113,7 +108,8 @@ class Comparison(PlainResult):
         for row in largest[:_LISTED]:
             amplitude, spread = row["amplitude_arcsec"] or 0.0, row["std_arcsec"]
             size, std = unit.pair(amplitude, spread)
-            if spread is not None and 0.0 < spread < _ROUNDING * amplitude:
+            # Part of an amplitude below which its standard error is that of rounded numbers.
+            if spread is not None and 0.0 < spread < 1e-6 * amplitude:
                 # What rounding alone leaves open is no reason to print nine digits.
                 size, std = unit.number(amplitude), f"{spread * unit.per_arcsec:.1g}"
             lines.append(f"{row['order']:7g}  {size:>16}  {row['phase_deg']:9.1f}  {std:>10}")
@@ -192,10 +188,12 @@ def compare(
         )
     at_readings = _is_looked_up(first) or _is_looked_up(second)
     same = first.argument == second.argument and not at_readings
-    turns = 1 if one.is_periodic and two.is_periodic else _TURNS
+    # Turns over which shafts that do not come back are looked at.
+    turns = 1 if one.is_periodic and two.is_periodic else 32
     top = max(orders, default=1.0)
-    points = 1 << math.ceil(math.log2(max(4096.0, _POINTS * top * turns)))
-    if points > _MOST_POINTS:
+    # Points per cycle of the fastest order.
+    points = 1 << math.ceil(math.log2(max(4096.0, 32 * top * turns)))
+    if points > 1 << 22:
         raise ArgumentError(f"order {top:g} is too high to be compared over a turn")
     x = np.arange(points, dtype=np.float64) * (turns / points)
     if at_readings:
@@ -260,10 +258,6 @@ def _is_looked_up(model: HarmonicModel) -> bool:
 
 def _signed(turns: float) -> float:
     return turns - math.ceil(turns - 0.5)
-
-
-#: Turns over which shafts that do not come back are looked at.
-_TURNS = 32
 
 
 def _at_truth(pattern: TurnPattern, theta: Array) -> Array:

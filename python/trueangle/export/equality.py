@@ -15,15 +15,6 @@ from ..support.distributions import f_tail
 #: Probability that two calibrations of one pattern are reported to differ.
 FALSE_ALARMS: Final = 0.01
 
-#: Factor on the p-value of a single order: the orders that a selection tests in two models.
-_LOOKED_AT: Final = 220
-
-#: Fewest degrees of freedom of a scatter: fewer contain no information.
-_FEWEST: Final = 0.1
-
-#: Least pivot of the covariance, its rows scaled, with which it is inverted.
-_TOLD: Final = 1e-10
-
 
 class Equality(NamedTuple):
     """``statistic`` is T^2 over the tested orders, ``p`` its p-value under noise alone."""
@@ -87,7 +78,8 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
     if not (scale > 0.0).all():
         return None
     scaled = whole / np.outer(scale, scale)
-    if float(np.linalg.eigvalsh(scaled)[0]) < _TOLD:
+    # Least pivot of the covariance, its rows scaled, with which it is inverted.
+    if float(np.linalg.eigvalsh(scaled)[0]) < 1e-10:
         return None
     apart = (values[1] - values[0]) / scale
     statistic = wald_statistic(apart, scaled)
@@ -108,7 +100,9 @@ def pattern_equality(first: HarmonicModel, second: HarmonicModel) -> Equality | 
             if float(np.linalg.det(spread)) > 0.0:
                 alone = wald_statistic(np.array(pair), 2.0 * spread)
                 chance = _pair_tail if scattered else _known_tail
-                p = min(p, _LOOKED_AT * chance(alone, freedom))
+                # Factor on the p-value of a single order: the orders that a selection tests in two
+                # models.
+                p = min(p, 220 * chance(alone, freedom))
     return Equality("changed" if p <= FALSE_ALARMS else "same", p, statistic, len(common))
 
 
@@ -122,7 +116,8 @@ def _by_orders(apart: Array, scaled: Array, freedom: float) -> float:
 
 def _pair_tail(squares: float, freedom: float) -> float:
     """P-value of Hotelling's T² of two numbers; ``freedom`` is that of their covariance."""
-    left = max(freedom - 1.0, _FEWEST)
+    # Fewest degrees of freedom of a scatter: fewer contain no information.
+    left = max(freedom - 1.0, 0.1)
     return f_tail(squares * left / (2.0 * freedom), 2.0, left)
 
 

@@ -33,7 +33,6 @@ _ARCSEC = re.compile(r"(\d[\d.]*(?:e[-+]\d+)?) arcsec\b")
 
 #: Digits of a bound in a file, and in a summary.
 HEADER_DIGITS = 6
-_SUMMARY_DIGITS = 4
 
 #: Readings to a turn, and turns before those that count: hysteresis has settled by then.
 _GRID = 4096
@@ -124,7 +123,7 @@ class Exported(PlainResult):
         """
         unit = error_unit(errors_in, self.max_difference_total_arcsec)
         where = f"{self.output}: " if self.output else ""
-        first = where + self.difference(unit, _SUMMARY_DIGITS)
+        first = where + self.difference(unit, 4)
         if not self.left_out:
             first = laid_out([first])
         # Else it stays one line, however wide: whoever reads it also reads what is omitted.

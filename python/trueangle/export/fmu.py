@@ -36,10 +36,7 @@ from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: The model that a unit was made of, and its most bytes.
 _MODEL = "resources/trueangle.json"
-_MOST_BYTES = 16 << 20
 
-#: Radians by which it differs from the model at most.
-_WITHIN = 1e-9
 
 #: Folders of binaries and endings, by system and processor.
 _SYSTEMS = {"linux": "linux", "darwin": "darwin", "win32": "windows"}
@@ -49,9 +46,6 @@ _SECOND = {"linux": "linux64", "darwin": "darwin64", "windows": "win64"}
 
 #: Of the library and of its functions.
 _IDENTIFIER = "trueangle_model"
-
-#: Turns that the last step of a search may leave.
-_LEFT = 1e-17
 
 
 class Fmu(Target):
@@ -110,7 +104,8 @@ class Fmu(Target):
                 pattern,
                 lambda places: pattern.taken_off(places / 2.0**32),
                 zero=0.0,
-                resolution=_WITHIN / (2.0 * math.pi),
+                # Radians by which it differs from the model at most.
+                resolution=1e-9 / (2.0 * math.pi),
                 continuous=True,
             ),
             floor_arcsec=0.0,
@@ -125,7 +120,7 @@ class Fmu(Target):
         try:
             with zipfile.ZipFile(io.BytesIO(raw)) as archive:
                 size = archive.getinfo(_MODEL).file_size
-                return archive.read(_MODEL).decode() if size <= _MOST_BYTES else ""
+                return archive.read(_MODEL).decode() if size <= 16 << 20 else ""
         except (zipfile.BadZipFile, KeyError, NotImplementedError, EOFError, zlib.error):
             return ""
 
@@ -326,7 +321,8 @@ def _pattern(terms: RunTimeTerms, zero: str) -> str:
         loop = _part("sum", count=len(series.orders))
     pairs = zip(series.orders, series.amplitudes, strict=True)
     bend = sum((2.0 * math.pi * m) ** 2 * c for m, c in pairs)
-    near = math.sqrt(_LEFT * max(1.0 - series.slope, 0.0) / max(bend, 1.0))
+    # Turns that the last step of a search may leave.
+    near = math.sqrt(1e-17 * max(1.0 - series.slope, 0.0) / max(bend, 1.0))
     size = DOUBLE.number(sum(series.amplitudes) * (1.0 + 1e-9) + 1e-12)
     series_text = _part("series", sum=loop, zero=zero, near=DOUBLE.number(near), size=size)
     return f"{table}\n{series_text}"

@@ -31,8 +31,6 @@ from .target import CommentBlock, Made, Option, TablePart, Target
 TURN = 65536
 KNOTS = 64
 _BUCKET = TURN // KNOTS
-#: Bytes of a printer.cfg, with all that it may include.
-_CONFIG_BYTES = 8 << 20
 
 Whole = NDArray[np.int64]
 
@@ -64,7 +62,7 @@ class Klipper(Target):
         if options["bits"] > 16:
             raise ArgumentError("bits must be at most 16: Klipper's angles have 65536 counts")
         path = options["existing"]
-        raw = read_whole(path, _CONFIG_BYTES, "a printer.cfg")
+        raw = read_whole(path, 8 << 20, "a printer.cfg")
         section, present = _list_of(raw.decode("utf-8", "replace"), path, options["section"])
         pattern.check_one_turn(self.name)
         pattern.check_orders(KNOTS, self.name, None)

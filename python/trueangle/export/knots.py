@@ -71,13 +71,16 @@ def rounded_knots(knots: Array) -> Array:
     found = np.rint(knots)
     # Knots that are no neighbours of each other are moved at once.
     groups = [np.arange(0, count - 1, 2), np.arange(1, count, 2), np.arange(count - 1, count)]
-    for _ in range(_SWEEPS):
+    # Sweeps after which rounding ends; each lowers the error, and ten are enough.
+    for _ in range(50):
         before = found.copy()
         for group in groups:
             error = found - knots
             pull = (error[group - 1] + error[(group + 1) % count]) / 4.0
             moved = np.rint(knots[group] - pull)
-            near = np.abs(moved - knots[group]) <= _FARTHEST
+            # Farthest that a knot is moved from where it should be, in units of its last digit: a
+            # little beyond the half takes most of the gain in rms, and the maximum grows with it.
+            near = np.abs(moved - knots[group]) <= 0.55
             found[group] = np.where(near, moved, np.rint(knots[group]))
         if np.array_equal(found, before):
             break
@@ -88,14 +91,6 @@ def rounded_knots(knots: Array) -> Array:
 def _left(error: Array) -> float:
     """What errors of knots leave between them, up to a factor."""
     return float(np.sum(error * (2.0 * error + np.roll(error, 1))))
-
-
-#: Farthest that a knot is moved from where it should be, in units of its last digit: a little
-#: beyond the half takes most of the gain in rms, and the maximum grows with it.
-_FARTHEST = 0.55
-
-#: Sweeps after which rounding ends; each lowers the error, and ten are enough.
-_SWEEPS = 50
 
 
 def _basis(t: Array, count: int) -> tuple[Array, Array]:

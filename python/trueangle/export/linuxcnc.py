@@ -121,13 +121,10 @@ class LinuxCnc(Target):
         if options["type"] == "0":
             table[:, 1:] = table[:, :1] - table[:, 1:]
         largest = float(np.max(np.abs(table[:, 1:])))
-        if largest > _LARGEST:
+        # Degrees: no trim of an axis that works is larger.
+        if largest > 30.0:
             raise ArgumentError(
                 f"{path}: trims of up to {largest:.4g} deg: are these positions? give "
                 f"`type={'1' if options['type'] == '0' else '0'!r}`"
             )
         return travel_model(table, path, self, 10.0**-decimals)
-
-
-#: Degrees: no trim of an axis that works is larger.
-_LARGEST = 30.0

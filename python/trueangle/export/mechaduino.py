@@ -22,7 +22,6 @@ from .target import CommentBlock, Made, Option, TablePart, Target
 ENTRIES = 16384
 _BITS = 14
 _DECIMALS = 4
-_SOURCE_BYTES = 8 << 20
 
 
 class Mechaduino(Target):
@@ -53,7 +52,7 @@ class Mechaduino(Target):
             )
         else:
             path = options["existing"]
-            raw = read_whole(path, _SOURCE_BYTES, "a source with the lookup array")
+            raw = read_whole(path, 8 << 20, "a source with the lookup array")
             present = _lookup(raw.decode("utf-8", "replace"), path)[0] / 360.0
             away = np.exp(2j * np.pi * (present - exact))
             zero = float(np.angle(np.mean(away))) / (2.0 * math.pi)

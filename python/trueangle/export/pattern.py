@@ -15,10 +15,6 @@ from ..model.terms import LocalDefect
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 
-#: Steps of regula falsi. A bracket with a straight function needs one; with a curved one each
-#: step leaves a share of the error equal to its relative curvature, a hundredth or less.
-_STEPS = 8
-
 
 class TurnPattern:
     """The part of a model that follows the angle alone, with every angle in turns.
@@ -69,7 +65,8 @@ class TurnPattern:
         """What the device indicates at true angles, the constant included."""
         if self.model.argument == "reference":
             return theta + self.error(theta) + self.zero
-        points = max(_BRACKETS, math.ceil(_BRACKETS_PER_WAVE * max(self.lines, default=1.0)))
+        # Brackets to a turn, and to a wave of the highest order.
+        points = max(1024, math.ceil(64.0 * max(self.lines, default=1.0)))
         return inverse_rising(lambda r: r - self.error(r) - self.zero, theta, points)
 
     def directed(self, theta: Array, direction: int) -> Array:
@@ -210,12 +207,6 @@ class TurnPattern:
         return parts
 
 
-#: Brackets in which readings of the indicated argument are looked for, to a turn and to a
-#: wave of the highest order.
-_BRACKETS = 1024
-_BRACKETS_PER_WAVE = 64.0
-
-
 def of_direction(term: Term) -> bool:
     """Whether two tables, one for each direction of travel, hold a term."""
     return term.follows_travel and set(term.needs) <= {"direction"}
@@ -267,7 +258,9 @@ def inverse_rising(rising: Callable[[Array], Array], wanted: Array, points: int)
     low, high = at[i], at[i + 1]
     below, above = values[i] - wanted, values[i + 1] - wanted
     found = low
-    for _ in range(_STEPS):
+    # Steps of regula falsi. A bracket with a straight function needs one; with a curved one each
+    # step leaves a share of the error equal to its relative curvature, a hundredth or less.
+    for _ in range(8):
         found = low - below * ((high - low) / (above - below))
         left = rising(found) - wanted
         # Turns: the rounding of a double.

@@ -29,13 +29,7 @@ Places = NDArray[np.int64]
 
 #: Sizes that are tried; where none is requested, up to the largest default.
 _SIZES = tuple(1 << bits for bits in range(3, 17))
-_LARGEST_DEFAULT = 4096
 
-#: Lines with more segments take more flash than cubics of the same accuracy.
-_LARGEST_LINES = 1024
-
-#: Share of the model's uncertainty that a default table may add: a twentieth more in all.
-_SHARE = 1.0 / 3.0
 
 #: Readings of the self-test: spread, and none of them a knot.
 _TEST_ANGLES = tuple((i * 0x1F123BB5 + 0x01234567) % 2**32 for i in range(8))
@@ -70,7 +64,8 @@ class PortableTarget(Target):
         if options["entries"]:
             return ()
         free = options["method"] is None and options["number"] is None
-        return tuple(size for size in _SIZES if not free or size <= _LARGEST_LINES)
+        # Lines with more segments take more flash than cubics of the same accuracy.
+        return tuple(size for size in _SIZES if not free or size <= 1024)
 
     def finer(self, options: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
         if options["entries"] or options["method"] or options["number"]:
@@ -168,7 +163,8 @@ def _chain(pattern: TurnPattern, options: Mapping[str, Any]) -> Chain:
         return _first_that_fits(pattern, method or "linear", numbers, [entries] * len(shafts))
     # The smallest tables that leave less than the model itself does not know.
     known = pattern.uncertainty_arcsec
-    allowed = None if known is None else known * _SHARE
+    # Share of the model's uncertainty that a default table may add: a twentieth more in all.
+    allowed = None if known is None else known / 3.0
     sizes = []
     for _, cycles, part in shafts:
         sizes.append(_smallest(part, cycles, method or "linear", number or "q15", allowed))
@@ -211,7 +207,7 @@ def _smallest(
     probe = np.arange(4096) * 0x9E3779B1 % 2**32
     top = max(part.lines, default=0.0)
     for size in _SIZES:
-        if size <= 2.0 * top or (size > _LARGEST_DEFAULT and size > 8.0 * top):
+        if size <= 2.0 * top or (size > 4096 and size > 8.0 * top):
             continue
         chain = make_chain(part, method, "f32" if number == "q15" else number, size)
         difference = chain.correction(probe) - part.taken_off(probe / TURN)

@@ -31,9 +31,6 @@ _LARGEST_GRID = 1 << 18
 #: Readings at which a table's own arithmetic is compared with the model made of it.
 _PROBES = 1 << 18
 
-#: Orders below this many standard deviations of the table's rounding are not significant.
-_SIGNIFICANT = 3.0
-
 
 #: Largest number of orders of a model made of a table, the strongest ones: its covariance is
 #: a matrix.
@@ -150,7 +147,8 @@ def _model(
         sigma = table.step / math.sqrt(12.0)
         std = sigma * math.sqrt(2.0 / table.entries)
         size = np.hypot(cosine, sine)
-        keep = size > max(_SIGNIFICANT * std, np.sort(size)[-_MOST_ORDERS:][0])
+        # Orders below this many standard deviations of the table's rounding are not significant.
+        keep = size > max(3.0 * std, np.sort(size)[-_MOST_ORDERS:][0])
         orders = np.flatnonzero(keep) + 1
         shafts.append(
             Shaft(

@@ -28,10 +28,6 @@ from ..support.signals import coupled_joint
 #: Sources of the direction of travel.
 DIRECTIONS = ("auto", "angle", "velocity", "signal")
 
-#: Units of 2^-32 turns by which rounding to them moves an angle, and of its sum by which float
-#: arithmetic changes an error (a sine and some ten products and sums of 2^-24 each).
-_UNITS = 4.0
-_OF_THE_SUM = 2.0**-20
 
 #: Power of two up to which signals are numbers: products of a few of them are finite floats.
 _LARGEST = 40
@@ -231,7 +227,9 @@ class RunTimeTerms:
 
     def rounding(self, largest: float) -> float:
         """Turns that float arithmetic adds to terms of a sum of ``largest`` turns, at most."""
-        return _UNITS / 2.0**32 + _OF_THE_SUM * largest
+        # Units of 2^-32 turns by which rounding moves an angle, and the share of its sum by which
+        # float arithmetic changes an error: a sine and some ten products and sums.
+        return 4.0 / 2.0**32 + (2.0**-20) * largest
 
 
 def _way(direction: str, needs: set[str], travels: bool) -> str:

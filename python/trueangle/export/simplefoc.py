@@ -34,8 +34,6 @@ VARIANTS = {
 
 #: The library's macro, a float.
 _2PI = np.float32(6.28318530718)
-#: Entries of the class before its table could be given.
-_FIXED = 128
 #: Value of a uint16 entry: (entry - 32767) / 10430.2192 rad.
 _MIDDLE = 32767
 #: Entries, at most.
@@ -89,7 +87,8 @@ class SimpleFoc(Target):
         if variant == _LINEAR_HALL:
             return _linear_hall(pattern)
         old = variant == "plus-float"
-        entries = _FIXED if old else options["entries"]
+        # Entries of the class before its table could be given.
+        entries = 128 if old else options["entries"]
         if not 4 <= entries <= _MOST:
             raise ArgumentError(f"entries must be from 4 to {_MOST}, got {entries}")
         if not old:

@@ -26,8 +26,6 @@ TURN = 2.0**32
 PER_RADIAN = np.float32(TURN / (2.0 * math.pi))
 
 #: Knots the arithmetic of the core is promised; see src/table.
-_LARGEST_SHORT = 32700
-_LARGEST_STEP = 32767
 _LARGEST_LINEAR = 2.0**30 - 1.0
 _LARGEST_CUBIC = 2.0**27
 
@@ -198,8 +196,7 @@ def make_table(
 
 
 def _fits_short(values: Array, method: str) -> bool:
-    if np.max(np.abs(values), initial=0.0) > _LARGEST_SHORT:
+    # What the arithmetic of the core is promised; see src/table.
+    if np.max(np.abs(values), initial=0.0) > 32700:
         return False
-    return method == "cubic" or bool(
-        np.max(np.abs(np.diff(values, axis=0)), initial=0.0) <= _LARGEST_STEP
-    )
+    return method == "cubic" or bool(np.max(np.abs(np.diff(values, axis=0)), initial=0.0) <= 32767)

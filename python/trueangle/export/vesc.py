@@ -20,7 +20,6 @@ from .reading import table_error
 from .target import CommentBlock, Made, Option
 
 #: The configuration keeps thousandths in 16 bits.
-_DIGITS: Final = 3
 _MOST: Final = 32.767
 
 _NAMES: Final = (
@@ -69,7 +68,8 @@ class Vesc(ChannelTarget):
                 strict=True,
             )
         )
-        written = decimals(exact, _DIGITS)
+        # The configuration keeps thousandths in 16 bits.
+        written = decimals(exact, 3)
         if max(map(abs, written.values())) > _MOST or min(written[n] for n in _NAMES[1:4:2]) <= 0.0:
             raise ArgumentError(
                 "vesc takes volts up to 32.767 at the pin: give what one unit of the columns is, "

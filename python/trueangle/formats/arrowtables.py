@@ -20,7 +20,6 @@ from .stored import Checksum
 METADATA_KEY = b"trueangle"
 #: An element of a column of lists, and how many of them are columns, at most.
 _ELEMENT = re.compile(r"(.+)\[(\d+)\]", re.DOTALL)
-_MOST = 256
 
 
 def element_names(schema: pa.Schema, first: Callable[[str], int]) -> list[str]:
@@ -38,7 +37,7 @@ def element_names(schema: pa.Schema, first: Callable[[str], int]) -> list[str]:
         elif pa.types.is_integer(kind.value_type) or pa.types.is_floating(kind.value_type):
             fixed = pa.types.is_fixed_size_list(kind)
             size = kind.list_size if fixed else first(field.name)
-            found += [f"{field.name}[{i}]" for i in range(min(size, _MOST))]
+            found += [f"{field.name}[{i}]" for i in range(min(size, 256))]
     return found
 
 

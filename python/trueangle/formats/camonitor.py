@@ -23,8 +23,6 @@ LINE = re.compile(rb"(\S+)\s+(\d{4}-\d\d-\d\d)\s(\d\d:\d\d:\d\d(?:\.\d{1,9})?)\s
 _TIME = "time_s"
 #: Lines taken together.
 _BLOCK = 1 << 16
-#: Longest line that is read.
-_LONGEST = 1 << 16
 #: Times count from here: a later start keeps more digits of a second.
 _EPOCH = np.datetime64("2000-01-01T00:00:00", "ns")
 
@@ -73,7 +71,8 @@ def _lines(path: Path) -> Iterator[tuple[str, str, float | str, int]]:
     """Variable, time stamp, value and number of every line; blank and lost ones pass."""
     with open_text(path) as file:
         number = 0
-        while line := file.readline(_LONGEST):
+        # Longest line that is read.
+        while line := file.readline(1 << 16):
             number += 1
             if not line.strip() or line.startswith(b"#") or b"***" in line:
                 continue

@@ -18,8 +18,6 @@ from .damage import damage_told
 
 #: Where a cell or a row is: ``r="AB12"``, ``r="12"``.
 _PLACE = re.compile(rb"""\br=["']([A-Z]{0,3})(\d{1,7})["']""")
-#: Bytes in memory of a cell, empty ones among them, and of its text.
-_CELL = 64
 
 
 def sheet_text(path: Path) -> tuple[bytes, tuple[str, ...]]:
@@ -79,7 +77,8 @@ def _check_size(path: Path) -> None:
                 for letters, row in _places(part):
                     rows = max(rows, row)
                     columns = max(columns, letters)
-            if rows * columns * _CELL > DECODED_BYTES:
+            # Bytes in memory of a cell, empty ones among them, and of its text.
+            if rows * columns * 64 > DECODED_BYTES:
                 raise DecodedSizeError(
                     path,
                     f"a sheet reaches from its first cell to row {rows}, column {columns}: more "

@@ -10,17 +10,11 @@ from ..support.files import declare_endings, ending_of, promised_format, refuse_
 from .format import Format
 from .textfile import head_of_text
 
-#: A process variable and a date, as camonitor begins a line.
-_CAMONITOR = rb"\A\S+[ \t]+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d"
 #: Type, rows, columns, imaginary part, length of the name, of either order of bytes.
 _MATLAB4 = (
     rb"\A(?s:[\x00-\x33]\0\0\0.{8}[\0\1]\0\0\0.\0\0\0"
     rb"|\0\0[\x03\x04].{9}\0\0\0[\0\1]\0\0\0.)"
 )
-#: The signature of HDF5 behind a user block, as MATLAB writes one.
-_HDF5 = rb"\A(?s:.{512}|.{1024}|.{2048})\x89HDF\r\n\x1a\n"
-#: The first line of PHD2, and of what writes its logs too.
-_GUIDING = rb"\A[^\n]*PHD2 (?:log )?version|^(?:Guiding|Calibration) Begins at \d{4}-"
 #: A name and a number, and the same name again some lines later.
 _NAMED = rb"(?:[\d:.]+ *-> *)?[ \t]*%s[ \t]*[:=][ \t]*[-+]?\.?\d"
 _SERIAL = b"^%s[^\n]*\n(?:[^\n]*\n){0,5}?%s" % (_NAMED % rb"([A-Za-z_]\w*)", _NAMED % rb"\1")
@@ -44,7 +38,8 @@ FORMATS = (
         {"HDF5": (".h5", ".hdf5", ".hdf", ".he5"), "MATLAB": (".mat",), "NetCDF": (".nc",)},
         "hdf5",
         magics=(b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"),
-        pattern=_HDF5,
+        # The signature of HDF5 behind a user block, as MATLAB writes one.
+        pattern=rb"\A(?s:.{512}|.{1024}|.{2048})\x89HDF\r\n\x1a\n",
     ),
     Format("matlab", {"MATLAB": (".mat",)}, "matlab", None, (b"MATLAB 5.0",), _MATLAB4),
     Format(
@@ -58,8 +53,18 @@ FORMATS = (
     Format("wpilog", {"a data log of WPILib": (".wpilog",)}, magics=(b"WPILOG",)),
     Format("npy", {"numpy": (".npy",)}, magics=(b"\x93NUMPY",)),
     Format("npz", {"numpy": (".npz",)}, magics=(b"PK\x03\x04",)),
-    Format("camonitor", {"EPICS": (".camonitor",)}, pattern=_CAMONITOR),
-    Format("guidelog", {"a guide log": ()}, pattern=_GUIDING),
+    # A process variable and a date, as camonitor begins a line.
+    Format(
+        "camonitor",
+        {"EPICS": (".camonitor",)},
+        pattern=rb"\A\S+[ \t]+\d{4}-\d\d-\d\d \d\d:\d\d:\d\d",
+    ),
+    # The first line of PHD2, and of what writes its logs too.
+    Format(
+        "guidelog",
+        {"a guide log": ()},
+        pattern=rb"\A[^\n]*PHD2 (?:log )?version|^(?:Guiding|Calibration) Begins at \d{4}-",
+    ),
     Format("seriallog", {"a serial log": ()}, pattern=_SERIAL),
     Format(
         "csvfile",

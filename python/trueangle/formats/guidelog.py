@@ -43,8 +43,6 @@ _DECLINATION = re.compile(rf"\bDec = {_NUMBER} deg")
 _RATE = re.compile(rf"xAngle = {_NUMBER}, xRate = {_NUMBER}")
 _LOCK = re.compile(rf"(?:Lock position|new lock pos) = {_NUMBER}, {_NUMBER}")
 _NEEDED = ("Time", "mount", "RARawDistance", "RADuration", "RADirection")
-#: Longest line that is read.
-_LONGEST = 1 << 14
 
 
 @dataclass
@@ -128,7 +126,8 @@ def _frames(path: Path) -> tuple[list[_Frame], int, int]:
     section: _Section | None = None
     with io.TextIOWrapper(open_text(path), encoding="utf-8", errors="replace") as file:
         place = 0
-        while text := file.readline(_LONGEST):
+        # Longest line that is read.
+        while text := file.readline(1 << 14):
             place += 1
             text = text.strip()
             begins = _BEGINS.match(text)

@@ -24,9 +24,6 @@ _SCALE_OFFSET: Final = 6
 _PLAIN: Final = 8
 _NUMBER: Final = 1
 
-#: Rows of a chunk from which it is worth while to ask where it lies.
-_LEAST_CHUNK = 1 << 13
-
 
 def data_sets(path: Path, file: h5py.File, names: Sequence[str]) -> dict[str, h5py.Dataset]:
     """Data sets that belong together."""
@@ -211,7 +208,8 @@ class Hdf5Places(NamedTuple):
         if properties.get_layout() == h5py.h5d.CONTIGUOUS:
             place = data.id.get_offset()
             return None if place is None else cls(data.dtype, data.size, [place], 0)
-        if properties.get_layout() != h5py.h5d.CHUNKED or data.chunks[0] < _LEAST_CHUNK:
+        # Rows of a chunk from which it is worth while to ask where it lies.
+        if properties.get_layout() != h5py.h5d.CHUNKED or data.chunks[0] < (1 << 13):
             return None
         chunk = data.chunks[0]
         first = rows.start - rows.start % chunk

@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 #: Numbers of a joint, in the order in which the message holds them.
 FIELDS = ("position", "velocity", "effort")
-#: Longest string or list that a message may state.
-_LONGEST = 1 << 20
 
 
 class _Layout(NamedTuple):
@@ -70,7 +68,8 @@ class _Cursor:
         self.align(4)
         place = self.skip(4)
         value = int.from_bytes(self.data[place : place + 4], self.kind)  # type: ignore[arg-type]
-        if value > _LONGEST:
+        # Longest string or list that a message may state.
+        if value > 1 << 20:
             raise ValueError(f"a joint state of {len(self.data)} bytes states {value} entries")
         return value
 

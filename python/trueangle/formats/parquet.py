@@ -29,14 +29,9 @@ from .format import Addition, Batch, Contents, CopyTask, Selection
 
 #: Bytes of decoded columns in hand at once; larger row groups are cut.
 _BYTES = 1 << 25
-#: Bytes of a column of the file that are in hand while it is read.
-_BUFFER = 1 << 20
-#: Rows at once of texts that take more than `_BYTES` in the file.
-_FEW = 64
 #: Rows, at least, of a segment that is read on its own, and of the batches it is read in:
 #: these stay in the cache until they are used.
 _STRETCH = 1 << 20
-_BATCH = 1 << 15
 
 
 class RowGroupRange(NamedTuple):
@@ -101,7 +96,7 @@ def _batches(
 ) -> Iterator[pa.RecordBatch]:
     tops = top_names(file.schema_arrow, names)
     found: Iterator[pa.RecordBatch] = file.iter_batches(
-        _BATCH, row_groups=groups, columns=tops, use_threads=False
+        1 << 15, row_groups=groups, columns=tops, use_threads=False
     )
     return found
 
@@ -145,7 +140,8 @@ def contents(path: Path, topic: str | None = None) -> Contents:
 @contextmanager
 def _opened(path: Path, **options: Any) -> Iterator[pq.ParquetFile]:
     """The file, its errors reported with its name."""
-    options = {"page_checksum_verification": True, "buffer_size": _BUFFER, **options}
+    # Bytes of a column of the file that are in hand while it is read.
+    options = {"page_checksum_verification": True, "buffer_size": 1 << 20, **options}
     with damage_told(path, "Parquet"), pq.ParquetFile(path, **options) as file:
         yield file
 
@@ -216,7 +212,8 @@ def _rows_at_once(file: pq.ParquetFile, schema: pa.Schema) -> int:
             width += encoded // max(file.metadata.num_rows, 1)
             nested = pa.types.is_nested(field.type)
             if encoded > _BYTES or nested:
-                rows = min(rows, _FEW if encoded > _BYTES else 1024)
+                # Rows at once of texts that take more than `_BYTES` in the file.
+                rows = min(rows, 64 if encoded > _BYTES else 1024)
     return max(min(rows, _BYTES // width), 1)
 
 

@@ -32,7 +32,6 @@ _TIME = "time_s"
 _DAY = 86400.0
 #: Lines taken together, and the longest that is read.
 _BLOCK = 1 << 14
-_LONGEST = 1 << 16
 
 
 class _Row(NamedTuple):
@@ -176,7 +175,7 @@ def _lines(path: Path, opened: TextFile | None = None) -> Iterator[tuple[bytes, 
     first: bytes | None = None
     with opened or open_text(path) as file:
         number = 0
-        while raw := file.readline(_LONGEST):
+        while raw := file.readline(1 << 16):
             number += 1
             clock = _CLOCK.match(raw)
             text = raw[clock.end() :] if clock else raw

@@ -24,16 +24,10 @@ from .damage import damage_told
 _PACKED = {b"\x1f\x8b": ("gzip", "gunzip"), b"\x28\xb5\x2f\xfd": ("zstd", "unzstd")}
 #: First bytes of an Excel file: an archive that begins with a part of a workbook.
 _EXCEL = (b"[Content_Types].xml", b"_rels/", b"docProps/", b"xl/", b"customXml/")
-_ARCHIVE = b"PK\x03\x04"
 #: Where an archive names its first part.
 _NAME = 30
-#: Bytes unpacked at a time.
-_BUFFER = 1 << 16
 #: Bytes of a text from which its length of lines is estimated; more of a packed one, read in parts.
 _HEAD, _HEAD_PACKED = 1 << 16, 1 << 22
-
-#: Characters of a message that are shown.
-_SHOWN = 60
 
 
 class TextFile(io.BufferedReader):
@@ -52,7 +46,7 @@ class TextFile(io.BufferedReader):
     def __init__(
         self, raw: Any, stored: Any, size: int, unpack: str = "", other_sheets: tuple[str, ...] = ()
     ) -> None:
-        super().__init__(raw, _BUFFER)
+        super().__init__(raw, 1 << 16)
         self._stored = stored
         self.size = size
         self.unpack = unpack
@@ -123,7 +117,7 @@ def open_text(path: Path) -> TextFile:
             if head.startswith(magic):
                 stream = _opener(kind)(stored, "rb")
                 return TextFile(_Unpacked(path, kind, stream), stored, size, unpack)
-        if head.startswith(_ARCHIVE) and head[_NAME:].startswith(_EXCEL):
+        if head.startswith(b"PK\x03\x04") and head[_NAME:].startswith(_EXCEL):
             from .excel import sheet_text
 
             stored.close()
@@ -206,7 +200,7 @@ def warn_of_messages(path: Path, messages: Sequence[tuple[int, str]]) -> None:
         one = len(messages) == 1
         warnings.warn(
             f"{path}: {len(messages)} line{'' if one else 's'} of words without readings "
-            f"{'is' if one else 'are'} omitted, the first at line {line}: {text[:_SHOWN]!r}",
+            f"{'is' if one else 'are'} omitted, the first at line {line}: {text[:60]!r}",
             MessageLinesWarning,
             stacklevel=9,
         )

@@ -36,8 +36,6 @@ LIMIT: Final = "TRUEANGLE_UNPACKED_BYTES"
 _METADATA = "metadata.yaml"
 #: A bag without it need not be looked at any closer.
 _PACKED = re.compile(r"compression_mode\W+file\b", re.IGNORECASE)
-#: Bytes unpacked at a time.
-_PART = 1 << 20
 
 
 def unpacked(path: Path, codec: str, part: str, data: bytes) -> bytes:
@@ -104,7 +102,7 @@ def _unpack(path: Path, target: Path, room: int) -> int:
     """Unpack one file to at most ``room`` bytes, and count them."""
     size = 0
     with zstd.open(path, "rb") as packed, target.open("wb") as file:
-        while part := packed.read(_PART):
+        while part := packed.read(1 << 20):
             size += len(part)
             if size > room:
                 raise FileError(

@@ -28,10 +28,6 @@ _MAGIC = b"WPILOG"
 _KINDS = {"double": "<f8", "float": "<f4", "int64": "<i8", "boolean": "?"}
 _ELEMENT = re.compile(r"(.*)\[(\d+)\]", re.DOTALL)
 _STAMP = np.dtype("<i8")
-#: Elements of an array that become columns, at most.
-_MOST = 256
-#: Microseconds: of a time beyond them a signed number of eight bytes has no room.
-_LATEST = 1 << 63
 #: Control records.
 _START, _FINISH = 0, 1
 
@@ -153,7 +149,8 @@ def _opened(path: Path) -> _Records:
             entry = started[number]
             if entry is not None:
                 time = int.from_bytes(data[size_end:begin], "little")
-                if time >= _LATEST:
+                # Microseconds: of a time beyond them a signed number of eight bytes has no room.
+                if time >= 1 << 63:
                     raise FileError(
                         path, f"is damaged: the record at byte {place} is of the time {time} us"
                     )
@@ -208,7 +205,7 @@ def _names(log: _Records) -> list[str]:
         elif entry.places:
             begin, end = entry.places[0]
             width = np.dtype(_KINDS[entry.kind[:-2]]).itemsize
-            found += [f"{name}[{i}]" for i in range(min((end - begin) // width, _MOST))]
+            found += [f"{name}[{i}]" for i in range(min((end - begin) // width, 256))]
     return found
 
 

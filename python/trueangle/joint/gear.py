@@ -53,12 +53,6 @@ _OUTPUT_SIDE: Final = {
     "a turn",
 }
 
-#: A line larger than its multiple by this factor explains that one too.
-_LARGER: Final = 3.0
-
-#: Highest multiple of a line that is put down to it.
-_HIGHEST_MULTIPLE: Final = 8
-
 
 def gear_orders(gear_ratio: float, fixed_member: str = "circular_spline") -> dict[float, str]:
     """Orders per output turn that a gear of this ratio is known to make, with names.
@@ -160,8 +154,10 @@ def explain_as_harmonic(order: float, amplitudes: Mapping[float, float]) -> tupl
     own = amplitudes.get(order, math.inf)
     for base in sorted(amplitudes, key=lambda k: -amplitudes[k]):
         times = order / base
-        whole = abs(times - round(times)) < 1e-9 and 2 <= round(times) <= _HIGHEST_MULTIPLE
-        if base > 1 and whole and amplitudes[base] >= _LARGER * own:
+        # Highest multiple of a line that is put down to it.
+        whole = abs(times - round(times)) < 1e-9 and 2 <= round(times) <= 8
+        # A line larger than its multiple by this factor explains that one too.
+        if base > 1 and whole and amplitudes[base] >= 3.0 * own:
             name = f"harmonic {round(times)} of order {base:g}, whose waveform is not a sine"
             return (Explanation(order, name),)
     return ()

@@ -13,9 +13,6 @@ from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array, distinct
 
-#: Departure from the grid, in shares of its step, up to which readings lie on it.
-ON_GRID = 0.02
-
 #: Positions beyond which a grid is not looked for.
 MOST_POSITIONS = 10_000
 
@@ -91,7 +88,8 @@ def _lies_on(turns: NDArray[np.float64], positions: int) -> bool:
     """Whether all places, in turns, lie on a grid of ``positions`` equal steps."""
     shift = np.angle(np.mean(np.exp(2j * np.pi * positions * turns))) / (2.0 * np.pi)
     away = turns * positions - shift
-    return float(np.abs(away - np.round(away)).max()) < ON_GRID
+    # Departure from the grid, in shares of its step, up to which readings lie on it.
+    return float(np.abs(away - np.round(away)).max()) < 0.02
 
 
 #: Departure of differences from a lattice, in shares of its step; differences below this
@@ -103,8 +101,6 @@ LEAST_STEP = 1e-9
 #: search for it.
 BY_CHANCE, STEPS_TRIED = 1e-3, 200
 
-#: Moves that most steps are tried on.
-_FIRST = 8
 
 #: Cells of a turn beyond which digits that were cut off are not looked behind, steps within the
 #: travel from which on they are a lattice, and share of one that a cell may be.
@@ -221,7 +217,8 @@ def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
     tried = distinct(np.concatenate([some, np.diff(some)]))
     tried = tried[(tried > rounding) & (tried < 0.5 * below)][::-1]
     # Most of them miss one of the first moves already.
-    near = tried[_aways(some[:_FIRST], tried) < ON_LATTICE]
+    # Most steps are tried on the first moves.
+    near = tried[_aways(some[:8], tried) < ON_LATTICE]
     aways = _aways(some, near)
     for k in np.flatnonzero(aways < ON_LATTICE).tolist():
         step, away = float(near[k]), float(aways[k])

@@ -22,9 +22,6 @@ from .turning import direction_at_turns, velocity_at_turns
 
 Index = NDArray[np.int64]
 
-#: Share of sign changes between neighbouring steps above which the direction is read
-#: with a dead zone: a reference at rest flickers by a count, a moving one does not.
-FLICKER = 0.05
 
 #: Sign changes that are taken as they are, however short the run.
 REVERSALS_TRUSTED = 10
@@ -319,7 +316,9 @@ def _travel(run: CalibrationRun) -> tuple[Array, Array, Index, Array, Array]:
             np.where(sign != 0.0, np.arange(sign.size), np.flatnonzero(sign)[0])
         )
         direction = sign[last]
-    if np.count_nonzero(np.diff(direction)) > max(FLICKER * len(run), REVERSALS_TRUSTED):
+    # Of more sign changes between neighbouring steps the direction is read with a dead zone: a
+    # reference at rest flickers by a count, a moving one does not; ten are taken as they are.
+    if np.count_nonzero(np.diff(direction)) > max(0.05 * len(run), REVERSALS_TRUSTED):
         direction = _dead_zone_direction(angle)
     elif run.velocity is None and "direction" not in run.signals:
         direction = direction_at_turns(angle, _clock(run), direction)

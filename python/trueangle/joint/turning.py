@@ -20,10 +20,6 @@ import numpy as np
 
 from ..support.arrays import Array
 
-#: Share of the one line's error below which the other one's must be to claim the reading: where
-#: both are similar the joint may have stopped there, and the direction stays.
-CLEARLY = 0.5
-
 #: Readings that make a line, and a parabola.
 LINE, PARABOLA = 2, 3
 
@@ -52,7 +48,9 @@ def direction_at_turns(angle: Array, clock: Array, direction: Array) -> Array:
             continue
         before = _at(clock[k], clock[k - LINE : k], angle[k - LINE : k])
         after = _at(clock[k], clock[turn : turn + LINE], angle[turn : turn + LINE])
-        if abs(angle[k] - after) < CLEARLY * abs(angle[k] - before):
+        # Share of the one line's error below which the other one's must be to claim the reading:
+        # where both are similar the joint may have stopped there, and the direction stays.
+        if abs(angle[k] - after) < 0.5 * abs(angle[k] - before):
             found[k] = direction[turn]
     return found
 

@@ -42,10 +42,6 @@ LABELS = ("unit", "run")
 
 #: Readings taken together: what is computed of them stays in the cache.
 _BLOCK = 1 << 16
-#: Readings, at most, of the first batch that are checked for wrong units and signs.
-_LOOKED_AT = 4096
-#: Bytes of a reading, to estimate how much of a log is done.
-_BYTES = 16
 
 #: Called after every batch with its rows and the bytes that those took.
 Advance: TypeAlias = Callable[[int, float], None]
@@ -284,7 +280,8 @@ def _accumulate(stretch: _LogPart, settings: LogFitSettings, advance: Advance) -
                     tally.high = max(tally.high, float(np.nanmax(angle)))
                 found.kept.take(run, stretch.number, taken_of[run], x, y)
                 taken_of[run] += x.size
-        taken = min(float(true.size * _BYTES), left)
+        # Bytes of a reading, to estimate how much of a log is done.
+        taken = min(float(true.size * 16), left)
         left -= taken
         advance(true.size, taken)
     advance(0, left)
@@ -372,7 +369,8 @@ def _sha256(path: Path) -> str:
 
 
 def _check_usable(path: Path, true: NDArray[Any], said: NDArray[Any], period: float) -> None:
-    known = np.flatnonzero(np.isfinite(true) & np.isfinite(said))[:_LOOKED_AT]
+    # The first readings are checked for wrong units and signs.
+    known = np.flatnonzero(np.isfinite(true) & np.isfinite(said))[:4096]
     if known.size:
         try:
             check_usable([CalibrationRun(true[known], said[known], period)])

@@ -42,8 +42,6 @@ from .report import Progress
 
 #: Places across a segment at which the model is looked at.
 _ACROSS = np.linspace(0.0, 1.0, 5)
-#: Passes, at most, in which outliers are rejected and looked for anew.
-_PASSES = 4
 
 
 class Passes:
@@ -104,7 +102,8 @@ class Passes:
         if start is None:
             return plain.answer()
         judged, outliers = plain, start
-        for _ in range(_PASSES):
+        # Passes, at most, in which outliers are rejected and looked for anew.
+        for _ in range(4):
             before = judged.summed.outliers
             found = self._pass(plain.summed.argument, outliers)
             if not 0.0 < len(found.outliers) / found.readings <= WILD_SHARE:

@@ -13,9 +13,6 @@ from ..formats.formats import find_format, known_format
 from ..runs.paths import find_logs
 from ..support.files import RUNS_BYTES, check_output, kind_of_log, promised_format, same_file
 
-#: Rows that a byte of a packed file holds, at most, where nothing else is known.
-_PACKED = 64
-
 
 class LogTarget(NamedTuple):
     """A log, its output, and the folder whose manifest notes it (None: none is kept)."""
@@ -39,7 +36,8 @@ def logs_hold_at_most(paths: Iterable[Path], most: int, topic: str | None = None
 def _rows(path: Path, most: int, topic: str | None) -> int:
     """Rows of a log, about; of a small one its bytes, without a look into it."""
     size = path.stat().st_size
-    if path.is_file() and size <= most // _PACKED:
+    # Rows that a byte of a packed file holds, at most, where nothing else is known.
+    if path.is_file() and size <= most // 64:
         return size
     try:
         return find_format(path).extent(path, (), topic).rows

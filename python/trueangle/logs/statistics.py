@@ -15,9 +15,6 @@ from ..support.angles import UNIT_PERIODS, arcsec, unit_name
 
 #: Readings fill a turn of another unit, and nothing beyond it, to this share ...
 _FILLED: Final = 0.9
-#: ... and jump over its border by as much, while a usual step is below a tenth.
-_WRAPPED: Final = 0.8
-_STEP: Final = 0.1
 
 #: Turns from which whole numbers or angles of one turn at most are likelier another unit.
 _MANY: Final = 10.0
@@ -26,9 +23,6 @@ _MANY: Final = 10.0
 #: Mismatch of two tracks, in periods, from which a reading is nearer to a wrong period than to
 #: none.
 _NEAR: Final = 0.25
-
-#: Fewest readings from which a unit is suspected.
-_FEWEST: Final = 20
 
 
 @dataclass
@@ -199,7 +193,8 @@ class UnitEvidence:
 
     def unit(self, span: tuple[float, float] | None) -> str | None:
         """The unit that the readings look like, where it is another; ``span`` was calibrated."""
-        if self.readings < _FEWEST:
+        # Fewest readings from which a unit is suspected.
+        if self.readings < 20:
             return None
         extent = self.high - self.low
         largest = max(abs(self.low), abs(self.high))
@@ -208,7 +203,8 @@ class UnitEvidence:
                 continue
             within = _FILLED * turn <= extent <= 1.001 * turn
             usual = self._travel / self.readings
-            if within and self._jump >= _WRAPPED * turn and usual <= _STEP * turn:
+            # ... and jump over its border by as much, while a usual step is below a tenth.
+            if within and self._jump >= 0.8 * turn and usual <= 0.1 * turn:
                 return unit
             if unit == "turn":
                 continue

@@ -62,9 +62,6 @@ _TRACK_KEYS = (*_CHANNEL_KEYS, "second", "second_zero_deg", "excitation_deg")
 MAX_TERM_LINES = 4096
 #: Smallest turn in the unit of angles, and the inverse of the largest.
 _LEAST_PERIOD = 1e-12
-#: Highest order times number of harmonics up to which the greatest slope of a steep model is
-#: looked for: a second of work.
-_STEEP_LINE_ORDERS = 3e5
 #: Signals (velocity in turns per second) at which any model must correct.
 _NORMAL = (
     {"velocity": 0.01, "temperature": 20.0, "torque": 1.0, "current": 1.0, "direction": 1.0},
@@ -193,7 +190,9 @@ class _ModelReader(RecordReader):
         """Refuse steep models of so high orders that nobody waits for their proof."""
         harmonics = sum(len(shaft.orders) for shaft in shafts)
         highest = max((s.cycles_per_turn * max(s.orders, default=0) for s in shafts), default=0.0)
-        if harmonics * highest <= _STEEP_LINE_ORDERS:
+        # Highest order times number of harmonics up to which the greatest slope of a steep model is
+        # looked for: a second of work.
+        if harmonics * highest <= 3e5:
             return
         slope = sum(
             float(np.dot(np.asarray(s.orders) * s.cycles_per_turn, sizes))

@@ -71,14 +71,6 @@ class WatchedWindow(ShownResult):
         return {{"time": "time_s"}.get(k, k): v for k, v in found.items() if k != "readings"}
 
 
-#: By which the run length of all charts is raised: what standardizing by a few windows, and
-#: correlation that is found late, take from it.
-_MARGIN: Final = 1.25
-
-#: Share of the model's largest line that the sums of a window may lack of it, at one spacing of the
-#: readings in every window: within a bin the model is represented to second order.
-_ROUNDING: Final = 1e-4
-
 #: Highest order that is watched: a window's sums grow with it.
 HIGHEST: Final = 4096
 
@@ -159,14 +151,18 @@ class Monitor(ShownResult):
         self.model, self.every, self.shift = model, float(every), float(shift)
         self.run_length = float(run_length)
         self._orders = orders
-        charts = _MARGIN * (2 * len(orders) + 1)  # that of the zero's steps included
+        # By which the run length of all charts is raised: what standardizing by a few windows, and
+        # correlation that is found late, take from it.
+        charts = 1.25 * (2 * len(orders) + 1)  # that of the zero's steps included
         allowance = 0.5 * self.shift
         self.limit = chart_limit(allowance, self.run_length * charts)
         step = two_sided_quantile(1.0 / (self.run_length * charts))
         known = [0.0] * (2 * len(orders))
         if model.covariance is not None:
             known = _variances(model, orders)
-        rounding = _ROUNDING * float(np.hypot(cosine, sine).max())
+        # Share of the model's largest line that the sums of a window may lack of it, at one spacing
+        # of the readings in every window: within a bin the model is represented to second order.
+        rounding = 1e-4 * float(np.hypot(cosine, sine).max())
         known = [variance + rounding**2 for variance in known]
         limits = (allowance, self.limit, step, step)
         self._core = _core.Monitor(model.period, orders, cosine, sine, known, self.every, limits)

@@ -14,8 +14,6 @@ MOST_TURNS = 1e9
 #: Ranges of signals and runs or files that a record lists, at most.
 MAX_TERMS = 64
 MAX_OFFSETS = 1_000_000
-#: Most sentences of a record about what its model is blind to.
-_MOST_SENTENCES = 1000
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,8 @@ class RecordReader(Decoder):
                     raise self.error(f"true or false is needed, got {shown_value(entry)}", name)
                 checked[key] = entry
             elif key == "blind":
-                texts = self.items(entry, name, "texts", _MOST_SENTENCES)
+                # Most sentences of a record about what its model is blind to.
+                texts = self.items(entry, name, "texts", 1000)
                 checked[key] = tuple(self.text(t, f"{name}[{i}]") for i, t in enumerate(texts))
             elif key == "signals":
                 ranges = self.items(entry, name, "ranges", MAX_TERMS)

@@ -20,9 +20,6 @@ ROUNDING = 1e-6
 #: Samples per period of the highest order: the greatest of them is at most 0.5 % low.
 _SAMPLES: Final = 32
 
-#: Below this the sum of amplitudes is a sufficient bound.
-_LOW: Final = 0.5
-
 
 def check_number(what: str, value: object, least: float, most: float) -> None:
     """Raise `ArgumentError` unless ``value`` is a finite number from ``least`` to ``most``."""
@@ -90,7 +87,7 @@ def greatest_slope(
     rate = 2.0 * math.pi / period
     aside = rate * float(np.hypot(a[~whole], b[~whole]) @ m[~whole])
     bound = rate * float(np.hypot(a[whole], b[whole]) @ m[whole])
-    if not whole.any() or aside + bound < _LOW:
+    if not whole.any() or aside + bound < 0.5:
         return aside + bound
     lines = sorted(zip(m[whole].astype(int).tolist(), a[whole], b[whole], strict=True))
     series = _core.Series(

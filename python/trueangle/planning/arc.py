@@ -33,13 +33,6 @@ HOPELESS = math.sqrt(1000.0)
 #: Expanded uncertainty of the curve, in its standard deviations.
 COVERAGE = 2.0
 
-#: Share of the readings by which their number grows until the uncertainty wanted is reached.
-_GROWS = 0.01
-
-#: Share of an uncertainty that rounding may miss it by: as many readings as the optimum needs
-#: reach it exactly.
-_ROUNDING = 1e-9
-
 
 @told_kinds
 def plan_arc(
@@ -135,9 +128,12 @@ def plan_arc(
         reached = _uncertainty(columns, turns, per_step, noise)
         if uncertainty is None or reached is None or readings is not None:
             break
-        if reached <= uncertainty * (1.0 + _ROUNDING):
+        # Share of an uncertainty that rounding may miss it by: as many readings as the optimum
+        # needs reach it exactly.
+        if reached <= uncertainty * (1.0 + 1e-9):
             break
-        steps = math.ceil(steps * (1.0 + _GROWS))
+        # Share of the readings by which their number grows until the uncertainty wanted is reached.
+        steps = math.ceil(1.01 * steps)
     factors = noise_factors(turns, wanted)
     beyond = [k for k, f in zip(wanted, factors, strict=True) if f > HOPELESS]
     if beyond:
@@ -232,7 +228,10 @@ def _places(columns: OrthonormalColumns, best: ArcDesign, readings: int) -> Arra
     """Places of single readings, the better of the rounded optimum and of exchanges."""
     if best.places.size <= readings:
         found = np.repeat(best.places, rounded(best.weights, readings))
-        if _efficiency(columns, best, found) >= _GOOD:
+        # Efficiency from which on single readings are not exchanged any more: exchanges gain some
+        # thousandths of it, scatter the readings over twice as many places, and leave the worst
+        # coefficient up to 7 % more uncertain.
+        if _efficiency(columns, best, found) >= 0.985:
             return found
     even = np.linspace(columns.grid[0], columns.grid[-1], readings)
     tried = exchanged(columns, even)
@@ -241,12 +240,6 @@ def _places(columns: OrthonormalColumns, best: ArcDesign, readings: int) -> Arra
     ):
         return found
     return tried
-
-
-#: Efficiency from which on single readings are not exchanged any more: exchanges gain some
-#: thousandths of it, scatter the readings over twice as many places, and leave the worst
-#: coefficient up to 7 % more uncertain.
-_GOOD = 0.985
 
 
 def _spread(turns: Array, apart: float, columns: OrthonormalColumns) -> Array:

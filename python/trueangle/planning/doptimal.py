@@ -13,33 +13,14 @@ from ..errors import ArgumentError
 from ..estimation.linear import least_squares, pseudo_inverse
 from ..support.arrays import Array, first_largest
 
-#: Places of the grid, to a cycle of the highest order and at least.
-_PER_CYCLE = 48
-_LEAST_PLACES = 801
-
 #: Multiplicative steps on the grid, and the excess that ends them: a design's efficiency is at
 #: least 1 / (1 + excess).
-_GRID_STEPS = 2000
 _GRID_EXCESS = 1e-4
 
-#: Sweeps over the places, each moved to its best, until none moves so far (turns) any more; looks
-#: at one place, each 16 times finer.
-_SWEEPS = 400
-_MOVES = 1e-9
-_LOOKS = 9
-
-#: Logarithm of a determinant that is lost in rounding.
-_ROUNDING = 1e-10
 
 #: Share of the largest singular value of the columns below which an arc does not resolve them:
 #: the variance grows with the square of its inverse.
 _SINGULAR = 1e-7
-
-#: Passes of exchanges of single readings.
-_PASSES = 20
-
-#: Relative gain of the determinant below which readings are not exchanged.
-_GAIN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -72,8 +53,9 @@ class OrthonormalColumns:
 
     def __init__(self, orders: Sequence[float], start: float, stop: float) -> None:
         self.orders = np.asarray(orders, dtype=np.float64)
-        count = math.ceil(_PER_CYCLE * float(self.orders.max()) * (stop - start))
-        self.grid = np.linspace(start, stop, max(_LEAST_PLACES, count + 1))
+        # Places to a cycle of the highest order, and at least.
+        count = math.ceil(48 * float(self.orders.max()) * (stop - start))
+        self.grid = np.linspace(start, stop, max(801, count + 1))
         self._turned: Array | None = None
         raw = self.at(self.grid)
         _, values, turned = np.linalg.svd(raw, full_matrices=False)
@@ -145,7 +127,9 @@ def d_optimal(columns: OrthonormalColumns) -> ArcDesign:
     rows = columns.at(grid)
     weights = np.full(grid.size, 1.0 / grid.size)
     excess = math.inf
-    for _ in range(_GRID_STEPS):
+    # Multiplicative steps on the grid; the excess ends them: a design's efficiency is at least 1 /
+    # (1 + excess).
+    for _ in range(2000):
         variances = _variances(rows, pseudo_inverse(rows.T @ (weights[:, None] * rows)))
         excess = float(variances.max()) / p - 1.0
         if excess < _GRID_EXCESS:
@@ -186,13 +170,15 @@ def _settled(columns: OrthonormalColumns, places: Array) -> tuple[Array, Array, 
     By Newton's method for all places together, by a sweep over them where that loses.
     """
     shares = np.full(places.size, 1.0 / places.size)
-    for _ in range(_SWEEPS):
+    # Until no place moves so far (turns) any more.
+    for _ in range(400):
         tried = _newton(columns, places)
-        if columns.log_det(tried, shares) < columns.log_det(places, shares) - _ROUNDING:
+        # Less of a logarithm is lost in rounding.
+        if columns.log_det(tried, shares) < columns.log_det(places, shares) - 1e-10:
             tried = _swept(columns, places)
         moved = float(np.abs(tried - places).max())
         places = tried
-        if moved < _MOVES:
+        if moved < 1e-9:
             break
     return places, shares, columns.worst_variance(places, shares) / columns.count - 1.0
 
@@ -235,7 +221,7 @@ def _newton(columns: OrthonormalColumns, places: Array) -> Array:
 
 def _highest(height: Callable[[Array], Array], low: float, high: float) -> float:
     """Where a function of one peak between two places is highest, by ever finer looks."""
-    for _ in range(_LOOKS):
+    for _ in range(9):
         x = np.linspace(low, high, 33)
         k = int(np.argmax(height(x)))
         low, high = float(x[max(k - 1, 0)]), float(x[min(k + 1, 32)])
@@ -251,7 +237,7 @@ def exchanged(columns: OrthonormalColumns, places: Array) -> Array:
     """
     grid = columns.at(columns.grid)
     places = places.copy()
-    for _ in range(_PASSES):
+    for _ in range(20):
         before = columns.log_det(places, np.ones(places.size))
         for i in range(places.size):
             rows = columns.at(places)
@@ -260,7 +246,7 @@ def exchanged(columns: OrthonormalColumns, places: Array) -> Array:
             own = float(rows[i] @ inverse @ rows[i])
             gains = (1.0 + _variances(grid, inverse)) * (1.0 - own) + mixed**2
             k = first_largest(gains)
-            if gains[k] > 1.0 + _GAIN:
+            if gains[k] > 1.0 + 1e-9:
                 places[i] = columns.grid[k]
         if columns.log_det(places, np.ones(places.size)) < before + 1e-4:
             break

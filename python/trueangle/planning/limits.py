@@ -23,9 +23,6 @@ SPEEDS = (1.0, 60.0)
 #: Readings of one run at most, where not stated and no earlier run had more.
 SAMPLES = 360
 
-#: Readings of one run at most, where not stated, where earlier ones were logs: what these do
-#: not show needs another motion, if any shows it; more can be stated.
-MOST_SAMPLES = 2000
 
 #: Degrees of travel from which on a joint is one that turns whole turns.
 WHOLE = 350.0
@@ -33,9 +30,6 @@ WHOLE = 350.0
 #: What lies a little beyond the earlier runs: kelvin, turns of the reference on its mount (deg),
 #: and a load (Nm) and current (A) where there was none.
 WARMER, MOUNTS, LOAD, CURRENT = 15.0, (0.0, 130.0, 250.0), 10.0, 2.0
-
-#: Bytes of a file of limits at most.
-_MOST_BYTES = 100_000
 
 
 @told_kinds
@@ -119,7 +113,9 @@ class Limits:
         bounds = signals.run_bounds()
         limits = cls(
             arc_deg=_arc(signals, bounds),
-            samples=min(max(SAMPLES, *(stop - start for start, stop in bounds)), MOST_SAMPLES),
+            # Readings of one run at most, where not stated, where earlier ones were logs: what
+            # these do not show needs another motion, if any shows it; more can be stated.
+            samples=min(max(SAMPLES, *(stop - start for start, stop in bounds)), 2000),
         )
         if signals.temperature is not None:
             limits = replace(limits, temperature_C=_range(signals.temperature))
@@ -184,7 +180,7 @@ def load_limits(path: str | Path) -> Limits:
     >>> load_limits(path).arc_deg
     (-135.0, 135.0)
     """
-    text = read_text(path, _MOST_BYTES, FileError, "a file of limits")
+    text = read_text(path, 100_000, FileError, "a file of limits")
     try:
         document = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as cause:

@@ -29,8 +29,6 @@ _STEPS: Final = 1000
 
 
 _STARTS: Final = 4000  # random starts of the search for three mounts and more
-_REFINED: Final = 8  # of these, the best are refined
-_SWEEPS: Final = 6  # coordinate sweeps of a refinement
 
 
 def noise_factors(
@@ -203,9 +201,9 @@ def search_spread(worst: Callable[[Array], Array], starts: Array, steps: Array) 
     moves.
     """
     found = []
-    for start in starts[np.argsort(worst(starts), kind="stable")[:_REFINED]]:
+    for start in starts[np.argsort(worst(starts), kind="stable")[:8]]:
         here: Array = start.copy()
-        for _ in range(_SWEEPS):
+        for _ in range(6):
             before = here.copy()
             for j in range(1, here.size):
                 trial = np.repeat(here[None], steps.size, axis=0)

@@ -32,12 +32,6 @@ from .worth import NOTHING, Worth, barely
 WORK = 20_000
 
 
-#: Passes over all choices of a run: the last one rarely changes anything.
-_PASSES = 3
-
-#: Steps of a level (speed, temperature, load ...), as shares of its range.
-_STEPS = (0.25, 0.1)
-
 #: Fewest readings of a run: a held-out run of 12 gives its zero and lines so coarsely that one
 #: diagnosis in ten does not confirm what it finds.
 LEAST = 18
@@ -246,13 +240,15 @@ class RunSearch:
         """Run k changed to the best there is: choices, and levels where these do not decide all."""
         kinds = [*run_choices(self.limits, self.scales.needs_current, designs[k].samples)]
         best = self.scales.weighed(designs, start, count_of_changes(designs[k], kinds))
-        for _ in range(_PASSES):
+        # Passes over all choices of a run: the last one rarely changes anything.
+        for _ in range(3):
             before = best
             for options in kinds:
                 designs, best = self._picked(designs, k, start, best, options, kinds)
             if best == before:
                 break
-        for step in () if self._tells_all(best) else _STEPS:
+        # Steps of a level (speed, temperature, load ...), as shares of its range.
+        for step in () if self._tells_all(best) else (0.25, 0.1):
             for name, at in [*run_amounts(designs[k], self.limits)]:
                 options = [{name: at(step)}, {name: at(-step)}]
                 designs, best = self._picked(designs, k, start, best, options, kinds)

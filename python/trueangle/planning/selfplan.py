@@ -21,15 +21,10 @@ from .noisefactors import search_spread
 from .plan import readings_needed
 from .result import SelfPlan
 
-#: Ratios of start to end speed whose costs are reported.
-_RATIOS: Final = (1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0)
 #: Turns below which the pattern cannot be separated from the motion.
 _TURNS: Final = 10.0
-#: Knots per turn of a motion that leaves order 1 to within half a percent.
-_KNOTS: Final = 0.5
 #: Resolution of the angles in degrees; blind below this share.
 _STEP: Final = 0.1
-_BLIND: Final = 1e-3
 
 _STARTS: Final = 4000
 
@@ -61,9 +56,7 @@ def angle_factors(angles_deg: ArrayLike, orders: Sequence[float]) -> Array:
     mean = np.exp(1j * angles[..., None] * k).mean(axis=-2)
     share = 1.0 - np.abs(mean) ** 2
     with np.errstate(divide="ignore"):
-        return np.asarray(
-            np.where(share > _BLIND, 1.0 / np.sqrt(np.maximum(share, 1e-300)), np.inf)
-        )
+        return np.asarray(np.where(share > 1e-3, 1.0 / np.sqrt(np.maximum(share, 1e-300)), np.inf))
 
 
 def best_angles(count: int, orders: Sequence[float]) -> tuple[float, ...]:
@@ -223,11 +216,12 @@ def _spin_down(
         orders,
         dict.fromkeys(orders, factor),
         speed_ratio=ratio,
-        speed_ratio_factors={r: speed_factor(r) for r in _RATIOS},
+        speed_ratio_factors={r: speed_factor(r) for r in (1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0)},
         turns=turns,
         readings=readings,
         seconds=seconds,
-        knots_per_turn=_KNOTS * min(orders),
+        # Knots per turn of a motion that leaves order 1 to within half a percent.
+        knots_per_turn=0.5 * min(orders),
         notes=tuple(notes),
     )
 

@@ -36,8 +36,6 @@ MOST_EVIDENCE = round(2.0 * math.log(ENOUGH) / math.log(ALIKE))
 #: Rounds in which the size of an effect is brought to that of the noise, and how near.
 _ROUNDS, _NEAR = 12, 0.02
 
-#: Draws of a cause that has no estimate: the runs must find it whatever its form.
-_DRAWS = 4
 
 #: Draws of an effect before a cause counts as one that such a joint cannot have.
 _TRIES = 4
@@ -86,7 +84,8 @@ def question_of(spot: Ambiguity, rich: Signals, around: JointPattern, rms: float
         if any(special.kind in spot.causes for special in EFFECTS[cause].contains):
             effects = ()  # its estimate is the special case, where the runs do not separate them
         if not effects:
-            made = [effect_of_size(cause, rms, rich, around, k * _TRIES) for k in range(_DRAWS)]
+            # Draws of a cause that has no estimate: the runs must find it whatever its form.
+            made = [effect_of_size(cause, rms, rich, around, k * _TRIES) for k in range(4)]
             drawn = [Hypothesis(cause, (one,)) for one in made if one is not None]
             effects = drawn[0].effects if drawn else ()
             draws += drawn[1:]

@@ -169,15 +169,9 @@ def _numbers(text: bytes) -> dict[str, float]:
 #: after which a line is whole.
 _PAUSE: Final = 0.002
 TICK: Final = 0.05
-_SILENCE: Final = 0.02
-#: Seconds after which a layout is found by the lines there are.
-_HURRY: Final = 0.2
 #: Seconds between two times at least: those of a run differ.
 _STEP: Final = 1e-6
-#: Lines that are taken at once: memory does not depend on pauses of this program.
-_BATCH: Final = 1024
 #: Bytes of a line, and lines that are looked at for their layout.
-_LONGEST: Final = 4096
 _LOOKED_AT: Final = 200
 
 
@@ -276,14 +270,16 @@ class Arrivals:
     def look(self) -> bool:
         """Take lines apart that have arrived; whether their layout is known by now."""
         over = self.is_over
-        while self._read and len(self._lines) < _BATCH:
+        # Lines that are taken at once: memory does not depend on pauses of this program.
+        while self._read and len(self._lines) < 1024:
             self._split(*self._read.popleft())
         if over and not self._read and self._tail and not self._stopped.is_set():
             self.rejected.append(self._tail)  # no line: it was not ended
             self._tail = b""
         if self.layout is None and self._lines:
             waited = time.monotonic() - self._start - self._times[0]
-            self.layout = layout_of(self._lines[:_LOOKED_AT], over or waited > _HURRY)
+            # Seconds after which a layout is found by the lines there are.
+            self.layout = layout_of(self._lines[:_LOOKED_AT], over or waited > 0.2)
             if self.layout is None and (over or len(self._lines) > _LOOKED_AT):
                 gone = len(self._lines) - (0 if over else _LOOKED_AT // 2)
                 self.rejected += self._lines[:gone]  # the oldest are not looked at again
@@ -297,11 +293,13 @@ class Arrivals:
         mean interval at most.
         """
         if math.isnan(self._before):
-            self._is_cut = self._source.midway and now - self._opened < _SILENCE
+            # After such a silence a line is whole.
+            self._is_cut = self._source.midway and now - self._opened < 0.02
             self._before = now
         data = (self._tail + data).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         *lines, self._tail = data.split(b"\n")
-        if len(self._tail) > _LONGEST:
+        # A line that long is none.
+        if len(self._tail) > 4096:
             lines, self._tail = [*lines, self._tail], b""
         if lines and self._is_cut:
             self.rejected.append(lines.pop(0))

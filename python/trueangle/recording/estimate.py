@@ -23,13 +23,9 @@ _ORDERS: Final = [list(range(1, _HIGHEST + 1))]
 _CHANCE: Final = 0.01
 #: Variance of all orders by turns, in that of white noise, from which on noise is not white, and
 #: orders on either side that have as much of it.
-_COLOURED: Final = 1.5
 _NEAR: Final = 4
-#: Of the period, below which a standard error is that of rounding.
-_ROUNDING: Final = 1e-12
 #: Turns by which an angle moves before it has another direction, and seconds that make a speed.
 _MOVED: Final = 1.0 / 288.0
-_SPEED: Final = 0.5
 
 
 class LiveOrder(NamedTuple):
@@ -129,7 +125,8 @@ class Estimate:
             steps.append((self._sign, int(self.travelled)))
         start, before, sign = self._from
         seconds, far = float(time[-1]) - start, self.travelled - before
-        if seconds >= _SPEED or sign != self._sign:
+        # Seconds that make a speed.
+        if seconds >= 0.5 or sign != self._sign:
             if far > _MOVED and sign == self._sign:
                 slow, fast = self.speeds
                 self.speeds = [min(slow, far / seconds), max(fast, far / seconds)]
@@ -153,14 +150,16 @@ class Estimate:
         before, (self._values, white) = self._values, self._solved(self._all)
         self.turns, self._ended = self.turns + 1, ended
         self._steps += np.abs(turn - self._before) ** 2 * (self.turns > 1)
-        self._before, white = turn, np.maximum(white, (_ROUNDING * self.period) ** 2)
+        # Of the period, below which a standard error is that of rounding.
+        self._before, white = turn, np.maximum(white, (1e-12 * self.period) ** 2)
         more = max(self.turns - 1.0, 1.0)
         own = self._steps / (4.0 * self.turns * more)
         # Of n turns noise has one mean, in which true orders are few, and n - 1 steps.
         middle = chi_squared_quantile(0.5, 2.0 * more) / (2.0 * more)
         mean = np.abs(self._values) ** 2 / (2.0 * math.log(2.0))
         noise = np.array([mean, *[own / middle] * min(self.turns - 1, _NEAR)])
-        if np.median(noise / white) > _COLOURED:
+        # Where all orders by turns vary so much more than white noise, noise is not white.
+        if np.median(noise / white) > 1.5:
             near = (noise[:, max(i - _NEAR, 0) : i + _NEAR + 1] for i in range(_HIGHEST))
             white = np.maximum(white, [np.median(part) for part in near])
         limit = chi_squared_quantile(1.0 - _CHANCE / _HIGHEST, 2.0 * more) / (2.0 * more)

@@ -19,8 +19,6 @@ from ..support.layout import counted
 
 #: Bytes of a page: what a call of the system puts into one is there as a whole, or not at all.
 _PAGE: Final = 4096
-#: Seconds between two times that the disk has all.
-_SYNC: Final = 1.0
 
 
 class WholeFile:
@@ -52,7 +50,8 @@ class WholeFile:
         """Add whole lines; what has waited for a second is written."""
         self._waiting += lines
         self.lines += count
-        if time.monotonic() - self._synced >= _SYNC:
+        # Seconds between two times that the disk has all.
+        if time.monotonic() - self._synced >= 1.0:
             self.flush()
 
     def flush(self) -> None:

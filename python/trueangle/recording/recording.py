@@ -23,10 +23,6 @@ from .estimate import Estimate
 from .output import RunsFile
 from .sources import SourceOptions
 
-#: Ratio of two speeds that show a delay.
-_SPEEDS = 1.5
-#: Share of lines that are rejected from which on something is wrong with the line.
-_LOSSES = 0.01
 #: Seconds between two looks for faults, and of silence that is one.
 _LOOK, _SILENT = 2.0, 2.0
 #: Readings that are looked at for faults, and the fewest that suffice.
@@ -200,7 +196,8 @@ class LiveRecording:
         found = self._faults_of_readings()
         gc.collect(0)  # what the look has made; commands keep much before they search it
         rejected = self.file.rejected.lines
-        if rejected > max(_LOSSES * (self.rows + rejected), 2.0):
+        # Share of lines that are rejected from which on something is wrong with the line.
+        if rejected > max(0.01 * (self.rows + rejected), 2.0):
             found["rejected_lines"] = (
                 f"{rejected} of {self.rows + rejected} lines are no rows "
                 f"({self.file.rejected.path}): bytes are lost, the baud rate is another, or lines "
@@ -249,7 +246,8 @@ class LiveRecording:
         if not self.estimate.is_settled:
             return "turn on: a further turn changes orders by more than their standard errors"
         slow, fast = self.estimate.speeds
-        return "turn it at another speed as well" if fast < _SPEEDS * slow else ""
+        # Ratio of two speeds that show a delay.
+        return "turn it at another speed as well" if fast < 1.5 * slow else ""
 
     def to_dict(self, now: float) -> dict[str, Any]:
         """What is known by ``now``, as plain values."""

@@ -15,10 +15,8 @@ from .recording import LiveRecording
 
 #: Seconds between two drawings, and drawings over which the rate is taken.
 _DRAWN: Final = {"text": 0.25, "json": 0.5, "none": 0.5}
-_RATED: Final = 9
 #: Letters of the cells of a turn by direction, and orders that are shown.
 _MARKS: Final = ("forwards ", "backwards")
-_SHOWN: Final = 6
 
 
 class Screen:
@@ -39,7 +37,8 @@ class Screen:
         self._redraws = self.style == "text" and is_terminal
         self._errors_in = errors_in
         self._drawn, self._lines = -1.0, 0
-        self._counts: deque[tuple[float, int]] = deque([(0.0, 0)], _RATED)
+        # Drawings over which the rate is taken.
+        self._counts: deque[tuple[float, int]] = deque([(0.0, 0)], 9)
 
     def show(self, recording: LiveRecording, now: float, ended: str = "") -> None:
         """Draw, where it is time to, at the first reading, or where the recording has ended."""
@@ -104,7 +103,7 @@ class Screen:
             lines.append(f"{counted(recording.unpaired, 'reading')} without a reference")
         if recording.jitter >= 0.0:
             lines.append(f"times are those of arrival, jitter {1e3 * recording.jitter:.2g} ms")
-        for order in estimate.orders[:_SHOWN]:
+        for order in estimate.orders[:6]:
             size = order.amplitude_arcsec
             shown = error_unit(self._errors_in, size).text(size, order.std_arcsec)
             lines.append(f"order {order.order:3d}  {shown} at {order.phase_deg:.0f} deg")

@@ -23,9 +23,6 @@ from ..formats.seriallog import NUMBER
 #: Bytes of one read, at most; seconds that one waits, and a server is waited for.
 MOST: Final = 1 << 16
 WAIT: Final = 0.1
-_PATIENCE: Final = 5.0
-#: Seconds between two looks at a file that may have grown.
-_LOOK: Final = 0.02
 
 #: ``ID:byte:length:scale``; behind the length ``s`` is signed, ``b`` is big-endian.
 _FIELD: Final = re.compile(rb"(0x[\da-fA-F]+|\d+):(\d+):([1-8])([sb]{0,2}):(%s)" % NUMBER)
@@ -148,7 +145,8 @@ def open_source(address: str, options: SourceOptions) -> Source:
         """What was added to the file; it ends where it gets shorter."""
         data: bytes = file.read(MOST)
         if not data:
-            time.sleep(_LOOK)
+            # Seconds between two looks at a file that may have grown.
+            time.sleep(0.02)
         return data if data or os.fstat(file.fileno()).st_size >= file.tell() else None
 
     if kind == "file":
@@ -181,7 +179,8 @@ def _socket(address: str, kind: str, sent: bytes) -> Source:
         raise ArgumentError(f"{address}: tcp://HOST:PORT or udp://:PORT is needed")
     try:
         if kind == "tcp":
-            link = socket.create_connection((host, port), _PATIENCE)
+            # Seconds that a server is waited for.
+            link = socket.create_connection((host, port), 5.0)
             link.sendall(sent)
             return Source(partial(_ready, link, lambda: link.recv(MOST) or None), link.close)
         family = socket.AF_INET6 if ":" in host else socket.AF_INET

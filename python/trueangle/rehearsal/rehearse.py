@@ -28,8 +28,6 @@ from .workers import LocalTrials, Workers, usable_cores
 #: Trials of a cause where not given.
 SEEDS = 20
 
-#: Share of the time given for the search for further runs.
-FOR_NEXT_RUNS = 0.2
 
 #: Note of every rehearsal.
 FORMS = (
@@ -39,12 +37,6 @@ FORMS = (
 
 #: Trials of a round while the sizes are bracketed, and steps up and down between two rounds.
 _BRACKETING, _STEP_UP, _STEP_DOWN = 2, 8, 6
-
-#: Probabilities at which a later round tries.
-_AIMS = (0.3, 0.75, 0.95, 0.95)
-
-#: Trials at the largest size after which a cause that is never named is given up.
-_GIVEN_UP = 4
 
 
 @told_kinds
@@ -129,7 +121,8 @@ def rehearse(
             sizes = size_range(sim, signals, cause, seed)
             searches[cause] = SizeSearch.of(cause, sizes, blind.get(cause), seeds)
         closed = [cause for cause in names if searches[cause].is_blind]
-        with at.part(FOR_NEXT_RUNS):
+        # Share of the time given for the search for further runs.
+        with at.part(0.2):
             further = _opening(sim, signals, closed, blind)
         _ask(sim, signals, list(searches.values()), seed, workers or usable_cores(), at)
         found = [search.result() for search in searches.values()]
@@ -266,14 +259,16 @@ def next_sizes(
     named = sum(n for n, _ in tried.values())
     if named == 0:
         top = max(tried)
-        if top >= highest and tried[top][1] >= min(_GIVEN_UP, seeds):
+        # Trials at the largest size after which a cause that is never named is given up.
+        if top >= highest and tried[top][1] >= min(4, seeds):
             return []
         return [min(top + _STEP_UP, highest)] * min(_BRACKETING, left)
     if all(n == count for n, count in tried.values()) and min(tried) > lowest:
         return [max(min(tried) - _STEP_DOWN, lowest)] * min(_BRACKETING, left)
     chance = Chance(tried)
     steps = []
-    for aim in _AIMS[:left]:
+    # Probabilities at which a later round tries.
+    for aim in (0.3, 0.75, 0.95, 0.95)[:left]:
         step = chance.quantile(aim, 0.5)
         steps.append(
             highest if not np.isfinite(step) else int(np.clip(round(step), lowest, highest))

@@ -28,9 +28,6 @@ THREADS = (
     "BLIS_NUM_THREADS",
 )
 
-#: Seconds between two looks at the pace while answers are waited for.
-LOOK = 0.1
-
 
 class WorkerError(TrueAngleError):
     """A process that ran trials has ended, or could not be given the simulation."""
@@ -105,7 +102,8 @@ class Workers:
         at = current_deadline()
         while self._outstanding and not at.over:
             try:
-                trial, answer = self._done.get(timeout=LOOK)
+                # Seconds between two looks at the pace while answers are waited for.
+                trial, answer = self._done.get(timeout=0.1)
             except queue.Empty:
                 continue
             if isinstance(answer, Exception):

@@ -25,29 +25,8 @@ from .run import CalibrationRun, as_runs
 #: of order 202 by 2 degrees, so that no order of interest depends on the difference.
 POSITION_TOLERANCE: Final = 1.0 / 36_000.0
 
-#: Highest order that is named as an alias where no gear is declared, and the phase (radians)
-#: by which it may turn within a place that was visited again and not met exactly: no order
-#: that is searched for differs there by more than a tenth of itself from the middle.
-_HIGHEST_ALIAS: Final = 404
-_SAME_PHASE: Final = 0.2
-
-
-#: Cells of a turn for each order: within one it turns by a fifth of a radian at most.
-_CELLS_PER_ORDER: Final = 32
-
-#: Coherence from which an order far from another may pass for it at the positions.
-_ALIKE: Final = 0.5
-
-#: A gap counts as missing travel when wider than this part of a turn (20 deg) and than
-#: three usual ones.
-_MISSING: Final = 20.0 / 360.0
-
-#: Readings that a turn takes at least, in steps below half of it.
-_LEAST_OF_A_TURN: Final = 3
-
 
 #: Up to this many positions their spectrum is summed exactly, beyond by a histogram.
-_EXACT_SPECTRUM: Final = 4096
 _BLOCK: Final = 1 << 18
 _CELLS: Final = 1 << 16
 
@@ -82,7 +61,9 @@ class Positions:
         """Part of the turn that is covered: 1, or less where an arc was not travelled."""
         gaps = np.diff(self.turns, append=self.turns[0] + 1.0)
         largest = float(gaps.max())
-        return 1.0 if largest <= max(_MISSING, 3.0 * float(median(gaps))) else 1.0 - largest
+        # A gap counts as missing travel when wider than this part of a turn (20 deg) and than three
+        # usual ones.
+        return 1.0 if largest <= max(20.0 / 360.0, 3.0 * float(median(gaps))) else 1.0 - largest
 
     def of_rows(self, rows: NDArray[np.intp]) -> Positions:
         """The same positions for the readings in another order, or for some of them."""
@@ -90,7 +71,8 @@ class Positions:
 
     def spectrum(self, highest: int) -> Array:
         """``|mean exp(2 pi i m t)|`` for m = 0 .. highest, by a histogram for many t."""
-        if len(self) > _EXACT_SPECTRUM:
+        # Of more positions a histogram serves.
+        if len(self) > 4096:
             cells = (self.turns * _CELLS).astype(np.int64) % _CELLS
             counts = np.bincount(cells, minlength=_CELLS)
             return np.asarray(np.abs(np.fft.rfft(counts))[: highest + 1] / len(self))
@@ -121,10 +103,12 @@ class Positions:
         """
         first = math.ceil(1.0 / self.span)
         highest = max(highest, first)
-        cells = 1 << int(_CELLS_PER_ORDER * highest).bit_length()
+        # Cells of a turn for each order: within one it turns by a fifth of a radian at most.
+        cells = 1 << int(32 * highest).bit_length()
         counts = np.bincount((self.turns * cells).astype(np.int64) % cells, minlength=cells)
         coherence = np.abs(np.fft.rfft(counts)[first : highest + 1]) / len(self)
-        return bool((coherence > _ALIKE).any())
+        # Coherence from which an order far from another may pass for it at the positions.
+        return bool((coherence > 0.5).any())
 
     def describe(self) -> str:
         """The positions in words, as in ``36 positions, 10 deg apart``."""
@@ -238,7 +222,8 @@ def closure_errors(
     """
     found = []
     for run in as_runs(runs):
-        if len(run) < _LEAST_OF_A_TURN:
+        # Readings that a turn takes at least, in steps below half of it.
+        if len(run) < 3:
             continue
         width = run.period * POSITION_TOLERANCE if tolerance is None else tolerance
         reference = run.unwrapped_reference
@@ -252,7 +237,9 @@ def closure_errors(
 
 def _places(ascending: Array) -> NDArray[np.intp] | None:
     """Clearly separate clusters, none so wide that an order varies within it; or None."""
-    width = _SAME_PHASE / (2.0 * math.pi * _HIGHEST_ALIAS)
+    # Highest order that is named as an alias where no gear is declared, and the phase by which it
+    # may turn within a place.
+    width = 0.2 / (2.0 * math.pi * 404)
     gaps = np.diff(ascending)
     starts = gaps > width
     if starts.all() or not starts.any():

@@ -23,11 +23,6 @@ from .run import CalibrationRun
 #: The column that is made.
 _MADE: Final = "angle of sine and cosine"
 
-#: Part of a period from reading to reading up to which its periods are counted, and how far the
-#: count may be off a whole number.
-_DENSE: Final = 0.3
-_WHOLE: Final = 0.05
-
 
 def with_channel_angle(
     table: FileReadings, periods: tuple[int, ...] | None, reference_counts: float | None
@@ -112,10 +107,11 @@ def _periods(channels: Channels, sine: Array, cosine: Array, reference: Array) -
     moved = wrap(np.diff(reference) / channels.period, 1.0)
     steps = np.nan_to_num(wrap(np.diff(phase), 1.0))
     travel = float(np.abs(moved).sum())
-    if travel < 1.0 / stated or np.abs(steps).max(initial=0.0) > _DENSE:
+    # Up to this part of a period from reading to reading its periods are counted.
+    if travel < 1.0 / stated or np.abs(steps).max(initial=0.0) > 0.3:
         return stated
     counted = abs(float(np.sign(moved) @ steps)) / travel
-    return round(counted) if abs(counted - round(counted)) < _WHOLE else stated
+    return round(counted) if abs(counted - round(counted)) < 0.05 else stated
 
 
 def following(

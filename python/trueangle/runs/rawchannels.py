@@ -25,11 +25,7 @@ CONSTANTS: Final = ("offset_cosine", "offset_sine", "amplitude", "gain_ratio", "
 #: Phases at which the error of a curve is sampled, and the highest order kept of it.
 _SAMPLES: Final = 512
 _HIGHEST: Final = 64
-#: Amplitudes of the error, radians, that no double angle resolves.
-_NOTHING: Final = 1e-12
 
-#: Amplitudes that are not corrected, relative to the standard error of a harmonic.
-_NEGLIGIBLE: Final = 0.1
 
 #: Roles of two tracks.
 TRACKS: Final = ("sine", "cosine", "sine2", "cosine2")
@@ -351,7 +347,9 @@ class Channels:
         if not self.harmonics:
             return [], [], []
         # Orders far below the standard error of the harmonics cost time and correct nothing.
-        least = max(_NOTHING, _NEGLIGIBLE * max(h.std for h in self.harmonics))
+        # Amplitudes, radians, that no double angle resolves; those below a tenth of a standard
+        # error are not corrected.
+        least = max(1e-12, 0.1 * max(h.std for h in self.harmonics))
         found = self.error_series()
         kept = np.flatnonzero(np.abs(found) > least)
         # The angle falls with the phase where the direction is -1.

@@ -36,9 +36,6 @@ from ..support.times import elapsed_seconds, parsed_time
 
 T = TypeVar("T")
 
-#: Most columns of unknown role that are kept: a wide log has thousands.
-_KEPT = 256
-
 
 #: Columns of files by path, topic and the columns that are texts, where a file is read once.
 _Kept: TypeAlias = dict[tuple[str, str | None, frozenset[str]], dict[str, NDArray[Any]]]
@@ -184,7 +181,8 @@ def readings_of(path: Path, wanted: Mapping[str, Any], topic: str | None) -> Fil
     warn_of_unread(path, kind.unread(path), roles)
     needed = list(dict.fromkeys(c.name for c in roles.values() if c.name not in keys))
     known = set(needed)
-    others = [name for name in header if name not in known][:_KEPT]
+    # Most columns of unknown role that are kept: a wide log has thousands.
+    others = [name for name in header if name not in known][:256]
     together = getattr(kind.module, "together", None)
     if together is not None:  # formats whose columns need not be equally long
         if not needed and len(header) > 1:  # which columns belong together is unknown

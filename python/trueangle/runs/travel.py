@@ -19,25 +19,14 @@ from ..support.angles import unit_name
 from ..support.arrays import Array
 from .run import CalibrationRun
 
-#: Readings whose positions are looked at: one lies in every degree of the travel.
-_LOOKED_AT = 65_536
-
 #: Below this condition number of the design plain least squares is harmless on an arc.
 #: Orders 0..8 reach 31 on 300 deg of travel, 274 on 270 deg.
 CONDITION = 30.0
 
 
-#: An end of a span nearer to zero than this share of the span is reported as zero.
-_TOLD = 1e-4
-
-
 #: A short travel (turns), a single pass over it (travel there over its width), readings of a
 #: log, periods that a line needs to come back, and correlation that is not noise of readings.
-_SHORT = 0.25
-_ONE_PASS = 1.5
-_LONG = 100
 _PERIODS = 2.0
-_CORRELATED = 0.3
 
 #: Degree of what is slow over a short travel.
 _SLOW = 5
@@ -60,7 +49,8 @@ class Span(NamedTuple):
         """
         within_a_turn = self.stop - self.start < period
         turn = period if within_a_turn and self.stop > period else 0.0
-        finest = _TOLD * (self.stop - self.start)
+        # An end of a span nearer to zero than this share of the span is reported as zero.
+        finest = 1e-4 * (self.stop - self.start)
         low, high = (x if abs(x) > finest else 0.0 for x in (self.start - turn, self.stop - turn))
         return f"{low:.4g} to {high:.4g} {unit_name(period)}"
 
@@ -79,7 +69,8 @@ def covered_span(angles: Sequence[Array], period: float) -> Span:
     >>> covered_span([np.linspace(-40.0, 150.0, 96)], 360.0)
     Span(start=320.0, stop=510.0, full=False)
     """
-    return Span(*_core.covered_span(angles, period, _LOOKED_AT))
+    # Readings whose positions are looked at: one lies in every degree of the travel.
+    return Span(*_core.covered_span(angles, period, 65_536))
 
 
 def travelled_span(angles: Sequence[Array], period: float, periodic: bool) -> Span:
@@ -111,7 +102,7 @@ def is_swept_once(run: CalibrationRun) -> bool:
     """
     turns = run.unwrapped_reference / run.period
     travel = float(np.ptp(turns))
-    return 0.0 < travel <= 1.0 and float(np.abs(np.diff(turns)).sum()) <= _ONE_PASS * travel
+    return 0.0 < travel <= 1.0 and float(np.abs(np.diff(turns)).sum()) <= 1.5 * travel
 
 
 def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> float:
@@ -129,12 +120,13 @@ def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> fl
     >>> held_orders([run], [360.0])
     30.0
     """
-    if len(runs) != 1 or len(runs[0]) < _LONG:
+    if len(runs) != 1 or len(runs[0]) < 100:
         return 0.0
     (run,) = runs
     reference = run.unwrapped_reference
     travel = float(np.ptp(reference)) / run.period
-    if travel >= _SHORT or not is_swept_once(run):
+    # Travel of so many turns is not short.
+    if travel >= 0.25 or not is_swept_once(run):
         return 0.0
     held = [k for k in declared if k * travel >= _PERIODS]
     # Readings whose neighbours are compared.
@@ -148,7 +140,7 @@ def held_orders(runs: Sequence[CalibrationRun], declared: Sequence[float]) -> fl
     design, error = np.column_stack(columns), run.centred_error[part]
     left = error - design @ np.linalg.lstsq(design, error, rcond=None)[0]
     size = float(left @ left)
-    agree = size > 0.0 and float(left[:-1] @ left[1:]) > _CORRELATED * size
+    agree = size > 0.0 and float(left[:-1] @ left[1:]) > 0.3 * size
     return _PERIODS / travel if held or agree else 0.0
 
 

@@ -6,7 +6,7 @@ import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
@@ -29,15 +29,6 @@ from .channelchanges import (
     standard_errors,
 )
 from .recording import Recording, as_recordings, track_readings
-
-#: Noise of one reading, relative to the amplitude, from which the signal is weak.
-_WEAK: Final = 0.01
-
-#: Gain ratio of the channels from which one is weak.
-_UNEQUAL: Final = 1.5
-
-#: Displacement over distance, up to which the field of a dipole is expanded.
-_EXPANDED: Final = 0.5
 
 
 class ChannelCause(NamedTuple):
@@ -242,7 +233,8 @@ def _causes(
     words = (
         f"the {'cosine' if channels.gain_ratio > 1.0 else 'sine'} channel is weak, {1 / ratio:.2g} "
         "of the other"
-        if ratio > _UNEQUAL
+        # Gain ratio of the channels from which one is weak.
+        if ratio > 1.5
         else f"gain (sine over cosine {channels.gain_ratio:.4g}) or phase "
         f"({channels.phase_deg:+.2g} deg) of the channels is off, or the sensor is off the "
         f"axis{_off(sensor, p)}"
@@ -257,7 +249,8 @@ def _causes(
         words = f"the {channel} channel is clipped in {counted(count, 'reading')}: lower its gain"
         rows.append(ChannelCause("clipping", (4.0 * p,), share, 0.0, 0.0, words))
     noise = max(found.noise)
-    if noise > _WEAK and not several:
+    # Noise of one reading, relative to the amplitude, from which the signal is weak.
+    if noise > 0.01 and not several:
         words = f"noise is {100 * noise:.2g} % of the amplitude: the gap may be too wide"
         rows.append(ChannelCause("weak_signal", (), noise, 0.0, noise * unit, words))
     return tuple(sorted(rows, key=lambda row: -row.error_deg))
@@ -265,7 +258,8 @@ def _causes(
 
 def _off(share: float, periods: int) -> str:
     """How far off the axis, by the field of a dipole; nothing where that is not expanded."""
-    if periods > 1 or share > _EXPANDED:
+    # Displacement over distance, up to which the field of a dipole is expanded.
+    if periods > 1 or share > 0.5:
         return ""
     return (
         f" by about {share:.2g} of the distance from the magnet's middle to the sensor "

@@ -19,14 +19,6 @@ from ..support.arrays import Array
 SURE: Final = 4.0
 LEAST: Final = 1e-3
 
-#: Change of ln(amplitude) that counts as much as one of 1 of a coefficient of the curve: also
-#: temperature, supply and a shift of the sensor change the amplitude.
-_AMPLITUDE: Final = 30.0
-
-#: Kelvin from which drift is estimated, and parts of the readings by temperature.
-_KELVIN: Final = 2.0
-_PARTS: Final = 5
-
 
 class ChannelChange(NamedTuple):
     """What moved between the first run and another one."""
@@ -64,7 +56,9 @@ def changes_between(runs: Sequence[tuple[str, Channels]], known: bool) -> Iterab
                 "the magnet moved off the axis" + ("" if known else ", or the offsets changed"),
             ),
             "gap": (
-                abs(amplitude) / _AMPLITUDE,
+                # Change of ln(amplitude) that counts as much as one of 1 of a coefficient of the
+                # curve: also temperature, supply and a shift of the sensor change the amplitude.
+                abs(amplitude) / 30.0,
                 f"the gap changed (amplitude {100.0 * math.expm1(amplitude):+.2g} %)",
             ),
         }
@@ -97,9 +91,10 @@ def per_kelvin(sine: Array, cosine: Array, temperature: Array, named: str) -> di
     """Slopes of the constants with temperature that are significant."""
     known = np.isfinite(temperature)
     sine, cosine, temperature = sine[known], cosine[known], temperature[known]
-    if temperature.size == 0 or float(np.ptp(temperature)) < _KELVIN:
+    # Kelvin from which drift is estimated.
+    if temperature.size == 0 or float(np.ptp(temperature)) < 2.0:
         return {}
-    edges = np.quantile(temperature, np.linspace(0.0, 1.0, _PARTS + 1)[1:-1])
+    edges = np.quantile(temperature, np.linspace(0.0, 1.0, 6)[1:-1])
     part = np.searchsorted(edges, temperature, side="right")
     kept, values, std = _constants_by(part, sine, cosine, named)
     at = np.array([temperature[part == i].mean() for i in kept])[:, None]

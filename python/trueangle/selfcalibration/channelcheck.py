@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from ..support.layout import counted, laid_out, wrapped_lines
 from ..support.plainresult import PlainResult, plain_fields
 from .channelcauses import ChannelDiagnosis, channel_diagnosis
 from .recording import Recording, as_recordings, track_readings
-
-#: Degrees of the channels' period from which it is whole.
-_WHOLE: Final = 355.0
 
 
 @dataclass(frozen=True)
@@ -157,7 +154,7 @@ def channel_faults(
             "less weight",
             "nothing: a place is known by the arc, not by the time",
         )
-    if found.coverage < _WHOLE and not found.recorded.clipped:
+    if found.coverage < 355.0 and not found.recorded.clipped:
         add(
             "partial_arc",
             f"the readings cover {found.coverage:.0f} deg of the channels' period: outside it the "

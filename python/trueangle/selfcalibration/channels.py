@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -27,9 +26,6 @@ from .model import reference_free_model
 from .recording import Recording, track_readings
 from .result import ARCSEC, Blind, OrderEstimate, SelfCalibration, blind_words
 from .spindown import spin_down
-
-#: Turns from which time stamps are needed for the orders that the curve cannot give.
-_TURNS: Final = 5.0
 
 
 def channel_patterns(
@@ -155,7 +151,8 @@ def _by_time(
     notes: list[str],
 ) -> SelfCalibration | None:
     """The pattern of the decoded angle by its time stamps, which resolve what the curve cannot."""
-    if recordings[0].time is None or turns < _TURNS or recordings[0].periods > 1:
+    # Turns from which time stamps are needed for the orders that the curve cannot give.
+    if recordings[0].time is None or turns < 5.0 or recordings[0].periods > 1:
         return None
     try:
         found = spin_down(recordings, orders, loop=loop, bandwidth=bandwidth, period=period)

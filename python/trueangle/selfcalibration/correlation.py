@@ -20,20 +20,8 @@ from numpy.typing import NDArray
 
 from ..support.arrays import Array
 
-#: Terms of an autoregression, at most; and readings to a term, at least.
-_MOST: Final = 24
-_PER_TERM: Final = 10
-
-#: Rounds in which what a fit absorbed settles.
-_ROUNDS: Final = 4
-
 #: Points of frequency over which a spectrum is averaged.
 _GRID: Final = 8192
-
-#: Highest frequency below which fitted motion may remove everything; and the fewest cycles of a
-#: series over which the power just above it is averaged.
-_HIGHEST_CUT: Final = 0.15
-_LEAST_BAND: Final = 10.0
 
 
 @dataclass(frozen=True)
@@ -111,7 +99,8 @@ def lag_pairs(lengths: Sequence[int], most: int) -> Array:
 
 def _most_terms(lengths: Sequence[int]) -> int:
     """Most terms that series of these lengths can determine."""
-    return min(_MOST, sum(lengths) // _PER_TERM, max(lengths, default=1) - 1)
+    # Terms of an autoregression, at most, and readings to a term, at least.
+    return min(24, sum(lengths) // 10, max(lengths, default=1) - 1)
 
 
 def correlation_of(
@@ -143,7 +132,8 @@ def correlation_of(
         return WHITE
     pairs = lag_pairs(lengths, most)
     found = WHITE
-    for _ in range(1 if absorbed is None else _ROUNDS):
+    # Rounds in which what a fit absorbed settles.
+    for _ in range(1 if absorbed is None else 4):
         taken = np.zeros(most + 1) if absorbed is None else absorbed(found, most)
         variance = left[0] / max(count - taken[0], 1.0)
         lags = (left + variance * taken) / np.maximum(pairs, 1) / variance
@@ -168,14 +158,16 @@ def correlation_above(series: Sequence[Array], cut: float) -> tuple[Correlation,
     """
     lengths = [one.size for one in series]
     count, most = sum(lengths), _most_terms(lengths)
-    if most < 1 or cut > _HIGHEST_CUT:
+    # Above, fitted motion does not remove everything.
+    if most < 1 or cut > 0.15:
         return WHITE, sum(float(one @ one) for one in series) / max(count, 1)
     left = np.zeros(most + 1)
     for one in series:
         n = 1 << (2 * one.size - 1).bit_length()
         power = np.abs(np.fft.rfft(one, n)) ** 2
         frequency = np.fft.rfftfreq(n)
-        above = (frequency >= cut) & (frequency <= max(2.0 * cut, cut + _LEAST_BAND / one.size))
+        # The fewest cycles of a series over which the power just above is averaged.
+        above = (frequency >= cut) & (frequency <= max(2.0 * cut, cut + 10.0 / one.size))
         if cut > 0.0 and above.any():
             power[frequency < cut] = power[above].mean()
         found = np.fft.irfft(power, n)[: most + 1]

@@ -21,14 +21,11 @@ from .densetriangle import (
 from .projected import NOT_SEEN, Projected, Unknown, combinations
 
 #: Readings from which the correlation of residuals is estimated, and blocks that are averaged.
-_TOLD: Final = 60
 _BLOCKS: Final = 40
 
 #: Most fits, each at the angles corrected by the one before; fits whose angles are not corrected
 #: yet; and the change, in standard errors, below which coefficients have converged.
-_ROUNDS: Final = 8
 _AT_FIRST: Final = 2
-_STILL: Final = 0.02
 
 
 @dataclass(frozen=True)
@@ -122,7 +119,8 @@ def fit_dense(
         )
         bread = spread = _bread(solved, projected)
         before, correlation = correlation, WHITE
-        if residuals.size > _TOLD and float(residuals @ residuals) > 0.0:
+        # Readings from which the correlation of residuals is estimated.
+        if residuals.size > 60 and float(residuals @ residuals) > 0.0:
             series = DenseSeries(parts, bread, freedom_lost)
             correlation = correlation_of(series.of(residuals), series.absorbed)
             if not correlation.is_white:
@@ -173,12 +171,13 @@ def dense_fixed_point(fit_at: Callable[[Array, bool], DenseFit], size: int) -> D
     is not noise, and random nuisances cannot be estimated from it.
     """
     coefficients = np.zeros(size)
-    for number in range(_ROUNDS):
+    # Each at the angles corrected by the one before.
+    for number in range(8):
         fit = fit_at(coefficients, number >= _AT_FIRST)
         # A hardly identifiable combination is noise of any size: it corrects no angle.
         found = np.where(fit.projected.told, fit.patterns, 0.0)
         std = np.sqrt(np.maximum(np.diagonal(fit.covariance), 1e-300))
-        still = np.abs((found - coefficients) / std).max(initial=0.0) < _STILL
+        still = np.abs((found - coefficients) / std).max(initial=0.0) < 0.02
         coefficients = found
         if still and number >= _AT_FIRST:
             break

@@ -18,10 +18,6 @@ from .correlation import Correlation
 _SIZES: Final = np.logspace(-1.0, 12.0, 27)
 
 
-#: Singular values of patterns below this share of the largest count as zero.
-_RANK: Final = 1e-9
-
-
 @dataclass(frozen=True)
 class DenseRows:
     """A part of the readings: patterns (n, m), nuisances (n, p), target (n)."""
@@ -121,7 +117,8 @@ def _split(root: Array, right: Array) -> tuple[Array, Array]:
     if root.size == 0:
         return np.zeros(0), right
     u, values, _ = np.linalg.svd(root)
-    seen = values > _RANK * max(float(values.max(initial=0.0)), 1e-300)
+    # Singular values of patterns below this share of the largest count as zero.
+    seen = values > 1e-9 * max(float(values.max(initial=0.0)), 1e-300)
     return values[seen], u[:, ~seen].T @ right
 
 

@@ -69,16 +69,6 @@ _ECCENTRIC: Final = math.radians(1.0)
 #: Where no estimate of the ratio was requested, a given one is reported as doubtful beyond this
 #: many standard errors if it also differs by this share.
 _DOUBTED: Final = 6.0
-_SHARE: Final = 1e-4
-
-#: Both halves of a run are the same places where they share this part of the travel.
-_SAME_PLACES: Final = 0.8
-
-#: Blocks in turn that predict each other where a run passes every place once.
-_BLOCKS: Final = 20
-
-#: Readings from which parts of them predict each other.
-_READINGS: Final = 200
 
 
 class _UsedRatio(NamedTuple):
@@ -189,7 +179,7 @@ def _ratio(
         return _UsedRatio(start if given else whole, measured, note if asked or not given else "")
     if given and not asked:
         off = abs(measured.value - start)
-        doubted = off > _DOUBTED * measured.std and off > _SHARE * abs(start)
+        doubted = off > _DOUBTED * measured.std and off > 1e-4 * abs(start)
         note = f"the readings show a gear ratio of {told}, not {start:g}, which is kept; "
         note += "`fit_ratio=True` takes what they show"
         return _UsedRatio(start, measured, note if doubted else "")
@@ -306,10 +296,12 @@ def _notes(fit: DualFit, ratio: float, channels: GearedChannels) -> list[str]:
 
 def _held_out(channels: GearedChannels, ratio: float, fit: DualFit) -> dict[str, HeldOutPattern]:
     """One part of the readings predicts the other: halves, or blocks in turn over one pass."""
-    if min(o.size for o in channels.output) < _READINGS:
+    # Readings from which parts of them predict each other.
+    if min(o.size for o in channels.output) < 200:
         return {}
     halves = all(_same_places(m) for m in channels.motor)
-    blocks = 2 if halves else _BLOCKS
+    # Blocks in turn that predict each other where a run passes every place once.
+    blocks = 2 if halves else 20
     columns = [c for line in fit.lines for c in harmonic_unknowns(line.of, [line.order])]
     rows = list(dual_rows(channels, ratio, fit.lines, fit.zeros))
     groups = list(dual_groups(channels, ratio, DualSample(blocks, 0)))
@@ -334,4 +326,5 @@ def _same_places(motor: Array) -> bool:
     """Whether both halves of a run travel the same arc, or a turn and more each."""
     first, second = np.array_split(motor, 2)
     shared = min(first.max(), second.max()) - max(first.min(), second.min())
-    return bool(shared >= _SAME_PLACES * float(np.ptp(motor)))
+    # Both halves of a run are the same places where they share this part of the travel.
+    return bool(shared >= 0.8 * float(np.ptp(motor)))

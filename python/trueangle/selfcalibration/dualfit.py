@@ -34,9 +34,6 @@ _CHANCE: Final = 0.01
 #: Orders of the output that are estimated jointly with a ratio: eccentricity and ellipse.
 BESIDE_RATIO: Final = (1, 2)
 
-#: Fits within which a ratio converges, and those for the zeros, jointly with the patterns.
-_RATIOS: Final = 3
-_ZEROS: Final = 2
 
 #: The column of the ratio among the patterns.
 _RATIO: Final = Unknown("the gear ratio", 0.0, "")
@@ -87,7 +84,7 @@ def fit_dual_lines(
     columns = [c for line in lines for c in harmonic_unknowns(line.of, [line.order])]
     columns += [_RATIO] * slope
     zeros = [float(np.median(o - m / ratio)) for m, o in zip(*channels[:2], strict=True)]
-    for _ in range(_ZEROS if settled and any(line.output for line in lines) else 1):
+    for _ in range(2 if settled and any(line.output for line in lines) else 1):
         at = tuple(zeros)
         dense = fit_dense(list(dual_rows(channels, ratio, lines, at, slope=slope)), columns)
         zeros = [z + float(dz) for z, dz in zip(at, dense.nuisances[-len(at) :], strict=True)]
@@ -194,7 +191,8 @@ def choose_dual_lines(
             break
         kept = [i for i in kept if i != droppable[int(np.argmin(loss))]]
     retained = fit.projected.retained()
-    lost = [i for i in own if i not in kept and float(retained[2 * i : 2 * i + 2].min()) < _LEAST]
+    # An order that retains less than this share, jointly with the others, is not determined.
+    lost = [i for i in own if i not in kept and float(retained[2 * i : 2 * i + 2].min()) < 0.02]
     candidates = [lines[i] for i in sorted((*motor, *kept))]
     fit = fit_dual_lines(channels, ratio, candidates, slope=slope, settled=False).dense
     told = [
@@ -203,10 +201,6 @@ def choose_dual_lines(
         if not line.motor or _statistic(fit, slice(2 * i, 2 * i + 2)) > limit
     ]
     return told, [lines[i] for i in lost]
-
-
-#: An order that retains less than this share, jointly with the others, is not determined.
-_LEAST: Final = 0.02
 
 
 def _statistic(fit: DenseFit, pair: slice) -> float:
@@ -237,7 +231,8 @@ def estimate_dual_ratio(
     if not isinstance(orders, str):
         orders = sorted({*orders, *beside})
     ratio = start
-    for _ in range(_RATIOS):
+    # A ratio converges within these fits.
+    for _ in range(3):
         lines = lines_of_gear(orders, ratio, turns)
         if isinstance(orders, str):
             lines = choose_dual_lines(channels, ratio, lines, slope=True, held=beside)[0]

@@ -24,10 +24,6 @@ SLIP: Final = 0.05
 _WIDTH: Final = 5
 
 
-#: Speed is a separate regressor where it varies by this share of the highest.
-_VARIED: Final = 0.2
-
-
 class SharedLine(NamedTuple):
     """One order of the output, with every shaft that has it."""
 
@@ -124,7 +120,8 @@ def motion_varies(channels: GearedChannels, ratio: float) -> tuple[bool, bool]:
     ways = np.unique(np.concatenate([np.unique(way) for way, _ in motions]))
     speed = np.abs(np.concatenate([v for _, v in motions]))
     known = all(t is not None for t in channels.time)
-    varied = known and float(speed.std()) > _VARIED * float(np.quantile(speed, 0.99))
+    # Speed is a separate regressor where it varies by this share of the highest.
+    varied = known and float(speed.std()) > 0.2 * float(np.quantile(speed, 0.99))
     return bool({-1.0, 1.0} <= set(ways.tolist())), bool(varied)
 
 

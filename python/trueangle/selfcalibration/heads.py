@@ -33,12 +33,6 @@ from .result import (
 )
 from .verification import chance_of_parts, judged_patterns
 
-#: Orders tried by default.
-_HIGHEST: Final = 32
-
-#: Differences of heads show less of an order than this: refused (a factor of 30).
-_LEAST: Final = 1e-3
-
 #: Heads whose readings differ by less than this share one zero (radians: half a degree).
 _SAME: Final = math.radians(0.5)
 
@@ -61,7 +55,7 @@ def head_patterns(
         )
     places = _places(recordings, numbers, angles)
     readings = [np.stack([r.heads[i] for i in numbers]) + s[:, None] for r, s in places]
-    wanted = tuple(float(k) for k in range(1, _HIGHEST + 1)) if isinstance(orders, str) else orders
+    wanted = tuple(float(k) for k in range(1, 33)) if isinstance(orders, str) else orders
     fit = _fit(readings, wanted)
     blind = _blind(fit, wanted, numbers, readings)
     lost = {k for b in blind for k in b.orders}
@@ -195,7 +189,10 @@ def _blind(
 ) -> list[Blind]:
     retained = fit.projected.retained()
     lost = tuple(
-        k for i, k in enumerate(orders) if float(np.min(retained[2 * i : 2 * i + 2])) < _LEAST
+        # Differences of heads show less of an order than this: refused (a factor of 30).
+        k
+        for i, k in enumerate(orders)
+        if float(np.min(retained[2 * i : 2 * i + 2])) < 1e-3
     )
     if not lost:
         return []

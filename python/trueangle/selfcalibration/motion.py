@@ -34,7 +34,6 @@ _STIFFEST, _SOFTEST = 7.0, -5.0
 
 #: The search ends after a few grids in a row that raise the evidence by less (log likelihood).
 _WORTH = 1.0
-_BEHIND = 2
 
 #: A combination of common columns of which motion leaves less is the motion's own.
 _GONE = 1e-13
@@ -191,7 +190,7 @@ class MotionSearch:
             behind = 0 if worth else behind + 1
             if best is None or found.evidence > best.evidence:
                 best = found
-            if behind == _BEHIND:
+            if behind == 2:
                 break
         assert best is not None
         # Correlation times of the acceleration that are tried, as shares of the longest segment.

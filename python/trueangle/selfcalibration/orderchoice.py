@@ -20,23 +20,6 @@ from .steady import SteadyFit, fit_steady
 #: Highest order looked for.
 HIGHEST: Final = 128
 
-#: Orders that are always tried first.
-_FIRST: Final = 8
-
-#: Probability of taking up any order that is not there.
-_CHANCE: Final = 0.01
-
-_ROUNDS: Final = 5
-
-#: Distances from an order at which its neighbourhood is looked at.
-_BESIDE: Final = (-0.5, -0.41, -0.32, -0.23, 0.23, 0.32, 0.41, 0.5)
-
-#: P-value below which noise next to an order counts as stronger than at the order.
-_COLOURED: Final = 1e-3
-
-#: Turns from which it is looked at, and readings over which a spectrum in time is averaged.
-_TURNS: Final = 6.0
-_LOOKED_AT: Final = 4096
 
 #: Readings that are looked at: enough to see 10 %.
 _MOST: Final = 200_000
@@ -58,11 +41,11 @@ def choose_selfcal_orders(readings: SegmentReadings) -> tuple[float, ...]:
     does; at last those that are not significant are dropped.
     """
     most = highest_order(readings)
-    orders = tuple(float(k) for k in range(1, min(_FIRST, most) + 1))
+    orders = tuple(float(k) for k in range(1, min(8, most) + 1))
     limit = _limit(most)
     fit: SteadyFit | None = None
     stride = max(1, readings.size // 100_000)
-    for _ in range(_ROUNDS):
+    for _ in range(5):
         fit = fit_steady(readings, orders, start=fit, thorough=False, smooth=True)
         good = np.flatnonzero(fit.valid)[:100_000] if stride == 1 else _runs(fit.valid)
         theta = readings.angle[good] - _series(fit, good)
@@ -85,7 +68,8 @@ def choose_selfcal_orders(readings: SegmentReadings) -> tuple[float, ...]:
 
 
 def _limit(tried: int) -> float:
-    return chi_squared_quantile(1.0 - _CHANCE / max(tried, 1), 2.0)
+    # Probability of taking up any order that is not there.
+    return chi_squared_quantile(1.0 - 0.01 / max(tried, 1), 2.0)
 
 
 def _series(fit: SteadyFit, rows: NDArray[np.intp]) -> Array:
@@ -174,14 +158,14 @@ def noise_spectrum_at(
         steps[rows] = np.median(np.diff(readings.time[rows]))
     cut = fit.motion.fastest * float(np.median(steps))
     correlation, variance = correlation_above(series, cut)
-    part = slice(None, None, max(1, readings.size // _LOOKED_AT))
+    part = slice(None, None, max(1, readings.size // 4096))
     passing = readings.speed[part] * steps[part]
     power = correlation.spectrum(np.multiply.outer(np.asarray(orders, dtype=np.float64), passing))
     if not correlation.is_white:
         # Motion removes more of the noise, not less, where the noise is slow.
         power *= variance / fit.projected.variance
     factors = louder = np.asarray(power.mean(axis=1))
-    if sum(stretch.turns for stretch in readings.stretches) >= _TURNS:
+    if sum(stretch.turns for stretch in readings.stretches) >= 6.0:
         few = slice(0, _MOST)
         louder = louder_beside(x[few], left[few], orders, factors)
     if groups is None:
@@ -193,10 +177,14 @@ def noise_spectrum_at(
 def louder_beside(theta: Array, residuals: Array, orders: Sequence[float], factors: Array) -> Array:
     """``factors``; where the noise next to an order is stronger, its power instead."""
     found = factors.copy()
-    near = np.add.outer(np.asarray(orders, dtype=np.float64), _BESIDE)
+    # Distances from an order at which its neighbourhood is looked at.
+    near = np.add.outer(
+        np.asarray(orders, dtype=np.float64), (-0.5, -0.41, -0.32, -0.23, 0.23, 0.32, 0.41, 0.5)
+    )
     power = spectrum_at(theta, residuals, near.ravel()).reshape(near.shape)
     for i, there in enumerate(near > 0.3):
         beside = power[i, there] / factors[i]
-        if chi_squared_tail(float(beside.sum()), 2.0 * beside.size) < _COLOURED:
+        # P-value below which noise next to an order counts as stronger than at the order.
+        if chi_squared_tail(float(beside.sum()), 2.0 * beside.size) < 1e-3:
             found[i] *= max(float(beside.mean()) / 2.0, 1.0)
     return found

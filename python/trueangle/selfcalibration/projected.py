@@ -22,9 +22,6 @@ NOT_SEEN = 1e-9
 #: A column that retains less is not determined: its standard error is 30 times that of it alone.
 TOLD = 1e-3
 
-#: A column with more of its square in unidentifiable combinations is not identifiable.
-_SHARE = 0.01
-
 
 class Unknown(NamedTuple):
     """What an unknown is: ``order`` 3 of ``"the encoder"``, its cosine or sine."""
@@ -136,7 +133,8 @@ class Projected:
     def seen(self) -> NDArray[np.bool_]:
         """Columns that take part in identifiable combinations only."""
         lost = (self._eigen[3] ** 2).sum(axis=1)
-        return np.asarray(lost < _SHARE)
+        # A column with more of its square in unidentifiable combinations is not identifiable.
+        return np.asarray(lost < 0.01)
 
     @cached_property
     def inverse(self) -> Array:

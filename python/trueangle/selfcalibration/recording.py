@@ -42,7 +42,6 @@ _CHANNELS = (
 _APART: Final = math.radians(0.5)
 
 #: Readings of a polygon lie on its facets within this share of their pitch.
-_ON_FACET: Final = 0.1
 _MOST_FACETS: Final = 720
 
 
@@ -339,7 +338,7 @@ def _facets(other: Sequence[Array]) -> int:
         return 0
     for n in range(max(2, steps.size), _MOST_FACETS + 1):
         if (
-            float(np.abs(x * n - np.round(x * n)).max()) < _ON_FACET
+            float(np.abs(x * n - np.round(x * n)).max()) < 0.1
             and np.unique(np.round(x * n) % n).size >= 0.8 * n
         ):
             return n

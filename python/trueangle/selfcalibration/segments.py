@@ -16,22 +16,12 @@ from ..support.arrays import Array
 from .recording import Recording
 from .splines import Knots
 
-#: Steps between readings beyond this part of a turn may as well go the other way round.
-_LARGEST_STEP: Final = 0.4
-
 #: A segment shorter than this does not show a pattern (turns, readings).
 _SHORTEST: Final = (0.8, 48)
 
 
-_BLOCKS: Final = 400  # pieces into which a log is divided, about
-
 #: Readings per knot of the finest grid, at least.
 PER_KNOT: Final = 6
-
-#: Most smooth trends of a segment: polynomials of degree 2 to 8 suffice for a coasting shaft;
-#: and the turns that each needs, so that none comes near an order.
-_TRENDS: Final = 7
-_TURNS_PER_TREND: Final = 5.0
 
 
 @dataclass(frozen=True)
@@ -194,7 +184,7 @@ def _cut(recording: Recording) -> list[Segment]:
 
 def _moving(time: Array, angle: Array, offset: int) -> tuple[NDArray[np.int64], Array]:
     """Starts of equal pieces of a log and the speed of each in radians per second."""
-    size = max(12, time.size // _BLOCKS)
+    size = max(12, time.size // 400)
     starts = np.arange(0, max(time.size - size // 2, 1), size)
     ends = np.append(starts[1:], time.size)
     half = np.maximum((ends - starts) // 3, 1)
@@ -214,7 +204,8 @@ def _unwrapped(recording: Recording, time: Array, angle: Array) -> Array:
     steps -= np.round(steps)
     usual = float(np.median(np.abs(steps)))
     # An outlier steps out and back; motion that is too fast does so all the time.
-    often = float(np.mean(np.abs(steps) > _LARGEST_STEP))
+    # Steps between readings beyond this part of a turn may as well go the other way round.
+    often = float(np.mean(np.abs(steps) > 0.4))
     if usual > 0.25 or often > 0.002:
         rate = 1.0 / float(np.median(np.diff(time)[np.diff(time) > 0.0]))
         raise _fault(
@@ -252,7 +243,9 @@ class SegmentReadings:
             [ripple_lead(s, v) for s, v in zip(self.stretches, speeds, strict=True)]
         )
         #: Smooth trends that a segment may follow at no cost: one for every few turns.
-        self.trends = tuple(min(_TRENDS, int(s.turns / _TURNS_PER_TREND)) for s in self.stretches)
+        # Polynomials of degree 2 to 8 suffice for a coasting shaft; each needs turns, so that none
+        # comes near an order.
+        self.trends = tuple(min(7, int(s.turns / 5.0)) for s in self.stretches)
         self.extra: Array | None = None  # further columns of motion, (r, n)
         self.extra_names: tuple[str, ...] = ()
 

@@ -38,13 +38,9 @@ from .result import (
 OTHER: Final = "the other encoder"
 FACETS: Final = "the polygon's facets"
 
-_HIGHEST: Final = 32
 
 #: An order that retains less, jointly with the other pattern, is refused.
 _LEAST: Final = 1e-3
-
-#: Directions of columns below this share of the greatest are none.
-_RANK: Final = 1e-8
 
 
 def shift_patterns(
@@ -56,7 +52,7 @@ def shift_patterns(
     """Both patterns from readings at several shifts; see `trueangle.selfcal`."""
     design = clampings_of(recordings)
     if isinstance(orders, str):
-        highest = design.facets // 2 if design.facets else _HIGHEST
+        highest = design.facets // 2 if design.facets else 32
         wanted = tuple(float(k) for k in range(1, highest + 1))
     else:
         wanted = tuple(orders)
@@ -323,7 +319,7 @@ def _chance_of_one_pattern(
     prior = np.zeros((4 * runs, design_rows.shape[1]))
     prior[:, runs : 5 * runs] = np.eye(4 * runs)
     one = np.concatenate([design_rows, prior])
-    basis = _basis(one[:, :-1], _RANK)
+    basis = _basis(one[:, :-1], 1e-8)
     left = one[:, -1] - basis @ (basis.T @ one[:, -1])
     extra = np.vstack([more, np.zeros((4 * runs, more.shape[1]))])
     size = np.sqrt((extra**2).sum(axis=0))

@@ -26,9 +26,6 @@ _MASK = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 8.0
 _DIFFERENCE = np.array([-1.0, 3.0, -3.0, 1.0])
 _SECOND = np.array([1.0, -2.0, 1.0])
 
-#: Readings whose columns are made at once: some MB, so that they stay in cache.
-_CHUNK = 4096
-
 
 @dataclass(frozen=True)
 class Knots:
@@ -305,7 +302,8 @@ def ordered_motion_sums(
     common = np.zeros((width + 1, width + 1))
     edges = np.concatenate([[0], np.flatnonzero(np.diff(index)) + 1, [n]])
     chunk_edges = np.unique(
-        np.concatenate([edges[np.searchsorted(edges, np.arange(0, n, _CHUNK))], [n]])
+        # Readings whose columns are made at once: some MB, so that they stay in cache.
+        np.concatenate([edges[np.searchsorted(edges, np.arange(0, n, 4096))], [n]])
     )
     upper = [(p, q) for p in range(4) for q in range(p, 4)]
     for a, b in itertools.pairwise(chunk_edges):

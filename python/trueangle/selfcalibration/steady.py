@@ -23,7 +23,6 @@ _INTERVALS: Final = 512
 #: Steps of the pattern below this share of its standard error end the iteration.
 _STILL: Final = 0.02
 _ROUNDS: Final = 12
-_SEARCHES: Final = 3
 
 
 @dataclass(frozen=True)
@@ -138,7 +137,7 @@ def fit_steady(
         if smooth:
             break
         near = None
-        for _ in range(_SEARCHES):
+        for _ in range(3):
             fit, spline, unknowns, moved = work.step(
                 knots, spline, unknowns, valid, stride, near=near
             )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +16,6 @@ from .orderchoice import noise_spectrum_at
 from .result import ARCSEC, HeldOutPattern
 from .segments import SegmentReadings
 from .steady import SteadyFit, fit_steady
-
-#: Speeds that differ by less than this ratio test nothing.
-_SPEEDS: Final = 1.3
-
-#: Turns in all from which odd ones are compared with even ones.
-_TURNS: Final = 4.0
 
 
 def judged_patterns(
@@ -79,10 +72,12 @@ def held_out_patterns(fit: SteadyFit, tested: Sequence[float]) -> dict[str, Held
     found = {}
     turn = _turn_numbers(readings)
     turns = sum(s.turns for s in readings.stretches)
-    if turns >= _TURNS:
+    # Turns in all from which odd ones are compared with even ones.
+    if turns >= 4.0:
         found["odd_even_turns"] = _compare(fit, turn & 1, tested, ("odd turns", "even turns"))
     low, high = np.quantile(readings.speed, [0.05, 0.95])
-    if high / low >= _SPEEDS:
+    # Speeds that differ by less than this ratio test nothing.
+    if high / low >= 1.3:
         middle = math.sqrt(low * high)
         slow = (readings.speed < middle).astype(np.int64)
         if 0.1 < slow.mean() < 0.9:

@@ -10,15 +10,6 @@ from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 from .designs import RunDesign
 
-#: Places at which the way of another joint is kept.
-_PLACES = 65
-
-#: Share of a step by which steps differ at most where they are equal.
-_EQUAL = 0.01
-
-#: Share of the torque's variance from which on it is that of a weight.
-_WEIGHT = 0.5
-
 
 def design_of(run: CalibrationRun) -> RunDesign:
     """The design by which a run like a measured one is simulated.
@@ -55,7 +46,8 @@ def design_of(run: CalibrationRun) -> RunDesign:
     speed = None if signals.velocity is None else np.abs(signals.velocity)
     moving = np.zeros(0) if speed is None else speed[speed > 0.0]
     steps = np.abs(np.diff(signals.degrees))
-    is_even = bool(steps.size and np.ptp(steps) <= _EQUAL * float(np.median(steps)))
+    # Share of a step by which steps differ at most where they are equal.
+    is_even = bool(steps.size and np.ptp(steps) <= 0.01 * float(np.median(steps)))
     torque, gravity, at = _load(signals)
     first, last = _ends(signals.temperature)
     current, shift = run.signals.get("current"), run.signals.get("shift")
@@ -108,7 +100,8 @@ def _load(signals: Signals) -> tuple[float, float, float]:
     columns = np.column_stack([np.ones(len(signals)), np.sin(signals.theta), np.cos(signals.theta)])
     level, a, b = least_squares(columns, torque)
     left = torque - columns @ np.array([level, a, b])
-    if float(np.var(left)) > (1.0 - _WEIGHT) * power:
+    # Share of the torque's variance from which on it is that of a weight.
+    if float(np.var(left)) > 0.5 * power:
         return mean, 0.0, 0.0
     return float(level), float(np.hypot(a, b)), float(np.degrees(np.arctan2(-b, a)))
 
@@ -130,5 +123,6 @@ def _way(signals: Signals, angle: Array, lengths: Array) -> list[float]:
     begun = np.concatenate([[0.0], np.cumsum(lengths)])
     segment = np.minimum(signals.segment, len(lengths) - 1)
     travel = np.maximum.accumulate(begun[segment] + signals.travel)
-    places = np.linspace(0.0, float(begun[-1]), _PLACES)
+    # Places at which the way of another joint is kept.
+    places = np.linspace(0.0, float(begun[-1]), 65)
     return [float(x) for x in np.interp(places, travel, angle)]

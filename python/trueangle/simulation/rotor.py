@@ -30,10 +30,6 @@ from ..support.arrays import Array
 
 ARCSEC_PER_RAD: Final = ARCSEC_PER_TURN / (2.0 * math.pi)
 
-#: Radians that the fastest term turns by in one step of the integration, at most: Runge and
-#: Kutta's rule of fourth order is then right to some 1e-6 of what the term moves.
-_STEP: Final = 0.1
-
 
 class RotorDrive(NamedTuple):
     """What moves a shaft, in radians and seconds; the friction that drifts, in deg/s^2."""
@@ -123,7 +119,9 @@ def rotor_angle(
         return a
 
     fastest = max([order if cogging else 1.0, *(m for m, _ in lines)])
-    longest = _STEP / max(fastest * abs(start) * max(1.0, math.exp(-rate * time[-1])), band, 1e-12)
+    # Radians that the fastest term turns by in one step of the integration, at most: Runge and
+    # Kutta's rule of fourth order is then right to some 1e-6 of what the term moves.
+    longest = 0.1 / max(fastest * abs(start) * max(1.0, math.exp(-rate * time[-1])), band, 1e-12)
     friction = np.radians(_drift(drive, time, rng)).tolist()
     n = time.size
     angle, speed, driven = np.empty(n), np.empty(n), np.zeros(n)

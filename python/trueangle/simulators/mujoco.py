@@ -21,10 +21,6 @@ from ..support.suggestions import did_you_mean
 if TYPE_CHECKING:
     from mujoco import MjModel
 
-#: Radians within which the reading of a model at its indicated angle is found, and steps to it.
-_SOLVED = 1e-13
-_STEPS = 100
-
 
 class SensorLayer:
     """What the encoders of joints would read: true angles of MuJoCo with their errors.
@@ -270,12 +266,13 @@ class _Encoder:
             return np.asarray(angle + self._states.error(angle, **signals))
         # The error is one of the reading, which is looked for from the same past.
         past, reading = self._states, angle
-        for _ in range(_STEPS):
+        for _ in range(100):
             self._states = past.copy()
             found = np.asarray(angle + self._states.error(reading, **signals))
             moved = float(np.max(np.abs(found - reading), initial=0.0))
             reading = found
-            if moved <= _SOLVED * self._unit:
+            # Radians within which the reading is found.
+            if moved <= 1e-13 * self._unit:
                 return reading
         self._states = past
         raise ArgumentError(

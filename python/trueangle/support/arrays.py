@@ -60,10 +60,6 @@ Array: TypeAlias = NDArray[np.float64]
 _Kind = TypeVar("_Kind", bound=np.generic)
 
 
-#: Share of the largest value within which others are as large: rounding is far below.
-_ALIKE = 1e-7
-
-
 def first_largest(values: NDArray[np.floating[Any]]) -> int:
     """Index of the first value that is as large as the largest, within 1e-7 of it.
 
@@ -71,7 +67,8 @@ def first_largest(values: NDArray[np.floating[Any]]) -> int:
     would decide which of them is chosen.
     """
     most = float(values.max())
-    return int(np.argmax(values >= (most - _ALIKE * abs(most) if math.isfinite(most) else most)))
+    # Share of the largest value within which others are as large: rounding is far below.
+    return int(np.argmax(values >= (most - 1e-7 * abs(most) if math.isfinite(most) else most)))
 
 
 def distinct(values: NDArray[_Kind]) -> NDArray[_Kind]:

@@ -28,8 +28,6 @@ _DIGITS: Final = 4
 #: A size in a sentence.
 _SIZE: Final = r"(-?\d+(?:\.\d+)?(?:e[+-]?\d+)?) arcsec\b"
 
-#: Decimals are kept this far; beyond it a double has none.
-_MOST_DECIMALS: Final = 12
 
 ARCSEC_PER_DEG: Final = 3600.0
 ARCSEC_PER_TURN: Final = 360.0 * ARCSEC_PER_DEG
@@ -197,7 +195,8 @@ def brief_number(value: float) -> str:
 def _decimals(value: float, digits: int) -> int:
     """Decimals that show ``digits`` significant digits of the rounded value."""
     exponent = int(f"{abs(value):.{digits - 1}e}".partition("e")[2])
-    return min(max(0, digits - 1 - exponent), _MOST_DECIMALS)
+    # Decimals are kept this far; beyond it a double has none.
+    return min(max(0, digits - 1 - exponent), 12)
 
 
 def _fixed(value: float, decimals: int) -> str:

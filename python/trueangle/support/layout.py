@@ -16,11 +16,7 @@ from typing import Final
 _NARROWEST, _WIDEST, _USUAL = 60, 100, 80
 
 #: Columns where nothing is to be folded.
-_ENDLESS: Final = 1_000_000
 _UNFOLDED: Final = ContextVar("unfolded", default=False)
-
-#: Fewest columns for the words behind a label; with fewer they are put below it.
-_ROOM: Final = 20
 
 
 #: The character that replaces a blank at which no line is cut.
@@ -56,7 +52,8 @@ def text_columns() -> int:
     True
     """
     if _UNFOLDED.get():
-        return _ENDLESS
+        # Nothing is folded.
+        return 1_000_000
     # As `shutil.get_terminal_size` has it, whose import costs more than a small fit.
     try:
         found = int(os.environ.get("COLUMNS", 0))
@@ -109,7 +106,8 @@ def laid_out(lines: Iterable[str]) -> str:
             continue
         lead = _LEAD.match(line)
         indent = max(lead.end() if lead else 0, 2)
-        found += _folded(line, width, indent if indent <= width - _ROOM else 2)
+        # Fewest columns for the words behind a label; with fewer they are put below it.
+        found += _folded(line, width, indent if indent <= width - 20 else 2)
     return "\n".join(found)
 
 

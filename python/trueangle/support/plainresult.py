@@ -138,9 +138,6 @@ AngleOrNaN: TypeAlias = float
 #: Characters of a result's ``repr`` at most: one line of a screen.
 WIDTH = 100
 
-#: Characters of a text that a ``repr`` shows by itself.
-_SHORT = 30
-
 
 class ShownResult:
     """A result that shows itself: one line as ``repr``, its summary as text and in notebooks.
@@ -169,7 +166,8 @@ class ShownResult:
                 continue
             if isinstance(value, float):
                 yield f"{field.name}={value:.4g}"
-            elif isinstance(value, int) or (isinstance(value, str) and 0 < len(value) < _SHORT):
+            # Characters of a text that a ``repr`` shows by itself.
+            elif isinstance(value, int) or (isinstance(value, str) and 0 < len(value) < 30):
                 yield f"{field.name}={value!r}"
 
     def __repr__(self) -> str:

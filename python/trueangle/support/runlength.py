@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Final
 
 import numpy as np
 
 from ..errors import ArgumentError
 from .argumentkinds import told_kinds
 from .distributions import normal_tail
-
-#: Nodes of Gauss and Legendre's rule in the integral equation.
-_NODES: Final = 64
 
 
 @told_kinds
@@ -58,7 +54,7 @@ def run_length(allowance: float, limit: float, shift: float = 0.0) -> float:
 
 
 def _one_sided(allowance: float, limit: float, shift: float) -> float:
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(64)
     places = 0.5 * limit * (nodes + 1.0)
     weights = 0.5 * limit * weights
     starts = np.concatenate([[0.0], places])

@@ -7,9 +7,6 @@ from itertools import islice
 
 from ..errors import ArgumentError, KindError
 
-#: Known words that are compared, at most.
-_LOOKED_AT = 2000
-
 
 def listed_names(names: Sequence[str], most: int = 12) -> str:
     """The first names, and how many more there are.
@@ -36,7 +33,8 @@ def did_you_mean(got: str, known: Iterable[str]) -> str:
     import difflib  # needed only where something is wrong
 
     # A wide log has thousands of names: a search through more of them rarely finds one.
-    words = {word.lower(): word for word in reversed(list(islice(known, _LOOKED_AT)))}
+    # Known words that are compared, at most.
+    words = {word.lower(): word for word in reversed(list(islice(known, 2000)))}
     near = difflib.get_close_matches(got.lower(), words, n=3, cutoff=0.6)
     # Words are begun right more often than ended right.
     near.sort(key=lambda word: word[:2] != got.lower()[:2])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from trueangle.formats.checksum import Checksum
+from trueangle.formats.stored import Checksum
 
 
 def checksum(*parts):

@@ -31,9 +31,6 @@ UNITS = {
 
 #: Denominators of gear ratios that are offered, round ones first, and how near one must be.
 DENOMINATORS = (1, 2, 3, 4, 5, 10, 6, 7, 8, 9, 11, 12, 13)
-RATIONAL = 2e-3
-#: How near the whole number of teeth must be of wheels that differ by one, in shares of it.
-TOOTH = 0.01
 
 #: Share by which a part's values and steps are those of another unit.
 UNIT_SPREAD = 0.35
@@ -104,12 +101,13 @@ def ratio_suggestion(ratio: float | None, agrees: float = AGREES) -> str:
                 return name + sign
     for denominator in DENOMINATORS:
         best = Fraction(round(size * denominator), denominator)
-        if best != 1 and abs(float(best) - size) < RATIONAL * size:
+        if best != 1 and abs(float(best) - size) < 2e-3 * size:
             return f"a gear of ratio {best} between the two that is not reduced{sign}"
     # Wheels that differ by a tooth, as those of a harmonic drive with one or the other held.
     departure = abs(size - 1.0)
     teeth = round(1.0 / departure) if departure > DRIFTS else 0
-    if teeth > max(DENOMINATORS) and abs(teeth * departure - 1.0) < TOOTH:
+    # How near the whole number of teeth must be of wheels that differ by one, in shares of it.
+    if teeth > max(DENOMINATORS) and abs(teeth * departure - 1.0) < 0.01:
         best = Fraction(teeth + (1 if size > 1.0 else -1), teeth)
         return f"a gear of ratio {best} between the two that is not reduced{sign}"
     return f"the indicated angle moves {size:.4g} times as far as the reference{sign}"

@@ -20,10 +20,6 @@ from .fault import DataFault
 #: Readings that a curve needs.
 _LEAST: Final = 12
 
-#: Spread of a channel, relative to the other, of a dead one or an arc of a few degrees, and what
-#: two channels share that are one.
-_DEAD: Final = 0.01
-_ONE: Final = 1e-3
 
 #: Offset in amplitudes from which the converter has no middle: a magnet's is far below it.
 CENTRED: Final = 1.0
@@ -165,13 +161,15 @@ def no_curve(means: tuple[float, float], moments: Array) -> str:
     """Why channels of these means and second moments draw no curve; empty where they may."""
     spread = np.sqrt(np.maximum(np.diag(moments), 0.0))
     for name, mean, std in zip(_RAILS, means, spread.tolist(), strict=True):
-        if std <= _DEAD * spread.max():
+        # Of the other's: a dead channel, or an arc of a few degrees.
+        if std <= 0.01 * spread.max():
             return (
                 f"the {name} channel is constant ({mean:.6g}): a dead channel or a shaft that "
                 "hardly turns; check the wire and turn the shaft"
             )
     agreement = float(moments[0, 1] / spread.prod())
-    if max(1.0 - agreement**2, 0.0) < _ONE**2:
+    # Two channels that share all but this are one.
+    if max(1.0 - agreement**2, 0.0) < 1e-6:
         return (
             f"sine and cosine are one signal (correlation {agreement:.5f}): the same channel "
             "twice, or a shaft that hardly turns"

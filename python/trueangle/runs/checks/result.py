@@ -15,7 +15,6 @@ from .fault import DataFault
 from .record import LEAST_READINGS, Record
 
 #: Levels are apart by this share of their range, and by so much at least.
-_GAP = 0.1
 _LEAST_GAP = {"speed": 0.5, "load": 0.05, "temperature": 1.0, "mount": 0.5}
 
 #: Share of the widest gap within which readings are of one place, and of a turn that all such
@@ -163,7 +162,7 @@ def _groups(values: Array, kind: str) -> list[Array]:
     if not values.size:
         return []
     ordered = np.sort(values)
-    gap = max(_GAP * float(np.ptp(ordered)), _LEAST_GAP[kind])
+    gap = max(0.1 * float(np.ptp(ordered)), _LEAST_GAP[kind])
     return np.split(ordered, np.flatnonzero(np.diff(ordered) > gap) + 1)
 
 

@@ -28,8 +28,6 @@ BY = ("time", "angle")
 SAME_MOTION = 0.05
 #: Share of a run's readings that the log must cover in time.
 COVERED = 0.5
-#: Multiple of the median of second differences, 6 standard deviations, that noise does not reach.
-_USUAL = 6.0 / 0.6745
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,9 @@ class MeasuredMinusSimulated(ShownResult):
         if not bends:
             return 0.0
         every = np.concatenate(bends)
-        usual = every[every <= _USUAL * np.median(every)]
+        # Multiple of the median of second differences, 6 standard deviations, that noise does not
+        # reach.
+        usual = every[every <= (6.0 / 0.6745) * np.median(every)]
         rms = math.sqrt(float(np.mean(usual**2)) / 6.0)
         return rms * ARCSEC_PER_TURN / 360.0
 

@@ -36,9 +36,6 @@ __all__ = [
 #: Errors of the system that occur in writing only.
 _OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
-#: Bytes that a file must take for its disk not to be full.
-_ROOM = 1 << 16
-
 
 def check_output(
     path: str | PathLike[str],
@@ -275,7 +272,8 @@ def _check_room(place: Path) -> None:
     found = [place] if aside is None else [p for p in aside.rglob("*") if p.is_file()]
     for file in found if aside is None else [*found, aside / "more"]:
         with _named_by(file), open(file, "ab", buffering=0) as more:
-            block = memoryview(bytes(_ROOM))
+            # Bytes that a file must take for its disk not to be full.
+            block = memoryview(bytes(1 << 16))
             while block:
                 block = block[more.write(block) :]
             os.fsync(more.fileno())

@@ -23,13 +23,8 @@ except ImportError:  # pragma: no cover - Windows has no flock
 PARTIAL: Final = ".trueangle-partial"
 #: Ending of a folder that is being replaced, in the place where the new one was made.
 _REPLACED: Final = ".replaced"
-#: Times that what others removed at once is made anew; some folders (/proc) take nothing at all.
-_TRIES: Final = 100
-#: Characters of a name that its hidden neighbour repeats: names may have 255 bytes in all.
-_LONGEST: Final = 50
 #: Linux's renameat2: paths are relative to the working folder; both names change places.
 _AT_FDCWD: Final = -100
-_EXCHANGE: Final = 2
 
 
 def hidden_beside(target: Path) -> Path:
@@ -39,7 +34,8 @@ def hidden_beside(target: Path) -> Path:
 
 def hidden_name(target: Path) -> str:
     """What all of `hidden_beside` begin with."""
-    return f".{target.name[:_LONGEST]}"
+    # Characters of a name that its hidden neighbour repeats: names may have 255 bytes in all.
+    return f".{target.name[:50]}"
 
 
 @contextmanager
@@ -54,8 +50,9 @@ def made_beside(target: Path, make: Callable[[Path], int]) -> Iterator[Path]:
     handle = -1
     # Known before it is made: Ctrl-C may come with the call that makes it.
     beside = hidden_beside(target)
+    # Times that what others removed at once is made anew; some folders (/proc) take nothing at all.
     try:
-        for _ in range(_TRIES):
+        for _ in range(100):
             with contextlib.suppress(FileNotFoundError):
                 handle = make(beside)
                 if handle < 0:  # a system without such locks
@@ -167,7 +164,8 @@ def exchange_names(first: Path, second: Path) -> bool:
     except (AttributeError, OSError, TypeError):
         return False
     names = os.fsencode(first), os.fsencode(second)
-    return bool(rename(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _EXCHANGE) == 0)
+    # 2: the names change places.
+    return bool(rename(_AT_FDCWD, names[0], _AT_FDCWD, names[1], 2) == 0)
 
 
 def restore(folder: Path) -> bool:
