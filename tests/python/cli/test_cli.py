@@ -1,14 +1,24 @@
 """The command line: fit and correct end to end, exit statuses, one-line errors."""
 
+import argparse
 import json
+import os
+import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.cli import COMMANDS, main
+from trueangle.cli import COMMANDS, fit, main, plan
+from trueangle.cli.options import refuse_given
+from trueangle.cli.signal_options import add_signals
+from trueangle.cli.values import seconds, turns
+from trueangle.logs.keeping import KEPT, SAMPLE
+from trueangle.rehearsal import after
+from trueangle.simulation import RunDesign, Simulation, simulate
 
 
 def write_runs(path, seed=0, runs=3, zero=-109.4):
@@ -173,3 +183,161 @@ def test_the_command_is_installed():
         [sys.executable, "-m", "trueangle", "--version"], capture_output=True, text=True, check=True
     )
     assert done.stdout == f"trueangle {ta.__version__}\n"
+
+
+SECONDS = {
+    "10": 10.0, "10s": 10.0, "0.5 s": 0.5, "500ms": 0.5, "2min": 120.0, "1h": 3600.0, "1H": 3600.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", SECONDS)
+def test_a_time_is_in_seconds(text):
+    assert seconds(text) == pytest.approx(SECONDS[text])
+
+
+@pytest.mark.parametrize(
+    "text", ["10x", "s", "-1s", "0", "nan", "inf", "1e999h", "1 2s", "10us", ""]
+)
+def test_what_is_no_time_is_refused(text):
+    with pytest.raises(argparse.ArgumentTypeError, match="a time above zero"):
+        seconds(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"), [("1turn", 1.0), ("5turns", 5.0), ("0.5", 0.5), (" 2 turns ", 2.0)]
+)
+def test_travel_is_in_turns(text, wanted):
+    assert turns(text) == wanted
+
+
+def after_options():
+    parser = argparse.ArgumentParser(add_help=False)
+    plan.add_arguments(parser)
+    (group,) = [g for g in parser._action_groups if "after" in str(g.title)]
+    signals = argparse.ArgumentParser(add_help=False)
+    add_signals(signals)
+    output = [action for action in parser._actions if action.dest == "output"]
+    found = [*group._group_actions, *signals._actions, *output]
+    return [action for action in found if action.dest != "after"]
+
+
+@pytest.mark.parametrize("given", after_options(), ids=lambda action: action.dest)
+def test_an_option_of_a_plan_after_a_diagnosis_is_refused_without_one(given):
+    """Whichever it is, and by its long name, also where what is given counts as nothing."""
+    args = argparse.Namespace(**{action.dest: None for action in after_options()})
+    refuse_given(args, plan.OF_AFTER, "is of")
+    for value in ("x", 0):
+        setattr(args, given.dest, value)
+        with pytest.raises(ta.errors.ArgumentError, match=rf"^{given.option_strings[-1]} is of"):
+            refuse_given(args, plan.OF_AFTER, "is of")
+
+
+def test_a_command_refuses_it(capsys):
+    for words in (["--seeds", "0"], ["--counts-per-turn", "4096"], ["--topic", "/joints"]):
+        assert main(["plan", "--gear-ratio", "100", *words]) == 1
+        assert f"{words[0]} is of plans after a diagnosis" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["fit", "orders"])
+def test_readings_from_which_on_one_pass_is_made_are_those_that_the_help_tells(
+    command, monkeypatch, capsys
+):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    asked, by_itself = (int(n) for n in re.findall(r"more than 2\^(\d+)", text))
+    kept = int(re.search(r"some (\d+) 000 of them", text)[1])
+    assert asked == KEPT.bit_length() - 1
+    assert kept * 1000 == pytest.approx(SAMPLE, rel=0.01)
+    limits = []
+
+    def hold_at_most(paths, most, topic):
+        limits.append(most)
+        return True
+
+    monkeypatch.setattr("trueangle.logs.sources.logs_hold_at_most", hold_at_most)
+    args = SimpleNamespace(
+        one_pass=False, scheduler=None, runs=["."], topic=None, nuisance="none",
+        reference_orders=None, run=None,
+    )  # fmt: skip
+    assert not fit.wants_one_pass(args)
+    assert limits == [1 << by_itself]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes have no names here")
+def test_a_pipe_is_read_once_and_into_memory(tmp_path):
+    """It is not opened to see how much it holds, which would take from it."""
+    os.mkfifo(tmp_path / "pipe")
+    args = SimpleNamespace(
+        one_pass=False, scheduler=None, runs=[str(tmp_path / "pipe")], topic=None, nuisance="none",
+        reference_orders=None, run=None,
+    )  # fmt: skip
+    assert not fit.wants_one_pass(args)
+
+
+def test_values_that_a_command_cannot_take(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["record", "log.txt", "-o", "c.csv", "--rate", "0"]) == 1
+    assert "--rate must be positive, got 0.0" in capsys.readouterr().err
+    (tmp_path / "a.csv").write_text("reference_deg,indicated_deg\n0,0.1\n90,90.2\n180,180\n")
+    words = ["fit", "a.csv", "-o", "m.json", "--one-pass", "--periods-per-turn", "1"]
+    assert main(words) == 1
+    message = (
+        "--periods-per-turn is for sine and cosine channels, which need all readings: leave "
+        "--one-pass out"
+    )
+    assert message in capsys.readouterr().err
+
+
+SIM = Simulation(sigma_arcsec=2.0, runs=(RunDesign(samples=40),))
+
+
+@pytest.fixture
+def asked(tmp_path, monkeypatch):
+    """What `plan_after` is given for some options."""
+    SIM.save(tmp_path / "belief.toml")
+    ta.write_runs(simulate(SIM), tmp_path / "runs.csv")
+    (tmp_path / "limits.toml").write_text("[limits]\nruns = 3\n")
+
+    found = []
+
+    def plan_after(runs, sim, **given):
+        found.append((len(runs), sim.sigma_arcsec, given))
+        raise ta.errors.ArgumentError("a plan is not needed here")
+
+    monkeypatch.setattr(after, "plan_after", plan_after)
+    monkeypatch.chdir(tmp_path)
+
+    def ask(*words):
+        assert main(["plan", "--after", "runs.csv", "--simulation", "belief.toml", *words]) == 1
+        runs, sigma, given = found.pop()
+        assert (runs, sigma) == (1, 2.0)
+        return given
+
+    return ask
+
+
+def test_without_options_it_is_the_plan_of_the_api(asked):
+    assert asked() == {"between": None, "limits": None, "progress": "auto"}
+
+
+@pytest.mark.parametrize(
+    ("words", "name", "value"),
+    [
+        (("--seeds", "0"), "seeds", 0),
+        (("--seeds", "25"), "seeds", 25),
+        (("--within", "1min"), "within", 60.0),
+        (("--between", "backlash,latency"), "between", ["backlash", "latency"]),
+    ],
+)
+def test_an_option_is_what_it_is_made_by(words, name, value, asked):
+    """Nought, too: no simulated diagnoses."""
+    given = asked(*words)
+    assert given.pop(name) == value
+    others = asked()
+    others.pop(name, None)
+    assert given == others
+
+
+def test_limits_are_those_of_the_file(asked):
+    assert asked("--limits", "limits.toml")["limits"].runs == 3

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.export import reading, simplefoc
 
 from .test_bounds import existing
 
@@ -132,3 +135,53 @@ def test_entries_of_a_scaled_table_are_int8(tmp_path) -> None:
     for entry in ("-129", "128", "1.5"):
         with pytest.raises(ta.errors.FileError, match=f"line {at + 1}.*table of int8"):
             read(entry)
+
+
+#: A model that takes a quarter of a turn off, and nothing else.
+QUARTER = ta.HarmonicModel(
+    [ta.Shaft("output", 1, [1], [0.0], [0.0])], 90.0, 360.0, argument="indicated"
+)
+
+
+@pytest.mark.parametrize("size", [0.01, -0.01])
+@pytest.mark.parametrize("argument", ["indicated", "reference"])
+@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize("travel", [None, (90.0, 180.0), (-30.0, 60.0), (180.0, 450.0)])
+def test_a_pulse_beside_the_model_has_its_rms_and_its_maximum(size, argument, whole, travel):
+    """Over the travel alone, its mean apart, and a jump by a whole turn is none."""
+    start, stop = travel or (0.0, 360.0)
+    share = 0.2
+    begin = start + 0.3 * (stop - start)
+    end = begin + share * (stop - start)
+
+    def device(places: np.ndarray) -> np.ndarray:
+        angle = places * (360.0 / 2.0**32)
+        assert start <= angle.min() < angle.max() < stop
+        pulse = np.where((angle >= begin) & (angle < end), size, 0.0)
+        return pulse + (np.where(angle > 0.5 * (start + stop), 1.0, 0.0) if whole else 0.0)
+
+    target = SimpleNamespace(argument=argument)
+    rms, largest = reading._arithmetic(QUARTER, target, device, 1, travel)
+    assert rms == pytest.approx(abs(size) * math.sqrt(share * (1.0 - share)), rel=1e-4)
+    assert largest == pytest.approx(abs(size) * (1.0 - share), rel=1e-4)
+
+
+SEED = 63
+#: Single precision of angles up to a turn, and of places among the entries.
+SINGLE = 4e-6
+
+
+@pytest.mark.parametrize("entries", [16, 50, 128])
+@pytest.mark.parametrize("contracted", [False, True])
+def test_the_short_table_is_interpolated_and_wrapped(entries, contracted):
+    print(f"seed {SEED}")
+    rng = np.random.default_rng(SEED)
+    table = (simplefoc._MIDDLE + rng.integers(-300, 300, entries)).astype(np.uint16)
+    raw = rng.uniform(-2.0, 8.0, 500).astype(np.float32)
+    found = simplefoc.corrected_short(raw, table, contracted)
+    knots = (np.append(table, table[0]).astype(float) - simplefoc._MIDDLE) / simplefoc._PER_RADIAN
+    turn = np.mod(raw.astype(float), 2.0 * np.pi)
+    offset = np.interp(turn / (2.0 * np.pi) * entries, np.arange(entries + 1), knots)
+    apart = np.mod(found - (turn - offset) + np.pi, 2.0 * np.pi) - np.pi
+    np.testing.assert_allclose(apart, 0.0, atol=SINGLE)
+    assert ((found >= 0.0) & (found < 6.2832)).all()

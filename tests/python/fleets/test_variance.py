@@ -4,12 +4,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.optimize import minimize
-from scipy.stats import multivariate_normal
+from scipy.special import digamma, polygamma
+from scipy.stats import bartlett, chi2, kstest, multivariate_normal
 from statsmodels.regression.mixed_linear_model import MixedLM
 
+from trueangle.errors import ArgumentError
 from trueangle.fleets.calibration import order_columns
+from trueangle.fleets.tolerance import tolerance_factor, tolerance_of, wilks_units
 from trueangle.fleets.units import noise_of
 from trueangle.fleets.variance import held_out_score, reml
+from trueangle.support.plainresult import plain_row
 
 SEED = 52_010
 
@@ -170,3 +174,132 @@ def test_noise_that_differs_is_each_units_own_but_held_to_the_common():
     assert np.log(found.units).std() < np.log(own / freedom).std()
     same = noise_of(rng.chisquare(8.0, 40), freedom)
     assert np.ptp(same.units) == 0.0
+
+
+UNITS_SEED = 52_300
+
+
+def test_the_test_of_equal_noise_is_bartletts():
+    """With readings whose sums of squares are given, differ where scipy's p is below 1 %."""
+    print("seed", UNITS_SEED)
+    differed = 0
+    for seed in range(150):
+        rng = np.random.default_rng([UNITS_SEED, seed])
+        sizes = rng.integers(4, 9, int(rng.integers(2, 5)))
+        spread = rng.choice([1.0, 3.0])
+        readings = [rng.normal(0.0, spread ** rng.normal(), n) for n in sizes]
+        squares = np.array([((x - x.mean()) ** 2).sum() for x in readings])
+        found = noise_of(squares, sizes - 1.0)
+        alike = np.ptp(found.units) == 0.0
+        p = bartlett(*readings).pvalue
+        # What differs may still be held to one where the logarithms scatter no more than noise.
+        assert alike or p < 0.01
+        if p < 0.01:
+            logs = np.log(squares / (sizes - 1.0)) - digamma((sizes - 1.0) / 2.0)
+            logs += np.log((sizes - 1.0) / 2.0)
+            more = logs.var(ddof=1) > polygamma(1, (sizes - 1.0) / 2.0).mean()
+            assert alike != more
+            differed += more
+    assert differed > 20
+
+
+def test_noise_is_held_to_the_common_by_the_moments_of_its_logarithm():
+    """Smyth (2004), written out with scipy's functions."""
+    print("seed", UNITS_SEED)
+    rng = np.random.default_rng(UNITS_SEED + 1)
+    freedom = rng.integers(5, 40, 30).astype(float)
+    own = 4.0 * 6.0 / rng.chisquare(6.0, 30) * rng.chisquare(freedom) / freedom
+    found = noise_of(own * freedom, freedom)
+    logs = np.log(own) - digamma(freedom / 2.0) + np.log(freedom / 2.0)
+    spread = logs.var(ddof=1) - polygamma(1, freedom / 2.0).mean()
+    assert float(polygamma(1, found.freedom / 2.0)) == pytest.approx(spread, rel=1e-9)
+    common = np.exp(logs.mean() + digamma(found.freedom / 2.0) - np.log(found.freedom / 2.0))
+    assert found.variance == pytest.approx(common, rel=1e-9)
+    held = (found.freedom * common + freedom * own) / (found.freedom + freedom)
+    assert found.units == pytest.approx(held, rel=1e-9)
+
+
+def test_units_without_a_difference_are_told_one_noise_as_often_as_said():
+    """Of 1000 fleets of 12 units: 1 % are told to differ, to 4.5 standard errors."""
+    print("seed", UNITS_SEED)
+    rng = np.random.default_rng(UNITS_SEED + 2)
+    told = [np.ptp(noise_of(rng.chisquare(6.0, 12), np.full(12, 6.0)).units) > 0.0
+            for _ in range(1000)]  # fmt: skip
+    assert sum(told) <= 10 + 4.5 * np.sqrt(9.9)
+
+
+def test_further_noise_is_as_its_degrees_of_freedom_say():
+    """Variances of further units over the common one are those of F with the freedom found."""
+    print("seed", UNITS_SEED)
+    rng = np.random.default_rng(UNITS_SEED + 3)
+    true = 9.0 * 5.0 / rng.chisquare(5.0, 4000)
+    found = noise_of(true * rng.chisquare(30.0, 4000), np.full(4000, 30.0))
+    assert found.freedom == pytest.approx(5.0, rel=0.15)
+    assert kstest(found.freedom * found.variance / true, chi2(found.freedom).cdf).pvalue > 1e-3
+
+
+TOLERANCE_SEED = 52_001
+
+
+@pytest.mark.parametrize(
+    ("n", "share", "confidence", "sides", "published"),
+    [
+        (10, 0.95, 0.95, 2, 3.393),
+        (43, 0.90, 0.99, 2, 2.2228),
+        (43, 0.90, 0.99, 1, 1.8740),
+        (2, 0.90, 0.95, 1, 20.581),  # ISO 16269-6
+        (10, 0.95, 0.95, 1, 2.911),
+    ],
+)
+def test_factors_are_the_published_ones(n, share, confidence, sides, published):
+    assert tolerance_factor(n, share, confidence, sides) == pytest.approx(published, abs=6e-4)
+
+
+@pytest.mark.parametrize("sides", [1, 2])
+def test_a_factor_holds_as_often_as_it_says(sides):
+    print("seed", TOLERANCE_SEED)
+    rng = np.random.default_rng(TOLERANCE_SEED)
+    from scipy.stats import norm
+
+    draws = rng.normal(size=(20_000, 12))
+    mean, std = draws.mean(axis=1), draws.std(axis=1, ddof=1)
+    k = tolerance_factor(12, 0.9, 0.9, sides)
+    low = norm.cdf(mean - k * std) if sides == 2 else 0.0
+    held = norm.cdf(mean + k * std) - low >= 0.9
+    assert held.mean() == pytest.approx(0.9, abs=0.008)
+
+
+def test_ranks_need_as_many_units_as_wilks_says():
+    assert wilks_units(0.95, 0.95, 1) == 59
+    assert wilks_units(0.95, 0.95, 2) == 93
+    values = np.arange(1.0, 59.0)
+    assert tolerance_of(values, values, 0.95, 0.95).method == "normal"
+    values = np.arange(1.0, 60.0)
+    found = tolerance_of(values, values, 0.95, 0.95)
+    assert (found.method, found.peak_to_peak) == ("wilks", 59.0)
+    assert tolerance_of(np.arange(1.0, 94.0), np.arange(1.0, 94.0), 0.95, 0.95).peak_to_peak == 92.0
+
+
+def test_few_units_are_bounded_by_the_scatter_of_their_logarithms():
+    """One-sided, with the standard deviation of n - 1."""
+    print("seed", TOLERANCE_SEED)
+    sizes = np.random.default_rng(TOLERANCE_SEED + 1).lognormal(2.0, 0.4, 10)
+    found = tolerance_of(sizes, 0.5 * sizes, 0.9, 0.95)
+    assert found.factor == pytest.approx(2.355, abs=6e-4)  # ISO 16269-6, one-sided
+    logs = np.log(sizes)
+    bound = np.exp(logs.mean() + found.factor * np.sqrt(((logs - logs.mean()) ** 2).sum() / 9.0))
+    assert found.peak_to_peak == pytest.approx(bound)
+    assert found.left == pytest.approx(0.5 * bound)
+    assert plain_row(found, 3600.0)["peak_to_peak_arcsec"] == pytest.approx(3600.0 * bound)
+
+
+def test_impossible_limits_are_refused():
+    with pytest.raises(ArgumentError, match="n must be 2"):
+        tolerance_factor(1, 0.9, 0.9)
+    with pytest.raises(ArgumentError, match="share must lie"):
+        tolerance_factor(5, 1.0, 0.9)
+    with pytest.raises(ArgumentError, match="confidence must lie"):
+        wilks_units(0.9, 0.0)
+    for asked in (tolerance_factor, wilks_units):
+        with pytest.raises(ArgumentError, match="sides must be"):
+            asked(*((5, 0.9, 0.9, 3) if asked is tolerance_factor else (0.9, 0.9, 3)))

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import datetime
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +17,15 @@ import pyarrow.feather  # noqa: E402
 import pyarrow.parquet as pq  # noqa: E402
 
 import trueangle as ta  # noqa: E402
-from trueangle.formats import parquet  # noqa: E402
+from trueangle.errors import FileError  # noqa: E402
+from trueangle.formats import arrow, budget, parquet  # noqa: E402
+from trueangle.formats.arrow import BatchRange  # noqa: E402
 from trueangle.formats.arrowtables import (  # noqa: E402
     ArrowDigest,
     arrow_numbers,
+    arrow_values,
     element_names,
+    label_codes,
 )
 
 ROWS = 60
@@ -194,3 +201,132 @@ def test_an_index_of_pages_is_kept_where_there_is_one(index: bool, tmp_path: Pat
     assert ta.correct_logs(source, model, target).logs[0].error is None
     chunks = pq.ParquetFile(target).metadata.row_group(0)
     assert [chunks.column(i).has_offset_index for i in range(2)] == [index, index]
+
+
+KINDS = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"]
+KINDS += ["float", "double"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("nulls", [False, True])
+@pytest.mark.parametrize(("start", "stop"), [(0, 11), (3, 9), (5, 5), (0, 0)])
+def test_values_are_those_of_pyarrow(kind: str, nulls: bool, start: int, stop: int):
+    rng = np.random.default_rng(7)
+    given = rng.integers(0, 100, 11).tolist()
+    if nulls:
+        given[4] = given[7] = None
+    column = pa.array(given, pa.type_for_alias(kind)).slice(start, stop - start)
+    expected = column.to_numpy(zero_copy_only=False)
+    found = arrow_values(column)
+    assert found.dtype == expected.dtype
+    np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("rows", [0, 2, 7, 10])
+@pytest.mark.parametrize("parts", [1, 3, 4])
+def test_parts_of_a_batch_hold_each_row_once(rows: int, parts: int):
+    batch = pa.record_batch({"x": np.arange(rows)})
+    found = [BatchRange(range(1), part, parts).of(batch)["x"].to_numpy() for part in range(parts)]
+    np.testing.assert_array_equal(np.concatenate(found), np.arange(rows))
+
+
+def test_nothing_but_nulls():
+    column = pa.nulls(3, pa.float64())
+    assert np.isnan(arrow_values(column)).all()
+    assert np.isnan(arrow_numbers("f", "a", column)).all()
+
+
+def test_labels_with_and_without_nulls():
+    found = label_codes(pa.array(["b", None, "a", "b"]))
+    assert [found.names[code] for code in found.codes] == ["b", None, "a", "b"]
+    assert found.codes.dtype == np.intp
+    found = label_codes(pa.array(["b", "a"]))
+    assert [found.names[code] for code in found.codes] == ["b", "a"]
+
+
+@pytest.mark.parametrize("ending", ["parquet", "csv"])
+def test_reading_does_without_pandas(tmp_path: Path, ending: str):
+    angle = np.linspace(0.0, 720.0, 30_000)  # a small file of text is read without pyarrow
+    table = pa.table({"reference_deg": angle, "indicated_deg": angle + 0.1})
+    path = tmp_path / f"log.{ending}"
+    if ending == "parquet":
+        pq.write_table(table, path)
+    else:
+        rows = "".join(f"{a},{a + 0.1}\n" for a in angle.tolist())
+        path.write_text("reference_deg,indicated_deg\n" + rows)
+    script = (
+        "import sys, trueangle as ta\n"
+        f"assert len(ta.read_runs({str(path)!r})[0]) == 30000\n"
+        f"assert ta.fit_logs({str(path)!r}, [1], progress='none').readings == 30000\n"
+        "assert 'pyarrow' in sys.modules\n"
+        "sys.exit('pandas' in sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, env=dict(os.environ))
+
+
+#: Rows of the batches, none first.
+ARROWHEADERS_ROWS = (0, 300, 7)
+LABELS = [f"label {k}" for k in range(50)]
+
+
+def table(rows: int) -> Any:
+    """Numbers, and labels by a dictionary, which is a message of its own."""
+    codes = pa.array((np.arange(rows) % 50).astype("int32"))
+    labels = pa.DictionaryArray.from_arrays(codes, pa.array(LABELS))
+    return pa.record_batch({"x": np.zeros(rows), "label": labels})
+
+
+def written(path: Path, codec: str | None, batches: list[Any]) -> Path:
+    options = pa.ipc.IpcWriteOptions(compression=codec)
+    new = pa.ipc.new_stream if path.suffix == ".arrows" else pa.ipc.new_file
+    schema = batches[0].schema
+    with pa.OSFile(str(path), "wb") as file, new(file, schema, options=options) as writer:
+        for batch in batches:
+            writer.write_batch(batch)
+    return path
+
+
+@pytest.mark.parametrize("ending", ["arrow", "arrows"])
+@pytest.mark.parametrize("codec", [None, "lz4", "zstd"])
+def test_headers_say_rows_codec_and_bytes_of_batches_and_of_dictionaries(
+    codec: str | None, ending: str, tmp_path: Path
+):
+    batches = [table(rows) for rows in ARROWHEADERS_ROWS]
+    path = written(tmp_path / f"a.{ending}", codec, batches)
+    is_file = ending == "arrow"
+    found = list(arrow._packed(path, is_file))
+    assert {one.codec for one in found} == {codec}
+    dictionaries = [one for one in found if one.rows < 0]
+    assert len(dictionaries) == 1
+    assert dictionaries[0].size >= sum(map(len, LABELS))
+    records = [one for one in found if one.rows >= 0]
+    assert tuple(one.rows for one in records) == ARROWHEADERS_ROWS
+    for one, rows in zip(records, ARROWHEADERS_ROWS, strict=True):
+        # Eight bytes a number and four a code; what is not packed stands at whole 64 bytes.
+        assert 12 * rows <= one.size <= 12 * rows + (0 if codec else 2 * 64)
+    assert arrow._compression(path, is_file) == codec
+    assert arrow.extent(path, ["x", "x"]) == (sum(ARROWHEADERS_ROWS), 16 * sum(ARROWHEADERS_ROWS))
+    assert arrow.extent(path) == (sum(ARROWHEADERS_ROWS), 0)
+
+
+@pytest.mark.parametrize("ending", ["arrow", "arrows"])
+@pytest.mark.parametrize("large", ["batch", "dictionary"])
+def test_a_packed_batch_beside_a_dictionary_is_held_to_the_budget_as_that_is(
+    large: str, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """The larger of the two, from both sides; what is not packed is only mapped."""
+    batch = table(20_000)
+    if large == "dictionary":
+        labels = pa.DictionaryArray.from_arrays(pa.array([0], pa.int32()), pa.array(["a" * 10**5]))
+        batch = pa.record_batch({"x": np.zeros(1), "label": labels})
+    for codec in ("zstd", None):
+        path = written(tmp_path / f"a.{ending}", codec, [batch])
+        size = max(one.size for one in arrow._packed(path, ending == "arrow"))
+        monkeypatch.setattr(budget, "DECODED_BYTES", size)
+        assert arrow.columns(path) == ["x", "label"]
+        monkeypatch.setattr(budget, "DECODED_BYTES", size - 1)
+        if codec is None:
+            assert arrow.columns(path) == ["x", "label"]
+            continue
+        with pytest.raises(FileError, match="record batch unpacks to"):
+            arrow.columns(path)

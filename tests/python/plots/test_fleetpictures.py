@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ import trueangle as ta
 from fleets.made import MEAN, units
 from model.test_windows import PER, model, readings
 from trueangle.plots import text_alternative
+from trueangle.plots.amplitudespectrum import OrderAxis
 from trueangle.plots.controlcharts import watched_windows
 
 matplotlib = pytest.importorskip("matplotlib")
@@ -205,3 +207,22 @@ def test_windows_of_a_watched_joint(errors_in, per):
         assert sizes[f"order {order}"][0].tolist() == [one.window for one in windows]
     alarms = [(one.window, one.statistic) for one in windows if one.alarm]
     assert list(zip(*sums["alarm"], strict=True)) == alarms != []
+
+
+#: Share of a group's width left to each side of its orders, least width, and what is between.
+MARGIN, LEAST, GAP = 0.06, 2.5, 1.0
+
+
+@pytest.mark.parametrize("last", [3, 5, 17, 26])
+def test_a_group_takes_the_root_of_its_span(last):
+    orders = [*range(1, last + 1), 100, 101, 102]
+    axis = OrderAxis.of(orders)
+    assert axis.groups == [(1, last), (100, 102)]
+    widths = [max(math.sqrt(last - 1), LEAST), LEAST]
+    at = axis.places([1, last, 100, 102])
+    inside = 1.0 - 2.0 * MARGIN
+    assert at[1] - at[0] == pytest.approx(inside * widths[0])
+    assert at[3] - at[2] == pytest.approx(inside * widths[1])
+    assert at[2] - at[1] == pytest.approx(GAP + MARGIN * sum(widths))
+    # Even within a group.
+    assert axis.places(2) - at[0] == pytest.approx(inside * widths[0] / (last - 1))

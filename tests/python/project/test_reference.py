@@ -1,10 +1,15 @@
 """The reference: every name it lists can be imported, and it lists what is public."""
 
+import ast
 import inspect
+import re
 import sys
+from collections import defaultdict
+from pathlib import Path
 
 import pytest
 
+import trueangle
 import trueangle as ta
 from conftest import ROOT
 
@@ -79,3 +84,37 @@ def test_a_cause_that_needs_a_column_stands_under_it():
     assert places["current_coupling"] == "current"
     assert places["reference_error"] == "mount"
     assert places["latency"] == "velocity"
+
+
+def test_class_names_are_unique():
+    root = Path(trueangle.__file__).parent
+    places = defaultdict(list)
+    for path in sorted(root.rglob("*.py")):
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                places[node.name.lstrip("_")].append(path.relative_to(root).as_posix())
+    assert not {name: found for name, found in places.items() if len(found) > 1}
+
+
+def test_every_promise_names_tests_that_exist() -> None:
+    page = (ROOT / "docs" / "promises.md").read_text(encoding="utf-8")
+    promised, planted, _ = page.partition("**Planted faults.**")
+    assert planted
+    rows = [line for line in promised.splitlines() if line.startswith("| ")][2:]
+    assert len(rows) >= 12
+    for row in rows:
+        named = re.findall(r"`((?:tests|\.ci)/[^`]+)`", row)
+        assert named, row
+        for path in named:
+            assert (ROOT / path).exists(), path
+
+
+def test_every_part_of_the_night_has_a_job() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    workflow = (ROOT / ".github" / "workflows" / "nightly.yml").read_text(encoding="utf-8")
+    parts = re.findall(r"^NIGHTLY = (.*)$", makefile, re.MULTILINE)[0].split()
+    jobs = re.findall(r"^ +part: \[(.*)\]$", workflow, re.MULTILINE)[0].split(", ")
+    assert len(parts) >= 8
+    assert sorted(parts) == sorted(jobs)
+    for part in parts:
+        assert re.search(rf"^{part}:.*##", makefile, re.MULTILINE), part

@@ -7,9 +7,11 @@ import pytest
 
 import trueangle as ta
 from trueangle.fitting.heldout import hold_out
+from trueangle.reports import demo
 from trueangle.reports.diagnosed import unknown_content
 from trueangle.reports.measured import error_size, measured_content
 from trueangle.reports.modelled import gain_content, given_model
+from trueangle.simulation import Backlash, simulate
 
 PERIODS = (360.0, 2.0 * np.pi, 1.0)
 
@@ -121,3 +123,17 @@ def test_what_is_unknown_follows_from_what_was_not_done():
         assert said not in told(run(**first), more)
         others = [s for s in ("latency", "thermal", "compliance", "own errors") if s not in said]
         assert all(s in told(run(**first), more) for s in others), said
+
+
+@pytest.mark.parametrize("seed", [0, 7])
+def test_it_is_of_the_readings_of_its_seed_and_its_effect(seed, monkeypatch):
+    asked = []
+    monkeypatch.setattr(demo, "report", lambda runs, path, **more: asked.append((runs, more)))
+    hidden = Backlash(5.0)
+    demo.demo_report(hidden=hidden, seed=seed)
+    ((runs, more),) = asked
+    believed = demo.demo_simulation()
+    assert more["simulation"] == believed
+    wanted = simulate(believed.with_effects([hidden]), seed)
+    for run, other in zip(runs, wanted, strict=True):
+        np.testing.assert_array_equal(run.indicated, other.indicated)

@@ -1,5 +1,6 @@
 """What a browser is asked to print, which one is taken, and what is told where it did not."""
 
+import re
 import stat
 import sys
 
@@ -88,3 +89,26 @@ def test_no_browser_is_told_with_names_of_some(tmp_path, asked):
         "a PDF needs an installed browser (chromium, chromium-browser, google-chrome ...): install "
         "one, or open the HTML report and print it"
     )
+
+
+#: Directives that a page needs; all else falls back to none of it.
+NEEDED = {
+    "default-src": {"'none'"},
+    "script-src": {"'unsafe-inline'"},
+    "style-src": {"'unsafe-inline'"},
+    "img-src": {"data:"},
+}
+
+
+def test_the_policy_lets_a_page_reach_nothing(made):
+    page = made.html
+    (policy,) = re.findall(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', page)
+    found = {}
+    for directive in policy.split(";"):
+        name, *sources = directive.split()
+        assert name not in found
+        found[name] = set(sources)
+    assert found == NEEDED
+    # It holds for what stands behind it: nothing runs before.
+    before = page[: page.index("Content-Security-Policy")]
+    assert not re.search(r"<(script|style|link|img)\b", before)

@@ -79,3 +79,26 @@ def test_what_cannot_be_used_stands_first_then_the_largest():
     lines = ranking_text("Fit:", ranked(rows), "arcsec").splitlines()
     assert [line.split()[0] for line in lines[-3:]] == ["b", "c", "a"]
     assert [float(cell) for cell in lines[-2].split()[1:3]] == [7.5, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("findings", "first", "verdict"),
+    [
+        ([("a", True), ("b", True), ("c", True)], "a", "explained"),
+        ([("a", False), ("b", True), ("c", True)], "b", "explained"),
+        ([("a", False)], None, "simulation is enough"),
+        ([], None, "simulation is enough"),
+    ],
+)
+@pytest.mark.parametrize("is_open", [False, True])
+def test_the_first_confirmed_cause_is_the_first(findings, first, verdict, is_open):
+    found = SimpleNamespace(
+        findings=[SimpleNamespace(cause=c, confirmed=sure) for c, sure in findings],
+        unexplained=SimpleNamespace(found=is_open),
+        gain={"rms_after_arcsec": 3.0},
+        discrepancy=SimpleNamespace(peak_to_peak=17.0),
+    )
+    row = diagnosed_rank("knee", found)
+    assert row.first_cause == first
+    assert row.verdict == ("unexplained" if is_open else verdict)
+    assert (row.peak_to_peak_before_arcsec, row.rms_left_arcsec) == (17.0, 3.0)

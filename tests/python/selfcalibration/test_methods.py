@@ -7,9 +7,11 @@ import pytest
 from scipy import stats
 
 import trueangle as ta
+from selfcalibration import exam
 from trueangle.errors import ArgumentError, NoModelError
 from trueangle.selfcalibration.orderchoice import significant_orders
 from trueangle.selfcalibration.projected import Projected, harmonic_unknowns
+from trueangle.simulation import Harmonic, RunDesign, Simulation
 
 from .test_other_methods import dual_log, heads_log, shifts_log
 
@@ -183,3 +185,84 @@ def test_an_order_stands_out_where_chance_makes_none_of_thirty_so_large() -> Non
     covariance = np.kron(np.eye(30), half @ half.T)
     kept = significant_orders(told, values.ravel(), covariance, orders)
     assert kept == tuple(orders[::3])
+
+
+#: Seeds of these tests: none of the exam's.
+FIRST = 7_300_000
+
+#: Standard deviations by which an rms of a few seeds may be off: one in 15 000 beyond 4.
+FAR = 4.0
+
+
+def seeds(count):
+    print("seeds", FIRST, "to", FIRST + count - 1)
+    return range(FIRST, FIRST + count)
+
+
+def test_the_limit_of_white_noise_is_met():
+    # Cosine and sine of three orders: the rms of n numbers scatters by 1 / sqrt(2 n).
+    figure = next(exam.limit(seeds(6)))
+    print(figure)
+    assert abs(figure.value - 1.0) < FAR / np.sqrt(2.0 * 6 * 6)
+
+
+@pytest.mark.parametrize("row", [exam.weighed, exam.ripple, exam.wander])
+def test_stated_errors_hold(row):
+    # 95 % inside two standard errors: of 30 numbers 24 or fewer with probability 1 in 500.
+    figure = next(row(seeds(5)))
+    print(figure)
+    assert figure.value >= 24 / 30
+
+
+@pytest.mark.parametrize("row", [exam.one_speed, exam.loop, exam.heads])
+def test_what_is_blind_is_refused(row):
+    figure = next(row(seeds(5)))
+    print(figure)
+    assert figure.value == 1.0
+
+
+def test_closure_and_dual_are_at_their_limits():
+    for row, count in ((exam.closure, 12), (exam.dual, 6)):
+        for figure in row(seeds(count)):
+            print(figure)
+            assert figure.met
+
+
+COAST = RunDesign(
+    speed_deg_s=3600.0, speed_end_deg_s=720.0, turns=100.0, samples=20_000, spacing="uniform"
+)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    lines = (Harmonic("output", 1, 300.0, 20.0), Harmonic("output", 2, 150.0, 60.0))
+    return ta.simulate(Simulation(harmonics=lines, sigma_arcsec=20.0, runs=(COAST,)), seed=8401)
+
+
+def test_a_simulated_coast_slows_down_by_itself(runs):
+    run = runs[0]
+    speed = np.gradient(run.reference, run.time)
+    assert speed[5] == pytest.approx(3600.0, rel=0.01)
+    assert speed[-5] == pytest.approx(720.0, rel=0.01)
+    # Viscous friction: the logarithm of the speed falls in proportion to time.
+    bend = np.polyfit(run.time[1:-1], np.log(speed[1:-1]), 2)
+    assert abs(bend[0]) < 1e-4 * abs(bend[1])
+    with pytest.raises(ArgumentError, match="speed_end_deg_s"):
+        RunDesign(speed_end_deg_s=-1.0)
+
+
+def test_a_report_says_what_had_no_reference(runs, tmp_path):
+    found = ta.selfcal(runs, orders=[1, 2], loop="open", ripple="none")
+    assert [round(o.amplitude) for o in found.orders] == [300, 150]
+    path = tmp_path / "joint.json"
+    found.model.save(path)
+    made = ta.report(runs, orders=[1, 2], model=path)
+    told = made.content["given_model"]
+    assert told["calibrated_without_reference"] is True
+    assert any("zero" in said for said in told["blind"])
+    assert told["after_arcsec"] == pytest.approx(20.0, rel=0.05)
+    assert told["before_arcsec"] > 200.0
+    pytest.importorskip("jinja2")
+    pytest.importorskip("matplotlib")
+    page = made.html
+    assert page.index("calibrated without a reference") < page.index('class="verdict') + 400

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
+from datetime import UTC, datetime, timedelta, timezone
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from trueangle.errors import ArgumentError
+import trueangle as ta
+from trueangle.errors import ArgumentError, UnitWarning
+from trueangle.formats import seriallog
+from trueangle.formats.format import Selection
 from trueangle.support.display_units import (
     LARGE,
     ErrorUnit,
@@ -20,6 +25,8 @@ from trueangle.support.display_units import (
     significant_digits,
     sine_of_rms,
 )
+from trueangle.support.roles import unit_in_name
+from trueangle.support.times import elapsed_seconds, local_day
 
 #: Of each unit in a turn.
 TURNS = {"arcsec": 1_296_000.0, "deg": 360.0, "mrad": 2000.0 * math.pi, 65536.0: 65536.0}
@@ -103,3 +110,110 @@ def test_decimals_show_two_digits_of_an_error(arcsec: float) -> None:
     known = math.isfinite(arcsec) and arcsec != 0.0
     wanted = max(0, 1 - math.floor(math.log10(10.0 * arcsec))) if known else 0
     assert unit.decimals(arcsec) == wanted
+
+
+THETA = np.arange(0.0, 360.0, 5.0)
+
+
+def said(theta):
+    rng = np.random.default_rng(7)
+    return theta + 0.5 * np.sin(np.radians(theta + 20.0)) + 0.01 * rng.standard_normal(theta.size)
+
+
+def test_degrees_without_their_period_are_warned_of():
+    with pytest.warns(UnitWarning, match=r"monday goes to 355.*give `period=360`"):
+        ta.fit(ta.CalibrationRun(THETA, said(THETA), label="monday"), orders=[1])
+
+
+@pytest.mark.parametrize(
+    ("theta", "period"),
+    [
+        (THETA, 360.0),
+        (np.radians(THETA), 2.0 * np.pi),
+        (np.linspace(0.0, 355.0, 700), 2.0 * np.pi),  # a motor of 56 turns, in radians
+    ],
+    ids=["degrees", "radians", "many turns"],
+)
+def test_right_units_are_not(theta, period):
+    error = 1e-3 * np.sin(2.0 * np.pi * theta / period)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ta.fit(ta.CalibrationRun(theta, theta + error, period=period), orders=[1])
+
+
+@pytest.mark.parametrize(
+    ("name", "role", "unit"),
+    [
+        ("pos_deg", "indicated", "deg"),
+        ("pos_rad", "reference", "rad"),
+        ("pos (deg)", "reference", "deg"),
+        ("bus/pos_arcsec", "reference", "arcsec"),
+        # Of a speed the second is a part of its own.
+        ("w_deg_s", "velocity", "deg/s"),
+        ("axis/w_rad_s", "velocity", "rad/s"),
+        ("w_deg", "velocity", None),
+        ("t_s", "time", "s"),
+        ("t_ms", "time", "ms"),
+        ("t_s", "reference", None),
+        ("w", "velocity", None),
+        ("w_s", "velocity", None),
+        ("pos_fast", "indicated", None),
+    ],
+)
+def test_a_unit_is_read_from_a_name(name, role, unit):
+    assert unit_in_name(name, role) == unit
+
+
+SEED = 5_150
+
+
+def test_a_day_is_that_of_the_texts_own_zone():
+    """The first ten letters, whatever the zone and however near to midnight."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED)
+    start = datetime(2026, 2, 27)
+    for _ in range(300):
+        clock = start + timedelta(seconds=int(rng.integers(0, 4 * 86400)))
+        zone = timezone(timedelta(minutes=15 * int(rng.integers(-48, 57))))
+        for text in (clock.isoformat(), clock.replace(tzinfo=zone).isoformat(" ")):
+            assert local_day(text) == text[:10], text
+
+
+def test_seconds_do_not_depend_on_the_zone_that_they_are_written_in():
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 1)
+    start = datetime(2026, 12, 31, 22, tzinfo=UTC)
+    wanted = np.append(0.0, rng.uniform(-1e5, 1e5, 200).round(6))
+    texts = []
+    for seconds in wanted.tolist():
+        zone = timezone(timedelta(minutes=15 * int(rng.integers(-48, 57))))
+        texts.append((start + timedelta(seconds=seconds)).astimezone(zone).isoformat())
+    found, wrong = elapsed_seconds(texts)
+    assert wrong is None
+    np.testing.assert_allclose(found, wanted, atol=1e-6)
+    # One without a zone cannot be told from them.
+    for place in (1, 7, 200):
+        mixed = [*texts]
+        mixed[place] = mixed[place][:19]
+        assert elapsed_seconds(mixed)[1] == place
+
+
+def test_a_clock_that_is_set_back_is_not_midnight(tmp_path):
+    """Of a terminal: days and nights pass, and now and then it is put right by some seconds."""
+    print("seed", SEED)
+    rng = np.random.default_rng(SEED + 2)
+    for draw in range(5):
+        # Half an hour from reading to reading, and a few corrections apart from midnight.
+        seconds = 1800.0 * np.arange(1, 150) + rng.uniform(0.0, 600.0, 149).round(3)
+        for place in rng.choice(np.flatnonzero(seconds % 86400.0 > 7200.0), 8, replace=False):
+            seconds[place] = seconds[place - 1] - round(rng.uniform(0.5, 60.0), 3)
+        clocks = seconds % 86400.0
+        lines = [
+            f"{t // 3600:02.0f}:{t // 60 % 60:02.0f}:{t % 60:06.3f} -> a:1,b:{i}"
+            for i, t in enumerate(clocks.tolist())
+        ]
+        path = tmp_path / f"{draw}.log"
+        path.write_text("\n".join(lines) + "\n")
+        (batch,) = seriallog.read(path, Selection(["time_s", "b"]))
+        found = batch["time_s"] - batch["time_s"][0]
+        np.testing.assert_allclose(found, seconds - seconds[0], atol=2e-3)
