@@ -119,7 +119,6 @@ def test_few_positions_leave_the_orders_that_they_tell_apart():
 
 
 STOP_SEED = 52_077
-JOINTS, WITHIN, HELD = 20, 1.5, 19
 TURNS = 60
 #: Standard errors from which an order is told from noise, the largest of 32 of them in a hundred.
 TOLD = math.sqrt(2.0 * math.log(3200.0))

@@ -177,7 +177,8 @@ DRAWN_SIM = Simulation(
         )
     ),
 )  # fmt: skip
-TORQUES = float(np.ptp(SIGNALS.torque))
+DRAWN_SIGNALS = measured_signals(DRAWN_SIM)
+TORQUES = float(np.ptp(DRAWN_SIGNALS.torque))
 
 #: Of what is drawn beside the size: least and greatest.
 BETWEEN = {
@@ -207,7 +208,7 @@ CURVED = {
 
 def drawn(kind, size, number):
     rng = trial_rng(SEED, kind, number)
-    return drawn_effect(kind, size, Drawing(SIGNALS, DRAWN_SIM.surroundings, rng)), rng
+    return drawn_effect(kind, size, Drawing(DRAWN_SIGNALS, DRAWN_SIM.surroundings, rng)), rng
 
 
 @pytest.mark.parametrize("kind", list(EFFECTS))
@@ -237,7 +238,7 @@ def test_twice_the_size_is_twice_the_error(kind):
         if one is None:
             assert two is None
             return
-        errors = [effect.signal(SIGNALS, DRAWN_SIM.surroundings, chance)
+        errors = [effect.signal(DRAWN_SIGNALS, DRAWN_SIM.surroundings, chance)
                   for effect, chance in ((one, rng), (two, again))]  # fmt: skip
         assert np.isfinite(errors).all()
         assert astuple(one) != astuple(two)
@@ -247,13 +248,13 @@ def test_twice_the_size_is_twice_the_error(kind):
 def test_a_spring_that_stiffens_is_softer_by_a_quarter_at_the_largest_load():
     for size in (0.02, 0.3):
         effect, rng = drawn("stiffening_compliance", size, 0)
-        error = effect.signal(SIGNALS, DRAWN_SIM.surroundings, rng)
-        loads = np.abs(SIGNALS.torque)
+        error = effect.signal(DRAWN_SIGNALS, DRAWN_SIM.surroundings, rng)
+        loads = np.abs(DRAWN_SIGNALS.torque)
         k = int(np.argmax(loads))
         assert abs(error[k]) == pytest.approx(0.75 * effect.arcsec_per_Nm * loads[k])
         assert effect.arcsec_per_Nm3 == -size
     # Where no load was recorded there is no error.
-    bare = replace(SIGNALS, torque=None)
+    bare = replace(DRAWN_SIGNALS, torque=None)
     free = EFFECTS["stiffening_compliance"].drawn(0.3, Drawing(bare, DRAWN_SIM.surroundings, rng))
     assert not free.signal(bare, DRAWN_SIM.surroundings, rng).any()
 
@@ -265,4 +266,4 @@ def test_what_these_runs_cannot_have_is_not_drawn():
     for kind in ("torque_hysteresis", "joint_coupling"):
         assert drawn_effect(kind, 1.0, Drawing(signals, still.surroundings, rng)) is None
     bare = replace(DRAWN_SIM, harmonics=())
-    assert drawn_effect("filter_lag", 1.0, Drawing(SIGNALS, bare.surroundings, rng)) is None
+    assert drawn_effect("filter_lag", 1.0, Drawing(DRAWN_SIGNALS, bare.surroundings, rng)) is None
