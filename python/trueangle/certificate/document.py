@@ -49,7 +49,7 @@ class Certificate:
     Attributes
     ----------
     content : dict
-        Every number and word of it, plain values: `save` adds nothing but the layout.
+        All numbers and words, plain values: `save` adds nothing but the layout.
         Errors are in arcsec; ``errors_in`` states which unit the pages show.
         ``positions`` holds ``angle_deg, error_arcsec, standard_arcsec,
         degrees_of_freedom, coverage_factor, expanded_arcsec`` of every position;

@@ -229,7 +229,7 @@ def model_as_left(model: HarmonicModel | str | PathLike[str]) -> HarmonicModel:
 
 
 def corrected_runs(model: HarmonicModel, runs: Sequence[CalibrationRun]) -> list[CalibrationRun]:
-    """Runs whose indicated angle is the model's correction of it, signals included.
+    """Runs with indicated angles corrected by the model, signals included.
 
     Raises
     ------

@@ -186,7 +186,7 @@ def _failed(
 
 
 def _system(error: OSError) -> str:
-    """What the system refused, and of which file."""
+    """What the system refused, and the file."""
     if error.filename is None:
         return str(error)
     name = error.filename
@@ -196,7 +196,7 @@ def _system(error: OSError) -> str:
 
 
 def _say(text: str) -> None:
-    """Print it in one line, whatever lines it came in."""
+    """Print it in one line, however it was broken."""
     if sys.stderr is not None:
         with contextlib.suppress(OSError):  # a closed terminal
             # Blanks stay as they are: a name of a file may have two.

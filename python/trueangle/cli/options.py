@@ -63,8 +63,8 @@ _SHARED: Final[dict[str, tuple[str, Kind, str, dict[str, Any]]]] = {
         "--covariance",
         ("auto", "white", "cluster", "hac"),
         "standard errors of independent readings (white), by the scatter between runs "
-        "(cluster) or between segments of readings (hac); default: between three runs and "
-        "more, of fewer white unless correlation is found",
+        "(cluster) or between segments of readings (hac). Default: cluster for three runs "
+        "and more; else white, or hac where correlation is found",
         {"default": "auto"},
     ),
     "orders": (

@@ -135,7 +135,7 @@ def _planned(
         return _of_self(args, wanted)
     if args.prior is not None or args.arc is not None or args.uncertainty is not None:
         return _of_arc(args, wanted)
-    refuse_given(args, OF_ARC, "is of plans for an arc: add --arc START:STOP")
+    refuse_given(args, OF_ARC, "is for an arc: add --arc START:STOP")
     from ..planning import plan as planning
 
     if args.reference != "off-null":
@@ -155,8 +155,8 @@ def _of_arc(args: argparse.Namespace, wanted: dict[str, Any]) -> ArcPlan | UnitP
     if args.prior is None:
         from ..planning.arc import plan_arc
 
-        refuse_given(args, OF_TURNS, "is of plans for whole turns: it has --readings")
-        by_orders = "is of plans for whole turns: name its orders by --orders"
+        refuse_given(args, OF_TURNS, "is for whole turns; an arc has --readings")
+        by_orders = "is for whole turns; name the orders of an arc by --orders"
         refuse_given(args, ("gear_ratio",), by_orders)
         return plan_arc(start, stop, **given(args, *OF_ARC, "uncertainty"), **wanted)
     from ..fleets import load_fleet, plan_unit

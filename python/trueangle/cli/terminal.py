@@ -119,7 +119,7 @@ def plain_streams(wording: Callable[[str], str] = str) -> Iterator[None]:
 
 
 def silence_output() -> None:
-    """Send what is still to be printed nowhere: Python would complain of it at its end."""
+    """Send what is still to be printed nowhere: Python would complain at its end."""
     try:
         handle = sys.stdout.fileno()
         nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -1,4 +1,4 @@
-"""Diagnosis: where a simulation and its joint disagree, and by which cause."""
+"""Diagnosis: where a simulation and its joint disagree, and why."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ class Account:
 
 
 def account_of(every: Signals, error: Array, sim: Simulation) -> Account:
-    """Choose the causes by which readings differ from a simulation.
+    """Choose the causes that make readings differ from a simulation.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def _start(seen: PreparedData, sim: Simulation) -> Regression:
 
 
 def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:
-    """Choose the causes by which readings differ from a simulation."""
+    """Choose the causes that make readings differ from a simulation."""
     start = _start(seen, sim)
     # What is always free is no blind spot.
     spots = blind_spots(start if seen.delay is None else _start(replace(seen, delay=None), sim))
@@ -238,7 +238,7 @@ def _chosen(seen: PreparedData, sim: Simulation) -> CauseSelection:
 
 
 def _uneven(start: Regression, chosen: Regression) -> list[ScatterFinding]:
-    """Causes of uneven noise, strongest first, with outliers (bursts above all) put aside."""
+    """Causes of uneven noise, strongest first, with outliers (bursts above all) rejected."""
     found = uneven_noise(unrounded(chosen))
     if not found:
         return []

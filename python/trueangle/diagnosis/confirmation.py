@@ -47,7 +47,7 @@ def confirmation_status(
     """Status of a finding and the reason where it is not confirmed.
 
     A cause that transfers is confirmed by a gain on held-out data whose interval excludes
-    zero. One that every run draws anew has none: it must explain the noise of the runs one
+    zero. One that is new in every run has none: it must explain the noise of the runs one
     by one. A cause that fits any residual (`is_flexible`, causes of the scatter) is not
     confirmed while something is ``unexplained``, but for a line in time that a test which needs
     no name sees at the same frequency. Nor is a cause that is smaller than what is unexplained: it

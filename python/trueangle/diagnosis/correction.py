@@ -126,7 +126,7 @@ def extend_model(
     """The correction model extended by the effects of a simulation, fitted to the runs.
 
     Effects become terms with the simulation's parameters; lines that the model lacks
-    become orders; the harmonics are fitted anew to what the terms leave, so that nothing
+    become orders; the harmonics are fitted again to what the terms leave, so that nothing
     is subtracted twice.
 
     Parameters

@@ -188,7 +188,7 @@ def delay_finding(
 
 
 def delay_factor(finding: Finding, signals: Signals, total: float) -> Factor:
-    """The speed, of which the error of a delay is a straight line: ``ε = -v τ``.
+    """The speed; the error of a delay is a straight line in it: ``ε = -v τ``.
 
     Parameters
     ----------

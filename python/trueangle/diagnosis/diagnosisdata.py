@@ -152,7 +152,7 @@ class DiagnosisData(Correctable):
 
     @property
     def in_question(self) -> list[Ambiguity]:
-        """Causes of which one is detected, and none is named."""
+        """Causes in question: one is detected, none is named."""
         return [spot for spot in self.not_identifiable if spot.supported and not spot.common]
 
     @property

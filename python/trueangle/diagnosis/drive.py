@@ -111,7 +111,7 @@ def _as_angle(run: CalibrationRun, number: int, largest: float) -> CalibrationRu
 
 
 def _finding(finding: Finding, one: float) -> TorqueFinding:
-    """A finding in Nm, of which an arcsecond is ``one``."""
+    """A finding in Nm; an arcsecond is ``one`` Nm."""
     effect = _EFFECTS.get(finding.cause, finding.cause)
     given = finding.parameters
     if effect == "damping":

@@ -217,7 +217,7 @@ def _number(value: Any, std: Any, of: ErrorUnit) -> str:
 
 
 def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
-    """A finding by its cause, of which line it is, and how large with its standard error."""
+    """A finding by its cause, its line, and its size with its standard error."""
     known = {name: quantity.value for name, quantity in finding.parameters.items()}
     name = finding.cause
     if isinstance(known.get("shaft"), str):

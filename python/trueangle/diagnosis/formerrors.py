@@ -28,7 +28,7 @@ SLIGHT = 0.01
 
 
 def form_error_columns(regression: Regression, exempt: Collection[str] = ()) -> Array:
-    """Form errors of the causes found as columns, each with the size that is expected of it.
+    """Form errors of the causes found as columns, each with its expected size.
 
     None of the causes ``exempt``: a further element of a cause is not explained by its form error.
     """

@@ -1,4 +1,4 @@
-"""Gates that a finding passes before it is confirmed: what was computed of it decides.
+"""Gates that a finding passes before it is confirmed, from its computed values.
 
 Each gate is a line of `GATES` and gives the reason why a finding is not confirmed, or nothing.
 """

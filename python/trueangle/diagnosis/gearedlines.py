@@ -159,7 +159,7 @@ class GearedLines:
         return float(self.shares(ratio) @ self._believed / self._believed.sum())
 
     def out_of_step(self, common: bool) -> float:
-        """Standard errors by which the lines fall out of step at the assumed ratio."""
+        """How far the lines fall out of step, in standard errors, at the assumed ratio."""
         departure, std = self._departure(self.sim.joint.gear_ratio, common)
         return departure / std if std else 0.0
 
@@ -231,7 +231,7 @@ class GearedLines:
         return left
 
     def keeps_phase(self, ratio: float) -> bool:
-        """Whether separate phases of each run explain no more than noise, beyond one for all."""
+        """Whether separate phases of each run explain only noise, beyond one for all."""
         apart = self.left(ratio, common=False)
         more = self.left(ratio, common=True) / max(apart, 1e-300) - 1.0
         extra = 2.0 * len(self.lines) * (len(self.bounds) - 1)

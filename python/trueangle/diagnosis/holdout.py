@@ -102,7 +102,7 @@ def rebuilt_term(term: Extension, rows: Rows) -> Extension:
 
 
 def _searched_again(full: Regression, group: Sequence[int]) -> Regression:
-    """The finding's searched terms chosen anew in this part of the runs."""
+    """The finding's searched terms chosen again in this part of the runs."""
     terms = list(full.terms)
     kept = [term for k, term in enumerate(terms) if k not in group]
     cause = terms[group[0]].cause
@@ -153,7 +153,7 @@ def reducible_share(
 ) -> tuple[float, tuple[float, float]]:
     """Reducible share and its bootstrap interval over the units held out, from 0 to 1.
 
-    What was removed was reducible, whatever the estimated variance; a larger error is no share. A
+    What was removed was reducible, for any estimated variance; a larger error is no share. A
     draw without any unit that shows more than noise has nothing to remove, and no share: loads in
     two of four runs are in all but 6 % of the draws.
     """

@@ -63,7 +63,7 @@ def open_origins(
 def with_open_origins(
     spots: Sequence[Ambiguity], origins: Sequence[Ambiguity], evidence: float
 ) -> list[Ambiguity]:
-    """Blind spots, and those by which only the origin of what is named is open."""
+    """Blind spots, and those that leave only the origin of a cause open."""
 
     def is_told(spot: Ambiguity) -> bool:
         return any(set(spot.causes) <= set(of.causes) for of in origins)

@@ -166,7 +166,7 @@ def _effect(regression: Regression, sim: Simulation, old: Effect, new: Effect) -
 
 
 def believed_columns(regression: Regression) -> NDArray[np.bool_]:
-    """Columns of the base that are low orders over an arc, as large as they are believed."""
+    """Columns of the base that are low orders over an arc, at their assumed size."""
     held = np.zeros(regression.base.shape[1], dtype=bool)
     wider = with_unseen_orders(regression)
     for k, order in enumerate(regression.belief.pattern.orders):

@@ -150,7 +150,7 @@ def chosen_by_factor(
 ) -> Regression | None:
     """The causes without some terms, and for each factor without a name those that are forms of it.
 
-    The strongest factor comes first: what one form took of several is named by each of its own.
+    The strongest factor comes first: each factor that one form took is named.
     Terms of the noise come after the forms of the place: over a part of a turn a walk in time may
     stand for a ramp and two orders.
     """

@@ -88,9 +88,9 @@ def path_evidence(regression: Regression) -> Evidence | None:
 
 
 def aside_evidence(regression: Regression) -> Evidence | None:
-    """That readings are put aside in rows too long for glitches: these are an error of the mean.
+    """That readings are rejected in rows too long for glitches: these are an error of the mean.
 
-    If a share q of n readings is put aside independently, ``n q^m`` rows of m and more are
+    If a share q of n readings is rejected independently, ``n q^m`` rows of m and more are
     expected: none. Rows in correlated noise last as long as its correlation time.
     """
     rho, aside = regression.whiten.rho, regression.outlying

@@ -153,7 +153,7 @@ def equal_causes(
 
     What contains it or is contained in it is the same cause in another form, and explains for it
     where noise that follows a misfit makes the simpler form the better one; a flexible
-    cause is none; a line is what is detected, whatever makes it, and so is a ramp among those that
+    cause is none; a line is what is detected, from any origin, and so is a ramp among those that
     share its form only by the design (``spots``). What follows a recorded load or temperature
     is not known to follow the angle: in motion under others it is no ramp. A
     step so near an end of its run that the run's own zero explains as much is no step.

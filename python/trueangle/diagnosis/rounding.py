@@ -96,7 +96,7 @@ def unrounded(regression: Regression) -> Regression:
 
 
 def _fit(start: Regression, terms: Sequence[Extension], outlying: NDArray[np.bool_]) -> Rounded:
-    """Terms fitted to the steps of the readings; what runs draw anew has a size in each."""
+    """Terms fitted to the steps of the readings; what is new in every run has a size in each."""
     drawn = [term.run_effect.columns for term in terms if term.run_effect is not None]
     own = [_of_each_run(columns, start.bounds) for columns in drawn]
     columns = np.hstack([start.base, *(term.columns for term in terms), *own])

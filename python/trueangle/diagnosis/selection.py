@@ -45,7 +45,7 @@ def acts_on_runs() -> list[str]:
 
 
 def is_flexible(effect: type[Effect]) -> bool:
-    """It can imitate a specific cause, whatever the travel; chosen after those were tried."""
+    """It can imitate a specific cause, on any travel; chosen after those were tried."""
     return effect.flexible_below == ALWAYS
 
 

@@ -163,7 +163,7 @@ def _is_material(item: Evidence) -> bool:
 
 
 def _seen(spot: Ambiguity, unit: ErrorUnit) -> str:
-    """Causes of which one is detected, each with the size that it would have."""
+    """Causes in question, each with the size that it would have."""
     each = (Finding(cause, spot.estimates.get(cause, {}), {}, None, []) for cause in spot.causes)
     return " or ".join(brief_finding(finding, unit) for finding in each)
 

@@ -65,7 +65,7 @@ class TorqueAccount(ShownResult):
     Attributes
     ----------
     rms, noise : float
-        Measured minus simulated, and what of it is noise of one reading, Nm.
+        Measured minus simulated, and the noise of one reading in it, Nm.
     unexplained : bool
         More is there than the findings and noise.
     findings : tuple of TorqueFinding

@@ -59,7 +59,7 @@ class Backlash(Effect):
     kind: ClassVar[str] = BacklashTerm.kind
     sentence: ClassVar[str] = (
         "Play in the gear, a coupling or a key: the output lags by a constant angle "
-        "whose sign is the direction of travel, whatever the speed, load and place."
+        "whose sign is the direction of travel, at any speed, load and place."
     )
     factor: ClassVar[str] = "direction"
     form_of: ClassVar[tuple[str, ...]] = ("direction", "reversal_time")

@@ -1,4 +1,4 @@
-"""`blind_spots`: which causes a design of runs can separate, whatever the readings are."""
+"""`blind_spots`: which causes a design of runs can separate, for any readings."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ FORGOTTEN = 1e-18
 
 
 def departure_columns(signals: Signals, factor: str, signal: Array) -> Array:
-    """Columns by which an error ``signal`` may depart from its law in a factor x.
+    """Columns of the departures of an error ``signal`` from its law in a factor x.
 
     ::
 

@@ -15,7 +15,7 @@ LOW_ORDERS = tuple(("output", k) for k in range(1, 9))
 
 @dataclass(frozen=True)
 class Drawing:
-    """The readings in which an effect is to be hidden, what they are of, and chance."""
+    """The readings to hide an effect in, their joint, and random numbers."""
 
     signals: Signals
     around: JointPattern

@@ -57,9 +57,9 @@ class Effect(TabledParameters):
         the negative control: "direction", "velocity", "temperature", "torque", "mount",
         "angle", "run", "time", "none".
     form_of : tuple of str
-        Factors of an account without names of which it is a form; none for what has no such.
+        Factors of an account without names that it is a form of; none for what has none.
     is_cause : bool
-        It has a name, by which a diagnosis looks for it.
+        It has a name, and a diagnosis looks for it.
     confused_with : mapping of Effect class to str
         Causes before it in the list that it can be confused with, each with the measurement
         that separates them.
@@ -68,7 +68,7 @@ class Effect(TabledParameters):
     contains : tuple of Effect classes
         Special cases of this one: once it is chosen they are not.
     transfers : bool
-        A model of it lowers the error of runs that were not used to fit it.
+        Its model lowers the error of runs that were not used in the fit.
     located : bool
         Its search goes over a grid and is repeated inside the training part of a hold-out.
     acts_on_runs : bool
@@ -81,7 +81,7 @@ class Effect(TabledParameters):
     draws_zeros : bool
         It gives each run its own zero; held-out runs then get one too.
     has_exact_form : bool
-        Its form leaves nothing of it, however large it is: steps of a zero, ratios of teeth.
+        Its form is exact, however large it is: steps of a zero, ratios of teeth.
     changes_lines : bool
         It takes or gives a part of the pattern's own lines on average.
     form_follows : bool
@@ -93,7 +93,7 @@ class Effect(TabledParameters):
     rounds : bool
         It is the rounding of readings; other causes of the scatter act before it.
     of_motion : bool
-        Its columns follow from the shape and the motion alone, whatever the pattern.
+        Its columns follow from the shape and the motion alone, for any pattern.
     not_at_run_time : str
         Why no corrector can subtract it while the joint runs; empty where one can.
     size_name : str
@@ -185,7 +185,7 @@ class Effect(TabledParameters):
     def imitate(cls, regression: Regression) -> Extension | None:
         """What it would explain in the place of another cause, where it is not named itself.
 
-        None where `propose` covers all of it.
+        None where `propose` covers everything.
         """
         return None
 
@@ -201,12 +201,12 @@ class Effect(TabledParameters):
 
     @classmethod
     def form_columns(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
-        """Columns of its form, which is held against free functions of its factors."""
+        """Columns of its form, which is compared with free functions of its factors."""
         return np.hstack([term.columns for term, _ in terms])
 
     @classmethod
     def bends(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
-        """Columns by which the error of this cause's ``terms`` may depart from its form.
+        """Columns of the departures of this cause's ``terms`` from its form.
 
         By its factor (`trueangle.effects.departures`); of one that has an exact form none.
         """
@@ -232,7 +232,7 @@ class Effect(TabledParameters):
 
     @classmethod
     def blind_spots(cls, regression: Regression, found: Sequence[Ambiguity]) -> Iterator[Ambiguity]:
-        """What the design of the runs cannot show of it; the readings are not looked at.
+        """What the design of the runs cannot show; the readings are not used.
 
         ``found`` are those of the effects before it in the list.
         """
@@ -338,7 +338,7 @@ class ScatterFinding:
     alternatives : dict of str to Parameters
         What those would be.
     doubt : str
-        Why it is not confirmed, whatever else there is.
+        Why it is not confirmed, with anything else there is.
     """
 
     cause: str

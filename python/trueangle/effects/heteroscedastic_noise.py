@@ -126,7 +126,7 @@ class HeteroscedasticNoise(Effect):
 
 @dataclass(frozen=True)
 class NoiseBlock:
-    """Columns of which the logarithm of the variance may be made, and what choosing them costs."""
+    """Columns for the logarithm of the variance, and what choosing them costs."""
 
     columns: Array
     penalty: float
@@ -158,7 +158,7 @@ def noise_blocks(regression: Regression) -> dict[str, NoiseBlock]:
 
 
 def speed_penalty(regression: Regression) -> float:
-    """What noise that follows the speed (or the load) must bring, whatever its form."""
+    """What noise that follows the speed (or the load) must bring, in any form."""
     # One parameter, about which a reading has half as much information as about a mean, and one
     # of four factors.
     return regression.log_n - float(np.log(2.0)) + 2.0 * float(np.log(4.0))

@@ -275,7 +275,7 @@ class LocalDefect(Effect):
         pairs = ", ".join(f"{m:g} as {low:g}" for low, m in folded[:8])
         spot = cls.blind(
             f"all readings lie on one uniform grid of {grid.positions} positions, where gear "
-            f"orders look like low ones ({pairs}): a model of the aliases would hold at these "
+            f"orders look like low ones ({pairs}). A model of the aliases would hold at these "
             "positions and fail between them",
             MissingOrder,
             Sidebands,

@@ -1,4 +1,4 @@
-"""A line whose phase every run draws anew: how well its place and its amplitude are known."""
+"""A line whose phase is new in every run: how well its place and its amplitude are known."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ def known_orders(around: JointPattern) -> list[float]:
 
 
 def shows_line(signals: Signals, orders: Array) -> NDArray[np.bool_]:
-    """Orders of which a run travels enough for a line.
+    """Orders for which a run travels far enough to show a line.
 
     Less than half a period is like any slow curve.
     """

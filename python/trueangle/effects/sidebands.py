@@ -206,7 +206,7 @@ def _shared(regression: Regression, carrier: float, offset: float) -> Iterator[t
 
 
 def _is_one_line(extension: Extension) -> bool:
-    """A free pair of which only one line is there: that is a line, no modulation."""
+    """A free pair with one line only: that is a line, no modulation."""
     if extension.shape["form"] != "free":
         return False
     sizes = np.hypot(extension.coefficients[0::2], extension.coefficients[1::2])

@@ -135,7 +135,7 @@ class TimePeriodic(Effect):
 
     @staticmethod
     def _keeps_phase(regression: Regression, found: Extension) -> bool:
-        """An order of the angle with one phase for all runs explains as much of it.
+        """An order of the angle with one phase for all runs explains as much.
 
         Phases that are new in each of R runs leave a share of 1/R to one phase for all.
         """

@@ -46,7 +46,7 @@ class ZeroSlip(Effect):
 
     kind: ClassVar[str] = "zero_slip"
     sentence: ClassVar[str] = (
-        "A mount, coupling or turn counter settles anew before each run: every run has its own "
+        "A mount, coupling or turn counter settles again before each run: every run has its own "
         "zero, which no other factor of the run explains."
     )
     factor: ClassVar[str] = "run"

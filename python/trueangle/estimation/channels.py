@@ -106,10 +106,9 @@ def _refuse_beyond_limit(found: ChannelEstimate, named: str) -> None:
         return
     unit = math.degrees(1.0) / found.channels.periods_per_turn
     raise NoCurveError(
-        f"{named}: {found.coverage:.0f} deg of the channels' period with this noise settle the "
-        f"angle to {found.limit * unit:.2g} deg, and the correction takes "
-        f"{found.takes * unit:.2g} deg: turn the shaft further, 120 deg or more, or average "
-        "readings"
+        f"{named}: {found.coverage:.0f} deg of the channels' period determine the angle to "
+        f"{found.limit * unit:.2g} deg, and the correction is {found.takes * unit:.2g} deg: turn "
+        "the shaft 120 deg or more, or average readings"
     )
 
 

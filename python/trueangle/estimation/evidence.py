@@ -119,7 +119,7 @@ class EvidenceEstimate:
     def without(self, left_out: Collection[int]) -> EvidenceEstimate:
         """The estimate of the other runs, of the orders in ``told`` and under the same noise.
 
-        Models are sought anew from the sums of the other runs. Cost: one pass over their readings.
+        Models are sought again from the sums of the other runs. Cost: one pass over their readings.
         """
         runs = tuple(run for r, run in enumerate(self.runs) if r not in left_out)
         places = [self.orders.index(k) for k in self.told]

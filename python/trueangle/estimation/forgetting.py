@@ -63,7 +63,7 @@ class Forgetting:
         return faded if weights is None else faded * weights
 
     def follow(self, run: Hashable, weights: Array) -> float:
-        """Count readings of these weights; return the factor by which all before them fade."""
+        """Count readings of these weights; return the factor for all before them."""
         factor = self.factor**weights.size
         first, second = self._weights.get(run, (0.0, 0.0))
         self._weights[run] = (

@@ -116,7 +116,7 @@ class NormalEquations:
 
     @classmethod
     def of_rows(cls, design: Array, target: Array) -> NormalEquations:
-        """Of rows, whatever they are already multiplied by."""
+        """Of rows, with any weights already applied."""
         return cls(design.T @ design, design.T @ target, float(target @ target), len(target))
 
     @classmethod

@@ -54,8 +54,8 @@ class Moments(ShownResult):
 
     Notes
     -----
-    About 4 ns per reading and core, whatever the number of orders; 900 bytes per segment
-    and run, whatever the number of readings. Sums are compensated: a billion readings lose
+    About 4 ns per reading and core, for any number of orders; 900 bytes per segment
+    and run, for any number of readings. Sums are compensated: a billion readings lose
     no digits. Results do not depend on ``threads``. Threads may share an accumulator: they
     take turns, and nothing is lost; an accumulator for each, merged in the end, lets them
     work at the same time. Orders go up to 65 536 cycles of the shafts' common turn.
@@ -96,7 +96,7 @@ class Moments(ShownResult):
 
     @property
     def cycles(self) -> float:
-        """Turns per output turn of the base shaft, of which all orders are whole multiples."""
+        """Turns per output turn of the base shaft: all orders are whole multiples."""
         return self._sums.cycles
 
     @property

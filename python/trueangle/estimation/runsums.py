@@ -116,7 +116,7 @@ class RunSums:
         threads: int | None,
         forgetting: Forgetting,
     ) -> None:
-        """Add readings, each of which makes those before it count less."""
+        """Add readings; each makes those before it count less."""
         theta, error, weights = readings
         faded = forgetting.faded(theta.size, weights)
         with self._turn:

@@ -66,7 +66,7 @@ class Solution(Projection):
     ) -> Solution:
         """Fit the terms: run effects, correlation, clipping, projection.
 
-        What a fit ``before`` has made of the columns that both begin with is not made anew.
+        What a fit ``before`` has made of the columns that both begin with is not made again.
         """
         terms = tuple(terms)
         blocks = (readings.base, *(term.columns for term in terms))
@@ -305,7 +305,7 @@ def fields_of_solution(solution: Projection, of: type[Projection]) -> dict[str, 
 
 
 def _grown(blocks: tuple[Array, ...], before: Solution | None) -> Array:
-    """All columns side by side, one after the other; those of a fit before are not made anew."""
+    """All columns side by side, one after the other; those of a fit before are not made again."""
     design = np.empty((len(blocks[0]), sum(block.shape[1] for block in blocks)), order="F")
     same, at = 0, 0
     if before is not None:

@@ -74,7 +74,7 @@ class Admt4000(Target):
         missing = [k for k in pattern.lines if k not in REGISTERS]
         notes = [
             "keep the reserved upper bits of each register, set bit 10 of GENERAL for the user's "
-            "order 8, and compute the ECC registers anew"
+            "order 8, and compute the ECC registers again"
         ]
         if missing:
             rms = float(np.sqrt(np.mean(left**2))) * ARCSEC_PER_TURN

@@ -27,7 +27,7 @@ _SAMPLES: Final = 512
 
 
 class ChannelTarget(Target):
-    """A target that takes constants of channels, whatever error of the angle is left."""
+    """A target that takes constants of channels, with any error of the angle left."""
 
     sign = "absolute"
 

@@ -43,7 +43,7 @@ class Comparison(PlainResult):
     zero_deg : float
         Difference of the constants.
     argument : str
-        Angle of which it is a function: the reading where one of them was read from a table that
+        Its angle: the reading where one of them was read from a table that
         is looked up there, which knows no other zero.
     table_rms_arcsec, table_max_abs_arcsec : float or None
         What tables that were read add to their models by interpolation between their entries and
@@ -122,7 +122,7 @@ class Comparison(PlainResult):
         if self.verdict is None or self.p is None:
             return []
         below = f"below {self.false_alarms:g} it counts as changed (without the zero)"
-        return [f"p = {self.p:.2g}; {below}"]
+        return [f"p {'< 1e-12' if self.p < 1e-12 else f'= {self.p:.2g}'}; {below}"]
 
     def _arithmetic(self, unit: ErrorUnit) -> list[str]:
         if self.table_max_abs_arcsec is None or self.table_rms_arcsec is None:
@@ -150,7 +150,7 @@ def compare(
 
         Δ(r) = θ_a(r) - θ_b(r)
 
-    with its mean taken out: two corrections of one device, whatever their zeros. Where one of
+    with its mean taken out: two corrections of one device, with any zeros. Where one of
     them is of a reversed sensor and the other is not, as a table for its firmware, both are taken
     as the sensor counts.
 

@@ -62,13 +62,13 @@ class Exported(PlainResult):
     floor_arcsec : float
         rms that the number format alone leaves.
     lost : list of dict
-        ``{"order", "arcsec"}``: amplitude by which each order of the model differs.
+        ``{"order", "arcsec"}``: amplitude of the difference of each order of the model.
     proven : bool
         Every input was evaluated, or a bound covers what lies between those that were.
     proof : str
         How.
     zero_deg : float
-        Constant by which the corrected angle is larger: left to the target's own zero.
+        Constant added to the corrected angle: left to the target's own zero.
     left_out : list of dict
         ``{"term", "size_arcsec", "over"}``: terms of the model that the table cannot hold, and
         the largest change of the corrected angle that is left with each, over the range of the
@@ -265,7 +265,7 @@ def ranges_of(pattern: TurnPattern, term: Term) -> dict[str, tuple[float, float]
 
 
 def _size(pattern: TurnPattern, term: Term, ranges: Mapping[str, tuple[float, float]]) -> float:
-    """Turns by which the corrected angle changes at most."""
+    """Largest change of the corrected angle, turns."""
     plain = pattern.model
     model: HarmonicModel = plain.replace(terms=(*plain.terms, term))
     cells = np.arange((_AHEAD + 1) * _GRID) * (pattern.period / _GRID)

@@ -1,4 +1,4 @@
-"""Klipper's ``[angle]`` section: the values of an existing ``calibrate`` list, made anew.
+"""Klipper's ``[angle]`` section: the values of an existing ``calibrate`` list, made again.
 
 The list is no table of corrections. It holds the sensor's reading at consecutive full steps of
 the motor; Klipper solves 64 knots from it. A model of the angle does not contain the position of

@@ -30,7 +30,7 @@ class MiniCheetah(Tinymovr):
     kind: ClassVar[FileKind] = FileKind("a C source for the motor controller", (".h", ".c", ".txt"))
     unknown = (
         "the firmware's own calibration fills the table and keeps it in words 6 to 133 of its "
-        "settings in flash; where the table is changed otherwise, the electrical zero is found anew"
+        "settings in flash; if the table is changed otherwise, the electrical zero is found again"
     )
     options: ClassVar[dict[str, Option]] = {}
 

@@ -119,7 +119,7 @@ def prove_export(
     bits : int
         Of a reading.
     resolution : float
-        Turns by which the target rounds its result, for readings of more bits.
+        Rounding of the target's result, turns, for readings of more bits.
     turns : int
         Over which a joint is looked at whose shafts do not come back after one.
     continuous : bool
@@ -171,7 +171,7 @@ def prove_export(
 def lost_orders(
     correction: Correction, exact: Callable[[Array], Array], orders: Iterable[float]
 ) -> dict[int, float]:
-    """Amplitude in arcsec by which each whole order of a turn differs: what a table loses."""
+    """Amplitude of each whole order of a turn in the difference, arcsec: what a table loses."""
     wanted = sorted({round(order) for order in orders})
     if not wanted:
         return {}

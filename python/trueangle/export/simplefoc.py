@@ -59,7 +59,7 @@ class SimpleFoc(Target):
     sign = "subtract"
     unknown = (
         "the electrical zero and the sensor's direction belong to the motor: let initFOC() find "
-        "zero_electric_angle and sensor_direction anew with this table in place"
+        "zero_electric_angle and sensor_direction again with this table in place"
     )
     options = {
         "variant": Option(

@@ -72,7 +72,7 @@ class TablePart(NamedTuple):
     exact : callable
         What it should be, at readings in turns.
     resolution : float
-        Turns by which a result is rounded.
+        Rounding of a result, turns.
     turns : int
         Of the output, over which shafts are looked at that do not come back after one.
     continuous : bool
@@ -108,7 +108,7 @@ class Made:
     floor_arcsec : float
         rms that the number format alone leaves.
     zero_deg : float
-        A constant by which the corrected angle is larger: left to the target's own zero.
+        A constant added to the corrected angle: left to the target's own zero.
     lost : callable, optional
         Of its own where several tables are not one of the output's turn.
     notes : tuple of str

@@ -88,7 +88,7 @@ class Vesc(ChannelTarget):
             _decode(written, volts),
             _decode(exact, volts),
             entries=len(_NAMES),
-            notes=("set the sensor port to sine/cosine; find the motor's offset anew",),
+            notes=("set the sensor port to sine/cosine; find the motor's offset again",),
         )
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:

@@ -50,7 +50,7 @@ def choose_argument(
 ) -> ArgumentChoice:
     """The angle requested; for ``"auto"`` the true one, unless its zero is new in every run.
 
-    Where a rig homes its reference anew for every run, the same place of the joint has
+    Where a rig homes its reference again for every run, the same place of the joint has
     another reference angle each time, and no order repeats in it. The joint's own reading
     keeps its zero. It is taken where the zeros of the runs differ by more than 0.2 deg and
     one pattern over it explains clearly more than one over the reference.
@@ -89,8 +89,8 @@ def choose_argument(
     return ArgumentChoice(
         "indicated",
         "the zero of the reference changes from run to run (by up to "
-        f"{moved * 360.0 / period:.3g} deg) and the pattern follows the joint's own reading; "
-        "the error is fitted over the indicated angle",
+        f"{moved * 360.0 / period:.3g} deg) and the pattern follows the joint's own reading: "
+        "fitted over the indicated angle",
     )
 
 

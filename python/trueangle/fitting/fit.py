@@ -109,7 +109,7 @@ def fit(
         Lines that the reference makes (50 and 100 of a stepper of 200 steps): fitted jointly with
         the pattern, and not in the model. With several runs each line has one amplitude, and a
         separate phase in every run where that lowers the held-out error: a reference that was
-        mounted anew has a new zero.
+        remounted has a new zero.
     method : {"plain", "moments", "qr", "counts"}, optional
         Forces a way of solving: QR of all rows, one pass of piecewise moments with normal
         equations or with QR, or one mean error per count of an encoder that counts (whole
@@ -143,7 +143,7 @@ def fit(
     Notes
     -----
     Coefficients agree with `numpy.linalg.lstsq` to 1e-12 relative on well-conditioned
-    data. Cost O(N) for N readings beyond a few thousand, whatever the number of orders.
+    data. Cost O(N) for N readings beyond a few thousand, for any number of orders.
 
     Examples
     --------

@@ -109,7 +109,7 @@ def hold_out(fit: FitResult) -> HeldOut:
     With many runs several are held out together (five or twelve parts, with and without
     a selection of orders).
 
-    Where the orders were selected by evidence they are selected anew without the run, from the
+    Where the orders were selected by evidence they are selected again without the run, from the
     sums of the others (`EvidenceEstimate.without`); the noise is that of all runs.
 
     Raises

@@ -1,7 +1,7 @@
 """The fit of orders that were chosen by evidence: the mixture over models and noises.
 
 Outliers are readings more than 8 robust standard deviations off its curve. They are rejected,
-and orders and coefficients are estimated anew, until the same readings are rejected twice.
+and orders and coefficients are estimated again, until the same readings are rejected twice.
 """
 
 from __future__ import annotations

@@ -45,14 +45,14 @@ class Nuisance:
     reference : tuple of (order, A, B)
         Lines that the reference makes, the same in every run.
     turned : tuple of (order, amplitude, phases)
-        The same where the reference was mounted anew for every run: one amplitude, and a phase
+        The same where the reference was remounted for every run: one amplitude, and a phase
         in every run, radians.
     shares : mapping of str to float
         Part of the held-out sum of squares that each kind took away.
     unseparated : tuple of str
         Kinds that lower the error as much but cannot be distinguished from the pattern.
     inflation : tuple of float
-        Factor by which they increase the standard errors of ``A, B`` of each order.
+        Their factor on the standard errors of ``A, B`` of each order.
     """
 
     kinds: tuple[str, ...] = ()

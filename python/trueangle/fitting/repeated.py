@@ -234,7 +234,7 @@ def _left_out(sums: _Repeats, basis: Array) -> tuple[float, float]:
 
 
 def _moved(sums: _Repeats, basis: Array, sizes: tuple[float, float], kind: str) -> Array:
-    """Covariance of the coefficients by what repeats, less what ``kind`` holds of it."""
+    """Covariance of the coefficients by what repeats, less that in ``kind``."""
     run, place = sums.of_pair
     runs = np.unique(run)
     found = _spread(sums.scores, basis, sizes)

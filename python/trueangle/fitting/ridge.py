@@ -77,7 +77,7 @@ def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
     Notes
     -----
     Every reading is reduced once, to the triangle of its fold, which is all that the
-    many fits and scores need: O(N) for N readings, whatever the number of penalties.
+    many fits and scores need: O(N) for N readings, for any number of penalties.
     """
     amplitudes, scores = _core.ridge_path(
         _folds(problem, weights), len(problem.runs) > 1, _PENALTIES

@@ -47,7 +47,7 @@ MANY = 0.06
 HIDDEN = 5.0
 
 #: Rounds of re-weighting end when no weight moves by more than this, or after `STEPS`; of many
-#: orders, which each round solves anew, earlier: after `_WORK` multiplications, but not before
+#: orders, which each round solves again, earlier: after `_WORK` multiplications, but not before
 #: `FEWEST_STEPS`.
 SETTLED = 1e-4
 STEPS = 50

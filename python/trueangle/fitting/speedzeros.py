@@ -23,7 +23,7 @@ _LEVEL: Final = 1e-3
 def zeros_follow_speed(
     runs: Sequence[CalibrationRun], zeros: Array, std: Array
 ) -> tuple[float, float] | None:
-    """Delay (s) by which the zeros follow the mean speeds of the runs, and its p-value.
+    """Delay (s) of the zeros behind the mean speeds of the runs, and its p-value.
 
     ::
 

@@ -117,7 +117,7 @@ def _table(fit: FittedCoefficients, shown: ErrorUnit) -> list[str]:
 
 
 def plain_fit(found: FittedCoefficients) -> dict[str, Any]:
-    """The fit with the same names whatever way it took; angles in arcsec."""
+    """The fit with the same names for every method; angles in arcsec."""
     period = found.model.period
     record = found.model.fit
     return {

@@ -42,7 +42,7 @@ class SummedProblem(Problem):
     def solve(
         self, weights: Sequence[Array | None], penalty: float = 0.0, watch: bool = False
     ) -> SolvedProblem:
-        """Least squares on all readings, whatever the weights of those kept."""
+        """Least squares on all readings, for any weights of those kept."""
         solution = self.summed.moments.solution(self.shafts)
         fitted = SolvedProblem(solution, solution.offsets, self.shafts, self.period)
         return self.penalised(fitted, weights, penalty) if penalty > 0.0 else fitted

@@ -57,7 +57,7 @@ def far_runs(runs: Sequence[NormalEquations]) -> list[tuple[int, float]]:
 
         S_r(b) - S_r(b_r) > 0.2 [S_r(0) - S_r(b_r)]
 
-    and 25 times what noise alone would make of it, where ``b`` are the common coefficients,
+    and 25 times what noise alone would make, where ``b`` are the common coefficients,
     ``b_r`` those of the run alone; with three runs and more that each hold all orders ``b`` is
     their median.
     """
@@ -86,7 +86,7 @@ def far_runs(runs: Sequence[NormalEquations]) -> list[tuple[int, float]]:
 
 
 def _solved(sums: NormalEquations) -> tuple[Array, int, bool]:
-    """Least squares from normal equations: its rank, and whether all of it is well determined."""
+    """Least squares from normal equations: its rank, and whether it is well determined."""
     found = sums.solved()
     values = np.linalg.eigvalsh(sums.gram)
     clear = bool(values[0] > _SPEAKS**2 * values[-1])

@@ -20,7 +20,7 @@ _LOOKED_AT: Final = 512
 
 
 def of_worth(fit: FitResult) -> FitResult:
-    """The fit; refuse a correction of which every order, and the curve, are below their errors.
+    """The fit; refuse a correction with every order, and the curve, below their errors.
 
     ::
 

@@ -185,7 +185,7 @@ def candidate_orders(
 
 
 def _distinct(run: CalibrationRun) -> int:
-    """Places within a turn, to a ten-thousandth of it."""
+    """Places within a turn, to a ten-thousandth."""
     return int(np.unique(np.round(np.mod(run.reference, run.period) / run.period, 4)).size)
 
 

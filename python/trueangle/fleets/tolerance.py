@@ -135,7 +135,7 @@ def _one_sided(k: float, n: int, share: float, places: Array, weights: Array) ->
 
 @told_kinds
 def wilks_units(share: float, confidence: float, sides: int = 2) -> int:
-    """Fewest units whose extremes bound a share of all, whatever the distribution.
+    """Fewest units whose extremes bound a share of all, for any distribution.
 
     One-sided ``1 - pⁿ ≥ γ``, two-sided ``1 - n pⁿ⁻¹ + (n-1) pⁿ ≥ γ``
     (Wilks 1941).

@@ -38,8 +38,8 @@ def check_decoded(path: Path, size: int, columns: int) -> None:
         raise DecodedSizeError(
             path,
             f"unpacks to {shown_bytes(size)} or more in {columns} columns "
-            f"({stored_size(path)} on the disk), but a table of runs is held in memory up to "
-            f"{shown_bytes(DECODED_BYTES)} only; `ta.fit_logs(...)` reads more, in constant memory",
+            f"({stored_size(path)} on the disk); a table of runs is read into memory up to "
+            f"{shown_bytes(DECODED_BYTES)}; `ta.fit_logs(...)` reads more",
         )
 
 

@@ -136,7 +136,7 @@ def decimal_of(delimiter: str) -> str:
 
 
 def is_blank_between_commas(text: str) -> bool:
-    """Whether blanks part numbers some of which have a decimal comma: ``0,5 1 1,25``.
+    """Whether blanks part numbers, some with a decimal comma: ``0,5 1 1,25``.
 
     Commas would part them as well, into other numbers.
     """

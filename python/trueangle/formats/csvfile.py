@@ -43,7 +43,7 @@ def columns(path: Path, topic: str | None = None) -> list[str]:
 def read(path: Path, wanted: Selection) -> Iterator[Batch]:
     """Columns ``names`` in batches, empty cells as NaN; see `format.FormatModule`.
 
-    Those of ``texts`` are labels, whatever they look like.
+    Those of ``texts`` are labels, even if they look like numbers.
     """
     labels = [name for name in wanted.names if name in wanted.texts]
     numbers = [name for name in wanted.names if name not in wanted.texts]

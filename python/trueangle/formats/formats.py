@@ -21,7 +21,7 @@ _SERIAL = b"^%s[^\n]*\n(?:[^\n]*\n){0,5}?%s" % (_NAMED % rb"([A-Za-z_]\w*)", _NA
 
 
 def _packed(*endings: str) -> tuple[str, ...]:
-    """Endings of text, and those of what gzip and zstd make of it."""
+    """Endings of text, and of text packed by gzip and zstd."""
     return tuple(ending + packed for packed in ("", ".gz", ".zst") for ending in endings)
 
 

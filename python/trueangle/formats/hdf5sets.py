@@ -131,7 +131,7 @@ def part(data: h5py.Dataset, start: int, stop: int) -> Any:
 
 
 def put(data: h5py.Dataset, start: int, stop: int, values: NDArray[Any]) -> None:
-    """Write a segment of a vector, in whatever direction it lies."""
+    """Write a segment of a vector, along any axis."""
     place = _place(data, start, stop)
     shape = tuple(
         stop - start if s.start is not None else n for s, n in zip(place, data.shape, strict=True)

@@ -123,7 +123,7 @@ def contents(path: Path, topic: str | None = None) -> Contents:
 
 
 def _clocked(names: Sequence[str]) -> Callable[[list[_Row]], Batch]:
-    """What makes columns of rows; the clock of a terminal begins anew at midnight."""
+    """What makes columns of rows; the clock of a terminal begins again at midnight."""
     days, last = 0.0, -np.inf
 
     def time(row: _Row) -> float:

@@ -1,4 +1,4 @@
-"""Packed parts and files of bags, unpacked up to a limit, whatever their headers declare.
+"""Packed parts and files of bags, unpacked up to a limit, for any header.
 
 A file that is packed as a whole is read at places all over, so it is unpacked to a temporary
 folder before; a few kilobytes can fill a disk there.

@@ -231,7 +231,7 @@ def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
 
 
 def _aways(moves: NDArray[np.float64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """By how much of each step the moves are no multiples of it at most."""
+    """Largest departure of the moves from multiples of each step, in steps."""
     counts = moves / steps[:, None]
     return np.asarray(np.abs(counts - np.round(counts)).max(axis=1, initial=0.0))
 

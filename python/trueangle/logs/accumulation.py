@@ -190,7 +190,7 @@ def accumulate_each(
     """Moments of every log in turn, segments of logs read side by side.
 
     A log is always cut in the same segments, merged in their order: the sums are the same,
-    bit for bit, whatever the number of threads.
+    bit for bit, with any number of threads.
     """
     workers = _core.thread_count(settings.threads)
     stretches = (stretch for path in paths for stretch in _found(path, settings))

@@ -45,7 +45,7 @@ def correct_logs(
 ) -> BatchReport:
     r"""Correct log files, in constant memory and without ever losing a row.
 
-    Every output is written aside, read back and compared, synced, and only then named.
+    Every output is written in a hidden folder, read back and compared, synced, and only then named.
     A log that fails does not stop the others (a full disk does). Running again skips what
     is done: the output folder's manifest knows.
 

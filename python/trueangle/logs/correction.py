@@ -1,4 +1,4 @@
-"""Correcting one log: copied aside with the corrected columns, verified, published."""
+"""Correcting one log: copied with the corrected columns, verified, published."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def correct_log(task: CorrectionTask, watch: Watch = lambda rows, part: None) ->
 
 
 def states_after(result: Mapping[str, Any]) -> dict[str, JointState]:
-    """The joints' states in what `correct_log` returned or a manifest kept of it."""
+    """The joints' states in a result of `correct_log` or its manifest."""
     return {name: JointState.of(state) for name, state in result.get("after", {}).items()}
 
 

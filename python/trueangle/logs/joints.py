@@ -217,7 +217,7 @@ class JointState(NamedTuple):
 
     @classmethod
     def of(cls, plain: Sequence[Any]) -> JointState:
-        """From the lists that JSON makes of it."""
+        """From lists of JSON."""
         turns, travel = plain
         return cls(TurnState(*turns), tuple(travel))
 

@@ -132,7 +132,7 @@ class ChannelStatistics:
         if off > 4.0 * exchanged:
             return (
                 "the channels are nearer to the curve of the model with sine and cosine exchanged: "
-                "they are swapped; name them anew, `signals={'sine': 'NAME', 'cosine': 'NAME'}`"
+                "they are swapped; rename them, `signals={'sine': 'NAME', 'cosine': 'NAME'}`"
             )
         if 2.0 * far > n:
             return (
@@ -141,9 +141,9 @@ class ChannelStatistics:
             )
         if self._near:
             return (
-                f"the second track is off choosing the period by up to {self.mismatch:.2g} periods "
-                f"and {self._near} of {n:.0f} readings by more than {_NEAR:g}: a period is wrong "
-                "from 0.5 on; calibrate both tracks again"
+                f"the two tracks differ by up to {self.mismatch:.2g} periods, {self._near} of "
+                f"{n:.0f} readings by more than {_NEAR:g}, and from 0.5 on a period is wrong; "
+                "calibrate both tracks again"
             )
         return "; ".join(dropout_words(int(far), self._first)) if self._first else ""
 

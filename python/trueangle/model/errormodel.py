@@ -1,4 +1,4 @@
-"""An angle error as a constant, harmonics and terms: what a model holds, and what follows of it."""
+"""An angle error as a constant, harmonics and terms: what a model holds, and what follows."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ class HarmonicModel(ErrorModel):
         ``step.swap(model)`` corrects by another model from the next step on, in every thread that
         holds the step: a step in another thread ends with the model it began with. Both have the
         same period and ``indicated_sign``, and terms or none. What is known about the travel stays
-        where the terms of the other model can hold it, else it begins anew. The new model is made
+        where the terms of the other model can hold it, else it begins again. The new model is made
         ready first (some tenths of a millisecond), by the thread that swaps.
 
         Examples
@@ -170,7 +170,7 @@ class HarmonicModel(ErrorModel):
         return axes
 
     def replace(self, **changes: Any) -> HarmonicModel:
-        """A copy with some fields changed, checked anew."""
+        """A copy with some fields changed, checked again."""
         return replace(self, **changes)
 
     def save(self, path: str | PathLike[str]) -> None:

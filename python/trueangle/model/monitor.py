@@ -115,7 +115,7 @@ class Monitor(ShownResult):
 
     Notes
     -----
-    About the cost of `Moments.update` a reading, whatever the number of orders, and 3
+    About the cost of `Moments.update` a reading, for any number of orders, and 3
     microseconds a window of eight orders, however many readings it had. 64 kB at most for orders
     up to 32. It never adapts to what it cannot name: an alarm restarts its chart, and the means
     go on.

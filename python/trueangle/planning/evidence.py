@@ -156,7 +156,7 @@ def evidence_between(
 
 
 def is_doubted(regression: Regression, one: Hypothesis, spots: Sequence[Ambiguity]) -> bool:
-    """Whether readings with this cause would leave it uncertain, whatever their evidence.
+    """Whether readings with this cause would leave it uncertain, with any evidence.
 
     ``spots`` are what the design of the readings cannot distinguish.
     """

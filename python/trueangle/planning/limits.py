@@ -50,7 +50,7 @@ class Limits:
     mount_deg : tuple of float
         How far the reference can be turned on its mount.
     current_A : (float, float)
-        Currents of the motor that can be set whatever the load; both 0: none.
+        Currents of the motor that can be set at any load; both 0: none.
     samples, runs : int
         Readings of one run and further runs, at most.
     reversals : bool

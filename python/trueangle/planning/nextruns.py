@@ -268,7 +268,8 @@ class NextRuns(PlainResult):
 
     def summary(self) -> str:
         """What to do at the rig, and what it would show."""
-        lines = []
+        notes = [f"  note: {note}" for note in self.notes]
+        lines = [] if self.runs else [*notes]
         if self.runs:
             lines.append(
                 f"Next: {counted(self.runs, 'run')} of {self.readings} readings in all, "
@@ -302,8 +303,7 @@ class NextRuns(PlainResult):
             lines.append(f"  shows {', '.join(dict.fromkeys(shown))}")
         if self.beyond:
             lines.append(f"  conditions not measured so far: {', '.join(self.beyond)}")
-        lines += [f"  note: {note}" for note in self.notes]
-        return laid_out(lines)
+        return laid_out([*lines, *(notes if self.runs else ())])
 
     def _brief(self) -> str:
         told = [cause for entry in self.between if entry.told for cause in entry.causes]

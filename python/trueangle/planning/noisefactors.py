@@ -150,7 +150,7 @@ def facet_noise_factor(divisions: int, shifts: ArrayLike, highest: int | None = 
     divisions : int
         Facets N.
     shifts : array_like of int, shape (..., mounts)
-        Facets by which the artefact is turned at each mount.
+        Facets that the artefact is turned by at each mount.
     highest : int, optional
         Highest order looked at; default the last below N/2.
 

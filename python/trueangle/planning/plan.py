@@ -160,7 +160,7 @@ def plan_mounts(
             "vanish in each mount's zero: only another number of facets shows them"
         )
     if mounts == 2:
-        notes.append("with two mounts the artefact's own errors separate badly; three do well")
+        notes.append("2 mounts determine the artefact's own errors poorly; use 3")
     worst = max(factors.values())
     return CalibrationPlan(
         kind="mounts",

@@ -140,7 +140,7 @@ class DesignScales:
         """What designs decide, added to earlier runs if there are any.
 
         ``changes`` are those from the plainest run. The evidence of designs that
-        cannot exceed ``least``, whatever it is, is not computed. One design in six has been weighed
+        cannot exceed ``least`` in any case is not computed. One design in six has been weighed
         before.
         """
         key = (*designs,), start is None

@@ -141,7 +141,7 @@ def strong_gear_order(
 
 
 def curve_envelope(curve: ModelCurve) -> tuple[Array, Array, Array]:
-    """Least and greatest value of a curve, at places of which each holds several periods.
+    """Least and greatest value of a curve, at places that each hold several periods.
 
     Returns
     -------

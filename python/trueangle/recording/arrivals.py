@@ -232,7 +232,7 @@ class Arrivals:
 
     @property
     def is_over(self) -> bool:
-        """The source gives no more; what it gave can be taken."""
+        """The source has ended; what it gave can be taken."""
         return not self._thread.is_alive()
 
     @property

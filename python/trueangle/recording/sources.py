@@ -216,7 +216,7 @@ def _library(name: str, what: str) -> Any:
 def _can_bus(address: str, options: SourceOptions) -> Source:
     """``can:CHANNEL`` or ``can:INTERFACE:CHANNEL``; rows come as lines of CSV.
 
-    A row is complete with one frame of each identifier that is requested, whatever their order:
+    A row is complete with one frame of each identifier that is requested, in any order:
     rows come as often as the rarest of them, with the newest of each. Frames without a value of
     each column become a line that is no row: it is rejected and counted as any other.
     """

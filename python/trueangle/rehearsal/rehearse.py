@@ -70,9 +70,9 @@ def rehearse(
         Of the vocabulary; all where not given.
     seeds : int
         Trials of a cause at most, each with noise, angles and all parameters but the size
-        drawn anew.
+        sampled again.
     seed : int
-        Equal seeds give equal results, whatever the number of workers, where all trials are made.
+        Equal seeds give equal results, with any number of workers, where all trials are made.
     within : float, optional
         Seconds that it may take; the result until then is returned and marked as incomplete.
     workers : int, optional

@@ -74,7 +74,7 @@ class Workers:
     """Trials side by side in ``count`` processes.
 
     A thread for each process hands it one trial after the other. `close` ends all of them at
-    once, whatever they are doing.
+    once, at any moment.
     """
 
     def __init__(self, sim: Simulation, seed: int, count: int) -> None:

@@ -217,7 +217,7 @@ def fit_or_reason(
 
 
 def gain_or_reason(fit: FitResult | None) -> tuple[HeldOut | None, str]:
-    """What the fit gains on runs held out of it; or the reason why that is not known."""
+    """The gain of the fit on held-out runs, or the reason why it is not known."""
     if fit is None:
         return None, "There is no model to compare with other runs."
     try:

@@ -105,12 +105,12 @@ class Page(ShownResult):
         return self._written().encode("utf-8", "replace").decode("utf-8")
 
     def _written(self) -> str:
-        """The page, anew."""
+        """The page, again."""
         raise NotImplementedError
 
     @property
     def _hashes(self) -> list[str]:
-        """Of the files that it was made from, none of which it replaces."""
+        """Of the files that it was made from; it replaces none."""
         return []
 
     def save(self, path: str | PathLike[str]) -> None:

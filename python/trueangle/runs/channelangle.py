@@ -137,7 +137,7 @@ def following(
 
 
 def common_channels(runs: Iterable[CalibrationRun]) -> Channels | None:
-    """The channels of which the indicated angles of all runs were made; None without."""
+    """The channels that all indicated angles were made from; None without."""
     found = {run.channels for run in runs}
     return found.pop() if len(found) == 1 else None
 

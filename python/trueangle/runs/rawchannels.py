@@ -358,7 +358,7 @@ class Channels:
         return (kept + 1).tolist(), part.real.tolist(), sine.tolist()
 
     def replace(self, **changes: Any) -> Channels:
-        """A copy with some fields changed, checked anew."""
+        """A copy with some fields changed, checked again."""
         return replace(self, **changes)
 
     def to_dict(self) -> dict[str, Any]:

@@ -301,7 +301,7 @@ def runs_or_data(data: Any) -> tuple[list[CalibrationRun] | None, Any]:
 def _resolved(angle: Array, other: Array, period: float) -> Array:
     """Angles, with those that a double does not resolve within a turn moved half a turn off.
 
-    Such a number (1e300) is no angle: whatever it wraps to is rounding, which could look like a
+    Such a number (1e300) is no angle: its wrapped value is rounding, which could look like a
     good reading. Half a period off the ``other`` angle it is an outlier to every test.
     """
     most = 2.0**40 * period  # at which a double resolves 1/4096 of a turn

@@ -59,7 +59,7 @@ def selfcal(
     loop : {"open", "closed", "unknown"}
         Whether the speed was held by a loop closed on this encoder.
     loop_bandwidth : float, optional
-        Of that loop, in hertz: orders that pass below twice of it are refused.
+        Of that loop, in hertz: orders that pass below twice that are refused.
     gear_ratio : float, optional
         Motor turns per output turn, for ``"dual"``: a count of teeth, which stays.
     fit_ratio : bool

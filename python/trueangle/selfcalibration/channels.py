@@ -59,7 +59,7 @@ def channel_patterns(
     notes += [followed, *(f"{fault.says}; {fault.mend}" for fault in faults), *apart]
     if found.correlated > 1.0:
         notes.append(
-            f"residuals are autocorrelated: {found.correlated:.3g} readings carry the "
+            f"residuals are autocorrelated: {found.correlated:.0f} readings carry the "
             "information of one"
         )
     timed = _by_time(

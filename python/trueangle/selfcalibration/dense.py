@@ -70,7 +70,7 @@ def fit_dense(
     averaged over the evidence of this variance; their covariance includes its uncertainty.
     Where neighbouring residuals are correlated it is estimated from whitened rows.
     ``freedom_lost`` counts rows without information of their own (differences to a mean).
-    Combinations of patterns that retain less than ``floor`` count as not identifiable, whatever
+    Combinations of patterns that retain less than ``floor`` count as not identifiable, for any
     the random nuisances hide of the others.
     """
     p, m = parts[0].nuisances.shape[1], len(columns)

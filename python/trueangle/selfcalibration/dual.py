@@ -154,8 +154,8 @@ def _check_travel(named: str, channels: GearedChannels, gear_ratio: float | None
     if turns < 1.0 - SLIP:  # positions evenly over a turn do not repeat the first
         ratio = "" if gear_ratio is None else f", gear_ratio={gear_ratio:g}"
         raise NoModelError(
-            f"{named}: the motor made only {turns:.2g} turns in the longest run; 1 turn in one "
-            "run is needed for orders of the motor, 1 turn of the output for those of the output. "
+            f"{named}: the motor made only {turns:.2g} turns in the longest run. Orders of the "
+            "motor require 1 turn of it in one run, orders of the output 1 turn of the output. "
             f'Record more: `ta.planning.plan_self("dual"{ratio})` plans the travel'
         )
 

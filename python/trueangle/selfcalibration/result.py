@@ -155,7 +155,7 @@ class SelfCalibration(PlainResult):
 
     @property
     def channels(self) -> Channels | None:
-        """Constants of a sine and a cosine channel, by which the model decodes."""
+        """Constants of a sine and a cosine channel that the model decodes with."""
         return self.model.channels
 
     def _plain_channels(self) -> dict[str, Any]:
@@ -239,7 +239,7 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
         f"{result.turns:.1f} turns, noise {unit.text(result.noise_arcsec)}",
     ]
     if result.diagnosis is not None:
-        lines = [*result.diagnosis.lines(), "", *lines]
+        lines += ["", *result.diagnosis.lines()]
     if result.channels is not None:
         lines += ["", *_constants(result, unit)]
     if result.orders:

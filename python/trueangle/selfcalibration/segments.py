@@ -79,7 +79,7 @@ class Segment:
 
 
 def ripple_lead(stretch: Segment, speed: Array) -> Array:
-    """Phase by which the ripple of order 1 leads that of a shaft at constant speed.
+    """Lead of the ripple of order 1 over that of a shaft at constant speed, phase.
 
     A rotor of friction ``f(ω)`` answers the torque ``T e^(ikθ)`` by
     ``-T / (k² ω²) e^(i(kθ + φ/k))`` with

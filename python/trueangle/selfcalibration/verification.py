@@ -23,7 +23,7 @@ def judged_patterns(
 ) -> HeldOutPattern:
     """Two patterns (cosine and sine in turn, radians) of two parts of the readings.
 
-    ``chance`` is that of so great a difference by noise alone.
+    ``chance`` is the p-value of the difference under noise alone.
     """
     gap = second - first
     return HeldOutPattern(

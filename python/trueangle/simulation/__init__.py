@@ -1,4 +1,4 @@
-"""Simulation of a joint: the assumed model of it, and how it would be measured."""
+"""Simulation of a joint: its assumed model, and how it would be measured."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from .designs import RunDesign
 
 
 def design_of(run: CalibrationRun) -> RunDesign:
-    """The design by which a run like a measured one is simulated.
+    """The design of a simulated run like a measured one.
 
     Parameters
     ----------

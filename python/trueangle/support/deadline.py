@@ -62,7 +62,7 @@ class ProgressLine:
         return due
 
     def show(self, text: str, state: dict[str, Any]) -> None:
-        """Show a text, or the object that says the same."""
+        """Show a text, or the object with the same content."""
         if self._style == "json":
             import json  # a help needs none of it
 

@@ -37,7 +37,7 @@ UNIT_PERIODS: Final = {"deg": 360.0, "rad": 2.0 * math.pi, "turn": 1.0}
 
 
 class ErrorUnit(NamedTuple):
-    """A unit, and how many of it one second of arc is.
+    """A unit, and its number in one second of arc.
 
     Examples
     --------

@@ -137,7 +137,7 @@ def test_the_commands_calibrate_correct_and_watch_the_margin(reference, tmp_path
     late = written(tmp_path / "late.csv", late)
     assert main(["correct", late, "-m", model, "-o", str(tmp_path / "late_out.csv")]) == 0
     err = capsys.readouterr().err
-    assert "a period is wrong from 0.5 on" in err
+    assert "from 0.5 on a period is wrong" in err
     assert len(err.strip().splitlines()) == 1
 
 

@@ -1,1 +1,1 @@
-"""What an error follows: functions of place, direction, speed, load ..., whatever their names."""
+"""What an error follows: functions of place, direction, speed, load ..., with or without a name."""

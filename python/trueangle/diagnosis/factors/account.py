@@ -322,7 +322,7 @@ def _shaft(orders: Sequence[float], shafts: dict[str, float]) -> str:
 def _alike(
     account: FactorAccount, members: Sequence[int], factor: str, mean: Array
 ) -> tuple[str, ...]:
-    """Factors any of which explains as much in the place of one, or is nearly the same columns.
+    """Factors that explain as much in the place of one, or are nearly the same columns.
 
     The evidence may distinguish the latter, but only by errors of the signals.
     """

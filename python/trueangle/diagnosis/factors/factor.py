@@ -82,7 +82,7 @@ class Factor(PlainResult):
     log_bayes_factor : float
         Natural logarithm, with the factor over without it.
     named_by : tuple of str
-        Confirmed causes that are forms of it.
+        Confirmed causes that are forms of this factor.
     not_distinguished_from : tuple of str
         Factors that are the same columns in these runs.
     curve : FactorCurve

@@ -64,7 +64,7 @@ class Group:
         of a group that is none.
     unit : str
     alternatives : float
-        Number of groups of which it was the strongest.
+        Number of groups compared; this was the strongest.
     event : tuple of int or None
         Run and row of what happened once, which no other run will show.
     jump : float or None

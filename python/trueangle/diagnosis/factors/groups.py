@@ -104,11 +104,11 @@ def factor_groups(
     error : ndarray, shape (n,)
         Measured minus simulated, whose spectra propose further lines.
     lines : sequence of float
-        Orders, in cycles of an output turn, that are looked at whatever the spectra are.
+        Orders, in cycles of an output turn, that are looked at for any spectra.
     drawn : sequence of float
-        Orders that every run has anew.
+        Orders that are new in every run.
     frequencies : sequence of float
-        Lines in Hz that every run has anew.
+        Lines in Hz that are new in every run.
     events : sequence of (int, int)
         Run and row at which something happened once.
     shafts : iterable of float
@@ -181,7 +181,7 @@ class _PeakSpectrum:
 
 
 def _without_low(theta: Array, error: Array, run: NDArray[np.int64]) -> Array:
-    """The error less what its mean by run and the low orders take of it."""
+    """The error less its mean by run and its low orders."""
     left = less_lines(theta, error, range(1, LOW + 1))
     counts = np.maximum(np.bincount(run), 1)
     return np.asarray(left - (np.bincount(run, left) / counts)[run])
@@ -379,7 +379,7 @@ def _longest(signals: Signals, x: Array) -> Array:
 
 
 def _clock(signals: Signals) -> Iterator[Axis]:
-    """Time in the run: what all runs show of it; what only one has is noise."""
+    """Time in the run: what all runs show; what only one has is noise."""
     spans = [float(np.ptp(signals.clock[a:b])) for a, b in signals.run_bounds()]
     whole = max(spans, default=0.0)
     if not whole > 0.0:

@@ -66,7 +66,7 @@ def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]
 
 
 def base_group(regression: Regression, rows: NDArray[np.int64]) -> Group | None:
-    """What is free whatever is found, but for zeros, as a group; None where nothing is.
+    """What is free with any findings, except zeros, as a group; None where nothing is.
 
     Low orders over an arc whose belief holds are not: a function of the place would be taken for
     a change of them.
@@ -136,7 +136,7 @@ class NamedForms:
         return score - sum(self.price(name) for name in names if name in self.places), tau
 
     def price(self, name: int) -> float:
-        """Penalty of a finding next to free functions: for the choice of it and of its size."""
+        """Penalty of a finding next to free functions: for its choice and its size."""
         own = self.account.groups[self.places[name]].alternatives
         return float(np.log(len(self.account.groups) * SIZES * own))
 

@@ -162,7 +162,7 @@ def _largest_step(values: Array, width: int) -> tuple[int, float]:
 
 
 def _orders(regression: Regression, *, drawn: bool) -> list[float]:
-    """Orders of the terms: those that every run draws anew, or the others."""
+    """Orders of the terms: those that are new in every run, or the others."""
     found: list[float] = []
     for term in regression.terms:
         if (term.run_effect is not None) is drawn:

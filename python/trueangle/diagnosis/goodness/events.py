@@ -7,7 +7,7 @@ With ``s`` seconds since the event and ``d`` the direction, the residual is comp
     g = e^(-s/τ)    and    g = d e^(-s/τ)
 
 about their means between two events, for a few ``τ``. The sums over runs (or pieces of few
-runs) are compared with their own scatter by Student's t, whatever the noise within them is.
+runs) are compared with their own scatter by Student's t, for any noise within them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The noise of one reading and its correlation, whatever pattern there may be.
+"""The noise of one reading and its correlation, for any pattern.
 
 Residuals of a fitted account misstate the correlation: what repeats at a place looks
 like it, and what the fit removes lowers it. Here the readings of each run are

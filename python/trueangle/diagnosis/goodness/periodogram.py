@@ -1,4 +1,4 @@
-"""Lines that every run draws anew: of one frequency in time, or of one order in angle.
+"""Lines that are new in every run: of one frequency in time, or of one order in angle.
 
 The periodograms of the runs, each divided by its own level about every frequency (which takes
 correlation and drift away), add up to
@@ -8,7 +8,7 @@ correlation and drift away), add up to
     P(f) = Σ_j |z_j(f)|² / s_j²(f) ~ Γ(R, 1)
 
 without asking for phases. Noise that neighbouring readings share comes back at every multiple
-of the rate of readings, whatever the axis: it is taken out reading by reading first, and beyond
+of the rate of readings, on any axis: it is taken out reading by reading first, and beyond
 half of the rate of evenly taken readings the level is that of the frequency which they fold it
 to. The false-alarm probability counts the independent frequencies
 (Baluev 2008 bounds it in the same way). A line that is not quite steady is looked for in bands as
@@ -101,7 +101,7 @@ def periodogram(
     top: float | None = None,
     correlation: float = 0.0,
 ) -> _Periodogram | None:
-    """Periodogram of ``values`` along ``axis``, whatever the phases of the runs.
+    """Periodogram of ``values`` along ``axis``, for any phases of the runs.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ units, noise does not:
     T_m = |Σ_u w_um|² / U ~ Exp(1),
     |Σ_u w_um|² / (U Σ_u |w_um|²) ~ Beta(1, U - 1).
 
-The second holds whatever the spectrum's shape, the first where a few units agree by
+The second holds for any spectrum, the first where a few units agree by
 accident; the larger p of the two counts. Orders are tried one by one, and the lowest 4, 8, 16
 and so on together, which the p value includes.
 """

@@ -24,7 +24,7 @@ class TestedResidual:
     left : Leftover
         What the whole account leaves.
     loose : Leftover
-        The same with free paths in time left in: they would follow whatever is bound to time.
+        The same with free paths in time left in: they would follow anything bound to time.
     noise : Noise
     top : float
         Highest output order that is looked for.

@@ -104,7 +104,7 @@ def goodness_of_fit(
     path : Evidence, optional
         Of a free path in time that the account needs.
     aside : Evidence, optional
-        Of readings in a row that the account puts aside.
+        Of readings in a row that the account rejects.
 
     Returns
     -------

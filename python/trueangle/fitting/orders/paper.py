@@ -200,7 +200,7 @@ def _gains(
     mean: NDArray[np.complex128],
     kept: NDArray[np.bool_],
 ) -> Array:
-    """Part by which each order, added to the kept ones, lowers the held-out mean square."""
+    """Reduction of the held-out mean square by each order added to the kept ones."""
     gains = np.empty(len(orders))
     for n in range(len(orders)):
         with_, without = kept.copy(), kept.copy()

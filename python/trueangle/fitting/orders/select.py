@@ -79,7 +79,7 @@ def select_orders(
     reference_orders : iterable of float, optional
         Orders that the reference itself is known to make (50 and 100 for a stepper motor
         of 200 steps). They and their side bands are fitted, named and not retained. Where their
-        phases are new in every run (the reference was mounted anew) they are taken out first.
+        phases are new in every run (the reference was remounted) they are taken out first.
     tolerance : float, optional
         Positions closer than this are one, default 0.01 degree; unit of the runs.
     **reading

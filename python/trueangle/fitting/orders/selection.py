@@ -243,7 +243,7 @@ class EvidenceSelection:
         return "; ".join([told, *drift_of_a_sweep(self.runs, estimate.noise)])
 
     def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> tuple[Array, float]:
-        """Part by which each order lowers the held-out mean square; that of the chosen orders."""
+        """Reduction of the held-out mean square by each order; that of the chosen orders."""
         if self.folds is None:
             return np.full(len(orders), math.nan), math.nan
         without, with_, model = held_out_gains(self.folds, chosen, orders)

@@ -81,7 +81,7 @@ def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
     chance = f"{row.probability:.3f}" if math.isfinite(row.probability) else "-"
     spread = f"{row.phase_spread_deg:.0f}" if math.isfinite(row.phase_spread_deg) else "-"
     phase, phase_std = rounded_phase(row.phase_deg, row.phase_error_deg)
-    gain = f"{100.0 * row.holdout_gain:.3g}"
+    gain = f"{100.0 * row.holdout_gain:.1f}"
     order = f"{row.order:g}"
     return _COLUMNS.format(order, size, std, phase, phase_std, spread, chance, gain, row.verdict)
 

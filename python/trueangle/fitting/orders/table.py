@@ -54,7 +54,7 @@ class OrderRow:
     aliases : tuple of int
         Orders that these readings cannot distinguish from this one.
     explanations : tuple of Explanation
-        Known lines of the joint that the order or an alias of it may be.
+        Known lines of the joint that the order or its alias may be.
     reason : str
     doubtful : bool
         True when an alias of a retained order is a known line of the joint or was a

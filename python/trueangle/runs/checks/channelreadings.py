@@ -140,7 +140,7 @@ class ChannelReadings:
                 "swapped_channels",
                 "the channels' phase falls as the recorded angle rises: sine and cosine are "
                 "swapped, or the sensor is reversed",
-                "nothing: the model keeps the direction; or name them anew, "
+                "nothing: the model keeps the direction; or rename them, "
                 "`signals={'sine': 'NAME'}`",
             )
         return found

@@ -73,14 +73,14 @@ def check(data: Any, **reading: Unpack[ReadingOptions]) -> Check:
         entry = {
             "what": "the true angle where the reference is nominal (a polygon)",
             "because": f"column '{unused[0]}' is not used",
-            "measure": "nothing anew: give it the role reference_offset",
+            "measure": "nothing new: give it the role reference_offset",
         }
         cannot.append(entry)
     clocks = sorted({name for record in records for name in record.clocks})
     for entry in cannot if clocks else ():
         if entry["because"] == "no time stamps":
             entry["because"] = f"column '{clocks[0]}' is not used"
-            entry["measure"] = "nothing anew: give it the role time, with its unit"
+            entry["measure"] = "nothing new: give it the role time, with its unit"
     faults = data_faults(records)
     ratio, suggestion = told_ratio(records)
     return Check(

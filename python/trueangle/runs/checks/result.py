@@ -141,7 +141,7 @@ def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
 
 
 def _signal_levels(signals: list[Array | None], kind: str) -> tuple[float, ...]:
-    """Levels of a signal over all runs, of which one run may hold several."""
+    """Levels of a signal over all runs; one run may hold several."""
     found: list[float] = []
     for values in signals:
         if values is not None:
@@ -252,7 +252,7 @@ class Check(PlainResult):
                 f"{role} is '{name}'" + (f" in {unit}" if unit else "") + _reversed(role, name)
                 for role, (name, unit) in self.columns.items()
             ]
-            lines += ["", *wrapped_lines(f"Understood: {'; '.join(told)}.", 2)]
+            lines += ["", *wrapped_lines(f"Columns: {'; '.join(told)}.", 2)]
         ratio = "unknown" if self.ratio is None else f"{self.ratio:.6g}"
         lines += [
             "",
@@ -264,10 +264,10 @@ class Check(PlainResult):
             f"temperatures: {_levels(e.temperatures, 'C')}; mounts: {_levels(e.mounts, 'deg')}.",
             "",
         ]
-        lines += wrapped_lines(f"Can be known: {'; '.join(self.can)}.", 2)
+        lines += wrapped_lines(f"Identifiable: {'; '.join(self.can)}.", 2)
         for entry in self.cannot:
             lines += wrapped_lines(
-                f"Cannot be known: {entry['what']} ({entry['because']}). To find out: "
+                f"Not identifiable: {entry['what']} ({entry['because']}). To find out: "
                 f"{entry['measure']}.",
                 2,
             )

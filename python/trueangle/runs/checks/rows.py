@@ -67,7 +67,7 @@ def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
                 [int(record.rows[k])],
                 f"the error of run {record.label} jumps by {brief_number(lost)} deg at row "
                 f"{record.rows[k]} and stays there: steps or counts were lost",
-                "give the rows from there another run label, or measure anew",
+                "give the rows from there another run label, or measure again",
             )
 
 

@@ -209,9 +209,9 @@ def _joined(
     if np.count_nonzero(inside) < LEAST:
         raise ArgumentError(
             f"{np.count_nonzero(inside)} readings have a reference at their time: the logs last "
-            f"from {indicated.time[0]:g} to {indicated.time[-1]:g} s and from "
-            f"{reference.time[0]:g} to {reference.time[-1]:g} s, with an offset of "
-            f"{clocks.offset:g} s; declare it (`offset_s=`)"
+            f"{indicated.time[0]:g} to {indicated.time[-1]:g} s and {reference.time[0]:g} to "
+            f"{reference.time[-1]:g} s, offset {clocks.offset:g} s; declare the offset "
+            "(`offset_s=`)"
         )
     angle, velocity = true.at(there)
     runs = []

@@ -120,7 +120,7 @@ class Stream:
         return float(quantile(np.abs(self.angle[middle] - line)[used], 0.9))
 
     def gaps(self, longest: float | None) -> Array:
-        """Start and end of every pause of which nothing is known, shape (n, 2)."""
+        """Start and end of every unknown pause, shape (n, 2)."""
         if self.is_on_change and longest is None:
             return np.empty((0, 2))
         limit = self.bridged if longest is None else longest

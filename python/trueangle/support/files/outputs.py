@@ -54,7 +54,7 @@ def check_output(
     kind : Kind, optional
         What is written; its endings are checked.
     inputs : iterable of paths
-        What was read: none of it is overwritten.
+        What was read: it is not overwritten.
     hashes : iterable of str
         sha256 of what was read, where its place is not known.
     regular : bool

@@ -53,7 +53,7 @@ def test_a_fit_and_a_check_tell_it_and_parts_apart_fit_well():
     assert says in ta.check(run).data_faults[0].says
     (note,) = [note for note in ta.fit(run, orders=[1, 2]).notes if "jumps" in note]
     assert says in note
-    assert note.endswith("; give the rows from there another run label, or measure anew.")
+    assert note.endswith("; give the rows from there another run label, or measure again.")
     parts = [
         ta.CalibrationRun(run.reference[rows], run.indicated[rows], 360.0, label=label)
         for label, rows in (("before", slice(at)), ("after", slice(at, None)))
