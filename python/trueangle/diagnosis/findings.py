@@ -206,6 +206,6 @@ def scatter_doubt(item: ScatterFinding, fault: DataFault | None = None) -> Ambig
         "the measurements named above, then diagnose again",
     )
     if fault is not None:
-        because = f"{fault.fault}: its readings scatter, not the sensor"
+        because = f"{fault.fault}: the faulty readings cause the scatter"
         measure = f"{fault.mend}; then diagnose again"
     return Ambiguity((item.cause,), because, measure, True, item.bic_gain)
