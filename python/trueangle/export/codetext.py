@@ -165,7 +165,7 @@ def check_choice(channels: Channels) -> None:
     moved = (q * first + p * second) / (2.0 * math.pi)
     if moved > _MOST:
         raise ArgumentError(
-            f"the harmonics of the two tracks move the choice of a period by up to {moved:.2g} "
-            f"periods, and a program decodes without them: {_MOST:g} are allowed; calibrate the "
+            f"the harmonics of the two tracks shift the choice of a period by up to {moved:.2g} "
+            f"periods; a program decodes without them and allows {_MOST:g}; calibrate the "
             f"first track alone, `periods_per_turn={p}`"
         )

@@ -102,7 +102,7 @@ class Passes:
         if start is None:
             return plain.answer()
         judged, outliers = plain, start
-        # Passes, at most, in which outliers are rejected and looked for anew.
+        # Passes, at most, in which outliers are rejected and looked for again.
         for _ in range(4):
             before = judged.summed.outliers
             found = self._pass(plain.summed.argument, outliers)

@@ -85,7 +85,7 @@ def count_of_changes(design: RunDesign, kinds: Sequence[Sequence[dict[str, Any]]
 def run_amounts(
     design: RunDesign, limits: Limits
 ) -> Iterator[tuple[str, Callable[[float], float]]]:
-    """What of a run is a matter of degree: its field, and what a step of it leads to.
+    """What of a run is a matter of degree: its field, and what a step leads to.
 
     A step of 1 leads over the whole range, of speeds in their logarithm, and never beyond limits.
     """

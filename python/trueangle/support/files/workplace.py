@@ -50,7 +50,7 @@ def made_beside(target: Path, make: Callable[[Path], int]) -> Iterator[Path]:
     handle = -1
     # Known before it is made: Ctrl-C may come with the call that makes it.
     beside = hidden_beside(target)
-    # Times that what others removed at once is made anew; some folders (/proc) take nothing at all.
+    # Tries to make what others removed at once; some folders (/proc) take nothing at all.
     try:
         for _ in range(100):
             with contextlib.suppress(FileNotFoundError):
