@@ -96,6 +96,12 @@ impl GroupSums {
         left
     }
 
+    /// `X' C^-1 X` of all columns, without a zero beside them.
+    pub fn information(&self) -> DMatrix<f64> {
+        let gram = &self.gram;
+        &gram.sums.products + gram.information * &gram.means * gram.means.transpose()
+    }
+
     /// Posterior of the coefficients of a model's groups.
     pub fn posterior(&self, tau: &[f64]) -> Option<Posterior> {
         self.model(tau).posterior(std::slice::from_ref(&self.gram))

@@ -136,6 +136,12 @@ impl PyGroupSums {
         Ok(Self(self.0.less(&own)))
     }
 
+    /// Inverse covariance of the coefficients of all columns, without a zero beside them.
+    fn information<'py>(&self, py: Python<'py>) -> PyResult<Matrix<'py>> {
+        let found = self.0.information();
+        columns(py, found.as_slice(), &[found.nrows(), found.ncols()])
+    }
+
     /// Log evidence, mean and covariance of the coefficients under variances of the groups.
     fn posterior<'py>(&self, py: Python<'py>, tau: Vec<f64>) -> PyResult<Solution<'py>> {
         check(&tau, self.0.widths().len())?;

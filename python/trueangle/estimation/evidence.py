@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from .._core import Evidence
+from .._core import Evidence, Groups
 from ..support.arrays import Array
 
 #: Correlation times of the noise's exponential terms, in median steps of a run's time.
@@ -318,6 +318,37 @@ def estimate_by_evidence(
         tuple(runs),
         np.asarray(probability, dtype=float),
     )
+
+
+def noise_information(
+    columns: Array, left: Array, bounds: Sequence[tuple[int, int]], scale: float
+) -> Array:
+    """Information of readings about coefficients, under the noise of most evidence.
+
+    ::
+
+        X' C^-1 X,    C = w I + sum_j a_j exp(-|dt| / T_j)   in every run
+
+    with the variances of most evidence for what a fit of the columns leaves. Equally spaced
+    readings; of many the noise is that of the first 12 000.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, p)
+    left : ndarray, shape (n,)
+    bounds : sequence of (int, int)
+        First reading and end of every run.
+    scale : float
+        Variance of what is left, above 0.
+    """
+    some = [(a, min(b, 12_000)) for a, b in bounds if a < 12_000]
+    first, every = (
+        Groups([(columns[a:b], left[a:b], None) for a, b in parts], [columns.shape[1]])
+        for parts in (some, bounds)
+    )
+    # A prior that is as good as flat.
+    noise = first.noise([1e6 * scale * len(left)], scale)
+    return every.sums(noise, scale).information()
 
 
 def _column(values: Array | None) -> Array | None:

@@ -209,6 +209,10 @@ def left_out(groups: Sequence[NormalEquations], ridge: float = 0.0) -> tuple[Arr
     return _core.left_out(*_stacked(groups), squares, ridge)
 
 
+#: Runs from which whole runs are the clusters.
+FEWEST_RUNS: Final = 3
+
+
 class ClusterCovariance(NamedTuple):
     """Covariance of the coefficients and the degrees of freedom of each one's variance."""
 

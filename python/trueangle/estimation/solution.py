@@ -17,10 +17,12 @@ from ..joint.pattern import JointPattern, Pattern
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from ..support.deadline import current_deadline
+from .evidence import noise_information
 from .extension import Extension
+from .linear import FEWEST_RUNS, NormalEquations, cluster_covariance, moderated_covariance
 from .lines import LineBasis
 from .projection import Projection, project
-from .readings import ENOUGH_RUNS, Readings
+from .readings import Readings
 from .whitening import RunEffect, Whitener
 
 
@@ -234,28 +236,36 @@ class Solution(Projection):
         return self.robust(self.place(k))
 
     def robust(self, where: NDArray[np.int64]) -> Array:
-        """Covariance of some coefficients, at least as wide as runs disagree on them.
+        """Covariance of some coefficients: of the noise, what runs disagree on, `form_errors`.
 
-        ::
-
-            V_s = (R / (R - 1))Σ_j s_j s_jᵀ,    s_j = X⁺_j r_j
-
-        with the residuals r of run j: no form is exact, and what it leaves is correlated within a
-        run. Coefficients whose variance is larger by this than by the noise alone are
-        widened to it; from `ENOUGH_RUNS` runs on. `form_errors`, where known, come on top.
+        The noise is that of most evidence (`noise_information`): what the map leaves correlated is
+        no less noise. Coefficients that the runs scatter by more are widened to that, moderated by
+        one another (`moderated_covariance`), since no form is exact, and what it leaves is
+        correlated within a run.
         """
         among = np.ix_(where, where)
-        plain = np.asarray(self.unscaled_covariance[among] * self.variance)
+        noise, scatter = self._covariances
         beyond = 0.0 if self.form_errors is None else self.form_errors[among]
-        runs = len(self.bounds)
-        if runs < ENOUGH_RUNS or not plain.size:
-            return np.asarray(plain + beyond)
-        scores = np.array(
-            [self.back[where] @ (self.q[a:b].T @ self.r[a:b]) for a, b in self.bounds]
-        )
-        between = (scores**2).sum(axis=0) * runs / (runs - 1.0)
-        wider = np.sqrt(np.maximum(between / np.maximum(np.diag(plain), 1e-300), 1.0))
+        plain = noise[among]
+        ratio = np.diag(scatter)[where] / np.maximum(np.diag(plain), 1e-300)
+        wider = np.sqrt(np.maximum(ratio, 1.0))
         return np.asarray(plain * np.outer(wider, wider) + beyond)
+
+    @cached_property
+    def _covariances(self) -> tuple[Array, Array]:
+        """Of all coefficients, by the noise and by the scatter of the runs."""
+        freedom = self.n - self.rank
+        if not (self.rss > 0.0 and freedom > 0 and self.rank):
+            plain = np.asarray(self.unscaled_covariance * self.variance)
+            return plain, plain
+        known = noise_information(self.q, self.r, self.bounds, self.rss / freedom)
+        own = np.asarray(np.linalg.inv(known))
+        noise = self.back @ own @ self.back.T
+        if len(self.bounds) < FEWEST_RUNS:
+            return noise, noise
+        clusters = [NormalEquations.of_rows(self.q[a:b], self.r[a:b]) for a, b in self.bounds]
+        scatter = moderated_covariance(cluster_covariance(clusters), own, freedom)
+        return noise, self.back @ scatter.covariance @ self.back.T
 
     def coefficients_with(self, extension: Extension) -> Array:
         """Coefficients of all terms if an extension joined them."""

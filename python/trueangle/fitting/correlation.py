@@ -18,9 +18,6 @@ from .residualform import ResidualSpace, Share
 #: Most clusters: of more runs several are taken together.
 _MOST_CLUSTERS: Final = 128
 
-#: Runs from which whole runs are the clusters.
-FEWEST_RUNS: Final = 3
-
 #: Fewest runs that show by themselves how coefficients scatter.
 ENOUGH_RUNS: Final = 8
 

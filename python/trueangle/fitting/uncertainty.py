@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..estimation.linear import (
+    FEWEST_RUNS,
     LEVELS,
     NormalEquations,
     cluster_covariance,
@@ -21,7 +22,6 @@ from ..support.suggestions import check_choice
 from .beside import BesideProblem
 from .correlation import (
     ENOUGH_RUNS,
-    FEWEST_RUNS,
     FEWEST_STRETCHES,
     clusters_of,
     correlation_found,

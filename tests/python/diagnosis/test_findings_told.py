@@ -229,26 +229,6 @@ def test_the_variance_is_that_of_the_residual_degrees_of_freedom(signals):
     assert one.variance == pytest.approx(float(left[0]) / (40 - rank), rel=1e-9)
     inverse = np.linalg.pinv(design.T @ design)[-12:, -12:]
     np.testing.assert_allclose(one.covariance(0), one.variance * inverse, rtol=1e-7)
-    # One run does not disagree with itself: nothing to widen by.
-    np.testing.assert_allclose(one.robust_covariance(0), one.variance * inverse, rtol=1e-7)
-
-
-def test_errors_widen_by_how_far_runs_disagree(signals):
-    """Scores of whole runs, by their definition, with the degree of freedom that they cost."""
-    slope = np.repeat(np.random.default_rng(8).normal(0.0, 3.0, signals.runs), 160)
-    regression = fitted(signals, slope * signals.direction)
-    columns = signals.direction[:, None]
-    one = regression.with_terms([regression.propose("backlash", {}, columns)])
-    plain = float(one.covariance(0)[0, 0])
-    back = np.linalg.pinv(np.hstack([one.base, columns]))[-1]
-    left = one.r
-    scores = [float(back[a:b] @ left[a:b]) for a, b in one.bounds]
-    runs = len(scores)
-    wider = sum(s**2 for s in scores) * runs / (runs - 1.0)
-    assert not one.outlying.any()
-    assert one.whiten.has(0.0, (), None)
-    assert wider > 2.0 * plain
-    assert float(one.robust_covariance(0)[0, 0]) == pytest.approx(wider, rel=1e-6)
 
 
 def test_noise_beyond_the_stated_is_never_nothing():

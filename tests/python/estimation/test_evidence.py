@@ -12,9 +12,14 @@ import pytest
 from scipy.linalg import cho_factor, cho_solve, toeplitz
 from statsmodels.regression.mixed_linear_model import MixedLM
 
-from trueangle._core import Evidence
+from trueangle._core import Evidence, Groups
 from trueangle.errors import ArgumentError
-from trueangle.estimation.evidence import CORRELATION_TIMES, RunReadings, estimate_by_evidence
+from trueangle.estimation.evidence import (
+    CORRELATION_TIMES,
+    RunReadings,
+    estimate_by_evidence,
+    noise_information,
+)
 
 #: The zero of a run, integrated over a flat prior.
 LOG_TURN = math.log(2.0 * math.pi)
@@ -36,6 +41,19 @@ def covariance(noise: list[float], time: np.ndarray) -> np.ndarray:
     apart = np.abs(np.subtract.outer(steps, steps))
     terms = zip(noise[1:], CORRELATION_TIMES, strict=True)
     return noise[0] * np.eye(time.size) + sum(a * np.exp(-apart / length) for a, length in terms)
+
+
+def test_information_is_that_of_the_dense_covariance() -> None:
+    rng = np.random.default_rng(60)
+    columns, left = rng.normal(size=(150, 3)), rng.normal(size=150).cumsum() / 5.0
+    bounds, scale = [(0, 90), (90, 150)], float(np.var(left))
+    parts = [(columns[a:b], left[a:b], None) for a, b in bounds]
+    noise = Groups(parts, [3]).noise([1e6 * scale * 150], scale)
+    dense = np.zeros((150, 150))
+    for a, b in bounds:
+        dense[a:b, a:b] = covariance(noise.tolist(), np.arange(float(b - a)))
+    expected = columns.T @ np.linalg.solve(dense, columns)
+    np.testing.assert_allclose(noise_information(columns, left, bounds, scale), expected, rtol=1e-9)
 
 
 NOISES = [[0.8, 0.3, 0.0, 0.9, 0.2, 3.0], [2.0, 0.0, 0.0, 0.0, 0.0, 0.0]]

@@ -134,7 +134,7 @@ def test_bad_arguments():
         moments.spectrum("x")
     with pytest.raises(ArgumentError, match="not accumulated"):
         moments.update(0.0, 0.0).solve([3])
-    with pytest.raises(ArgumentError, match="merge when"):
+    with pytest.raises(ArgumentError, match="merge only if"):
         moments.merge(ta.Moments([1, 3], period=360.0))
     with pytest.raises(ArgumentError, match="together"):
         ta.Moments({"output": [1], "motor": [1]}, gear_ratio=16 * np.pi)
