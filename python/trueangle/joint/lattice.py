@@ -132,14 +132,12 @@ def sensor_lattice(runs: Sequence[CalibrationRun], theta: Array) -> tuple[float,
     move = table_move(turns, step)
     if move and abs(1.0 / move - round(1.0 / move)) < CLOSES:
         return finer_step(values, step) * ARCSEC_PER_TURN, round(1.0 / move)
-    grid = uniform_grid(theta)
+    grid, true = uniform_grid(theta), theta / (2.0 * np.pi)
     table = 0 if grid is None else grid.positions
     # At even places, values that all lie one step apart lie on any lattice of that step.
-    even = grid is not None and np.diff(values).max(initial=0.0) < 1.5 * step
-    if move or even or abs(step * table - 1.0) < CLOSES * step:
+    if move or (grid is not None and np.diff(values).max(initial=0.0) < 1.5 * step):
         step = finer_step(values, step)
     step = step or finer_step(values)
-    true = theta / (2.0 * np.pi)
     if is_of_design(np.concatenate(turns), true, step):
         step = finer_step(values, step)
     return (step_behind(values, true, step) or step) * ARCSEC_PER_TURN, table
@@ -155,37 +153,45 @@ def lattice_step(values: NDArray[np.float64]) -> float:
     >>> lattice_step(np.array([0.5, 1.25, 3.0, 2.6]))
     0.0
     """
-    steps = np.diff(distinct(values))
-    rounding = LEAST_STEP * float(np.abs(values).max(initial=1.0))
-    steps = steps[steps > rounding]
-    if steps.size < 3:
+    moves = _moves(values)
+    if moves.size < 3:
         return 0.0
-    step = float(steps.min())
     # The finest difference may be several counts: the step is then a whole part of it.
-    for parts in (1, 2, 3):
-        away = steps * (parts / step)
-        if np.abs(away - np.round(away)).max() < ON_LATTICE:
-            return step / parts
-    return 0.0
+    tried, _ = _refined(_some_of(moves), float(moves.min()) / np.array([1.0, 2.0, 3.0]))
+    return next((step for step in (_shared(moves, s) for s in tried.tolist()) if step), 0.0)
 
 
-def even_rate(runs: Sequence[NDArray[np.float64]]) -> float:
-    """Equal steps in a turn that all runs keep to, each from its own start; 0 for none.
+def _moves(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Moves from each value to the next, but those that are the rounding of sums."""
+    moves = np.diff(distinct(values))
+    return moves[moves > LEAST_STEP * float(np.abs(values).max(initial=1.0))]
 
-    There, a line whose phase is new in every run has the same values as one whose order is higher
-    or lower by this rate, whether the steps close after a turn or not.
 
-    ``runs`` are the angles of each run, in turns.
+def _some_of(moves: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Moves that steps are tried on, ascending."""
+    return distinct(moves[:: max(1, moves.size // STEPS_TRIED)])
 
-    Examples
-    --------
-    >>> round(even_rate([np.arange(20) * 0.8 / 98.0, 0.3 - np.arange(30) * 0.8 / 98.0]), 6)
-    122.5
-    >>> even_rate([np.array([0.0, 0.11, 0.43, 0.5, 0.58])])
-    0.0
+
+def _refined(moves: Array, steps: Array) -> tuple[Array, Array]:
+    """Steps by least squares over the counts of moves, short ones first: each a longer rule.
+
+    A last digit that was cut off hides a small share of many counts and a large one of a single.
+    With them, by how much of each step the moves are no multiples of it at most.
     """
-    step = lattice_step(np.concatenate([run - run[0] for run in runs]))
-    return 1.0 / step if step > 0.0 else 0.0
+    along, counted, found = np.zeros_like(steps), np.zeros_like(steps), steps
+    for move in moves.tolist():
+        counts = np.round(move / found)
+        along, counted = along + move * counts, counted + counts * counts
+        found = np.divide(along, counted, out=steps.copy(), where=counted > 0.0)
+    counts = moves / found[:, None]
+    return found, np.abs(counts - np.round(counts)).max(axis=1, initial=0.0)
+
+
+def _shared(moves: NDArray[np.float64], step: float) -> float:
+    """The step, known better over all moves from value to value; 0 where they do not keep it."""
+    places, counts = np.cumsum(moves), np.cumsum(np.round(moves / step))
+    step = float(places[-1] / counts[-1])
+    return step if np.ptp(places / step - counts) < ON_LATTICE else 0.0
 
 
 def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
@@ -210,30 +216,17 @@ def finer_step(values: NDArray[np.float64], below: float = np.inf) -> float:
     >>> finer_step(places, 1.0 / 36.0)
     0.0
     """
-    moves = np.diff(distinct(values))
-    rounding = LEAST_STEP * float(np.abs(values).max(initial=1.0))
-    moves = moves[moves > rounding]
-    some = distinct(moves[:: max(1, moves.size // STEPS_TRIED)])
-    tried = distinct(np.concatenate([some, np.diff(some)]))
-    tried = tried[(tried > rounding) & (tried < 0.5 * below)][::-1]
+    some = _some_of(moves := _moves(values))
+    tried = distinct(np.concatenate([some, _moves(some)]))
     # Most of them miss one of the first moves already.
-    # Most steps are tried on the first moves.
-    near = tried[_aways(some[:8], tried) < ON_LATTICE]
-    aways = _aways(some, near)
+    near, aways = _refined(some[:8], tried[(tried < 0.5 * below)][::-1])
+    near, aways = _refined(some, near[aways < ON_LATTICE])
     for k in np.flatnonzero(aways < ON_LATTICE).tolist():
-        step, away = float(near[k]), float(aways[k])
-        told = distinct(np.round(some / step)).size - 1
+        told = distinct(np.round(some / near[k])).size - 1
         # That each further move is a whole number of counts, as near as they all are.
-        if tried.size * (2.0 * away) ** told < BY_CHANCE:
-            off = np.abs(moves / step - np.round(moves / step)).max()
-            return step if off < ON_LATTICE else 0.0
+        if tried.size * (2.0 * aways[k]) ** told < BY_CHANCE:
+            return _shared(moves, near[k])
     return 0.0
-
-
-def _aways(moves: NDArray[np.float64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Largest departure of the moves from multiples of each step, in steps."""
-    counts = moves / steps[:, None]
-    return np.asarray(np.abs(counts - np.round(counts)).max(axis=1, initial=0.0))
 
 
 def is_of_design(values: NDArray[np.float64], true: NDArray[np.float64], step: float) -> bool:
@@ -289,9 +282,13 @@ def step_behind(values: NDArray[np.float64], true: NDArray[np.float64], digit: f
     >>> 1.0 / step_behind(degrees / 360.0, np.arange(36) / 36.0, 0.01 / 360.0)
     4096.0
     """
-    cells = round(1.0 / digit) if digit > 0.0 else 0
-    if not 0 < cells <= MOST_CELLS or abs(cells * digit - 1.0) > LEAST_STEP:
-        return 0.0
+    cells = round(1.0 / digit) if digit * MOST_CELLS > 1.0 else MOST_CELLS
+    if abs(cells * digit - 1.0) > LEAST_STEP:
+        cells = MOST_CELLS
+        # Counts behind finer digits repeat their moves.
+        if 10 * distinct(np.round(np.diff(values) * cells)).size > 9 * values.size:
+            return 0.0
+    digit = max(digit, 1.0 / cells)  # of finer digits the first are looked at
     places = distinct(np.mod(np.round(values * cells).astype(np.int64), cells))
     marks = np.zeros(cells)
     marks[places] = 1.0
@@ -300,7 +297,7 @@ def step_behind(values: NDArray[np.float64], true: NDArray[np.float64], digit: f
     possible = (counts * float(np.ptp(values)) > LEAST_STEPS) & (counts * digit < WIDEST_CELL)
     possible &= cells * np.exp(-places.size * coherence**2) < BY_CHANCE
     told = np.where(possible, coherence / np.sinc(counts * digit), 0.0)
-    top, lattices = int(np.argmax(told)), np.flatnonzero(told > ON_COUNTS)
+    top, lattices = int(np.argmax(coherence * possible)), np.flatnonzero(told > ON_COUNTS)
     # Its multiples are as coherent as a lattice; on even places aliases nearly are.
     count = min((c for c in lattices.tolist() if top % c == 0), default=0)
     if not count or (np.flatnonzero(told > told[count] - ALIKE) % count).any():

@@ -17,7 +17,7 @@ from ..runs.run import CalibrationRun
 from ..support.angles import unwrapped
 from ..support.arrays import Array, median
 from ..support.signals import coupled_joint
-from .lattice import CLOSES, UniformGrid, even_rate, sensor_lattice, uniform_grid
+from .lattice import CLOSES, UniformGrid, lattice_step, sensor_lattice, uniform_grid
 from .turning import direction_at_turns, velocity_at_turns
 
 Index = NDArray[np.int64]
@@ -113,8 +113,14 @@ class Signals:
 
     @cached_property
     def even_rate(self) -> float:
-        """Equal steps in a turn that every run keeps to, or 0 (`trueangle.joint.lattice`)."""
-        return even_rate([self.theta[a:b] / (2.0 * np.pi) for a, b in self.run_bounds()])
+        """Equal steps in a turn that all runs keep to, each from its own start; 0 for none.
+
+        There, a line whose phase is new in every run has the same values as one whose order is
+        higher or lower by this rate, whether the steps close after a turn or not.
+        """
+        runs = (self.theta[a:b] / (2.0 * np.pi) for a, b in self.run_bounds())
+        step = lattice_step(np.concatenate([run - run[0] for run in runs]))
+        return 1.0 / step if step else 0.0
 
     def take(self, rows: NDArray[np.bool_] | Index) -> Signals:
         """The readings ``rows``; runs keep their index and segments their history."""
@@ -219,20 +225,20 @@ class Signals:
 def join_runs(runs: Sequence[CalibrationRun]) -> Signals:
     """Signals of ``runs``; a quantity that some run lacks is None for all."""
     parts = [_travel(run) for run in runs]
-    theta = _joined([run.unwrapped_reference * (2.0 * math.pi / run.period) for run in runs])
+    theta = np.concatenate([run.unwrapped_reference * (2.0 * math.pi / run.period) for run in runs])
     count, table = sensor_lattice(runs, theta)
     offset = np.cumsum([0, *(part[3].size for part in parts[:-1])])
     return Signals(
         theta=theta,
         run=np.repeat(np.arange(len(runs)), [len(run) for run in runs]),
         row=np.concatenate([np.arange(len(run)) for run in runs]),
-        direction=_joined([part[0] for part in parts]),
-        travel=_joined([part[1] for part in parts]),
+        direction=np.concatenate([part[0] for part in parts]),
+        travel=np.concatenate([part[1] for part in parts]),
         segment=np.concatenate([part[2] + o for part, o in zip(parts, offset, strict=True)]),
-        segment_direction=_joined([part[3] for part in parts]),
-        segment_length=_joined([part[4] for part in parts]),
+        segment_direction=np.concatenate([part[3] for part in parts]),
+        segment_length=np.concatenate([part[4] for part in parts]),
         segment_first=np.concatenate([np.arange(part[3].size) == 0 for part in parts]),
-        clock=_joined([_clock(run) for run in runs]),
+        clock=np.concatenate([_clock(run) for run in runs]),
         **{
             name: _all([read(run, part[0]) for run, part in zip(runs, parts, strict=True)])
             for name, read in RECORDED.items()
@@ -252,10 +258,6 @@ def _common_table(first: Signals, later: Signals) -> int:
     one, other = (np.mean(np.exp(1j * first.table * each.theta)) for each in (first, later))
     beside = float(np.angle(one * np.conj(other))) / (2.0 * np.pi)
     return first.table if abs(beside) < CLOSES else 0
-
-
-def _joined(parts: list[Array]) -> Array:
-    return np.concatenate(parts)
 
 
 def _all(parts: Sequence[Array | None]) -> Array | None:
@@ -281,7 +283,7 @@ def _velocity(run: CalibrationRun, direction: Array) -> Array | None:
 def _coupled(runs: Sequence[CalibrationRun]) -> dict[str, Array]:
     """Angles of the other joints that every run recorded, in degrees."""
     return {
-        joint: _joined(
+        joint: np.concatenate(
             [unwrapped(run.signals[name], run.period) * (360.0 / run.period) for run in runs]
         )
         for name in runs[0].signals

@@ -78,7 +78,7 @@ def test_the_step_is_the_largest_that_all_differences_share(step, counts):
     assert lattice_step(doubled) == pytest.approx(expected, rel=1e-3)
     for away, told in ((0.04, True), (0.06, False)):
         moved = values.copy()
-        moved[-1] += away * expected
+        moved[4] += away * expected
         assert (lattice_step(moved) > 0.0) == told
 
 
@@ -148,19 +148,19 @@ def test_no_finer_step_is_told_of_what_has_none():
     assert finer_step(np.array([0.25])) == finer_step(np.zeros(0)) == 0.0
 
 
-@pytest.mark.parametrize("digits", [2, 3])
-@pytest.mark.parametrize("seed", range(6))
-def test_counts_show_behind_digits_that_were_cut_off(digits, seed):
-    """4096 counts printed in hundredths of degrees; or nothing is told, of one place or another."""
-    rng = np.random.default_rng([seed, 12])
-    for n in (36, 72, 150):
-        places = np.sort(rng.uniform(0.0, 1.0, n)) if seed % 2 else np.arange(n) / n
-        error = 0.002 * np.sin(2.0 * np.pi * places + seed)
-        degrees = np.round(np.round(4096 * (places + error)) / 4096 * 360.0, digits)
-        found = step_behind(degrees / 360.0, places, 10.0**-digits / 360.0)
-        assert found in (0.0, pytest.approx(1.0 / 4096))
-        if seed % 2:
-            assert found > 0.0
+@pytest.mark.parametrize("bits", [9, 12, 14])
+@pytest.mark.parametrize("turn", [360.0, 2.0 * np.pi, 1.0])
+def test_counts_show_behind_decimals_and_make_no_orders(bits, turn):
+    """Of 12 bits in six decimals of a degree 15 orders had been kept: its last digit 4096 times."""
+    # From a twentieth of a count to what holds nothing but counts.
+    for decimals in range(int(np.ceil(np.log10(20.0 * 2**bits / turn))), 11):
+        for places in (np.arange(720) / 720.0, np.random.default_rng(bits).uniform(size=500)):
+            error = 3.0 * np.sin(2.0 * np.pi * places + 1.0) + np.cos(4.0 * np.pi * places)
+            turns = np.floor(places * 2**bits + error) / 2**bits
+            read = (np.round(turn * angle, decimals) for angle in (places, turns))
+            run = ta.CalibrationRun(*read, period=turn)
+            assert join_runs([run]).count == pytest.approx(1296000.0 / 2**bits, rel=1e-4)
+            assert sorted(ta.select_orders([run]).orders) == [1, 2], decimals
 
 
 def test_nothing_shows_behind_digits_of_what_has_no_counts():
