@@ -169,7 +169,7 @@ class DiagnosisData(Correctable):
         elif added or self.wrong:
             steps.append("write the extended simulation (`diagnosis.simulation()`)")
         lasting = {f.cause: EFFECTS[f.cause].not_at_run_time for f in sure}
-        steps += [f"{cause} cannot be corrected: {why}" for cause, why in lasting.items() if why]
+        steps += [f"{cause} cannot be corrected ({why})" for cause, why in lasting.items() if why]
         steps += ["measure the next runs (`diagnosis.plan()`)"] if self.planned else []
         still = [spot for spot in self.in_question if spot.causes not in self.planned]
         told = {spot.measure: ", ".join(spot.causes) for spot in reversed(still)}

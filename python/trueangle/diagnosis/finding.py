@@ -47,6 +47,9 @@ _PLACES = {
     "carrier": "of order {}",
     "frequency_hz": "{} Hz",
     "place_deg": "at {} deg",
+    "cosine": "over the turn",
+    "per_deg_s": "with the speed",
+    "per_Nm": "with the load",
 }
 
 
@@ -236,10 +239,9 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
         std = finding.parameters[parameter].std
         stds = std if isinstance(std, list) else [std] * len(sizes)
         shown = [*map((ErrorUnit(word, factor) if word else unit).text, sizes[:3], stds)]
-        shown += [f"{len(sizes) - 3} more"] if len(sizes) > 3 else []
         if parameter == "delay_s":
             shown.append(f"the {'joint' if sizes[0] > 0.0 else 'reference'} is late")
-        return f"{name} ({', '.join(shown)})"
+        return f"{name} ({', '.join(shown)}{' ...' * (len(sizes) > 3)})"
     if finding.gain is None:
         return name
     before, after = finding.gain.before[0], finding.gain.after[0]

@@ -56,25 +56,22 @@ def diagnosis_summary(
         for belief in diagnosis.wrong:
             lines += _wrapped(f"- {_belief(belief, unit)}", 2)
     g = diagnosis.gain
-    together = (
-        f"Extended simulation, in the readings that were fitted: rms {n(g['rms_before_arcsec'])} "
-        f"-> {unit.text(g['rms_after_arcsec'])}, peak-to-peak "
-        f"{n(g['peak_to_peak_before_arcsec'])} -> {n(g['peak_to_peak_after_arcsec'])}, max abs "
-        f"{n(g['max_abs_before_arcsec'])} -> {n(g['max_abs_after_arcsec'])}."
+    rms, peak, most = (
+        f"{n(g[f'{size}_before_arcsec'])} -> {n(g[f'{size}_after_arcsec'])}"
+        for size in ("rms", "peak_to_peak", "max_abs")
     )
+    together = f"Extended simulation, in the readings that were fitted: rms {rms} {unit.name}, "
+    together += f"peak-to-peak {peak}, max abs {most}."
     if sure < len(diagnosis.findings):
         together += " Causes that are not confirmed are not in it."
     lines += ["", *_wrapped(together, 2)]
     if diagnosis.torque is not None:
-        lines.append("")
-        for text in diagnosis.torque.lines():
-            lines += _wrapped(text, 2)
+        lines += ["", *(part for text in diagnosis.torque.lines() for part in _wrapped(text, 2))]
     open_still = [*_ambiguity_entries(diagnosis, verbose, unit)]
     if diagnosis.next_runs is not None and diagnosis.next_runs.runs:
         lines += ["", *diagnosis.next_runs.summary().splitlines()]
     lines += [""] if open_still else []
-    for text, indent, first in open_still:
-        lines += _wrapped(text, indent, first)
+    lines += [part for entry in open_still for part in _wrapped(*entry)]
     return laid_out(lines)
 
 
@@ -107,13 +104,15 @@ def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
     elif not entries:
         entries.append(("Nothing beyond the simulation: no test is significant.", 0, 0))
     entries.append((_noise(diagnosis, unit), 2, 0))
-    steps = "; ".join(diagnosis.next_steps)
-    entries += [(f"What to do: {steps}.", 2, 0)] if steps else []
+    if steps := "; ".join(diagnosis.next_steps):
+        entries.append((f"What to do: {steps}.", 2, 0))
     return [*(line for entry in entries for line in _wrapped(*entry)), ""]
 
 
 def _items(evidence: Iterable[Evidence], unit: ErrorUnit) -> Iterator[Entry]:
-    return ((f"- {unit.spoken(item.says)} (p {_chance(item.p)})", 4, 2) for item in evidence)
+    for item in evidence:
+        p = "below 1e-12" if item.p < 1e-12 else f"{item.p:.1g}"
+        yield f"- {unit.spoken(item.says)} (p {p})", 4, 2
 
 
 def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
@@ -175,14 +174,10 @@ def _belief(belief: Belief, unit: ErrorUnit) -> str:
         what, _, its_unit = shown.partition("_")
         size = " +- ".join(of.pair(belief.measured[name], belief.std[name]))
         text += f"; {what} {size} {its_unit}".rstrip() + f", assumed {of.number(value)}"
-    gain = belief.gain
-    if gain is not None:
-        text += f"; held-out rms {unit.number(gain.before[0])} -> {unit.text(gain.after[0])}"
-    return text
-
-
-def _chance(p: float) -> str:
-    return "below 1e-12" if p < 1e-12 else f"{p:.1g}"
+    if belief.gain is None:
+        return text
+    before, after = belief.gain.before[0], belief.gain.after[0]
+    return f"{text}; held-out rms {unit.number(before)} -> {unit.text(after)}"
 
 
 def _ambiguity_matters(spot: Ambiguity, diagnosis: DiagnosisData) -> bool:

@@ -87,7 +87,7 @@ def test_sums_of_another_turn_or_shaft_do_not_merge(other):
     more = {"orders": [1, 2], "period": 360.0} | other
     different = ta.Moments(more.pop("orders"), **more).update([1.0, 2.0], [0.0, 0.1])
     for merge in (made.merge, made.__iadd__, made.__add__):
-        with pytest.raises(ArgumentError, match="merge when"):
+        with pytest.raises(ArgumentError, match="merge only if"):
             merge(different)
     assert made.count == 2
 

@@ -66,6 +66,6 @@ def test_scatter_of_readings_in_doubt_is_in_doubt_itself() -> None:
     assert "has no certain cause yet" in spot.because
     fault = DataFault("stale_samples", ("a",), (3,), "three alike", "leave them out")
     spot = scatter_doubt(scatter(), fault)
-    assert spot.because.startswith("stale_samples: the readings that it names scatter")
+    assert spot.because.startswith("stale_samples: the faulty readings cause")
     assert spot.measure == "leave them out; then diagnose again"
     assert spot.evidence == 33.0

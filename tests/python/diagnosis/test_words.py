@@ -115,6 +115,6 @@ def test_a_headline_ends_with_what_to_do(geared):
     # What no corrector can subtract is told with its reason, and a doubt asks for more runs.
     jitter = replace(geared.findings[0], cause="timestamp_jitter", effects=[])
     (step,) = replace(geared, findings=[jitter], factors=[]).next_steps
-    assert step.startswith("timestamp_jitter cannot be corrected: scatter has no value")
+    assert step.startswith("timestamp_jitter cannot be corrected (scatter has no value")
     doubt = replace(geared.findings[0], status="not_confirmed")
     assert "measure more runs" in replace(geared, findings=[doubt]).next_steps[-1]

@@ -123,7 +123,7 @@ def test_the_angle_is_at_its_limit_and_the_pulls_are_one(arc, noise):
 def test_seventy_degrees_are_fitted_with_little_noise_and_refused_with_more():
     assert len(offs_and_pulls(70, 5e-4, range(5))) == 5
     for seed in range(20):
-        with pytest.raises(NoModelError, match="turn the shaft further"):
+        with pytest.raises(NoModelError, match="turn the shaft 120 deg or more"):
             estimate_channels(*drawn(70, 2e-3, seed), "log")
     with pytest.raises(NoModelError, match="5 readings of the channels"):
         estimate_channels(*drawn(70, 2e-3, 0, n=5), "log")

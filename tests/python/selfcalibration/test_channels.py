@@ -158,7 +158,7 @@ def test_the_command_writes_a_model_that_corrects_a_log_of_channels(tmp_path, ca
     [
         (lambda t: {**t, "cosine": np.zeros(2000)}, "the cosine channel is constant"),
         (lambda t: {**t, "cosine": t["sine"]}, "are one signal"),
-        (lambda t: {k: v[:250] for k, v in t.items()}, "turn the shaft further"),
+        (lambda t: {k: v[:250] for k, v in t.items()}, "turn the shaft"),
         (lambda t: {"sine": t["sine"]}, "sine and cosine"),
     ],
 )
