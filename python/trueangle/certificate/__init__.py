@@ -8,21 +8,14 @@ texts, `typesetting` makes the PDF.
 
 from __future__ import annotations
 
-from .budget import Budget, Contribution, Estimates, propagated
-from .conformity import Specification, conformance_probability, conformity
-from .document import Certificate, certify
-from .identity import Identity, load_identity
-
-__all__ = [
-    "Budget",
-    "Certificate",
-    "Contribution",
-    "Estimates",
-    "Identity",
-    "Specification",
-    "certify",
-    "conformance_probability",
-    "conformity",
-    "load_identity",
-    "propagated",
-]
+from .budget import Budget as Budget
+from .budget import Contribution as Contribution
+from .budget import Estimates as Estimates
+from .budget import propagated as propagated
+from .conformity import Specification as Specification
+from .conformity import conformance_probability as conformance_probability
+from .conformity import conformity as conformity
+from .document import Certificate as Certificate
+from .document import certify as certify
+from .identity import Identity as Identity
+from .identity import load_identity as load_identity

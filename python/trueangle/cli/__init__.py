@@ -22,9 +22,6 @@ from .paths import check_paths
 from .terminal import STANDARD_OUTPUT, plain_streams, silence_output
 from .wording import Wording
 
-__all__ = ["COMMANDS", "main", "process"]
-
-
 #: Modules of this package that each define one command of the same name.
 COMMANDS: tuple[str, ...] = (
     "record",

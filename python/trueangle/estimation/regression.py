@@ -13,15 +13,13 @@ from ..joint.pattern import JointPattern
 from ..joint.signals import Signals
 from ..support.arrays import Array
 from .cache import Cache
-from .extension import Extension
+from .extension import Extension as Extension
 from .lines import LineBasis
-from .projection import ROUNDING
+from .projection import ROUNDING as ROUNDING
 from .readings import Readings
 from .repeats import repeated_part
 from .solution import Solution, fields_of_solution
 from .whitening import RunEffect
-
-__all__ = ["BEYOND_SHOWN", "ROUNDING", "Extension", "Regression"]
 
 T = TypeVar("T")
 

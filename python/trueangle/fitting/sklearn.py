@@ -25,8 +25,6 @@ except ImportError:
         "the transformer needs scikit-learn: pip install 'trueangle[sklearn]'"
     ) from None
 
-__all__ = ["AngleCorrector"]
-
 
 class AngleCorrector(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):  # type: ignore[misc]
     """Correct columns of indicated angles by models of their errors.

@@ -21,19 +21,9 @@ from ..support.decoding import Decoder, Entries, json_value, read_text
 from ..support.files import RUNS_BYTES
 from ..support.plainresult import declared_fields
 from .history import HistoryOrder, HistoryRow
-from .result import (
-    FORMAT,
-    VERDICTS,
-    VERSION,
-    BetweenOrder,
-    CommonOrder,
-    Fleet,
-    FleetUnit,
-    UnitOrder,
-)
+from .result import FORMAT as FORMAT
+from .result import VERDICTS, VERSION, BetweenOrder, CommonOrder, Fleet, FleetUnit, UnitOrder
 from .tolerance import Tolerance
-
-__all__ = ["FORMAT", "load_fleet"]
 
 T = TypeVar("T")
 

@@ -10,20 +10,10 @@ from typing import Final, NamedTuple, TypeVar
 import numpy as np
 
 from ..errors import ArgumentError
-from ..joint import FIXED_MEMBERS
+from ..joint import FIXED_MEMBERS as FIXED_MEMBERS
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
-
-__all__ = [
-    "FIXED_MEMBERS",
-    "MOST_ORDERS",
-    "Shaft",
-    "ShaftOrders",
-    "limited_orders",
-    "resolve_orders",
-    "shaft_cycles",
-]
 
 T = TypeVar("T")
 

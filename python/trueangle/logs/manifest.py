@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ArgumentError
-from ..runs.paths import MANIFEST
+from ..runs.paths import MANIFEST as MANIFEST
 from ..support.decoding import finite_float
 from ..support.files import check_output
 from ..support.files.workplace import lock_path
-
-__all__ = ["MANIFEST", "Manifest", "Stamp", "stamp"]
 
 Stamp = tuple[int, int]
 

@@ -28,17 +28,10 @@ from ..support.layout import counted
 from .model import HarmonicModel
 from .records import MAX_TERMS, MOST_TURNS, RecordReader
 from .term import Term
-from .writing import FORMAT, ROBOT_FORMAT, VERSION, save_model
-
-__all__ = [
-    "FORMAT",
-    "VERSION",
-    "embedded_model",
-    "load_model",
-    "model_file_content",
-    "model_of_part",
-    "save_model",
-]
+from .writing import FORMAT as FORMAT
+from .writing import ROBOT_FORMAT
+from .writing import VERSION as VERSION
+from .writing import save_model as save_model
 
 #: Key of the file -> whether it must be there.
 _KEYS = {

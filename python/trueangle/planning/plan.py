@@ -11,7 +11,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ..errors import ArgumentError, NoModelError
-from ..joint.gear import HIGHEST_LOW_ORDER, wanted_orders
+from ..joint.gear import HIGHEST_LOW_ORDER as HIGHEST_LOW_ORDER
+from ..joint.gear import wanted_orders as wanted_orders
 from ..joint.shafts import limited_orders
 from ..runs.aliasing import fold
 from ..support.argumentkinds import told_kinds
@@ -23,18 +24,7 @@ from .noisefactors import (
     search_offsets,
     search_shifts,
 )
-from .result import CalibrationPlan
-
-__all__ = [
-    "HIGHEST_LOW_ORDER",
-    "CalibrationPlan",
-    "plan_encoder",
-    "plan_mounts",
-    "plan_tilts",
-    "readings_needed",
-    "wanted_orders",
-]
-
+from .result import CalibrationPlan as CalibrationPlan
 
 #: Readings that nobody takes.
 _MOST = 1e12

@@ -4,97 +4,52 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..effects import (
-    EFFECTS,
-    ArgumentShift,
-    Backlash,
-    ChannelSkew,
-    ClockDrift,
-    CurrentCoupling,
-    Curve,
-    DirectionalPattern,
-    DriftWithinRun,
-    Effect,
-    FilterLag,
-    HeteroscedasticNoise,
-    JointCoupling,
-    Latency,
-    LoadDependentGearError,
-    LocalDefect,
-    MissedCounts,
-    MissingOrder,
-    NonIntegerOrder,
-    Outliers,
-    PreslidingHysteresis,
-    Quantisation,
-    ReferenceLines,
-    ScaleError,
-    Sidebands,
-    StiffeningCompliance,
-    ThermalDrift,
-    TimePeriodic,
-    TimestampJitter,
-    TorqueHysteresis,
-    TorsionalCompliance,
-    VaryingLine,
-    WrongGearRatio,
-    ZeroSlip,
-)
-from ..joint.joint import Head, Joint
-from ..joint.pattern import Harmonic, Pattern
-from ..joint.signals import Signals, join_runs
+from ..effects import EFFECTS as EFFECTS
+from ..effects import ArgumentShift as ArgumentShift
+from ..effects import Backlash as Backlash
+from ..effects import ChannelSkew as ChannelSkew
+from ..effects import ClockDrift as ClockDrift
+from ..effects import CurrentCoupling as CurrentCoupling
+from ..effects import Curve as Curve
+from ..effects import DirectionalPattern as DirectionalPattern
+from ..effects import DriftWithinRun as DriftWithinRun
+from ..effects import Effect as Effect
+from ..effects import FilterLag as FilterLag
+from ..effects import HeteroscedasticNoise as HeteroscedasticNoise
+from ..effects import JointCoupling as JointCoupling
+from ..effects import Latency as Latency
+from ..effects import LoadDependentGearError as LoadDependentGearError
+from ..effects import LocalDefect as LocalDefect
+from ..effects import MissedCounts as MissedCounts
+from ..effects import MissingOrder as MissingOrder
+from ..effects import NonIntegerOrder as NonIntegerOrder
+from ..effects import Outliers as Outliers
+from ..effects import PreslidingHysteresis as PreslidingHysteresis
+from ..effects import Quantisation as Quantisation
+from ..effects import ReferenceLines as ReferenceLines
+from ..effects import ScaleError as ScaleError
+from ..effects import Sidebands as Sidebands
+from ..effects import StiffeningCompliance as StiffeningCompliance
+from ..effects import ThermalDrift as ThermalDrift
+from ..effects import TimePeriodic as TimePeriodic
+from ..effects import TimestampJitter as TimestampJitter
+from ..effects import TorqueHysteresis as TorqueHysteresis
+from ..effects import TorsionalCompliance as TorsionalCompliance
+from ..effects import VaryingLine as VaryingLine
+from ..effects import WrongGearRatio as WrongGearRatio
+from ..effects import ZeroSlip as ZeroSlip
+from ..joint.joint import Head as Head
+from ..joint.joint import Joint as Joint
+from ..joint.pattern import Harmonic as Harmonic
+from ..joint.pattern import Pattern as Pattern
+from ..joint.signals import Signals as Signals
+from ..joint.signals import join_runs as join_runs
 from ..support.argumentkinds import told_kinds
-from .designs import RunDesign
-from .simulation import Simulation, simulate, simulate_along
+from .designs import RunDesign as RunDesign
+from .simulation import Simulation as Simulation
+from .simulation import simulate as simulate
+from .simulation import simulate_along as simulate_along
 from .simulationtext import decoded_simulation, guarded_build
-
-__all__ = [
-    "EFFECTS",
-    "ArgumentShift",
-    "Backlash",
-    "ChannelSkew",
-    "ClockDrift",
-    "CurrentCoupling",
-    "Curve",
-    "DirectionalPattern",
-    "DriftWithinRun",
-    "Effect",
-    "FilterLag",
-    "Harmonic",
-    "Head",
-    "HeteroscedasticNoise",
-    "Joint",
-    "JointCoupling",
-    "Latency",
-    "LoadDependentGearError",
-    "LocalDefect",
-    "MissedCounts",
-    "MissingOrder",
-    "NonIntegerOrder",
-    "Outliers",
-    "Pattern",
-    "PreslidingHysteresis",
-    "Quantisation",
-    "ReferenceLines",
-    "RunDesign",
-    "ScaleError",
-    "Sidebands",
-    "Signals",
-    "Simulation",
-    "StiffeningCompliance",
-    "ThermalDrift",
-    "TimePeriodic",
-    "TimestampJitter",
-    "TorqueHysteresis",
-    "TorsionalCompliance",
-    "VaryingLine",
-    "WrongGearRatio",
-    "ZeroSlip",
-    "join_runs",
-    "load_simulation",
-    "simulate",
-    "simulate_along",
-]
 
 
 @told_kinds

@@ -11,21 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
 from .argumentkinds import told_kinds
-from .display_units import ARCSEC_PER_DEG, ARCSEC_PER_TURN, UNIT_PERIODS
-
-__all__ = [
-    "ARCSEC_PER_DEG",
-    "ARCSEC_PER_TURN",
-    "UNIT_PERIODS",
-    "arcsec",
-    "check_period",
-    "circular_mean",
-    "from_arcsec",
-    "unit_name",
-    "unwrapped",
-    "wrap",
-    "zero_text",
-]
+from .display_units import ARCSEC_PER_DEG as ARCSEC_PER_DEG
+from .display_units import ARCSEC_PER_TURN as ARCSEC_PER_TURN
+from .display_units import UNIT_PERIODS as UNIT_PERIODS
 
 #: Powers between two fresh evaluations: keeps rounding near 1e-15 * 64.
 _RESEED: Final = 64

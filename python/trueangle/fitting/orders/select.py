@@ -18,9 +18,7 @@ from ..fit import fitted_to
 from ..robust import without_spikes
 from ..uncertainty import CovarianceKind, check_covariance
 from .choice import Method, selected_orders
-from .result import OrderSelection
-
-__all__ = ["OrderSelection", "select_orders"]
+from .result import OrderSelection as OrderSelection
 
 
 @told_kinds

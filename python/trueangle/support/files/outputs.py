@@ -14,24 +14,9 @@ from typing import IO
 from ...errors import FileError, KindError
 from .inputs import irregular_file_kind, is_null_device, named_again, sha256_of
 from .kinds import FileKind, log_endings
-from .workplace import (
-    PARTIAL,
-    hidden_name,
-    made_beside,
-    remove_leftovers,
-    renamed,
-    workplace,
-)
-
-__all__ = [
-    "PARTIAL",
-    "check_output",
-    "external_output",
-    "hidden_name",
-    "publish",
-    "sync_to_disk",
-    "written_atomically",
-]
+from .workplace import PARTIAL as PARTIAL
+from .workplace import hidden_name as hidden_name
+from .workplace import made_beside, remove_leftovers, renamed, workplace
 
 #: Errors of the system that occur in writing only.
 _OF_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
