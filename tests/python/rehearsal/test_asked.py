@@ -248,6 +248,8 @@ def test_a_failure_is_noted_and_those_who_answer_are_ended(
         ({"seeds": 2.5}, "^seeds must be a whole number from 1, got 2.5$"),
         ({"seed": -1}, "^seed must be a whole number from 0, got -1$"),
         ({"workers": 0}, "^workers must be a whole number from 1, got 0$"),
+        ({"within": 0.0}, "above zero"),
+        ({"progress": "loud"}, "progress must be one of"),
     ],
 )
 def test_what_cannot_be_rehearsed_is_refused(changes: dict[str, Any], said: str) -> None:
