@@ -17,8 +17,7 @@ from .._core import __version__
 from ..errors import ArgumentError, TrueAngleError, shortened
 from ..support.layout import wrapped_lines
 from .ending import Ending
-from .parser import Parser
-from .paths import check_paths
+from .parser import Parser, check_paths
 from .terminal import STANDARD_OUTPUT, plain_streams, silence_output
 from .wording import Wording
 

@@ -7,8 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FileError, NoModelError
-from .parser import declare
-from .paths import Input
+from .parser import Input, declare
 from .robots import add_robot, each_joint, joints_asked, show_joints
 from .signal_options import add_signals, of_joint, reading_options
 

@@ -7,8 +7,7 @@ from functools import partial
 
 from ..support.plainresult import json_text
 from .options import add_shared, errors_in
-from .parser import declare
-from .paths import Input
+from .parser import Input, declare
 from .robots import model_asked, refuse_joint
 
 HELP = "difference of two models per order and over the turn"

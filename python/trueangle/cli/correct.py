@@ -13,8 +13,7 @@ from ..support.plainresult import json_text
 from ..support.suggestions import did_you_mean, listed_names
 from .ending import own_interrupts
 from .options import add_shared, errors_in
-from .parser import declare
-from .paths import Input, ModelInput
+from .parser import Input, ModelInput, declare
 from .robots import add_robot, joints_asked
 from .signal_options import add_signals, signals_by_joint
 

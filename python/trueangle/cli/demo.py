@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from ..errors import ArgumentError
 from ..support.files import REPORT
-from .parser import declare
-from .paths import Output
+from .parser import Output, declare
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -328,24 +327,15 @@ def reduction(
     """
     import numpy as np
 
-    from ..estimation.linear import least_squares
+    from ..fitting.fit import fit
 
     training, last = (runs, held) if held else (runs[:-1], runs[-1])
-
-    def columns(degrees: Array) -> Array:
-        x = np.radians(degrees)[:, None] * np.asarray(orders, dtype=np.float64)
-        return np.concatenate([np.cos(x), np.sin(x)], axis=1)
-
-    zeros = np.repeat(np.eye(len(training)), [len(run) for run in training], axis=0)
-    lines = columns(np.concatenate([run.reference for run in training]))
-    read = np.concatenate([3600.0 * run.centred_error for run in training])
-    found = least_squares(np.concatenate([lines, zeros], axis=1), read)
-    coefficients = found[: 2 * len(orders)]
+    model = fit(training, orders=orders).model
     measured = 3600.0 * last.centred_error
-    after = measured - columns(last.reference) @ coefficients
+    after = measured - 3600.0 * model.error(last.reference)
     grid = np.arange(0.0, 360.0, 0.05)
     truth = joint.error(grid)
-    left = truth - columns(grid) @ coefficients
+    left = truth - 3600.0 * model.error(grid)
     return Reduction(
         (float(np.ptp(measured)), float(np.ptp(after))),
         (float(np.ptp(truth)), float(np.ptp(left))),

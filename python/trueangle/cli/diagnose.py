@@ -12,8 +12,7 @@ from ..errors import ArgumentError, FileError, NoModelError, TrueAngleError
 from ..support.deadline import ending_early
 from ..support.files import MODEL, SENSOR, SIMULATION
 from .options import add_joint, add_shared, errors_in, refuse_given
-from .parser import declare
-from .paths import Input, Output
+from .parser import Input, Output, declare
 from .robots import add_robot, each_joint, joints_asked, save_models, show_joints
 from .signal_options import of_joint, reading_options, signals_by_joint
 from .values import declared_shafts, seconds

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..support.plainresult import json_text
 from .options import add_shared, errors_in
-from .parser import declare
-from .paths import Input, Output
+from .parser import Input, Output, declare
 from .robots import model_asked
 
 if TYPE_CHECKING:

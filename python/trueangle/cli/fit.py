@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ..errors import ArgumentError
 from .ending import own_interrupts
 from .options import add_joint, add_shared, show
-from .parser import declare
-from .paths import Input
+from .parser import Input, declare
 from .robots import add_robot, each_joint, joints_asked, save_models, show_joints
 from .signal_options import reading_options
 from .values import declared_shafts, orders_by_shaft, parse_orders

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..support.files import FLEET
 from .options import add_joint, add_shared, show
-from .parser import declare
-from .paths import Input, Output
+from .parser import Input, Output, declare
 from .signal_options import reading_options
 from .values import declared_shafts, orders_by_shaft
 

@@ -10,8 +10,7 @@ from ..support.layout import counted, laid_out
 from ..support.plainresult import json_text
 from .export import add_target_options, target_options
 from .options import add_shared, errors_in
-from .parser import declare
-from .paths import Input
+from .parser import Input, declare
 
 HELP = "read a table that firmware has, as a model: what does my present table do?"
 EXAMPLE = "trueangle import printer.cfg --from klipper -o present.json"

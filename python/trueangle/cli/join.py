@@ -6,8 +6,7 @@ import argparse
 from functools import partial
 
 from .options import add_shared, show
-from .parser import declare
-from .paths import Input
+from .parser import Input, declare
 from .signal_options import add_signals, signals_of_both
 
 HELP = "join an indicated and a reference log with separate clocks"

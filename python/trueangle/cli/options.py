@@ -12,8 +12,7 @@ from ..support.deadline import STYLES
 from ..support.display_units import ERROR_UNITS, ErrorsIn
 from ..support.files import MODEL, RUNS
 from ..support.plainresult import json_text
-from .parser import Kind, declare
-from .paths import Output
+from .parser import Kind, Output, declare
 from .signal_options import add_signals
 
 #: Options that several commands share, by the names under which commands take them.

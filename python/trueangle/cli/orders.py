@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from ..errors import ArgumentError
 from .fit import add_one_pass, log_options, refuse_robot, wants_one_pass
 from .options import add_joint, add_shared, show
-from .parser import declare
-from .paths import Input
+from .parser import Input, declare
 from .robots import add_robot, each_joint, joints_asked, show_joints
 from .values import declared_shafts, parse_orders
 

@@ -12,8 +12,7 @@ from ..errors import ArgumentError
 from ..selfcalibration import PLANNED
 from ..support.files import SIMULATION
 from .options import given, refuse_given
-from .parser import declare
-from .paths import Input, Output
+from .parser import Input, Output, declare
 from .signal_options import add_signals
 from .values import angle, arc, names, parse_orders, seconds
 

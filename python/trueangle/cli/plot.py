@@ -13,8 +13,7 @@ from ..support.files import PICTURE, written_atomically
 from ..support.layout import laid_out
 from ..support.plainresult import json_text
 from .options import add_joint, add_shared, errors_in, refuse_given
-from .parser import declare
-from .paths import Input, Output
+from .parser import Input, Output, declare
 from .robots import model_asked, refuse_joint
 from .values import declared_shafts, orders_by_shaft
 

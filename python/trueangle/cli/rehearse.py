@@ -8,8 +8,7 @@ from functools import partial
 from ..support.deadline import ending_early
 from ..support.files import PICTURE
 from .options import add_shared
-from .parser import declare
-from .paths import Input, Output
+from .parser import Input, Output, declare
 from .plot import save_picture
 from .values import names, seconds
 

@@ -11,8 +11,7 @@ from ..support.deadline import with_deadline
 from ..support.files import PDF, REPORT
 from ..support.plainresult import json_text
 from .options import add_joint, add_shared, errors_in, refuse_given
-from .parser import declare
-from .paths import Input, Output
+from .parser import Input, Output, declare
 from .robots import add_robot, each_joint, joints_asked
 from .values import declared_shafts, orders_by_shaft
 

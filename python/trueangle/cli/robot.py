@@ -7,8 +7,7 @@ from functools import partial
 
 from ..support.files import SIMULATION
 from ..support.plainresult import json_text
-from .parser import declare
-from .paths import Input, Output
+from .parser import Input, Output, declare
 
 HELP = "write a robot file: names and gear ratios of the joints of a URDF"
 EXAMPLE = "trueangle robot --from-urdf arm.urdf -o robot.toml"

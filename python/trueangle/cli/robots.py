@@ -46,7 +46,7 @@ class JointAsked:
 
 def add_robot(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments that name joints."""
-    from .paths import Input
+    from .parser import Input
 
     declare(
         parser,

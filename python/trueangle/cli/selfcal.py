@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from ..errors import ArgumentError
 from ..selfcalibration import LOOPS, METHODS
 from .options import add_shared, show
-from .parser import declare
-from .paths import Input
+from .parser import Input, declare
 from .robots import add_robot, each_joint, joints_asked, save_models, show_joints
 from .signal_options import add_signals, reading_options
 from .values import parse_orders

@@ -10,8 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ArgumentError
-from .parser import declare
-from .paths import Input
+from .parser import Input, declare
 from .values import track_periods
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ from functools import partial
 from ..support.layout import counted
 from ..support.plainresult import json_text
 from .options import add_shared
-from .parser import declare
-from .paths import Input
+from .parser import Input, declare
 
 HELP = "measure a simulated joint: calibration runs from a simulation file"
 EXAMPLE = "trueangle simulate joint.toml -o runs.csv --seed 1"

@@ -13,8 +13,7 @@ from ..errors import ArgumentError
 from ..support.files import PAGE, PICTURE
 from ..support.plainresult import json_text
 from .options import add_shared, errors_in, refuse_given
-from .parser import declare
-from .paths import Input, Output
+from .parser import Input, Output, declare
 from .plot import save_picture
 from .robots import add_robot, joint_asked, joints_asked, refuse_joint
 from .signal_options import (

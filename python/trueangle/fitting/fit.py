@@ -286,7 +286,7 @@ def fitted_to(
         problem = Problem(found, wanted, choice.argument, method, threads)
         weighted = fit_robustly(problem, loss, ROUNDING * problem.period)
     else:
-        from .summedproblem import SummedProblem
+        from .problem import SummedProblem
 
         problem = SummedProblem(summed, wanted, threads)
         weighted = fit_without_outliers(problem, len(summed.outliers))
@@ -310,8 +310,13 @@ def fitted_to(
     if taken is not None:
         remarks += taken.sentences(problem.period)
     if len(found) > 1:
-        from .speedzeros import zeros_follow_speed, zeros_follow_speed_sentence
-        from .unlikeruns import run_names, unlike_runs, unlike_runs_sentence
+        from .unlikeruns import (
+            run_names,
+            unlike_runs,
+            unlike_runs_sentence,
+            zeros_follow_speed,
+            zeros_follow_speed_sentence,
+        )
 
         if summed is None:
             following = zeros_follow_speed(found, fitted.offsets, fitted.solution.offset_std)

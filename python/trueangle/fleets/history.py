@@ -12,10 +12,10 @@ import numpy as np
 from ..estimation.linear import wald_statistic
 from ..support.angles import wrap
 from ..support.arrays import Array
+from ..support.decoding import parsed_time
 from ..support.distributions import f_quantile
 from ..support.plainresult import Angle
 from ..support.runlength import chart_limit
-from ..support.times import parsed_time
 from .calibration import Calibration, order_columns
 from .outliers import LEVEL, Deviates, deviates, level_by_order
 

@@ -16,7 +16,7 @@ from ..joint.joint import Joint
 from ..joint.shafts import ShaftOrders, resolve_orders
 from ..runs.follows import check_usable
 from ..runs.run import CalibrationRun
-from ..support.times import local_day
+from ..support.decoding import local_day
 from .calibration import Calibration, CalibrationSums, normal_matrix, output_orders
 
 #: Number of units, the first ones, by which orders are chosen.

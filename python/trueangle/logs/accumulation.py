@@ -33,8 +33,8 @@ from ..runs.paths import unit_of_path
 from ..runs.run import CalibrationRun
 from ..support.angles import common_sign, wrap
 from ..support.arrays import Array
+from ..support.decoding import local_day
 from ..support.files import partition_keys
-from ..support.times import local_day
 from .keeping import SAMPLE, KeptReadings
 
 #: Roles whose columns identify runs.

@@ -65,4 +65,4 @@ def watched_batches(
     if arrivals.problem is not None:
         raise FileError(address, f"ended by a fault: {arrivals.problem}")
     if columns is None:
-        raise FileError(address, f"{lines} lines, none of numbers; check the baud rate")
+        raise FileError(address, f"{lines}, none of numbers; check the baud rate")

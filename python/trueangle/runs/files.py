@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ..errors import EmptyCellsWarning, FileError, UnreadColumnWarning, level_of_caller
 from ..support.argumentkinds import told_kinds
+from ..support.decoding import local_day
 from ..support.files import InputFile
 from ..support.layout import counted
 from ..support.roles import LABELS, RoleColumn, checked_count_turn, role_code, unit_in_name
 from ..support.signals import FIELDS
-from ..support.times import local_day
 from .angles import PERIOD, Facets, find_run_angles, read_facets
 from .channelangle import with_channel_angle
 from .rawchannels import Channels

@@ -22,6 +22,7 @@ from ..formats.columns import find_columns, warn_of_unread
 from ..formats.csvcells import cell_number
 from ..formats.format import TEXTS, Batch, Format, Labels, Selection
 from ..formats.formats import format_of_content
+from ..support.decoding import elapsed_seconds, parsed_time
 from ..support.files import (
     RUNS_BYTES,
     InputFile,
@@ -32,7 +33,6 @@ from ..support.files import (
     sha256_of,
 )
 from ..support.roles import LABELS, RoleColumn, role_code, role_kind, wanted_columns
-from ..support.times import elapsed_seconds, parsed_time
 
 T = TypeVar("T")
 

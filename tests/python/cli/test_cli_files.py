@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from trueangle.cli import COMMANDS, build_parser, main
-from trueangle.cli.paths import Input, Output, check_paths
+from trueangle.cli.parser import Input, Output, check_paths
 from trueangle.errors import FileError
 from trueangle.support.files import FileKind
 

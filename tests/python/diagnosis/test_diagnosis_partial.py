@@ -7,8 +7,7 @@ import pytest
 
 import trueangle as ta
 from trueangle.effects import Latency, Outliers, ThermalDrift
-from trueangle.estimation.regression import Regression
-from trueangle.estimation.repeats import repeated_part
+from trueangle.estimation.regression import Regression, repeated_part
 from trueangle.simulation import Joint, RunDesign, Simulation, join_runs, simulate
 
 JOINT = Joint(7.3, "none", "motor")

@@ -9,8 +9,8 @@ import pytest
 from scipy.stats import kstest
 
 import trueangle as ta
+from trueangle.diagnosis.confirmation import chance_between_runs, scatter_chance
 from trueangle.diagnosis.remainder import unexplained_remainder
-from trueangle.diagnosis.runzeros import chance_between_runs, scatter_chance
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import Signals, join_runs

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from trueangle import CalibrationRun
-from trueangle.estimation.repeats import repeated_part
+from trueangle.estimation.regression import repeated_part
 from trueangle.joint.signals import Signals, join_runs
 
 

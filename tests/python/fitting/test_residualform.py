@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.fitting.correlation import correlation_found
-from trueangle.fitting.residualform import ResidualSpace
+from trueangle.fitting.correlation import ResidualSpace, correlation_found
 
 SEED = 91_300
 

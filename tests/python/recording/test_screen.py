@@ -185,7 +185,7 @@ def test_batches_have_the_unit_of_the_model(monkeypatch, argument, unit):
 
 
 def test_no_row_and_no_column_are_errors(monkeypatch):
-    for text, says in (("", "no line is a row"), ("a,b\n1,2\n", "no column reference_deg")):
+    for text, says in (("", "none of numbers"), ("a,b\n1,2\n", "no column reference_deg")):
         with typed(monkeypatch, text), pytest.raises(FileError, match=says):
             list(watched_batches("-", MODEL, ReadingOptions(), SourceOptions()))
 

@@ -16,6 +16,7 @@ import trueangle as ta
 from trueangle.errors import ArgumentError, UnitWarning
 from trueangle.formats import seriallog
 from trueangle.formats.format import Selection
+from trueangle.support.decoding import elapsed_seconds, local_day
 from trueangle.support.display_units import (
     LARGE,
     ErrorUnit,
@@ -26,7 +27,6 @@ from trueangle.support.display_units import (
     sine_of_rms,
 )
 from trueangle.support.roles import unit_in_name
-from trueangle.support.times import elapsed_seconds, local_day
 
 #: Of each unit in a turn.
 TURNS = {"arcsec": 1_296_000.0, "deg": 360.0, "mrad": 2000.0 * math.pi, 65536.0: 65536.0}

@@ -18,11 +18,11 @@ cost nothing:
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...effects.search import golden_maximum
 from ...support.arrays import Array
 from .leftover import Leftover
 
@@ -106,7 +106,8 @@ def estimate_noise(left: Leftover) -> Noise:
     k = int(np.argmin(values))
     # Less than none, too: noise alone is as often below as above, and its p value even.
     low, high = (trials[k - 1] if k else -BELOW), trials[min(k + 1, trials.size - 1)]
-    rho, value = _refined(lambda r: sums.deviance(r, means), float(low), float(high))
+    rho, best = golden_maximum(lambda r: -sums.deviance(r, means), float(low), float(high), 16)
+    value = -best
     if value > values[k]:
         rho, value = float(trials[k]), float(values[k])
     root = float(np.copysign(np.sqrt(max(float(values[0] - value), 0.0)), rho))
@@ -271,21 +272,3 @@ def _independent(x: Array) -> Array:
     values, vectors = np.linalg.eigh((x / scale).T @ (x / scale))
     kept = values > DISTINCT * values[-1]
     return np.asarray(x @ (vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]))
-
-
-def _refined(function: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
-    """Minimum of a function with one valley in [low, high], by golden section."""
-    golden = 0.5 * (5.0**0.5 - 1.0)
-    a, b = low, high
-    c, d = b - golden * (b - a), a + golden * (b - a)
-    fc, fd = function(c), function(d)
-    for _ in range(16):
-        if fc < fd:
-            b, d, fd = d, c, fc
-            c = b - golden * (b - a)
-            fc = function(c)
-        else:
-            a, c, fc = c, d, fd
-            d = a + golden * (b - a)
-            fd = function(d)
-    return (float(c), float(fc)) if fc < fd else (float(d), float(fd))

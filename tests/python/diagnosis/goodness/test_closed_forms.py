@@ -8,13 +8,13 @@ from trueangle.diagnosis.goodness import Leftover
 from trueangle.diagnosis.goodness.noise import (
     _independent,
     _PatternProducts,
-    _refined,
     _Sums,
     estimate_noise,
 )
 from trueangle.diagnosis.goodness.periodogram import _whitened, periodogram
 from trueangle.diagnosis.goodness.place import _smallest, unit_sums
 from trueangle.diagnosis.goodness.scatter import normal_kurtosis, scatter_of_repeats
+from trueangle.effects.search import golden_maximum
 
 from . import readings as made
 
@@ -77,8 +77,8 @@ def test_columns_made_independent_span_the_same():
     np.testing.assert_allclose(found @ (found.T @ x), x, rtol=1e-9, atol=1e-9)
 
 
-def test_a_valley_is_found():
-    place, value = _refined(lambda t: (t - 0.3) ** 2 + 2.0, -1.0, 1.0)
+def test_a_peak_is_found():
+    place, value = golden_maximum(lambda t: 2.0 - (t - 0.3) ** 2, -1.0, 1.0, 16)
     assert place == pytest.approx(0.3, abs=2e-3)
     assert value == pytest.approx(2.0, abs=1e-5)
 
