@@ -83,11 +83,10 @@ def judge_line(what: str, believed: Sequence[float], change: Array, covariance: 
     across = np.array([along[1], -along[0]])
     std = float(np.sqrt(max(float(along @ covariance @ along), 0.0)))
     turn = np.degrees(np.sqrt(max(float(across @ covariance @ across), 0.0)) / max(found, 1e-300))
-    deviance = wald_statistic(change, covariance)
     off = float(np.hypot(*change))
     phases = [float(np.degrees(np.arctan2(v[0], v[1])) % 360.0) for v in (old, new)]
     away = abs((phases[1] - phases[0] + 180.0) % 360.0 - 180.0)
-    if chi_squared_tail(deviance, 2.0) > LEVEL or off < CLOSE * size:
+    if not is_changed(change, covariance) or off < CLOSE * size:
         verdict = "confirmed"
     elif found < max(ABSENT * size, 3.0 * std) and found < 0.5 * size:
         verdict = "absent"
@@ -102,6 +101,11 @@ def judge_line(what: str, believed: Sequence[float], change: Array, covariance: 
         {"amplitude_arcsec": found, "phase_deg": phases[1]},
         {"amplitude_arcsec": std, "phase_deg": float(min(turn, 180.0))},
     )
+
+
+def is_changed(change: Array, covariance: Array) -> bool:
+    """Whether a fitted change of a line is more than its errors."""
+    return chi_squared_tail(wald_statistic(change, covariance), 2.0) <= LEVEL
 
 
 def verdict_of_factor(factor: float, std: float) -> str:

@@ -1,11 +1,12 @@
 """Gates that a finding passes before it is confirmed, from its computed values.
 
-Each gate is a line of `GATES` and gives the reason why a finding is not confirmed, or nothing.
+A law that does not carry over to other levels is not, nor a ratio that is one of several, nor two
+causes that are one column.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,11 +17,7 @@ from ..effects.wrong_gear_ratio import WrongGearRatio
 from ..estimation.regression import Regression
 from .confirmation import NOT_CONFIRMED
 from .finding import Finding
-from .levels import UNITS
 from .overlap import finding_overlaps
-
-#: Standard errors by which the size of a cause must differ from zero.
-TOLD = 2.0
 
 #: Share of what can be subtracted at a held-out level above which more is removed than left.
 MORE_THAN_LEFT = 0.5
@@ -43,7 +40,7 @@ FOLLOWED = {
 }
 
 
-def _not_carried(finding: Finding) -> str:
+def not_carried(finding: Finding) -> str:
     """A law that does not carry over to a level of its factor that was held out.
 
     Nothing is gained there for certain, or more is left than taken: another law.
@@ -54,33 +51,11 @@ def _not_carried(finding: Finding) -> str:
     low, high = by_level.interval
     if low > 0.0 and (by_level.reducible_share or 0.0) > MORE_THAN_LEFT:
         return ""
+    noun = {"velocity": "speed", "torque": "load"}.get(by_level.factor, by_level.factor)
     return (
-        f"its fitted form does not carry over to a {_NOUNS[by_level.factor]} that was held out "
+        f"its fitted form does not carry over to a {noun} that was held out "
         f"(share {by_level.reducible_share:.2f}, {low:.2f} to {high:.2f})"
     )
-
-
-def _not_told_from_zero(finding: Finding) -> str:
-    """A size within two standard errors of zero."""
-    effect = EFFECTS[finding.cause]
-    name = effect.size_name
-    if name not in finding.parameters:
-        name = next(iter(finding.parameters), "")
-    size = finding.parameters.get(name)
-    if size is None:
-        return ""
-    values, stds = (
-        np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64)))
-        if isinstance(each, int | float) or (isinstance(each, list) and each and _numeric(each))
-        else np.zeros(0)
-        for each in (size.value, size.std)
-    )
-    if values.size == 0 or values.size != stds.size or not (stds > 0.0).all():
-        return ""
-    z = float((values / stds).max())
-    if z >= TOLD:
-        return ""
-    return f"its {name} is {z:.1f} standard errors from zero"
 
 
 def not_the_only_ratio(finding: Finding) -> str:
@@ -100,27 +75,13 @@ def not_the_only_ratio(finding: Finding) -> str:
     )
 
 
-#: Every gate, in the order in which reasons are given.
-GATES: tuple[Callable[[Finding], str], ...] = (
-    _not_carried,
-    _not_told_from_zero,
-    not_the_only_ratio,
-)
-
-#: Levels of a factor, as one of them is called.
-_NOUNS = {"velocity": "speed", "temperature": "temperature", "torque": "load", "mount": "mount"}
-assert _NOUNS.keys() == UNITS.keys()
-
-
 def gated_findings(
     regression: Regression, findings: Sequence[Finding]
 ) -> tuple[list[Finding], list[Ambiguity], set[int]]:
     """Findings as the gates leave them, the pairs that are not separated, and their terms."""
     found = []
     for finding in findings:
-        reason = ""
-        if finding.confirmed:
-            reason = next((r for gate in GATES if (r := gate(finding))), "")
+        reason = (not_carried(finding) or not_the_only_ratio(finding)) if finding.confirmed else ""
         found.append(replace(finding, status=NOT_CONFIRMED, reason=reason) if reason else finding)
     spots: list[Ambiguity] = []
     shared: set[int] = set()
@@ -163,7 +124,3 @@ def many_causes(findings: Sequence[Finding]) -> str:
     if len(shared) > 1:
         text += f"; {', '.join(shared)} all follow {FOLLOWED[common]}"
     return text
-
-
-def _numeric(values: list[object]) -> bool:
-    return all(isinstance(value, int | float) for value in values)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..effects import EFFECTS, Effect
 from ..effects.ambiguity import Ambiguity
@@ -19,12 +18,11 @@ from ..joint.signals import Signals
 from ..simulation.simulation import Simulation
 from ..support.arrays import Array
 from ..support.distributions import normal_tail
-from .beliefs import LEVEL, Belief, judge_line, verdict_of_factor
+from .beliefs import LEVEL, Belief, is_changed, judge_line, verdict_of_factor
 from .formerrors import with_unseen_orders
 from .gain import measure_belief_gains
 from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
-from .unseenorders import is_low_over_arc
 
 #: Fields of effects, in addition to those in arcsec, that their signal is proportional to.
 LINEAR = ("delay_s", "relative_error", "pattern_per_K", "coefficient")
@@ -113,13 +111,14 @@ def judged_beliefs(
     believed: Simulation,
     spots: list[Ambiguity],
     with_gain: bool,
+    explained: Set[float] = frozenset(),
 ) -> tuple[list[Belief], Simulation]:
     """Verdicts on every line and effect, and the simulation with refuted ones as measured.
 
-    Lines that something else acts on, or that may hide behind another cause in these runs,
-    are not judged; the latter become entries of what is not identifiable.
+    Lines that something else acts on (``explained``), or that may hide behind another cause in
+    these runs, are not judged; the latter become entries of what is not identifiable.
     """
-    lines, harmonics = _lines(with_unseen_orders(regression), sim, spots, with_gain)
+    lines, harmonics = _lines(with_unseen_orders(regression), sim, spots, with_gain, explained)
     effects: list[Belief] = []
     refuted: list[tuple[int, tuple[Array, Array]]] = []
     for old, new in zip(sim.effects, believed.effects, strict=True):
@@ -165,43 +164,41 @@ def _effect(regression: Regression, sim: Simulation, old: Effect, new: Effect) -
     )
 
 
-def believed_columns(regression: Regression) -> NDArray[np.bool_]:
-    """Columns of the base that are low orders over an arc, at their assumed size."""
-    held = np.zeros(regression.base.shape[1], dtype=bool)
-    wider = with_unseen_orders(regression)
-    for k, order in enumerate(regression.belief.pattern.orders):
+def changed_lines(regression: Regression) -> dict[float, slice]:
+    """Orders whose lines are not as they are believed, each with its columns of the base."""
+    wider, found = with_unseen_orders(regression), {}
+    for k, order in enumerate(regression.belief.pattern.orders.tolist()):
         where = slice(1 + 2 * k, 3 + 2 * k)
-        if is_low_over_arc(regression, float(order)):
-            held[where] = _judged_line(wider, k, "").verdict == "confirmed"
-    return held
-
-
-def _judged_line(regression: Regression, k: int, what: str) -> Belief:
-    """Verdict on a line of the pattern."""
-    pattern, where = regression.belief.pattern, np.arange(1 + 2 * k, 3 + 2 * k)
-    believed = pattern.cosine[k], pattern.sine[k]
-    return judge_line(what, believed, regression.coefficients[where], regression.robust(where))
+        spread = wider.robust(np.arange(where.start, where.stop))
+        if is_changed(wider.coefficients[where], spread):
+            found[order] = where
+    return found
 
 
 def _lines(
-    regression: Regression, sim: Simulation, spots: list[Ambiguity], with_gain: bool
+    regression: Regression,
+    sim: Simulation,
+    spots: list[Ambiguity],
+    with_gain: bool,
+    explained: Set[float],
 ) -> tuple[list[Belief], tuple[Harmonic, ...]]:
     pattern, joint = regression.belief.pattern, regression.belief.joint
     if pattern.orders.size == 0 or any(EFFECTS[t.cause].changes_lines for t in regression.terms):
         return [], sim.harmonics
-    modulated = {term.shape["carrier"] for term in regression.terms if "carrier" in term.shape}
+    acted_on = {term.shape["carrier"] for term in regression.terms if "carrier" in term.shape}
     found: list[Belief] = []
     refuted: list[tuple[int, slice]] = []
     harmonics = list(sim.harmonics)
     for k, order in enumerate(pattern.orders):
-        if order in modulated:
+        if order in acted_on | explained:
             continue  # modulation takes from its carrier what it gives to the sidebands
         where = slice(1 + 2 * k, 3 + 2 * k)
         shaft, number = joint.name_order(float(order)) or ("output", float(order))
-        belief = _judged_line(regression, k, f"{shaft} order {number:g}")
+        believed = pattern.cosine[k], pattern.sine[k]
+        change = regression.coefficients[where]
+        spread = regression.robust(np.arange(where.start, where.stop))
+        belief = judge_line(f"{shaft} order {number:g}", believed, change, spread)
         if belief.verdict != "confirmed":
-            change = regression.coefficients[where]
-            spread = regression.robust(np.arange(where.start, where.stop))
             doubt = _doubt(regression, float(order), change, spread, spots)
             if doubt:
                 continue

@@ -40,6 +40,8 @@ class NamedCauses:
     factors : list of Factor
     lost : list of int
         Terms of findings whose form is not better than the free function of its factors.
+    explained : set of float
+        Lines of the simulation whose change is a part of what the readings follow.
     """
 
     chosen: Regression
@@ -48,6 +50,7 @@ class NamedCauses:
     spots: list[Ambiguity]
     factors: list[Factor]
     lost: list[int]
+    explained: set[float]
 
     @property
     def curves(self) -> list[Curve]:
@@ -194,7 +197,7 @@ def _named(
         rest = unexplained_remainder(others, sigma)
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
-    held, factors = stated_factors(chosen, findings)
+    held, factors, explained = stated_factors(chosen, findings)
     # Causes that are not distinguished, or were not tried, predict different errors in other
     # runs: no curve represents them.
     seen = [spot for spot in spots if spot.supported]
@@ -203,4 +206,4 @@ def _named(
     factors = [f if any(f is other for other in kept) else replace(f, effects=()) for f in factors]
     both = zip(findings, held, strict=True)
     lost = [k for one, other in both if one.confirmed and not other.confirmed for k in one.group]
-    return NamedCauses(chosen, rest, held, spots, factors, lost)
+    return NamedCauses(chosen, rest, held, spots, factors, lost, explained)

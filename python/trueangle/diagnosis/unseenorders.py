@@ -46,12 +46,6 @@ def arc_note(regression: Regression) -> str:
     )
 
 
-def is_low_over_arc(regression: Regression, order: float) -> bool:
-    """Whether a line of the output may be any smooth function of the place: over an arc."""
-    turns = _turns(regression)
-    return turns < WHOLE_TURN and _is_of_few(order, turns)
-
-
 def _turns(regression: Regression) -> float:
     """Travel of all runs together."""
     return float(np.ptp(regression.signals.theta)) / (2.0 * np.pi)

@@ -31,7 +31,7 @@ VALUES: Final[Mapping[str, tuple[Callable[[Signals], Array | None], str]]] = {
 }
 
 #: Products with the place.
-PRODUCTS: Final = ("direction_place", "speed_place", "load_place", "temperature_place")
+PRODUCTS: Final = tuple(f"{name}_place" for name in VALUES if name not in ("place", "run_time"))
 
 #: Points of a period of the highest order that a pattern has.
 POINTS: Final = 16
@@ -52,8 +52,8 @@ class Curve(Effect):
     ----------
     factor : str
         ``place``, ``direction``, ``speed``, ``load``, ``temperature``, ``current`` or
-        ``run_time``; ``direction_place``, ``speed_place``, ``load_place`` or
-        ``temperature_place`` with orders.
+        ``run_time``; ``direction_place``, ``speed_place``, ``load_place``,
+        ``temperature_place`` or ``current_place`` with orders.
     at : list of float
         Values of the factor, two or more, increasing: degrees, -1 and 1, deg/s, Nm, Celsius, A, s.
     value_arcsec : list of float
@@ -104,15 +104,13 @@ class Curve(Effect):
             return np.zeros(len(signals))
         if self._repeats:
             x = self.at[0] + (x - self.at[0]) % 360.0
-        found: Array = np.asarray(np.interp(x, self.at, self.value_arcsec))
-        if self.orders:
-            found *= line_sum(signals.theta, self._lines(around.joint.shafts))
-        return found
+        found = np.asarray(np.interp(x, self.at, self.value_arcsec))
+        lines = self._lines(around.joint.shafts)
+        return found * line_sum(signals.theta, lines) if lines else found
 
     @property
     def needs(self) -> tuple[str, ...]:  # type: ignore[override]
-        own = self._values[1]
-        return (own,) if own in ("temperature", "torque", "current") else ()
+        return tuple({"temperature", "torque", "current"} & {self._values[1]})
 
     @property
     def not_at_run_time(self) -> str:  # type: ignore[override]
@@ -120,7 +118,9 @@ class Curve(Effect):
 
     def to_lines(self) -> Sequence[tuple[str, float]]:
         if not self._repeats:
-            return ()
+            # The mean of both directions is a line of the pattern.
+            is_line = self.factor == "direction_place" and sum(self.value_arcsec) != 0.0
+            return tuple((self.shaft, m) for m in self.orders) if is_line else ()
         turn = np.linspace(0.0, 360.0, len(self.at) - 1, endpoint=False)
         lines = np.abs(np.fft.rfft(np.interp(turn, self.at, self.value_arcsec)))[1:]
         found = np.flatnonzero(lines > _ROUNDING * lines.max(initial=0.0))
@@ -133,10 +133,11 @@ class Curve(Effect):
         lines = line_values(self._lines(shafts), period) if self.orders else {}
         unit = period / 360.0 if follows in ("velocity", "angle") else 1.0
         scale = 1.0 if self.orders else from_arcsec(1.0, period)
-        ends = self.value_arcsec[0] + self.value_arcsec[-1]
-        middle = 0.5 * ends if follows in ("direction", "angle") else 0.0  # the pattern's
-        values = tuple(scale * (value - middle) for value in self.value_arcsec)
-        return (CurveTerm(follows, tuple(unit * x for x in self.at), values, **lines),)
+        at, values = unit * np.array(self.at), scale * np.array(self.value_arcsec)
+        if follows in ("direction", "angle"):
+            values -= 0.5 * (values[0] + values[-1])  # the pattern's
+            values[-1] = -values[0]
+        return (CurveTerm(follows, tuple(at.tolist()), tuple(values.tolist()), **lines),)
 
     @property
     def _values(self) -> tuple[Callable[[Signals], Array | None], str]:

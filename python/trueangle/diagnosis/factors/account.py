@@ -15,7 +15,7 @@ from ...joint.signals import Signals
 from ...support.arrays import Array
 from .extension import curves_of
 from .factor import Factor, FactorCurve
-from .group import FACTORS, Group
+from .group import FACTORS, FEW, Group, lines_of
 
 #: Readings used at most; of more, every n-th.
 MOST_READINGS: Final = 2500
@@ -23,8 +23,7 @@ MOST_READINGS: Final = 2500
 #: Part of the variance that each factor may have where the noise is first looked for.
 AT_FIRST: Final = 0.3
 
-#: Columns and orders that groups may have to be fitted where the noise is first estimated.
-FEW: Final = 4
+#: Highest order of groups that are fitted where the noise is first estimated.
 LOWEST: Final = 4.0
 
 #: Rounds of noise and search at most.
@@ -233,6 +232,9 @@ def factors_of(
     """
     shown = account if beside is None else account.less(beside, account.tau)
     _, mean, covariance = shown.sums.posterior(shown.tau)
+    lines = [k for k, group in enumerate(account.groups) if group.factor == "place"]
+    if beside is not None:
+        account = _with_constants(account, mean)
     base = account.evidence(account.tau)
     kinds: dict[tuple[str, str | None], list[int]] = {}
     for k in account.inside:
@@ -244,12 +246,15 @@ def factors_of(
     bounds = account.bounds
     found = []
     for (factor, shaft), members in kinds.items():
+        groups = [account.groups[k] for k in members]
+        means = [mean[bounds[k] : bounds[k + 1]] for k in members]
         at = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in members])
-        columns = np.hstack([account.groups[k].columns for k in members])
+        columns = np.hstack([group.columns for group in groups])
+        fitted = columns @ mean[at]
         rms, std = _size(columns, mean[at], covariance[np.ix_(at, at)])
         if rms**2 < HELD * account.total:
             continue
-        orders = [m for k in members for m in account.groups[k].orders]
+        orders = [m for group in groups for m in group.orders]
         cycles = shafts[shaft] if shaft else 1.0
         found.append(
             Factor(
@@ -262,33 +267,38 @@ def factors_of(
                 rms**2 / max(account.total, rms**2),
                 base - account.evidence(account.without(members)),
                 (),
-                _alike(account, members, factor, mean),
-                _curve(account, members, bounds, mean, covariance),
-                curves_of(
-                    factor,
-                    shaft,
-                    [account.groups[k] for k in members],
-                    [mean[bounds[k] : bounds[k + 1]] for k in members],
-                    shafts,
-                ),
-                _jumps(account, members, mean),
-                tuple(e for k in members if (e := account.groups[k].event) is not None),
-                columns @ mean[at],
+                _alike(account, members, lines, fitted),
+                _curve(account, members, mean, covariance),
+                curves_of(factor, shaft, groups, means, shafts),
+                _jumps(groups, means),
+                tuple(group.event for group in groups if group.event is not None),
+                fitted,
             )
         )
     return sorted(found, key=lambda f: (-f.rms, FACTORS.index(f.factor)))
 
 
-def _jumps(
-    account: FactorAccount, members: Sequence[int], mean: Array
-) -> tuple[tuple[float, float], ...]:
+def _with_constants(account: FactorAccount, mean: Array) -> FactorAccount:
+    """Lines of the place that are what products with them are on average, as parts of these."""
+    groups, bounds = list(account.groups), account.bounds
+    sizes = {
+        k: float(np.var(groups[k].columns @ mean[bounds[k] : bounds[k + 1]]))
+        for k in account.inside
+    }
+    for k in account.inside:
+        products = [j for j in account.inside if groups[j].is_of_line(account.groups[k].orders)]
+        if account.groups[k].factor == "place" and len(groups[k].orders) == 1 and products:
+            groups[k] = groups[k].as_constant_of(groups[max(products, key=sizes.__getitem__)])
+    return replace(account, groups=groups)
+
+
+def _jumps(groups: Sequence[Group], means: Sequence[Array]) -> tuple[tuple[float, float], ...]:
     """Where a function of the place jumps, and by how much upwards."""
     found = []
-    for k in members:
-        where = account.groups[k].jump
-        if where is not None:
-            below, above = account.groups[k].functions_at(where + np.array([-1e-6, 1e-6]))[:, 0]
-            found.append((where, float((above - below) * mean[account.bounds[k]])))
+    for group, mean in zip(groups, means, strict=True):
+        if group.jump is not None:
+            below, above = group.functions_at(group.jump + np.array([-1e-6, 1e-6]))[:, 0]
+            found.append((group.jump, float((above - below) * mean[0])))
     return tuple(sorted(found))
 
 
@@ -320,27 +330,34 @@ def _shaft(orders: Sequence[float], shafts: dict[str, float]) -> str:
 
 
 def _alike(
-    account: FactorAccount, members: Sequence[int], factor: str, mean: Array
+    account: FactorAccount, members: Sequence[int], lines: Sequence[int], fitted: Array
 ) -> tuple[str, ...]:
     """Factors that explain as much in the place of one, or are nearly the same columns.
 
-    The evidence may distinguish the latter, but only by errors of the signals.
+    The evidence may distinguish the latter, but only by errors of the signals. Products come with
+    the lines of the place that are their means.
     """
+    groups = account.groups
     rest = account.without(members)
     own, _ = account.best_beside(rest, members)
     kinds: dict[str, list[int]] = {}
-    for k, group in enumerate(account.groups):
-        if account.tau[k] == 0.0 and group.factor not in (factor, NAME):
+    for k, group in enumerate(groups):
+        if account.tau[k] == 0.0 and group.factor not in (groups[members[0]].factor, NAME):
             kinds.setdefault(group.factor, []).append(k)
     losses, _, instead = account.sums.changes(account.tau)
-    orders = {m for k in members for m in account.groups[k].orders}
-    means = [k for k in kinds.get("place", []) if orders & {*account.groups[k].orders}]
+    orders = {m for k in members for m in groups[k].orders}
+    means = [k for k in lines if rest[k] == 0.0 and orders & {*groups[k].orders}]
+    width = sum(groups[k].columns.shape[1] for k in members)
     found = []
     for kind, others in kinds.items():
-        if _is_function_of(account, members, others, mean):
+        also = means if kind.endswith("_place") else []
+        same = [[j for j in also if groups[j].orders == groups[k].orders] for k in others]
+        parts = [[k, *beside] for k, beside in zip(others, same, strict=True)]
+        columns = [np.hstack([groups[k].columns for k in part]) for part in parts]
+        if any(_holds(x, fitted, width) for x in columns):
             found.append(kind)
             continue
-        beside = [*others, *(means if kind.endswith("_place") and kind != "place" else [])]
+        beside = [*others, *also]
         if max(instead[k, j] / max(losses[k], 1e-9) for k in members for j in beside) < TRIED:
             continue
         score, tau = account.best_beside(rest, beside)
@@ -349,54 +366,40 @@ def _alike(
     return tuple(sorted(found, key=FACTORS.index))
 
 
-def _is_function_of(
-    account: FactorAccount, members: Sequence[int], others: Sequence[int], mean: Array
-) -> bool:
-    """What a group mostly is, in as many columns as a factor has, holds the factor's function."""
-    groups, bounds = account.groups, account.bounds
-    own = sum(groups[k].columns @ mean[bounds[k] : bounds[k + 1]] for k in members)
-    own = np.asarray(own - np.mean(own))
-    width = sum(groups[k].columns.shape[1] for k in members)
-    for k in others:
-        columns = groups[k].columns
-        if columns.shape[1] <= MOST_ALIKE:
-            parts = np.linalg.svd(columns - columns.mean(axis=0), full_matrices=False)[0]
-            mostly = parts[:, :width]
-            left = own - mostly @ (mostly.T @ own)
-            if left @ left < SAME_COLUMNS * (own @ own):
-                return True
-    return False
+def _holds(columns: Array, function: Array, width: int) -> bool:
+    """Columns hold a function mostly in a number of their principal parts."""
+    if columns.shape[1] > max(MOST_ALIKE, width):
+        return False
+    parts = np.linalg.svd(columns - columns.mean(axis=0), full_matrices=False)[0][:, :width]
+    own = function - np.mean(function)
+    left = own - parts @ (parts.T @ own)
+    return bool(left @ left < SAME_COLUMNS * (own @ own))
 
 
 def _curve(
-    account: FactorAccount,
-    members: Sequence[int],
-    bounds: Array,
-    mean: Array,
-    covariance: Array,
+    account: FactorAccount, members: Sequence[int], mean: Array, covariance: Array
 ) -> FactorCurve:
     """The function of the strongest axis of a factor's groups."""
+    bounds = account.bounds
     widest = max(members, key=lambda k: account.groups[k].at.size)
     at, unit = account.groups[widest].at, account.groups[widest].unit
     own = [k for k in members if np.array_equal(account.groups[k].at, at)]
     value: Array = np.zeros(at.size)
     variance: Array = np.zeros(at.size)
     products = account.groups[own[0]].is_product
+    index = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in own])
     if not products:
-        index = np.concatenate([np.arange(bounds[k], bounds[k + 1]) for k in own])
         rows = np.hstack([account.groups[k].values_about_mean() for k in own])
         value = rows @ mean[index]
         variance = np.einsum("ij,jk,ik->i", rows, covariance[np.ix_(index, index)], rows)
     else:
         squares, slopes = np.zeros(at.size), np.zeros(at.size)
-        for k in own:
-            for _, values, columns in account.groups[k].lines():
-                for part in range(2):
-                    index = np.arange(bounds[k], bounds[k + 1])[columns][part::2]
-                    f = values @ mean[index]
-                    spread = covariance[np.ix_(index, index)]
-                    squares += f**2
-                    slopes += f**2 * np.einsum("ij,jk,ik->i", values, spread, values)
+        for values, columns in lines_of([account.groups[k] for k in own]).values():
+            for part in range(2):
+                f = values @ mean[index[columns[part::2]]]
+                spread = covariance[np.ix_(*2 * [index[columns[part::2]]])]
+                squares += f**2
+                slopes += f**2 * np.einsum("ij,jk,ik->i", values, spread, values)
         value = np.sqrt(squares)
         variance = slopes / np.maximum(squares, 1e-24)
     apart = BAND * np.sqrt(np.maximum(variance, 0.0))

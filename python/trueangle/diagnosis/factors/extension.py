@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ...effects.curve import POINTS, PRODUCTS, VALUES, Curve
 from ...support.arrays import Array
-from .group import Group
+from .group import Group, lines_of
 
 #: Points of a turn, at least.
 LEAST = 72
@@ -45,14 +45,10 @@ def curves_of(
     own = [(group, mean) for group, mean in zip(groups, means, strict=True) if group.event is None]
     if factor in PRODUCTS:
         cycles = shafts.get(shaft or "output", 1.0)
-        return [
-            curve
-            for group, mean in own
-            for curve in _product(factor, shaft or "output", cycles, group, mean)
-        ]
-    if factor == "place" and any(group.at[-1] - group.at[0] == 360.0 for group, _ in own):
-        # A ramp over several turns is no pattern of one.
-        own = [(group, mean) for group, mean in own if group.orders or group.jump is not None]
+        return [*_products(factor, shaft or "output", cycles, own)] if own else []
+    # A ramp over several turns is no pattern of one, nor are its places.
+    most = max((group.at.size for group, _ in own), default=0)
+    own = [(group, mean) for group, mean in own if group.at.size == most]
     return [_alone(factor, own)] if factor in VALUES and own else []
 
 
@@ -62,32 +58,29 @@ def _alone(factor: str, own: Sequence[tuple[Group, Array]]) -> Curve:
     if highest:
         turns = (at[-1] - at[0]) / 360.0
         count = max(LEAST, int(np.ceil(POINTS * highest * turns)))
-        jumps = [group.jump for group, _ in own if group.jump is not None]
-        places = own[0][0].at
-        ends = [places[np.searchsorted(places, jump) - 1 :][:2] for jump in jumps]
-        at = np.concatenate([np.linspace(at[0], at[-1], 1 + count), *ends])
+        at = np.concatenate([np.linspace(at[0], at[-1], 1 + count), at])
     at = np.unique(plain_numbers(at))
     values = sum((group.values_about_mean(at) @ mean for group, mean in own), np.zeros(at.size))
     return Curve(factor, tuple(at.tolist()), plain_numbers(values))
 
 
-def _product(factor: str, shaft: str, cycles: float, group: Group, mean: Array) -> list[Curve]:
-    found = []
-    at = plain_numbers(group.at)
-    for order, values, own in group.lines():
+def _products(
+    factor: str, shaft: str, cycles: float, own: Sequence[tuple[Group, Array]]
+) -> Iterator[Curve]:
+    at, mean = plain_numbers(own[0][0].at), np.concatenate([mean for _, mean in own])
+    for order, (values, columns) in lines_of([group for group, _ in own]).items():
+        waves = values @ mean[columns].reshape(-1, 2)
         if not order:
-            alone = factor.removesuffix("_place")
-            found.append(Curve(alone, at, plain_numbers(values @ mean[own][0::2])))
+            yield Curve(factor.removesuffix("_place"), at, plain_numbers(waves[:, 0]))
             continue
-        parts, sizes, pairs = np.linalg.svd(values @ mean[own].reshape(-1, 2), full_matrices=False)
+        parts, sizes, pairs = np.linalg.svd(waves, full_matrices=False)
         for part, size, (cosine, sine) in zip(parts.T, sizes, pairs, strict=False):
             if not size > _ROUNDING * sizes[0]:
                 continue
             sign = 1.0 if part[np.argmax(np.abs(part))] > 0.0 else -1.0
             phase = float(np.degrees(np.arctan2(sign * cosine, sign * sine)) % 360.0)
             shown = plain_numbers(sign * size * part)
-            found.append(Curve(factor, at, shown, shaft, (order / cycles,), (round(phase, 4),)))
-    return found
+            yield Curve(factor, at, shown, shaft, (order / cycles,), (round(phase, 4),))
 
 
 def plain_numbers(values: Array) -> tuple[float, ...]:

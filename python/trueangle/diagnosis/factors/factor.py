@@ -29,6 +29,7 @@ WORDS = {
     "temperature": "the temperature",
     "temperature_place": "the temperature times the place",
     "current": "the current",
+    "current_place": "the current times the place",
     "mount_place": "the place on the reference's mount",
     "step": "the step of the sensor",
     "frequency": "a line in time",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Container, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...joint.pattern import line_columns
 from ...support.arrays import Array
@@ -26,12 +27,16 @@ FACTORS: Final = (
     "temperature",
     "temperature_place",
     "current",
+    "current_place",
     "mount_place",
     "run",
     "run_place",
     "run_time",
     "frequency",
 )
+
+#: Columns of a narrow group.
+FEW: Final = 4
 
 #: Orders of the output, each a group.
 LOW: Final = 12
@@ -41,6 +46,10 @@ STANDS_OUT: Final = 8.0
 
 #: Values of a factor at which its function is stated.
 GRID: Final = 25
+
+
+#: Functions of a factor's values, as columns.
+Basis = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +84,7 @@ class Group:
     columns: Array
     orders: tuple[float, ...]
     at: Array
-    function: Callable[[Array], Array] | None
+    function: Basis | None
     unit: str
     alternatives: float = 1.0
     event: tuple[int, int] | None = None
@@ -98,32 +107,40 @@ class Group:
         found: Array = self.function(x)
         return found
 
-    def lines(self) -> Iterator[tuple[float, Array, slice]]:
-        """Of a product each line: its order, the functions at `at` of it, and its columns."""
-        width = self.columns.shape[1] // len(self.orders)
-        for k, order in enumerate(self.orders):
-            yield order, self.values / max(order, 1.0), slice(k * width, (k + 1) * width)
+    def as_constant_of(self, product: Group) -> Group:
+        """A line of the place as what a product with it is on average."""
+        level = float(self.functions_at(np.zeros(1))[0, 0]) * max(*self.orders, 1.0)
+        return replace(
+            self,
+            factor=product.factor,
+            at=product.at,
+            unit=product.unit,
+            function=lambda x: np.full((x.size, 1), level),
+        )
 
     @property
     def is_product(self) -> bool:
         """Functions of the factor times a line."""
         return bool(self.values.shape[1] < self.columns.shape[1])
 
+    def is_of_line(self, orders: Container[float]) -> bool:
+        """Products of a factor with one of these lines."""
+        of_place = self.factor.endswith("_place") and self.factor != "mount_place"
+        return of_place and any(m in orders for m in self.orders)
+
     @classmethod
     def of_function(
         cls,
         factor: str,
         x: Array,
-        basis: Callable[[Array], Array],
+        basis: Basis,
         at: Array,
         unit: str,
         orders: tuple[float, ...] = (),
-    ) -> Group | None:
-        """Functions of a factor's values at the readings; None where they do not change."""
+    ) -> Group:
+        """Functions of a factor's values at the readings."""
         columns = basis(x)
         scale = _scale(columns)
-        if not scale > 0.0:
-            return None
         return cls(factor, columns / scale, orders, at, lambda x: basis(x) / scale, unit)
 
     @classmethod
@@ -131,7 +148,7 @@ class Group:
         cls,
         factor: str,
         x: Array,
-        basis: Callable[[Array], Array],
+        basis: Basis,
         at: Array,
         unit: str,
         theta: Array,
@@ -146,6 +163,22 @@ class Group:
         columns = np.hstack([product.reshape(len(theta), -1) for product in products])
         scale = _scale(columns)
         return cls(factor, columns / scale, orders, at, lambda x: basis(x) / scale, unit)
+
+
+def lines_of(groups: Sequence[Group]) -> dict[float, tuple[Array, NDArray[np.int64]]]:
+    """Of products of a factor each line: the functions at `at`, and the columns of all groups."""
+    found: dict[float, list[tuple[Array, NDArray[np.int64]]]] = {}
+    first = 0
+    for group in groups:
+        width = group.columns.shape[1] // len(group.orders)
+        for order in group.orders:
+            values = group.values / max(order, 1.0)
+            found.setdefault(order, []).append((values, np.arange(first, first + width)))
+            first += width
+    return {
+        order: (np.hstack([f for f, _ in parts]), np.concatenate([c for _, c in parts]))
+        for order, parts in found.items()
+    }
 
 
 def _line(theta: Array, order: float) -> Array:

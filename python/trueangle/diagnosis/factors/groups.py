@@ -3,47 +3,27 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...effects.orderspectrum import OrderSpectrum
 from ...joint.pattern import line_columns
 from ...joint.signals import Signals
-from ...runs.aliasing import count_positions
 from ...support.arrays import Array
 from .events import late_readings, step_events
-from .group import GRID, LOW, STANDS_OUT, Group
-from .jumps import jumps, less_lines
-
-#: Bands of orders above the low ones, a group each.
-BANDS: Final = ((13, 24), (25, 48), (49, 96))
-
-#: Harmonics of a shaft's turn by which any function of its place is represented: a bump, a worn
-#: sector, a row of them.
-HARMONICS: Final = 48
+from .group import FEW, GRID, LOW, Basis, Group
+from .places import PeakSpectrum, place_groups, without_low
 
 #: Orders whose products with a factor are always tried.
 ALWAYS: Final = (1.0, 2.0)
-
-#: Lines of a spectrum that are tried in addition.
-PEAKS: Final = 5
-
-#: Highest order of a spectrum, and readings for each order.
-ORDERS: Final = 400
-SAMPLED: Final = 2.5
 
 #: Shares of the range by which a factor must change to be one.
 SPEED_CHANGES, LOAD_CHANGES, TEMPERATURE_CHANGES = 0.1, 0.05, 0.1
 
 #: Deviation of sizes, over the greatest, below which they are one.
 ONE_SIZE: Final = 0.02
-
-#: Share of a turn below which the place is a smooth function, too.
-ARC: Final = 0.98
 
 #: Lengths of transitions after a reversal, in shares of the median segment of one direction.
 LENGTHS: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
@@ -56,35 +36,27 @@ KNOTS: Final = 8
 #: Runs up to which each may have a pattern.
 MOST_RUNS: Final = 24
 
-Basis = Callable[[Array], Array]
-
 
 class Axis:
-    """A factor: its values at the readings, and functions of them."""
+    """A factor: its values at the readings, functions of them, and those of products with lines."""
 
-    def __init__(self, factor: str, x: Array, basis: Basis, at: Array, unit: str) -> None:
+    def __init__(
+        self, factor: str, x: Array, basis: Basis, at: Array, unit: str, *products: Basis
+    ) -> None:
         self.factor, self.x, self.basis, self.at, self.unit = factor, x, basis, at, unit
+        self.products = products
 
-    def alone(self) -> Iterator[Group]:
+    def alone(self) -> Group:
         """Its function."""
-        group = Group.of_function(self.factor, self.x, self.basis, self.at, self.unit)
-        if group is not None:
-            yield group
+        return Group.of_function(self.factor, self.x, self.basis, self.at, self.unit)
 
-    def times(
-        self, theta: Array, orders: Iterable[float], basis: Basis | None = None
-    ) -> Iterator[Group]:
-        """Its products with lines."""
-        for order in orders:
-            yield Group.of_product(
-                f"{self.factor}_place",
-                self.x,
-                basis or self.basis,
-                self.at,
-                self.unit,
-                theta,
-                (order,),
-            )
+    def times(self, theta: Array, order: float, basis: Basis) -> Group:
+        """Products with a line less their means: a line of the place is a group of its own."""
+        means = basis(self.x).mean(axis=0)
+        factor = f"{self.factor}_place"
+        return Group.of_product(
+            factor, self.x, lambda x: basis(x) - means, self.at, self.unit, theta, (order,)
+        )
 
 
 def factor_groups(
@@ -115,28 +87,17 @@ def factor_groups(
         Cycles of the other shafts in an output turn.
     """
     theta = signals.theta
-    left = _without_low(theta, error, signals.run)
+    left = without_low(signals, error)
     known = [m for m in dict.fromkeys(lines) if m > 0.0]
-    spectrum = _PeakSpectrum(theta, signals.places)
-    peaks = [*known, *spectrum.peaks(left, LOW)]
-    groups = [*_place(signals, error, peaks)]
-    # Hundreds of columns, which would cost most of the search where single lines take all.
-    others = less_lines(theta, left, peaks)
-    wide = [orders for orders in _bands(signals) if orders and spectrum.shows(others, orders)]
-    patterns = (_pattern(signals, cycles) for cycles in dict.fromkeys(map(abs, shafts)))
-    wide += [orders for orders in patterns if orders and spectrum.shows(left, orders)]
-    for orders in wide:
-        waves, at = _waves(orders), groups[0].at
-        group = Group.of_function("place", signals.degrees, waves, at, "deg", orders)
-        groups += [group] if group is not None else []
-    for axis, product in _axes(signals):
-        groups += axis.alone()
-        if product is not None:
-            own = product(axis.x)
+    spectrum = PeakSpectrum(theta, signals.places)
+    groups = [*place_groups(signals, error, left, known, shafts, spectrum)]
+    for axis in _axes(signals):
+        groups.append(axis.alone())
+        for product in axis.products:
             asked = [*ALWAYS, *known[:LOW]]
-            for column in own.T:
-                asked += spectrum.peaks(left * (column - column.mean()))
-            groups += axis.times(theta, dict.fromkeys(asked), product)
+            for column in product(axis.x).T:
+                asked += spectrum.peaks(spectrum.powers(left * (column - column.mean())))
+            groups += [axis.times(theta, order, product) for order in dict.fromkeys(asked)]
     groups += _of_one_way(signals)
     groups += _of_runs(signals, [*ALWAYS, *known[:2], *drawn])
     groups += _of_frequencies(signals, frequencies)
@@ -151,105 +112,17 @@ def factor_groups(
     return groups
 
 
-class _PeakSpectrum:
-    """The strongest lines of values at angles in radians, and whether some have power."""
-
-    def __init__(self, theta: Array, places: int) -> None:
-        self.count = int(min(ORDERS, theta.size / SAMPLED, 0.5 * places))
-        self.turns = float(np.ptp(theta)) / (2.0 * np.pi)
-        self.sums = OrderSpectrum(theta, [0], 1.0, 1.0, self.count) if self.count > LOW else None
-
-    def peaks(self, values: Array, above: int = 0) -> list[float]:
-        """The strongest orders above some; none over an arc, where they run together."""
-        power = float(values @ values)
-        if self.sums is None or self.turns < ARC or not power > 0.0:
-            return []
-        spectrum = np.abs(self.sums.sums(values).sum(axis=1)) ** 2 / power
-        spectrum[:above] = 0.0
-        best = np.argsort(spectrum)[::-1][:PEAKS]
-        return [float(k + 1) for k in best if spectrum[k] > STANDS_OUT]
-
-    def shows(self, values: Array, orders: Iterable[float]) -> bool:
-        """Lines have more power together than noise leaves them; so where none can be looked at."""
-        if self.sums is None:
-            return True
-        at = [round(order) - 1 for order in orders if LOW < round(order) <= self.count]
-        spectrum = np.abs(self.sums.sums(values).sum(axis=1)) ** 2
-        level = float(np.median(spectrum)) / np.log(2.0)
-        # Three standard deviations of their mean power above that of noise.
-        return not at or float(spectrum[at].mean()) > level * (1.0 + 3.0 / np.sqrt(len(at)))
-
-
-def _without_low(theta: Array, error: Array, run: NDArray[np.int64]) -> Array:
-    """The error less its mean by run and its low orders."""
-    left = less_lines(theta, error, range(1, LOW + 1))
-    counts = np.maximum(np.bincount(run), 1)
-    return np.asarray(left - (np.bincount(run, left) / counts)[run])
-
-
-def _place(signals: Signals, error: Array, lines: Iterable[float]) -> Iterator[Group]:
-    """Lines, jumps, and over an arc a smooth function of the place."""
-    theta = signals.theta
-    start, span = float(theta.min()), float(np.ptp(theta))
-    turns = span / (2.0 * np.pi)
-    whole = turns >= ARC
-    at = np.linspace(0.0, 360.0, 73) if whole else np.degrees(np.linspace(start, start + span, 49))
-    degrees = signals.degrees
-    ramps = jumps(degrees, less_lines(theta, error, range(1, LOW + 1))) if whole else []
-    at = np.union1d(at, [end % 360.0 for ramp in ramps for end in (ramp.before, ramp.after)])
-
-    low = [float(k) for k in range(1, LOW + 1) if 2 * k <= signals.places]
-    for m in dict.fromkeys([*low, *lines]):
-        group = Group.of_function("place", degrees, _waves([m]), at, "deg", (m,))
-        if group is not None:
-            yield group
-    for ramp in ramps:
-        group = Group.of_function("place", degrees, ramp.values, at, "deg")
-        if group is not None:
-            yield replace(group, alternatives=ramp.count, jump=ramp.where)
-    middle = np.degrees(start + 0.5 * span)
-
-    def smooth(x: Array) -> Array:
-        u = (x - middle) / max(0.5 * np.degrees(span), 1e-12)
-        return np.column_stack([u, u**2, u**3] if not whole else [u])
-
-    # Over several turns this is a ramp of the travel, which no pattern is.
-    travel = at if not whole else np.degrees(np.linspace(start, start + span, GRID))
-    group = Group.of_function("place", degrees, smooth, travel, "deg")
-    if group is not None:
-        yield group
-
-
-def _waves(orders: Sequence[float]) -> Basis:
-    """Lines of an angle in degrees, expected to be the smaller the higher their order is."""
-    return lambda x: np.hstack([line_columns(np.radians(x), m) * orders[0] / m for m in orders])
-
-
-def _bands(signals: Signals) -> Iterator[tuple[float, ...]]:
-    """Orders of the output that are next to one another, and those of any function of its place."""
-    for first, last in BANDS:
-        if last * SAMPLED < len(signals) and 2 * last <= signals.places:
-            yield tuple(float(k) for k in range(first, last + 1))
-    yield _pattern(signals, 1.0)
-
-
-def _pattern(signals: Signals, cycles: float) -> tuple[float, ...]:
-    """Orders of any function of a shaft's place."""
-    places = count_positions(signals.theta * cycles / (2.0 * np.pi))
-    return tuple(k * cycles for k in range(1, min(HARMONICS, places // 2) + 1))
-
-
-def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:
-    """Factors, each with its functions in products with lines; None without products."""
+def _axes(signals: Signals) -> Iterator[Axis]:
+    """Factors that change."""
     d = signals.direction
     if bool((d > 0.0).any() and (d < 0.0).any()):
-        yield Axis("direction", d, _column, np.array([-1.0, 1.0]), "sign"), _column
-        yield from ((axis, None) for axis in _reversals(signals))
+        yield Axis("direction", d, _column, np.array([-1.0, 1.0]), "sign", _column)
+        yield from _reversals(signals)
     yield from _signed("speed", signals.velocity, 2.0 * SPEED_CHANGES, "deg/s")
     tau = signals.torque
     yield from _signed("load", tau, LOAD_CHANGES, "Nm")
     if tau is not None and np.unique(np.sign(tau)).size > 1:
-        yield Axis("load_sign", np.sign(tau), _column, np.array([-1.0, 1.0]), "sign"), None
+        yield Axis("load_sign", np.sign(tau), _column, np.array([-1.0, 1.0]), "sign")
     kelvin = signals.temperature
     if kelvin is not None and np.ptp(kelvin) > TEMPERATURE_CHANGES:
         mean, half = float(kelvin.mean()), 0.5 * float(np.ptp(kelvin))
@@ -260,45 +133,41 @@ def _axes(signals: Signals) -> Iterator[tuple[Axis, Basis | None]]:
             s = (x - mean) / half
             return np.column_stack([s, s * s])
 
-        def with_mean(x: Array) -> Array:
-            return np.column_stack([np.ones(x.size), warm(x)])
-
-        yield Axis("temperature", kelvin, warm, grid, "C"), with_mean
-        yield Axis("temperature", kelvin, _hats(knots), grid, "C"), None
-    for axis, _ in _signed("current", signals.current, LOAD_CHANGES, "A"):
-        yield axis, None
-    yield from ((axis, None) for axis in _clock(signals))
+        any_one = _hats(knots)
+        product = any_one if any_one(knots).shape[1] <= FEW else warm
+        yield Axis("temperature", kelvin, warm, grid, "C", product)
+        yield Axis("temperature", kelvin, any_one, grid, "C")
+    yield from _signed("current", signals.current, LOAD_CHANGES, "A")
+    yield from _clock(signals)
 
 
-def _signed(
-    factor: str, x: Array | None, changes: float, unit: str
-) -> Iterator[tuple[Axis, Basis | None]]:
+def _signed(factor: str, x: Array | None, changes: float, unit: str) -> Iterator[Axis]:
     """Functions of what has two signs: odd and even ones, and any, unless it has one size."""
     top = 0.0 if x is None else float(np.abs(x).max(initial=0.0))
     if x is None or not np.ptp(x) > changes * top > 0.0:
         return
-    knots = knots_of(x)
-    grid = grid_of(knots)
+    grid = grid_of(knots_of(x))
     if float(np.std(np.abs(x))) < ONE_SIZE * top:
-        yield Axis(factor, x, lambda x: x[:, None] / top, grid, unit), lambda x: x[:, None] / top
+        yield Axis(factor, x, lambda x: x[:, None] / top, grid, unit, _column)
         return
+    sizes = _hats(knots_of(np.abs(x)))
 
     def curves(x: Array) -> Array:
         lines = np.column_stack([x / top, np.abs(x) / top])
         return np.hstack([lines, lines * np.abs(x)[:, None] / top])
 
-    yield Axis(factor, x, curves, grid, unit), curves
-    if not float(x.min()) < 0.0 < float(x.max()):
-        yield Axis(factor, x, _hats(knots), grid, unit), None
-        return
-    sizes = _hats(knots_of(np.abs(x)))
+    def even(x: Array) -> Array:
+        return sizes(np.abs(x))
 
-    def both(x: Array) -> Array:
+    def odd(x: Array) -> Array:
         # One sign may differ from the other at any size, at the smallest too.
-        even = sizes(np.abs(x))
-        return np.hstack([even, np.sign(x)[:, None] * np.hstack([np.ones((x.size, 1)), even])])
+        return np.sign(x)[:, None] * np.hstack([np.ones((x.size, 1)), even(x)])
 
-    yield Axis(factor, x, both, grid, unit), None
+    parts = [even, odd] if float(x.min()) < 0.0 < float(x.max()) else [even]
+    # Of few levels these have no more columns.
+    is_few = even(x[:1]).shape[1] <= FEW
+    yield Axis(factor, x, curves, grid, unit, *(parts if is_few else [curves]))
+    yield Axis(factor, x, lambda x: np.hstack([part(x) for part in parts]), grid, unit)
 
 
 def knots_of(x: Array) -> Array:
@@ -422,17 +291,16 @@ def _of_runs(signals: Signals, lines: Sequence[float]) -> Iterator[Group]:
         return np.asarray(x[:, None] == at, dtype=np.float64)
 
     zeros = Axis("run", run, each, at, "run")
-    yield from zeros.alone()
+    yield zeros.alone()
     if signals.runs > 2:
-        yield from Axis("run", run, _in_order, at, "run").alone()
+        yield Axis("run", run, _in_order, at, "run").alone()
     if signals.runs <= MOST_RUNS:
-        # One of the runs less: what all have in common is of the place.
-        yield from zeros.times(signals.theta, dict.fromkeys(lines), lambda x: each(x)[:, 1:])
+        yield from (zeros.times(signals.theta, m, each) for m in dict.fromkeys(lines))
     mount = signals.mount
     if mount is not None and np.ptp(mount) > 0.0:
         degrees = np.degrees(signals.theta - mount)
         for k in (1.0, 2.0, 3.0, 4.0):
-            group = Group.of_function(
+            yield Group.of_function(
                 "mount_place",
                 degrees,
                 lambda x, k=k: line_columns(np.radians(x), k),  # type: ignore[misc]
@@ -440,8 +308,6 @@ def _of_runs(signals: Signals, lines: Sequence[float]) -> Iterator[Group]:
                 "deg",
                 (k,),
             )
-            if group is not None:
-                yield group
 
 
 def _in_order(x: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from ...effects import EFFECTS
 from ...effects.missing_order import MissingOrder
 from ...effects.time_periodic import TimePeriodic
+from ...estimation.extension import Extension
 from ...estimation.factor import orthonormal_basis
 from ...estimation.regression import Regression
 from ...support.arrays import Array
 from ..confirmation import NOT_CONFIRMED
 from ..finding import Finding
-from ..judgedbeliefs import believed_columns
+from ..judgedbeliefs import changed_lines
 from .account import ALIKE, NAME, FactorAccount
 from .factor import WORDS
 from .group import Group
@@ -47,7 +48,8 @@ _SAME: Final = 1e-6
 def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]) -> Group | None:
     """A finding's own columns at some readings as a group; None of what has none.
 
-    A finding that describes the noise has none: the account has its own noise.
+    A finding that describes the noise has none: the account has its own noise; nor has one that is
+    a form of no factor.
     """
     effect, fitted = EFFECTS[finding.cause], regression.fitted()
     own = [fitted[k] for k in finding.group if not effect.describes_noise(regression.terms[k])]
@@ -56,31 +58,37 @@ def name_group(regression: Regression, finding: Finding, rows: NDArray[np.int64]
     runs = regression.signals.run[:, None, None] == np.arange(regression.signals.runs)[:, None]
     for drawn in (term.run_effect for term, _ in own if term.run_effect is not None):
         parts.append((drawn.columns[:, None, :] * runs).reshape(regression.n, -1))
-    if not parts:
+    if not (parts and effect.form_of):
         return None
     sought = 0.5 * len(rows) if finding.cause == TimePeriodic.kind else 1.0
     columns = np.hstack(parts)[rows]
     # Places and lengths that were fitted with the columns (Schwarz).
     searched = sum(term.parameters for term, _ in own) - columns.shape[1]
-    return _group(columns, sought * len(rows) ** (0.5 * max(searched, 0)))
+    lines = {order for term, _ in own for order in orders_of(term)}
+    return _group(columns, sought * len(rows) ** (0.5 * max(searched, 0)), tuple(lines))
 
 
-def base_group(regression: Regression, rows: NDArray[np.int64]) -> Group | None:
-    """What is free with any findings, except zeros, as a group; None where nothing is.
-
-    Low orders over an arc whose belief holds are not: a function of the place would be taken for
-    a change of them.
-    """
-    return _group(regression.readings.base[rows][:, ~believed_columns(regression)], 1.0)
+def orders_of(term: Extension) -> list[float]:
+    """Orders of a term's lines."""
+    order = term.line if term.line is not None else term.shape.get("order", [])
+    return [float(m) for m in np.atleast_1d(np.asarray(order, dtype=np.float64))]
 
 
-def _group(columns: Array, sought: float) -> Group | None:
+def believed_groups(regression: Regression, rows: NDArray[np.int64]) -> Iterator[Group]:
+    """Changes of the simulation's lines, a group each: findings of their own."""
+    base = regression.readings.base[rows]
+    for order, where in changed_lines(regression).items():
+        if (group := _group(base[:, where], 1.0, (order,))) is not None:
+            yield group
+
+
+def _group(columns: Array, sought: float = 1.0, lines: tuple[float, ...] = ()) -> Group | None:
     spread = np.std(columns, axis=0)
     columns = columns[:, spread > 0.0] / spread[spread > 0.0]
     if not columns.size:
         return None
     scale = float(np.sqrt(columns.shape[1]))
-    return Group(NAME, columns / scale, (), np.zeros(1), None, "", sought)
+    return Group(NAME, columns / scale, lines, np.zeros(1), None, "", sought)
 
 
 class NamedForms:
@@ -92,30 +100,21 @@ class NamedForms:
         With a group for each finding.
     places : dict of int to int
         Group of a finding by its place in the list of findings.
-    base : int or None
-        Group that is in every model.
     """
 
-    def __init__(
-        self, account: FactorAccount, places: dict[int, int], base: int | None = None
-    ) -> None:
-        self.account, self.places, self.base = account, places, base
+    def __init__(self, account: FactorAccount, places: dict[int, int]) -> None:
+        self.account, self.places = account, places
         self._found: dict[tuple[object, ...], tuple[float, list[float]]] = {}
         self.free = [k for k, g in enumerate(account.groups) if g.factor != NAME]
-        sizes = [0.0] * len(account.groups)
-        own = [0.0] * len(account.groups)
-        for k in places.values():
-            own[k] = 0.5
-        if places:
-            sizes = account.sums.search(sizes, own, sizes)[1]
+        none = [0.0] * len(account.groups)
+        own = [0.5 * (k in places.values()) for k in range(len(none))]
+        sizes = account.sums.search(none, own, none)[1] if places else none
         least = 1e-4 * account.total
         self.sizes = [max(size, least) if own[k] else 0.0 for k, size in enumerate(sizes)]
-        if base is not None:
-            self.sizes[base] = account.total
 
     def given(self, names: Sequence[int]) -> list[float]:
         """The model of these findings alone."""
-        inside = {self.base, *(self.places[name] for name in names if name in self.places)}
+        inside = {self.places[name] for name in names if name in self.places}
         return [size if k in inside else 0.0 for k, size in enumerate(self.sizes)]
 
     def beside(
@@ -147,10 +146,16 @@ class NamedForms:
         tau: Sequence[float],
         factors: Sequence[str],
     ) -> tuple[float, float]:
-        """Variance that findings explain, and that free functions of factors explain of others."""
-        given = self.given(sure)
+        """Variance that findings explain, and that free functions explain of others.
+
+        Of factors, and of products with the findings' lines: the size of a line is one function of
+        all that it follows. What is met in one direction only is half of the place.
+        """
+        given, groups = self.given(sure), self.account.groups
         rest = self.account.less(given, tau)
-        free = [k for k in self.free if self.is_of(k, factors)]
+        lines = {0.0} if "place" in factors else set()
+        lines |= {m for k in own for m in groups[self.places[k]].orders}
+        free = [k for k in self.free if self.is_of(k, factors) or groups[k].is_of_line(lines)]
         mine = sum(self.account.variance(given, [self.places[k]]) for k in own)
         return mine, rest.variance(rest.tau, free)
 
@@ -166,10 +171,6 @@ class NamedForms:
                 found.append(groups[k].factor)
         return found
 
-    def factors(self, tau: Sequence[float]) -> set[str]:
-        """Factors of the free functions of a model."""
-        return {self.account.groups[k].factor for k in self.free if tau[k] > 0.0}
-
     def is_of(self, k: int, factors: Sequence[str]) -> bool:
         """A group is of one of the factors."""
         return self.account.groups[k].factor in factors
@@ -179,9 +180,7 @@ def _centred(columns: Array) -> Array:
     return np.asarray(columns - columns.mean(axis=0))
 
 
-def names_by_form(
-    names: NamedForms, findings: Sequence[Finding], regression: Regression
-) -> list[Finding]:
+def names_by_form(names: NamedForms, findings: Sequence[Finding]) -> list[Finding]:
     """The findings, those not confirmed whose form is not better than the free function.
 
     One is confirmed where a free function of any factors in its place has at most a log
@@ -217,7 +216,7 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
     if worst is not None:
         better, group, other = worst
         reason = (
-            f"a free function of {_followed(names, other, tau)} explains the readings better "
+            f"{_followed(names, other, tau) or 'a free function'} explains the readings better "
             f"(log Bayes factor {better:.0f})"
         )
         return dict.fromkeys(group, reason)
@@ -225,15 +224,13 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
         follows = [f for f in EFFECTS[found[k].cause].form_of if f != TRANSITION]
         follows += names.same(k)
         freed, free = names.beside([j for j in sure if j != k], tau, follows)
-        # What is there without a name may be all of it.
-        as_well = ALIKE * (names.factors(free) <= names.factors(tau))
-        if follows and freed > score - as_well:
+        if follows and freed > score - ALIKE:
             what = _followed(names, free, tau)
-            return {k: f"a function of {what} explains the readings as well"}
+            return {k: f"{what or 'noise alone'} explains the readings as well"}
     for k in sure:
-        if found[k].cause == MissingOrder.kind:
-            continue
-        own, left = names.taken(sure, [k], tau, EFFECTS[found[k].cause].form_of)
+        # Lines of the place that are not its own are no part of an order.
+        is_line = found[k].cause == MissingOrder.kind
+        own, left = names.taken(sure, [k], tau, () if is_line else EFFECTS[found[k].cause].form_of)
         if own < TAKES * (own + left):
             share = 100.0 * own / (own + left)
             return {k: f"its formula explains {share:.0f} % of what its factors explain"}
@@ -256,24 +253,10 @@ def _followed(names: NamedForms, other: Sequence[float], tau: Sequence[float]) -
     """Factors that a model has and another one has not, in words."""
     new = [k for k in names.free if other[k] > 0.0 and tau[k] == 0.0]
     factors = dict.fromkeys(names.account.groups[k].factor for k in new)
-    return " and ".join(WORDS[factor] for factor in factors) or "its factor"
+    words = " and ".join(WORDS[factor] for factor in factors)
+    return f"a free function of {words}" if words else ""
 
 
 def confirmed_names(names: NamedForms, findings: Sequence[Finding]) -> list[int]:
     """Places of the findings that are confirmed and have columns."""
     return [k for k, f in enumerate(findings) if f.confirmed and k in names.places]
-
-
-def names_of(names: NamedForms, findings: Sequence[Finding], factor: str) -> tuple[str, ...]:
-    """Confirmed causes that are forms of a factor."""
-    causes = [findings[k].cause for k in confirmed_names(names, findings)]
-    return tuple(dict.fromkeys(c for c in causes if factor in EFFECTS[c].form_of))
-
-
-def takes_all(names: NamedForms, findings: Sequence[Finding], factor: str) -> bool:
-    """Confirmed causes leave less than 5 % of a factor to its free functions."""
-    sure = confirmed_names(names, findings)
-    _, tau = names.beside(sure)
-    own = [k for k in sure if factor in EFFECTS[findings[k].cause].form_of]
-    taken, left = names.taken(sure, own, tau, [factor])
-    return bool(left < (1.0 - TAKES) * (left + taken))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...effects import EFFECTS
 from ...effects.missed_counts import MissedCounts
+from ...effects.missing_order import MissingOrder
 from ...estimation.regression import Regression
 from ...estimation.segments import short_segments
 from ...joint.signals import Signals
@@ -19,16 +20,15 @@ from ..finding import Finding
 from ..rounding import unrounded
 from .account import MOST_READINGS, factor_account, factors_of
 from .factor import Factor
-from .group import Group
 from .groups import factor_groups
 from .names import (
+    TAKES,
     NamedForms,
-    base_group,
+    believed_groups,
     confirmed_names,
     name_group,
     names_by_form,
-    names_of,
-    takes_all,
+    orders_of,
 )
 
 #: Steps whose surroundings are looked at, parts of a run in which its largest is looked for, and
@@ -42,8 +42,10 @@ MOST_LINES: Final = 24
 
 def stated_factors(
     chosen: Regression, findings: Sequence[Finding]
-) -> tuple[list[Finding], list[Factor]]:
+) -> tuple[list[Finding], list[Factor], set[float]]:
     """Findings confirmed by their form, and the factors that the readings follow.
+
+    A change of a line of the simulation is a finding as any other.
 
     Parameters
     ----------
@@ -56,6 +58,8 @@ def stated_factors(
     -------
     findings : list of Finding
     factors : list of Factor
+    explained : set of float
+        Lines of the simulation whose change is a part of what the readings follow.
     """
     rows = account_rows(chosen)
     signals = chosen.signals.take(rows)
@@ -64,48 +68,55 @@ def stated_factors(
         signals,
         error,
         _lines(chosen),
-        _orders(chosen, drawn=True),
+        _resolved(chosen, _orders(chosen, drawn=True)),
         _frequencies(chosen),
         [*_events(chosen), *_steps(signals, error)][:MOST_EVENTS],
         [cycles for cycles in chosen.belief.joint.shafts.values() if abs(cycles) > 1.0],
     )
+    count = len(findings)
+    named = [name_group(chosen, finding, rows) for finding in findings]
+    named += believed_groups(chosen, rows)
     places: dict[int, int] = {}
-    named: list[Group] = []
-    for k, finding in enumerate(findings):
-        is_form = finding.group and EFFECTS[finding.cause].form_of
-        if is_form and (group := name_group(chosen, finding, rows)) is not None:
-            places[k] = len(groups) + len(named)
-            named.append(group)
-    groups += named
-    free = base_group(chosen, rows)
-    account = factor_account(signals, error, groups if free is None else [*groups, free])
+    for k, group in enumerate(named):
+        if group is not None:
+            places[k] = len(groups)
+            groups.append(group)
+    account = factor_account(signals, error, groups)
     if account is None:
-        return list(findings), []
-    names = NamedForms(account, places, None if free is None else len(groups))
-    found = names_by_form(names, findings, chosen)
+        return list(findings), [], set()
+    names = NamedForms(account, places)
+    changes = [Finding(MissingOrder.kind, {}, {}, None, []) for _ in named[count:]]
+    found = names_by_form(names, [*findings, *changes])
+    lost = [k for k in range(count, len(found)) if not found[k].confirmed]
+    explained = {groups[places[k]].orders[0] for k in lost}
     shafts = {name: abs(cycles) for name, cycles in chosen.belief.joint.shafts.items()}
-    return found, _factors(names, found, shafts)
+    return found[:count], _factors(names, found, count, shafts), explained
 
 
-def _factors(names: NamedForms, found: Sequence[Finding], shafts: dict[str, float]) -> list[Factor]:
+def _factors(
+    names: NamedForms, found: Sequence[Finding], count: int, shafts: dict[str, float]
+) -> list[Factor]:
     """The factors that the readings follow: those with names, then those beyond all names."""
-    account = names.account
+    account, sure = names.account, confirmed_names(names, found)
+    given, tau = names.given(sure), names.beside(sure)[1]
     stated, named = [], set()
     for factor in factors_of(account, shafts):
-        if own := names_of(names, found, factor.factor):
-            stated.append(replace(factor, named_by=own))
-            if takes_all(names, found, factor.factor):
+        own = [k for k in sure if factor.factor in EFFECTS[found[k].cause].form_of]
+        if causes := dict.fromkeys(found[k].cause for k in own if k < count):
+            stated.append(replace(factor, named_by=tuple(causes)))
+            taken, left = names.taken(sure, own, tau, [factor.factor])
+            if left < (1.0 - TAKES) * (left + taken):
                 named.add(factor.factor)
-    sure = confirmed_names(names, found)
-    given = names.given(sure)
-    left = replace(account, tau=np.maximum(given, names.beside(sure)[1]).tolist())
-    stated += [f for f in factors_of(left, shafts, given) if f.factor not in named]
+    rest = replace(account, tau=np.maximum(given, tau).tolist())
+    stated += [f for f in factors_of(rest, shafts, given) if f.factor not in named]
     return sorted(stated, key=lambda factor: -factor.rms)
 
 
 def _less_what_no_factor_is(regression: Regression) -> Array:
-    """The error less causes that are forms of no factor: another joint's motion."""
+    """The error less causes that are forms of no factor, as another joint's motion, or a delay."""
+    delay = slice(1 + 2 * regression.belief.pattern.orders.size, regression.base.shape[1])
     error = regression.readings.residual
+    error = error - regression.base[:, delay] @ regression.coefficients[delay]
     for term, coefficients in regression.fitted():
         if not EFFECTS[term.cause].form_of and term.run_effect is None:
             error = error - term.columns @ coefficients
@@ -166,9 +177,14 @@ def _orders(regression: Regression, *, drawn: bool) -> list[float]:
     found: list[float] = []
     for term in regression.terms:
         if (term.run_effect is not None) is drawn:
-            order = term.line if term.line is not None else term.shape.get("order", [])
-            found += np.atleast_1d(np.asarray(order, dtype=np.float64)).tolist()
+            found += orders_of(term)
     return found
+
+
+def _resolved(regression: Regression, orders: Iterable[float]) -> list[float]:
+    """Orders, whole ones in the place of those that the travel does not distinguish from them."""
+    turns = 2.0 * float(regression.signals.run_turns().max())
+    return [round(m) if abs(m - round(m)) * turns < 1.0 else m for m in orders]
 
 
 def _lines(regression: Regression) -> list[float]:
