@@ -216,15 +216,15 @@ def _number(value: Any, std: Any, of: ErrorUnit) -> str:
         return " +- ".join(pair) if pair[1] != "-" else pair[0]
     if isinstance(value, float) and not (of is _PLAIN and value.is_integer()):
         return of.number(value)
-    return f"{value:.0f}" if isinstance(value, float) else str(value)
+    text = f"{value:.0f}" if isinstance(value, float) else str(value)
+    return " ".join(map(str, value)) if isinstance(value, list) else text  # a run and a row
 
 
 def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
     """A finding by its cause, its line, and its size with its standard error."""
     known = {name: quantity.value for name, quantity in finding.parameters.items()}
-    name = finding.cause
-    if isinstance(known.get("shaft"), str):
-        name += f" {known['shaft'].replace('_', ' ')}"
+    shaft = known.get("shaft")
+    name = f"{finding.cause} {shaft.replace('_', ' ')}" if shaft else finding.cause
     for parameter, words in _PLACES.items():
         if isinstance(known.get(parameter), int | float):
             std = finding.parameters[parameter].std

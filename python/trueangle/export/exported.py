@@ -139,10 +139,8 @@ class Exported(PlainResult):
                 )
             )
         worst = max(self.lost, key=lambda row: row["arcsec"], default=None)
-        if worst is not None:
-            lines.append(
-                f"of the orders, {worst['order']:g} loses most: {unit.text(worst['arcsec'])}"
-            )
+        if worst is not None and worst["arcsec"] >= _NOTABLE_ARCSEC:
+            lines.append(f"largest loss: order {worst['order']:g}, {unit.text(worst['arcsec'])}")
         further = laid_out([*lines, *(f"note: {_in_unit(note, unit)}" for note in self.notes)])
         return f"{first}\n{further}" if further else first
 
