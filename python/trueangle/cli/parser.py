@@ -52,7 +52,7 @@ class Output(str):
             output.kind = kind
             return output
 
-        made.output = True  # type: ignore[attr-defined]  # tells help that it is written
+        made.output = True  # type: ignore[attr-defined]  # for help: it is written
         return made
 
 

@@ -193,7 +193,7 @@ def show_joints(
 ) -> None:
     """Print what was found of every joint, the worst first where they are ranked.
 
-    ``told`` tells a joint's, by its summary where not given.
+    ``told`` prints one joint; by default its summary is printed.
     """
     from ..reports.robot import plain_ranking, ranked, ranking_text
 

@@ -327,7 +327,7 @@ def _shuffled(
         return replace(signals, temperature=_exchanged(signals.temperature, run, other))
     if factor == "torque" and signals.torque is not None:
         scale = _level(np.abs(signals.torque), run)
-        # Loads that are alike in all runs are no other labels where they are exchanged.
+        # Loads that are equal in all runs are no other labels where they are exchanged.
         if np.ptp(scale) <= LEAST_SHARE * float(scale.max()):
             return replace(signals, torque=signals.torque * sign)
         size = np.where(scale > 0.0, scale, 1.0)

@@ -85,7 +85,7 @@ def _law_without(full: Regression, group: Sequence[int]) -> HoldOutModel:
     effects = sum(term.run_effect is not None for term in full.terms)
     settles = effects > 1 or any(full.terms[k].run_effect is not None for k in group)
     if settles or full.rank < full.design.shape[1]:
-        # Run effects that are left find another size, columns that are alike another share.
+        # Run effects that are left find another size, collinear columns another share.
         return HoldOutModel.of(full.with_terms(full.terms[k] for k in kept))
     coefficients = full.coefficients_without(group)
     terms = [(full.terms[k], coefficients[full.place(k)]) for k in kept]

@@ -83,7 +83,7 @@ def dependence(
                 continue
             gap = _gap(account, lost, (extension, rest, extension.bic_gain))
             if equal_causes(cause, [(rival, gap)], ()):
-                return f"beside {instead} in place of {own}, {rival} explains as much"
+                return f"with {instead} in place of {own}, {rival} explains as much"
     return ""
 
 

@@ -167,7 +167,7 @@ class FilterLag(Effect):
                 )
             shape: dict[str, Any] = {"cutoff_hz": cutoff, "damping": damping}
             if len(grids) > 1:
-                # Cutoff and damping delay alike: together they go where each alone stops.
+                # Cutoff and damping delay equally: together they go where each alone stops.
                 shape = _settled(regression, waves, frequency, shape, cls.kind)
                 deviance = max(deviance, gain(**shape))
             extension = regression.propose(

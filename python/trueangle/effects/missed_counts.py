@@ -55,9 +55,7 @@ class MissedCounts(Effect):
     flexible_below: ClassVar[float] = ALWAYS
     draws_zeros: ClassVar[bool] = True
     has_exact_form: ClassVar[bool] = True
-    not_at_run_time: ClassVar[str] = (
-        "a step is distinguished from a motion only afterwards, in the log"
-    )
+    not_at_run_time: ClassVar[str] = "a step shows only afterwards; remove it in the log"
 
     def signal(self, signals: Signals, around: JointPattern, rng: np.random.Generator) -> Array:
         after = (signals.run == self.run) & (signals.row >= self.row)
@@ -122,7 +120,7 @@ class MissedCounts(Effect):
 
     @classmethod
     def form_columns(cls, signals: Signals, terms: Sequence[tuple[Extension, Array]]) -> Array:
-        # Counts are alike: steps are whole multiples of the sensor's, or of the smallest. What is
+        # Counts are equal: steps are whole multiples of the sensor's, or of the smallest. What is
         # taken back in the same run is no lost count.
         sizes = np.array([float(coefficients[0]) for _, coefficients in terms])
         runs = np.array([term.shape["run"] for term, _ in terms])

@@ -54,7 +54,7 @@ HIDDEN = 3.0
 #: Standard deviations from which on an isolated deviation is not used to predict neighbours.
 WILD = 6.0
 
-#: Scale below which no normal is narrow: readings that are all alike have none.
+#: Scale below which no normal is narrow: identical readings have none.
 NARROWEST = 1e-6
 
 #: Steps of expectation-maximisation.

@@ -82,7 +82,7 @@ def choose_nuisance_groups(
         if not good:
             return chosen, shares, unseparated
         least = min(float(after.sum()) for after in good.values())
-        # A kinked drift imitates a ramp there and back: of those alike the simplest.
+        # A kinked drift imitates a ramp there and back: of equal ones the simplest.
         alike = [name for name, after in good.items() if after.sum() <= (1.0 + _ALIKE) * least]
         best = min(alike, key=lambda name: rows.groups[name].shape[1])
         kind = best.rstrip("0123456789")

@@ -43,9 +43,9 @@ _by_time = itemgetter(1)
 class ChunkReader(McapReader):  # type: ignore[misc]
     """The MCAP storage of rosbags, with whole chunks of messages taken apart at once."""
 
-    #: Whether messages that are alike may come as `RecordRows`, and their first time before them.
+    #: Whether messages of one layout may come as `RecordRows`, and their first time before them.
     by_rows = False
-    #: Whether the order of messages of unlike topics is of no account.
+    #: Whether the order of messages of different topics does not matter.
     by_topic = False
 
     def messages(

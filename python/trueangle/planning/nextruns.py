@@ -128,7 +128,7 @@ def _motions(limits: Limits, samples: int) -> Iterator[dict[str, Any]]:
             yield {**over, "turns": 2.0 * span / 360.0, "reversals": (0.5,)}
     if limits.reversals:
         thirds = {**plain, "direction": 1, "start_deg": start, "turns": 2.0 * span / 360.0}
-        # Three segments of unlike length: two thirds out, a third back, two thirds out again.
+        # Three segments of different length: two thirds out, a third back, two thirds out again.
         yield {**thirds, "turns": 5.0 / 3.0 * span / 360.0, "reversals": (0.4, 0.6)}
         yield {**thirds, "turns": 4.0 * span / 360.0, "reversals": (0.25, 0.5, 0.75)}
         leg = min(CLOSE * samples / 4.0, span)

@@ -27,7 +27,7 @@ ENOUGH = 10.0
 #: Standard deviations that count as hardly any.
 HARDLY = 0.01
 
-#: Factor of the evidence below which two designs are alike, and the plainer one is taken.
+#: Factor of the evidence below which two designs are equal, and the plainer one is taken.
 ALIKE = 1.5
 
 #: Such factors of evidence at most: of the causes in question, and of the least of all.

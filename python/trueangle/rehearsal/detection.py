@@ -43,7 +43,7 @@ LAPSES = {
 }
 
 #: Widths, in steps: from 5 to 95 % in a third of an octave to six octaves. One effect in noise
-#: takes about one; draws of very unlike places or orders take more.
+#: takes about one; draws of very different places or orders take more.
 WIDTHS = np.geomspace(0.25, 4.0, 13)
 
 #: Steps beyond the range tried to which the place may lie, and between two places.

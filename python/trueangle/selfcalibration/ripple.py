@@ -17,8 +17,8 @@ import numpy as np
 from ..estimation.linear import inverse_and_log_determinant, pseudo_inverse
 from ..support.arrays import Array
 
-#: Where separating the ripple multiplies the standard error by more, speeds are too much
-#: alike: the sum is given under both names instead. A ratio of speeds of about 1.2.
+#: Where separating the ripple multiplies the standard error by more, speeds are too
+#: close: the sum is given under both names instead. A ratio of speeds of about 1.2.
 LARGEST_COST: Final = 10.0
 
 #: Sizes looked at: from a tenth of the standard error to ten thousand of it.

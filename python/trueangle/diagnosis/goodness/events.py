@@ -74,7 +74,7 @@ def _relaxing(
             found.append((unit_sums(g, about, units), rms, constant * span))
 
     def smallest(signs: Array | float) -> float:
-        # Time constants that differ by a factor of three are half alike.
+        # Time constants that differ by a factor of three are half collinear.
         return largest_of(min(sums.chance(signs) for sums, *_ in found), 0.6 * len(found))
 
     best, rms, constant = min(found, key=lambda item: item[0].chance())

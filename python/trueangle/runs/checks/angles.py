@@ -38,7 +38,7 @@ UNIT_SPREAD = 0.35
 OTHER_UNIT = math.pi / 180.0 * (1.0 + UNIT_SPREAD)
 
 
-#: Departure of steps, in shares of one, that are all alike.
+#: Departure of steps, in shares of one, that count as equal.
 EVEN = 1e-3
 
 #: Roughness of steps, in shares of a step, that is none.

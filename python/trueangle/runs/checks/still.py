@@ -34,7 +34,7 @@ _LEAST_STUCK: Final = 5
 #: Readings of a column that is sampled and held at most; a command is held for longer.
 _HELD: Final = 10
 
-#: Speeds are alike within this factor, and a movement is made up for to within this part
+#: Speeds are equal within this factor, and a movement is made up for to within this part
 #: (errors that change with the angle) and the noise.
 _ALIKE: Final = 0.3
 _MADE_UP: Final = 0.15
