@@ -123,14 +123,16 @@ class Factor(PlainResult):
     def sentence(self, unit: ErrorUnit) -> str:
         """The factor in words: what is followed, how much, and whether it has a name."""
         also = [WORDS[other] for other in self.not_distinguished_from]
-        text = " or ".join([WORDS[self.factor], *also])
-        if self.curve.unit == "deg":
+        times = " times the place"
+        products = [word.removesuffix(times) for word in also if word.endswith(times)]
+        text = " or ".join([WORDS[self.factor], *(w for w in also if not w.endswith(times))])
+        text += f" or the place times {', '.join(products)}" if products else ""
+        if (self.factor, self.curve.unit) == ("reversal_time", "deg"):
             text = text.replace(WORDS["reversal_time"], "the travel since the last reversal")
         if self.orders:
             of = "" if self.shaft in (None, "output") else f" of the {self.shaft}"
-            shown = order_ranges([*dict.fromkeys(round(m, DECIMALS) for m in self.orders)])
-            more = " ..." if shown.count(",") >= LISTED else ""
-            shown = ", ".join(shown.split(", ")[:LISTED]) + more + of.replace("_", " ")
+            each = order_ranges([*{round(m, DECIMALS) for m in self.orders}]).split(", ")
+            shown = ", ".join(each[:LISTED]) + " ..." * (len(each) > LISTED) + of.replace("_", " ")
             text += f" (order{'s' if len(self.orders) > 1 else ''} {shown})"
         n = unit.number
         if self.jumps:
@@ -141,11 +143,8 @@ class Factor(PlainResult):
             text += f" ({'events' if len(self.events) > 1 else 'an event'} in {shown})"
         range_ = f"{n(self.low)} to" if self.low else "at most"
         text += f", {n(self.rms)} {unit.name} rms ({range_} {n(self.high)})"
-        names = ", ".join(self.named_by)
-        if names:
-            return f"{text}: {names}"
         held = "; the extended simulation contains its curve" if self.effects else ""
-        return f"{text}: no known cause fits{held}"
+        return f"{text}: {', '.join(self.named_by) or f'no known cause fits{held}'}"
 
     def _brief(self) -> str:
         return f"{self.factor}, {self.rms:.3g} arcsec rms, {', '.join(self.named_by) or 'no name'}"
