@@ -51,8 +51,8 @@ def note_in(language: str, note: str) -> str:
 
     Examples
     --------
-    >>> note_in("de", "3 outliers rejected.")
-    '3 Ausreißer ausgeschlossen.'
+    >>> note_in("de", "2 outliers rejected: reading 7 of run a, reading 9 of run b.")
+    '2 Ausreißer ausgeschlossen: Ablesung 7 des Laufs a, Ablesung 9 des Laufs b.'
     """
     found = translated(note.removesuffix("."), language)
     return f"{found[:1].upper()}{found[1:]}{'.' if note.endswith('.') else ''}"

@@ -235,7 +235,7 @@ def fitted_to(
     beside = _beside(nuisance, reference_orders)
     given = calm = found
     if evidence is not None:
-        calm = _calm(found, loss)
+        calm = found if loss == "linear" else [without_spikes(run) for run in found]
         orders = evidence.by_shaft
     elif orders is None or isinstance(orders, str):
         if beside.wanted:
@@ -246,7 +246,7 @@ def fitted_to(
                 given, beside.kinds, likely, _angle(argument), beside.reference
             )
         sought["reference_orders"] = beside.reference
-        calm = _calm(found, loss)
+        calm = found if loss == "linear" else [without_spikes(run) for run in found]
         selection, orders = _selected(calm, orders, sought, summed)
         if not selection.orders:
             selection, orders = None, ()
@@ -375,11 +375,6 @@ def _beside(nuisance: str | Iterable[str], reference_orders: Iterable[float]) ->
 
 def _angle(argument: AnyArgument) -> Argument:
     return "indicated" if argument == "indicated" else "reference"
-
-
-def _calm(runs: Sequence[CalibrationRun], loss: Loss) -> Sequence[CalibrationRun]:
-    """The runs without spikes, unless all readings are to count."""
-    return runs if loss == "linear" else [without_spikes(run) for run in runs]
 
 
 def _selected(

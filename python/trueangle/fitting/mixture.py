@@ -19,11 +19,11 @@ from ..joint.shafts import ShaftOrders
 from ..runs.outliers import WILD, WILD_SHARE, robust_scale
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
-from ..support.arrays import Array
+from ..support.arrays import Array, median
 from .orders.result import OrderSelection
 from .orders.zerogroups import some_angles
 from .problem import PlainSolution, Problem, SolvedProblem
-from .robust import FAR, RobustFit, given_weights
+from .robust import FAR, RobustFit, given_weights, rejected
 from .uncertainty import Uncertainty
 
 #: Rounds of setting outliers aside.
@@ -83,9 +83,7 @@ def fit_mixture(
         selection = choose([replace(r, weights=w) for r, w in zip(runs, weights, strict=True)])
         if not selection.orders:
             raise NoOrderError(f"no order is supported by the data: {selection.reason}")
-    wild = sum(
-        int(np.count_nonzero((w == 0.0) & (g > 0.0))) for w, g in zip(weights, given, strict=True)
-    )
+    wild = rejected(weights, given)
     unsettled = 0 if same else _ROUNDS
     weighted = RobustFit(fitted, weights if wild else None, wild, far, unsettled)
     return MixtureFit(selection, problem, weighted, uncertainty)
@@ -107,7 +105,9 @@ def _inliers(
     problem: Problem, fitted: SolvedProblem, given: Sequence[Array], floor: float
 ) -> tuple[list[Array], float]:
     """Weights without the outliers, unless they are too many to be some, and the share far off."""
-    residuals = problem.residuals(fitted)
+    # About the middle of its run: an outlier of a short run moves the zero, and so all the others.
+    each = zip(problem.residuals(fitted), given, strict=True)
+    residuals = [r - median(r[g > 0.0]) for r, g in each]
     counted = np.abs(np.concatenate([r[g > 0.0] for r, g in zip(residuals, given, strict=True)]))
     scale = robust_scale(counted)
     limit = max(WILD * scale, floor)

@@ -21,6 +21,7 @@ from ..runs.checks.rows import duplicate_rows, duplicate_runs, missed_counts
 from ..support.angles import wrap
 from ..support.arrays import Array
 from ..support.distributions import student_quantile
+from ..support.layout import counted
 from .decoded import track_readings
 from .fitdata import FitData
 from .rounding import COUNTED
@@ -71,7 +72,9 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
             "patterns of this size, on average over the travel."
         )
     if weighted.wild:
-        yield f"{weighted.wild} outlier{'s' if weighted.wild > 1 else ''} rejected."
+        rows = ", ".join(f"reading {row + 1} of run {label}" for label, row in fit.wild[:3])
+        rows += ", ..." * (weighted.wild > 3)
+        yield f"{counted(weighted.wild, 'outlier')} rejected: {rows}."
     if fit.uncertainty.note:
         yield _sentence(fit.uncertainty.note)
     fractional = [s.name for s in fit.problem.shafts if s.cycles_per_turn % 1.0]

@@ -97,10 +97,7 @@ def fit_robustly(problem: Problem, loss: Loss, floor: float) -> RobustFit:
     weights, unsettled = _iterate(problem, _huber, problem.base, floor)
     if loss == "tukey":
         weights, unsettled = _iterate(problem, _tukey, weights, floor)
-    wild = sum(
-        int(np.count_nonzero((w == 0.0) & (given_weights(b, w.size) > 0.0)))
-        for w, b in zip(weights, problem.base, strict=True)
-    )
+    wild = rejected(weights, problem.base)
     fitted = problem.solve(weights)
     counted = _counted(problem, problem.residuals(fitted))
     far = _share(counted, robust_scale(counted))
@@ -122,6 +119,12 @@ def unsettled_weights_sentence(weighted: RobustFit) -> str:
         f"outliers still changed after {weighted.unsettled} rounds of rejecting them, the "
         "limit for this number of orders: fit fewer, or use loss='linear'"
     )
+
+
+def rejected(weights: Sequence[Array], given: Sequence[Array | None]) -> int:
+    """Readings that counted as they were given, and do not now."""
+    each = zip(weights, given, strict=True)
+    return sum(int(((w == 0.0) & (given_weights(g, w.size) > 0.0)).sum()) for w, g in each)
 
 
 def _rounds(problem: Problem) -> int:

@@ -26,8 +26,8 @@ WILD_SHARE: Final = 0.2
 #: The scale is taken from at most about this many readings.
 SAMPLE: Final = 4096
 
-#: Readings whose median a spike is compared with.
-_NEIGHBOURS: Final = 7
+#: Readings of a turn from which on they show the one that is wrong.
+FEWEST: Final = 12
 
 
 def robust_scale(residuals: Array) -> float:
@@ -38,45 +38,37 @@ def robust_scale(residuals: Array) -> float:
 def spikes(error: Array, angle: Array, period: float) -> tuple[NDArray[np.bool_], Array]:
     """Which readings are isolated outliers, and how far each is off its neighbours.
 
-    A reading is a spike where it lies more than 8 robust standard deviations off the median of
-    its neighbours in angle, and off the line between the next two; an error that changes as much
-    from neighbour to neighbour widens the limit itself, and so does noise on a slope. None of
-    fewer than 28 readings is one.
+    A reading is a spike where it lies more than 8 robust standard deviations off the line between
+    the next two in angle, and off those through the two on either side. What an error of the place
+    bends between two readings grows with the gaps to both, so wide gaps count the less. None of
+    fewer than 12 readings is one.
     """
-    none = np.zeros(error.size, dtype=np.bool_)
-    if error.size < 4 * _NEIGHBOURS:
-        return none, np.zeros_like(error)
+    far, distance = np.zeros(error.size, dtype=np.bool_), np.zeros_like(error)
     order = np.argsort(np.mod(angle, period), kind="stable")
-    around = _windows(error[order])
-    deviation = np.empty_like(error)
-    deviation[order] = error[order] - median(around, axis=1)
-    distance = np.abs(deviation)
-    # On a slope most readings are the median of their neighbours: what they scatter by is what
-    # they are off the line between the next two, 3/2 of the variance.
-    middle = _NEIGHBOURS // 2
-    between = around[:, middle] - 0.5 * (around[:, middle - 1] + around[:, middle + 1])
-    # Readings in counts: most deviations may be exactly 0, the others one count.
-    scales = robust_scale(deviation), robust_scale(between) / math.sqrt(1.5)
-    limit = WILD * max(*scales, float(quantile(distance, 0.8)))
-    far = distance > limit
-    if far.any():
-        # Across a gap a steep error is far off its neighbours, but not off the line between them.
-        place = np.mod(angle, period)[order]
-        before, after = np.roll(error[order], 1), np.roll(error[order], -1)
+    while order.size >= FEWEST:
+        place, read = np.mod(angle, period)[order], error[order]
         back = np.mod(place - np.roll(place, 1), period)
-        gap = back + np.mod(np.roll(place, -1) - place, period)
-        share = np.divide(back, gap, out=np.full_like(gap, 0.5), where=gap > 0.0)
-        line = before + share * (after - before)
-        distance[order] = np.minimum(distance[order], np.abs(error[order] - line))
-        far &= distance > limit
-        # On a slope an outlier moves the median of its neighbours, so it is replaced for them.
-        wilder = _windows(np.where(far, distance, 0.0)[order]) > 2.0 * distance[order, None]
-        around = np.where(wilder, _windows((error - deviation)[order]), around)
-        far[order] &= np.abs(error[order] - median(around, axis=1)) > limit
-    return (none if far.mean() > WILD_SHARE else far), distance
-
-
-def _windows(values: Array) -> Array:
-    """Each of the values of a turn with the three before it and the three after it."""
-    around = np.pad(values, _NEIGHBOURS // 2, mode="wrap")
-    return np.lib.stride_tricks.sliding_window_view(around, _NEIGHBOURS)
+        ahead, rise = np.roll(back, -1), read - np.roll(read, 1)
+        slope = np.divide(rise, back, out=np.zeros_like(back), where=back > 0.0)
+        share = np.divide(back, back + ahead, out=np.full_like(back, 0.5), where=back + ahead > 0.0)
+        away = (1.0 - share) * rise - share * np.roll(rise, -1)
+        bent = back * ahead
+        bent /= median(bent[bent > 0.0]) if bent.any() else 1.0
+        scaled = away / np.maximum(bent, 1.0)
+        # From a line between two normal readings a third is off by 3/2 of the variance. Of readings
+        # in counts most may be exactly on it, the others one count off: within one standard
+        # deviation are 68.27 % of normal readings.
+        usual = max(robust_scale(scaled), float(quantile(np.abs(scaled), 0.6827)))
+        # At a step the line from either side alone goes on.
+        after = np.roll(rise, -1) - np.roll(slope, -2) * ahead
+        off = np.min(np.abs([away, rise - np.roll(slope, 1) * back, after]), axis=0)
+        # The farthest of those side by side first: its neighbours are off the line by it.
+        peak = (off >= np.roll(off, 1)) & (off >= np.roll(off, -1))
+        peak &= np.minimum(off, np.abs(scaled)) > WILD * usual / math.sqrt(1.5)
+        if not peak.any():
+            break
+        far[order[peak]], distance[order[peak]] = True, np.abs(away[peak])
+        if far.mean() > WILD_SHARE:
+            return np.zeros_like(far), distance
+        order = order[~peak]
+    return far, distance

@@ -11,10 +11,10 @@ GRID = np.linspace(0.0, 2.0 * np.pi, 500, endpoint=False)
 SIZES = (0.5, 2.0, 44.0, 91.0, 178.0, 183.0, -60.0, 1e5, 1e12, 7e299)
 
 
-def joint(seed):
+def joint(seed, least):
     """Readings of one joint in turns of one to twenty runs, and which of them is to be wrong."""
     rng = np.random.default_rng(seed)
-    runs, size = int(rng.choice([1, 2, 3, 5, 8, 20])), int(rng.integers(50, 200))
+    runs, size = int(rng.choice([1, 2, 3, 5, 8, 20])), int(rng.integers(least, 200))
     orders = rng.choice(np.arange(1, 7), 2, replace=False)
     amplitudes = 0.06 * rng.uniform(0.3, 1.0, 2)
     phases = rng.uniform(0.0, 2.0 * np.pi, 2)
@@ -42,7 +42,7 @@ def runs_of(tables, run, row, off):
 @pytest.mark.parametrize("off", SIZES)
 def test_the_model_is_that_of_the_other_readings(off):
     for seed in range(8):
-        tables, run, row = joint(1000 + seed)
+        tables, run, row = joint(1000 + seed, 12)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             expected = ta.fit(runs_of(tables, run, row, None)).model.error(GRID)
@@ -50,12 +50,13 @@ def test_the_model_is_that_of_the_other_readings(off):
         left = fit.model.error(GRID) - expected
         assert left.std() <= 0.1 * expected.std(), (seed, run, row)
         assert (f"r{run}", row) in [(label, index) for label, index in fit.wild], seed
+        assert len(fit.wild) > 3 or f"reading {row + 1} of run r{run}" in fit.model.fit.note
 
 
 @pytest.mark.parametrize("off", SIZES)
 def test_check_names_the_row_and_nothing_else(off):
     for seed in range(8):
-        tables, run, row = joint(2000 + seed)
+        tables, run, row = joint(2000 + seed, 50)
         faults = ta.check(runs_of(tables, run, row, off)).data_faults
         assert [(f.fault, f.runs, f.rows) for f in faults] == [
             ("outliers", (f"r{run}",), (row + 1,))
@@ -64,7 +65,7 @@ def test_check_names_the_row_and_nothing_else(off):
         assert ta.check(runs_of(tables, run, row, None)).data_faults == ()
 
 
-@pytest.mark.parametrize("size", [1, 2, 3, 6, 7, 27])
+@pytest.mark.parametrize("size", [1, 2, 3, 6, 7, 11])
 def test_check_names_no_row_of_a_run_too_short_to_tell(size):
     x = np.linspace(0.5, 5.0, size)
     y = x + np.where(np.arange(size) == size // 2, 0.3, 0.0)

@@ -225,7 +225,9 @@ def test_readings_of_weight_zero_are_as_good_as_absent(left_out, runs, loss):
         without.append(ta.CalibrationRun(run.reference[kept], indicated[kept], 360.0, label=label))
     found, wanted = (ta.fit(x, orders=range(1, 6), loss=loss) for x in (with_them, without))
     np.testing.assert_allclose(found.amplitudes, wanted.amplitudes, rtol=1e-6, atol=1e-9)
-    assert found.model.fit.note == wanted.model.fit.note
+    # Beside the rows of what was rejected, of which there are more with them.
+    notes = (fit.model.fit.note.partition(": reading")[0] for fit in (found, wanted))
+    assert len(set(notes)) == 1
     assert found.model.fit.wild == wanted.model.fit.wild
     for one, other in zip(with_them, without, strict=True):
         left, right = without_spikes(one).weights, without_spikes(other).weights
