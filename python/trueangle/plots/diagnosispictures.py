@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import ArgumentError
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
+from ..support.layout import order_ranges
 from . import palette
 from .canvas import described, grid, legend, marked, new_axes, new_figure, plain_logarithms
 from .simulatedcurves import ErrorLeft, error_left_of, gain_bars
@@ -178,10 +179,11 @@ def factors(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto") -> Figure:
 
 def factor_title(factor: Factor) -> str:
     """The factor and its name, or that it has none."""
-    what = factor.factor.replace("_place", " times the place").replace("_", " ")
+    what = factor.factor.replace("_place", " times the place").replace("reversal_time", "reversal")
+    what = what.replace("_", " ")
     if factor.orders:
-        what += f" ({_orders(factor.orders)})"
-    return f"{what}: {', '.join(factor.named_by).replace('_', ' ') or 'no named form'}"
+        what += f" (order{'s' * (len(factor.orders) > 1)} {order_ranges(factor.orders)})"
+    return f"{what}: {', '.join(factor.named_by).replace('_', ' ') or 'no known cause'}"
 
 
 def draw_factor(ax: Axes, factor: Factor, unit: ErrorUnit) -> None:
@@ -195,7 +197,8 @@ def draw_factor(ax: Axes, factor: Factor, unit: ErrorUnit) -> None:
         ends = np.maximum([value - low, high - value], 0.0)
         ax.errorbar(curve.at, value, yerr=ends, fmt="o", color=palette.AFTER, capsize=3.0)
     ax.axhline(0.0, color=palette.MUTED, linewidth=0.8)
-    ax.set_xlabel(_AXES.get(curve.unit, curve.unit), fontsize="small")
+    known = _AXES | {"deg": "travel / deg"} if factor.factor == "reversal_time" else _AXES
+    ax.set_xlabel(known.get(curve.unit, curve.unit), fontsize="small")
     what = "amplitude" if factor.factor.endswith("_place") else "error"
     ax.set_ylabel(f"{what} / {unit.name}", fontsize="small")
     grid(ax)
@@ -204,8 +207,3 @@ def draw_factor(ax: Axes, factor: Factor, unit: ErrorUnit) -> None:
         f"What follows the {factor_title(factor)}; {unit.text(factor.rms)} rms, from "
         f"{unit.number(float(curve.value.min()))} to {unit.number(float(curve.value.max()))}.",
     )
-
-
-def _orders(orders: tuple[float, ...]) -> str:
-    first = ", ".join(f"{order:.6g}" for order in orders[:2])
-    return f"order {first}" if len(orders) == 1 else f"orders {first}{' …' * (len(orders) > 2)}"
