@@ -166,6 +166,6 @@ def check_choice(channels: Channels) -> None:
     if moved > _MOST:
         raise ArgumentError(
             f"the harmonics of the two tracks shift the choice of a period by up to {moved:.2g} "
-            f"periods; a program decodes without them and allows {_MOST:g}; calibrate the "
+            f"periods; programs allow {_MOST:g}; calibrate the "
             f"first track alone, `periods_per_turn={p}`"
         )
