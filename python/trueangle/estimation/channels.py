@@ -20,8 +20,6 @@ from .linear import least_squares
 #: Cells of a period in which readings are counted: coverage, and weights of rests.
 CELLS: Final = 64
 
-#: Readings of one cell count for at most this many times those of the median cell.
-_MOST_IN_CELL: Final = 4.0
 
 #: Harmonics ``z_(-m)`` that are tried: radius of order up to 8.
 _HARMONICS: Final = tuple(range(2, 8))
@@ -29,14 +27,10 @@ _HARMONICS: Final = tuple(range(2, 8))
 #: Harmonics of the curve, where the channels went through their whole period.
 _REFERENCED: Final = (-3, -2, 2, 3)
 
-#: Steps to the zeros of several runs, each about squares the distance left.
-_STEPS: Final = 4
 
 #: Share of the period that a harmonic needs, so that it is not one with the ellipse.
 _WHOLE: Final = 0.9
 
-#: Standard error of the middle, in radii, from which the curvature of the arc is not known.
-_LINEAR: Final = 0.2
 
 #: Confidence that a correction takes more than it adds.
 _CONFIDENCE: Final = 0.99
@@ -68,7 +62,8 @@ def cell_counts(phases: Array) -> NDArray[np.intp]:
 def rest_weights(phases: Array, counts: NDArray[np.intp]) -> Array:
     """Weights below one where the shaft rested: a place is known by the arc, not by the time."""
     cells = np.floor(phases / (2.0 * math.pi) * CELLS).astype(np.intp) % CELLS
-    most = _MOST_IN_CELL * float(np.median(counts[counts > 0]))
+    # Readings of one cell count for at most this many times those of the median cell.
+    most = 4.0 * float(np.median(counts[counts > 0]))
     return np.asarray(np.minimum(1.0, most / counts[cells]))
 
 
@@ -95,7 +90,8 @@ def inflation(residuals: Array) -> float:
 def _refuse_beyond_limit(found: ChannelEstimate, named: str) -> None:
     """Refuse constants that the arc settles worse than the correction is large."""
     std = np.sqrt(np.diag(np.asarray(found.channels.covariance)))[:2].max()
-    if std > _LINEAR * abs(found.channels.fundamental):
+    # Standard error of the middle, in radii, from which the curvature of the arc is not known.
+    if std > 0.2 * abs(found.channels.fundamental):
         raise NoCurveError(
             f"{named}: {found.coverage:.0f} deg of the channels' period with this noise do not "
             "determine the offsets of the channels: turn the shaft further, 120 deg or more"
@@ -300,7 +296,8 @@ def referenced_channels(
     harmonics = _REFERENCED if (cell_counts(phase) > 0).mean() >= _WHOLE else ()
     target, both = np.concatenate([cosine, sine]), np.tile(run, 2)
     found = least_squares(_design(phase, harmonics), target)
-    for _ in range(_STEPS if len(signals) > 1 else 1):
+    # Steps to the zeros of several runs, each about squares the distance left.
+    for _ in range(4 if len(signals) > 1 else 1):
         # The first zero is in C. Without the others, each a parameter of one run alone:
         slope = (_design(phase, harmonics, derivative=True) @ found) * (both > 0)
         power = np.maximum(np.bincount(both, slope**2), 1e-300)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,12 +14,6 @@ from ..support.arrays import Array
 
 #: Correlation times of the noise's exponential terms, in median steps of a run's time.
 CORRELATION_TIMES = tuple(Evidence.CORRELATION_TIMES)
-
-#: Part of the variance of the curve that orders omitted from a model may take from its mean.
-_LEFT_OUT: Final = 0.25
-
-#: Singular values of columns, over the largest, below which they are one column at the angles.
-_ALIKE: Final = 1e-6
 
 
 class RunReadings(NamedTuple):
@@ -170,7 +164,9 @@ class EvidenceEstimate:
             mean, _ = self.among(sorted(ranked[:count]), theta, beside)
             held = _columns(theta, sorted(ranked[:count])) @ mean
             # A curve within its own standard deviation is none.
-            share = _LEFT_OUT if count else 1.0
+            # Part of the variance of the curve that orders omitted from a model may take from its
+            # mean.
+            share = 0.25 if count else 1.0
             if np.mean((curve - held) ** 2) <= share * np.mean(std**2):
                 break
             count += 1
@@ -208,7 +204,9 @@ class EvidenceEstimate:
             looks = _columns(theta, [self.told[i] for i in others]) / math.sqrt(len(theta))
             target = np.vstack([looks, np.zeros((len(onto), looks.shape[1]))])
             places = np.ravel([(2 * i, 2 * i + 1) for i in others])
-            onto[:, places] = np.linalg.lstsq(rows, target, rcond=_ALIKE)[0]
+            # Singular values of columns, over the largest, below which they are one column at the
+            # angles.
+            onto[:, places] = np.linalg.lstsq(rows, target, rcond=1e-6)[0]
         return onto @ self.mean, onto @ self.covariance @ onto.T
 
     def gain_of_a_run(self, theta: Array) -> tuple[float, float]:

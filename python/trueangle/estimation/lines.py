@@ -18,8 +18,6 @@ from .blocks import BlockProducts
 #: Orders searched at least, and at most: bounds memory and the penalty of the search.
 LEAST_ORDERS, MOST_ORDERS = 128, 1024
 
-#: Orders of each shaft (per pole pair of the encoder) searched beyond the whole ones.
-SHAFT_ORDERS = 12
 
 #: Output orders up to this one are expected of any rotary part.
 LOW_ORDERS = 24
@@ -55,7 +53,8 @@ class LineBasis:
         multiples = {
             k * cycles
             for cycles in joint.shafts.values()
-            for k in range(1, SHAFT_ORDERS * min(joint.pole_pairs, 4) + 1)
+            # Orders of each shaft (per pole pair of the encoder) searched beyond the whole ones.
+            for k in range(1, 12 * min(joint.pole_pairs, 4) + 1)
         }
         further = sorted(multiples - whole)
         orders = np.array([*sorted(whole), *further], dtype=np.float64)

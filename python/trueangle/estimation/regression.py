@@ -23,10 +23,6 @@ from .whitening import RunEffect
 #: Places of a turn at most, and readings per pass and place on average.
 MOST_PLACES, PER_CELL = 180, 2
 
-#: Variance of the places' means over that of what varies between passes (an F ratio)
-#: from which on the residual counts as repeated.
-REPEATED = 4.0
-
 
 def repeated_part(residual: Array, signals: Signals, by_direction: bool = False) -> Array:
     """The part of a residual that is the same on every pass of a place.
@@ -81,17 +77,15 @@ def repeated_part(residual: Array, signals: Signals, by_direction: bool = False)
     common = np.where(again, mean.sum(axis=1) / np.maximum(visits, 1), 0.0)
     between = float(visits[again] @ common[again] ** 2) / max(int(again.sum()) - 1, 1)
     within = float((((mean - common[:, None]) ** 2)[again][seen[again]]).sum()) / freedom
-    return np.asarray(common[place]) if between > REPEATED * within else nothing
+    # Variance of the places' means over that of what varies between passes (an F ratio) from which
+    # on the residual counts as repeated.
+    return np.asarray(common[place]) if between > 4.0 * within else nothing
 
 
 T = TypeVar("T")
 
 #: Times the standard deviation of the residual beyond which no cause is as large.
 BEYOND_SHOWN = 3.0
-
-#: Times what a coarse search finds that the refined one may. Where the noise is correlated a
-#: search that does not whiten has its peaks elsewhere: a factor of three was observed.
-REFINED = 4.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -276,4 +270,6 @@ class Regression(Solution):
     def is_dominated(self, deviance: float, parameters: int, log_grid: float = 0.0) -> bool:
         """A coarse search so far below `least` is not refined to what another one explains."""
         needed = parameters * self.log_n + 2.0 * log_grid + self.least
-        return self.least > 0.0 and REFINED * deviance + 10.0 < needed
+        # Times what a coarse search finds that the refined one may. Where the noise is correlated a
+        # search that does not whiten has its peaks elsewhere: a factor of three was observed.
+        return self.least > 0.0 and 4.0 * deviance + 10.0 < needed

@@ -42,9 +42,6 @@ WITHIN = 2.0
 #: Passes at most, and the change of the fit, in steps, at which it has settled.
 PASSES, SETTLED = 100, 1e-3
 
-#: Least share of the readings' information that a pass counts on: a longer step may go astray.
-LEAST_TELLING = 0.05
-
 
 @dataclass(frozen=True)
 class Rounded:
@@ -120,7 +117,9 @@ def fit_rounded(
         if within and sigma == least:
             break
         hidden = (squares - float(error @ error)) / n / sigma**2
-        change = columns @ (columns.T @ error) / max(1.0 - hidden, LEAST_TELLING)
+        # Least share of the readings' information that a pass counts on: a longer step may go
+        # astray.
+        change = columns @ (columns.T @ error) / max(1.0 - hidden, 0.05)
         before, sigma = sigma, max(float(np.sqrt(squares / n)), least)
         if max(float(np.abs(change).max()), abs(sigma - before)) < SETTLED * step:
             break

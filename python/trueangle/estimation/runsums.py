@@ -16,9 +16,6 @@ from ..support.arrays import Array
 from .forgetting import Forgetting
 from .momentsfit import Spectrum
 
-#: Seconds between two looks at whose turn it is.
-_PATIENCE = 0.05
-
 
 class _Exclusive:
     """One thread at a time; the others wait, unless nobody can ever be done.
@@ -32,7 +29,8 @@ class _Exclusive:
         self._process = os.getpid()
 
     def __enter__(self) -> None:
-        while not self._lock.acquire(timeout=_PATIENCE):
+        # Seconds between two looks at whose turn it is.
+        while not self._lock.acquire(timeout=0.05):
             if self._process != os.getpid():
                 raise ArgumentError(
                     "this process was forked while another thread updated these moments: "

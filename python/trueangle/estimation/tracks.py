@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from ..errors import NoCurveError
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
 from .channels import estimate_channels
-
-#: Mean resultant of the mismatch of two tracks that agree: of 0.2 periods rms.
-_AGREE: Final = 0.45
 
 
 class Mismatch(NamedTuple):
@@ -73,7 +70,8 @@ def joined(first: Channels, second: Channels, readings: Sequence[Array], named: 
         tracks.append((abs(off), cmath.phase(off), track))
     agreement, phase, track = max(tracks, key=lambda found: found[0])
     periods = first.periods_per_turn, second.periods_per_turn
-    if agreement < _AGREE:
+    # Mean resultant of the mismatch of two tracks that agree: of 0.2 periods rms.
+    if agreement < 0.45:
         raise NoCurveError(
             f"{named}: two tracks of {periods[0]} and {periods[1]} periods do not agree on a "
             "period: check the columns and `periods_per_turn`"

@@ -19,12 +19,8 @@ from .problem import Problem
 AnyArgument: TypeAlias = Literal["auto", "reference", "indicated"]
 ARGUMENTS: tuple[AnyArgument, ...] = ("auto", "reference", "indicated")
 
-#: Zeros of the runs closer than this part of a turn (0.2 deg) shift no order enough to matter.
-_MOVED: Final = 1.0 / 1800.0
 
 #: Readings and runs looked at, and orders where none are named.
-_LOOKED_AT: Final = 32_768
-_MOST_RUNS: Final = 256
 _LOW_ORDERS: Final = tuple(range(1, 9))
 
 #: The indicated angle is taken where a common pattern explains `_MORE` times the energy
@@ -66,11 +62,13 @@ def choose_argument(
     if argument != "auto":
         return ArgumentChoice(argument)
     period = runs[0].period
-    runs = runs[:: max(1, len(runs) // _MOST_RUNS)]
-    looked_at = [_some(run, max(64, _LOOKED_AT // len(runs))) for run in runs]
+    runs = runs[:: max(1, len(runs) // 256)]
+    # Readings and runs looked at.
+    looked_at = [_some(run, max(64, 32_768 // len(runs))) for run in runs]
     zeros = np.array([circular_mean(r.indicated - r.reference, period) for r in looked_at])
     moved = float(np.abs(wrap(zeros - zeros[0], period)).max())
-    if moved < _MOVED * period:
+    # Zeros of the runs closer than this part of a turn (0.2 deg) shift no order enough to matter.
+    if moved < period / 1800.0:
         return ArgumentChoice("reference")
     asked = shafts or [ShaftOrders("output", 1.0, _LOW_ORDERS)]
     left: list[float] = []

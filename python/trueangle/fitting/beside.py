@@ -15,7 +15,7 @@ with p coefficients of the pattern, and q of the nuisances.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,9 +25,6 @@ from .problem import PlainSolution, Problem, SolvedProblem
 
 if TYPE_CHECKING:
     from .nuisance import Nuisance
-
-#: Size of the columns that runs share, those of the pattern being 1: no penalty restrains them.
-_FREE: Final = 100.0
 
 
 class BesideProblem(Problem):
@@ -63,7 +60,9 @@ class BesideProblem(Problem):
 
     def columns(self, index: int) -> Array:
         """Cosine and sine of every order, and what runs share."""
-        return np.hstack([super().columns(index), _FREE * self._shared[index]])
+        # Size of the columns that runs share, those of the pattern being 1: no penalty restrains
+        # them.
+        return np.hstack([super().columns(index), 100.0 * self._shared[index]])
 
     def private(self, index: int) -> Array:
         """The zero of a run, and a separate drift."""

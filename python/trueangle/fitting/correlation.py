@@ -14,14 +14,6 @@ from ..estimation.linear import NormalEquations, total
 from ..support.arrays import Array
 from .problem import Problem, SolvedProblem
 
-#: Readings times columns up to which the columns are written out.
-_MOST: Final = 4_000_000
-#: Columns in square roots of readings below which the fit changes no such form by a tenth of
-#: what is looked for: its share of the noise is then far below the form's own deviation.
-_SLIGHT: Final = 0.3
-#: Part of the largest eigenvalue below which columns add nothing new.
-_RANK: Final = 1e-10
-
 
 class Share(NamedTuple):
     """Expected ``rᵀ A r / rᵀ r`` of white noise, and its standard deviation."""
@@ -51,9 +43,12 @@ class ResidualSpace:
         """That of a fit of these runs; None of sums, of no orders, and where readings abound."""
         sizes = [len(problem.runs[i]) for i in used]
         width = problem.unknowns + len(used)
-        if not problem.unknowns or problem.summed or sum(sizes) * width > _MOST:
+        # Readings times columns up to which the columns are written out.
+        if not problem.unknowns or problem.summed or sum(sizes) * width > 4_000_000:
             return None
-        if width < _SLIGHT * math.sqrt(sum(sizes)):
+        # Columns in square roots of readings below which the fit changes no such form by a tenth of
+        # what is looked for: its share of the noise is then far below the form's own deviation.
+        if width < 0.3 * math.sqrt(sum(sizes)):
             return None
         own = [problem.private(i) for i in used]
         starts = np.cumsum([0, *(part.shape[1] for part in own)])
@@ -67,7 +62,8 @@ class ResidualSpace:
         columns = np.vstack(rows)
         columns /= np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-300)
         values, vectors = np.linalg.eigh(columns.T @ columns)
-        kept = values > _RANK * values[-1]
+        # Part of the largest eigenvalue below which columns add nothing new.
+        kept = values > 1e-10 * values[-1]
         return cls(columns @ (vectors[:, kept] / np.sqrt(values[kept])), sizes)
 
     def neighbours(self) -> Share:
@@ -119,21 +115,14 @@ _MOST_CLUSTERS: Final = 128
 #: Fewest runs that show by themselves how coefficients scatter.
 ENOUGH_RUNS: Final = 8
 
-#: Readings in a row whose correlation is looked at.
-_LOOKED_AT: Final = 65_536
 
 #: Standard errors from which a correlation counts; white noise reaches it once in 1000.
 _FOUND: Final = 3.1
 #: p-value of a scatter below which it is not that of white noise.
 SCATTER: Final = 1e-3
 
-#: Readings in a row that are averaged when slow correlation is looked for.
-_STRETCHES: Final = (8, 64)
 
-#: Segments count as independent from this length on, in correlation times of the readings.
-_LONG: Final = 8.0
 #: Segments of a run, most and fewest.
-_MOST_STRETCHES: Final = 64
 FEWEST_STRETCHES: Final = 8
 
 
@@ -172,7 +161,8 @@ def _in_time(
     problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], used: Sequence[int]
 ) -> list[Array]:
     """Weighted residuals of the first readings of every run, in the order they were taken."""
-    most = max(64, _LOOKED_AT // len(used))
+    # Readings in a row whose correlation is looked at.
+    most = max(64, 65_536 // len(used))
     found = []
     for i in used:
         run, weight = problem.runs[i], weights[i]
@@ -206,7 +196,8 @@ def correlation_found(
     white = white if space is None else space.neighbours()
     if near - white.expected > _FOUND * white.deviation:
         return f"neighbours in time correlate by {near - white.expected:.2f}"
-    for length in _STRETCHES:
+    # Readings in a row that are averaged when slow correlation is looked for.
+    for length in (8, 64):
         blocks = [part[: part.size // length * length].reshape(-1, length) for part in parts]
         means = np.concatenate([block.mean(axis=1) for block in blocks])
         if means.size < 20:
@@ -236,9 +227,11 @@ def residual_memory(
             break
         memory += 2.0 * near
         lag += 1
-    long = max(1, math.ceil(_LONG * memory))
+    # Segments count as independent from this length on, in correlation times of the readings.
+    long = max(1, math.ceil(8.0 * memory))
     sizes = [len(problem.runs[i]) for i in used]
-    stretches = [max(2, min(_MOST_STRETCHES, size // long)) for size in sizes]
+    # Segments of a run, most and fewest.
+    stretches = [max(2, min(64, size // long)) for size in sizes]
     if min(stretches) < FEWEST_STRETCHES:
         space = ResidualSpace.of(problem, weights, used)
         count = sum(part.size for part in parts)

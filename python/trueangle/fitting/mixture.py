@@ -29,9 +29,6 @@ from .uncertainty import Uncertainty
 #: Rounds of setting outliers aside.
 _ROUNDS: Final = 6
 
-#: Standard deviations between runs by which the gain of a further one must exceed nothing.
-_SURE: Final = 2.0
-
 
 class MixtureFit(NamedTuple):
     """Orders, coefficients and covariance of a problem."""
@@ -92,7 +89,8 @@ def fit_mixture(
 def check_new_run(estimate: EvidenceEstimate, travel: Array, orders: Sequence[float]) -> None:
     """Raise where runs differ so much that a gain in a further one is uncertain."""
     gain, spread = estimate.gain_of_a_run(travel)
-    if gain <= _SURE * spread:
+    # Standard deviations between runs by which the gain of a further one must exceed nothing.
+    if gain <= 2.0 * spread:
         listed = ", ".join(f"{order:g}" for order in orders[:6])
         raise NoModelError(
             f"no correction can be given: order {listed} differs so much between the runs that a "

@@ -22,13 +22,6 @@ FOLDS: Final = 3
 
 #: A nuisance must lower the held-out sum of squares by this share, in most of the folds, ...
 _GAIN: Final = 0.01
-#: ... and this share of it must remain next to the pattern: else they are not separable.
-_TOLD: Final = 0.02
-#: ... and no order's standard error may grow by more than this factor because of it: else what the
-#: nuisance takes away is the pattern.
-_GROWN: Final = 5.0
-#: Of nuisances that leave nearly the same the simplest is taken.
-_ALIKE: Final = 0.02
 
 
 class FoldRows(NamedTuple):
@@ -83,12 +76,15 @@ def choose_nuisance_groups(
             return chosen, shares, unseparated
         least = min(float(after.sum()) for after in good.values())
         # A kinked drift imitates a ramp there and back: of equal ones the simplest.
-        alike = [name for name, after in good.items() if after.sum() <= (1.0 + _ALIKE) * least]
+        alike = [name for name, after in good.items() if after.sum() <= 1.02 * least]
         best = min(alike, key=lambda name: rows.groups[name].shape[1])
         kind = best.rstrip("0123456789")
         barred.add(kind)
         grown = max(error_inflation(rows, [*chosen, best]), default=1.0)
-        if _told(rows, chosen, best) < _TOLD or grown > _GROWN:
+        # This share of it must remain next to the pattern, else they are not separable, and no
+        # order's standard error may grow by more than this factor, else what the nuisance takes
+        # away is the pattern.
+        if _told(rows, chosen, best) < 0.02 or grown > 5.0:
             unseparated.append(kind)
             continue
         shares.append((kind, float(before.sum() - good[best].sum()) / total))

@@ -16,16 +16,6 @@ from ..support.arrays import Array
 from .nuisance import KINDS, Nuisance
 from .nuisancechoice import FOLDS, FoldRows
 
-#: Intervals of the spline of a run's time that are tried, from a cubic on.
-_INTERVALS: Final = (1, 2, 4, 6)
-
-#: Segments of each run that are held out, every third together: twice as long as the reach
-#: of the stiffest spline tested on them. An odd number: way and return differ in fold.
-_STRETCHES: Final = 13
-
-#: Of twice as many readings and more every second, third, ... one is looked at.
-_LOOKED_AT: Final = 24_000
-
 #: Most runs that may each have a separate drift, or separate lines of the reference.
 _MOST_DRIFTING: Final = 24
 
@@ -62,7 +52,8 @@ def nuisance_columns(
                 mine["turned"] = _of_run(both, i, len(runs))
         if "drift" in wanted and timed and len(runs) <= _MOST_DRIFTING:
             assert run.time is not None
-            for count in _INTERVALS:
+            # Intervals of the spline of a run's time that are tried, from a cubic on.
+            for count in (1, 2, 4, 6):
                 own = time_spline(run.time[take], run.time, count)
                 mine[f"drift{count}"] = _of_run(own, i, len(runs))
         used = weight[take]
@@ -70,7 +61,9 @@ def nuisance_columns(
             parts.setdefault(name, []).append(_about(columns, used))
         patterns.append(_about(np.hstack([np.cos(angular), np.sin(angular)]), used))
         errors.append(_about(run.centred_error[take, None], used)[:, 0])
-        folds.append((np.arange(len(x)) * _STRETCHES // len(x) + i) % FOLDS)
+        # Segments of each run that are held out, every third together: twice as long as the reach
+        # of the stiffest spline tested on them. An odd number: way and return differ in fold.
+        folds.append((np.arange(len(x)) * 13 // len(x) + i) % FOLDS)
     groups = {name: np.vstack(v) for name, v in parts.items()}
     return FoldRows(
         np.vstack(patterns),
@@ -109,7 +102,8 @@ def taken_columns(
 
 def looked_at_stride(runs: Sequence[CalibrationRun]) -> int:
     """Every how many readings one is looked at."""
-    return max(1, sum(map(len, runs)) // _LOOKED_AT)
+    # Of twice as many readings and more every second, third, ... one is looked at.
+    return max(1, sum(map(len, runs)) // 24_000)
 
 
 def _about(columns: Array, weight: Array) -> Array:

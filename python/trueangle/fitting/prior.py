@@ -41,7 +41,6 @@ from .robust import Loss, RobustFit
 
 #: Rounds in which the outliers and the noise settle: each round removes part of the difference.
 _ROUNDS: Final = 20
-_STEPS: Final = 200
 
 #: Options that cannot be combined with a prior, and their defaults.
 _USUAL: dict[str, Any] = {
@@ -211,7 +210,7 @@ def _solved(
     apart = sums.moment - sums.gram @ np.where(fixed, prior.mean, 0.0)
     noise, freedom = prior.noise_variance, 1.0
     free = ~fixed
-    for _ in range(_STEPS):
+    for _ in range(200):
         hessian = (sums.gram / noise + np.diag(precision))[np.ix_(free, free)]
         target = (apart / noise + precision * prior.mean)[free]
         model = NormalEquations(hessian, target).solved()

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,12 +36,6 @@ from .correlation import SCATTER
 from .problem import Problem, SolvedProblem
 from .rounding import COUNTED, rounding_variance
 from .uncertainty import CovarianceKind, Uncertainty
-
-#: Share of a variance from which the contribution of omitted orders is reported.
-_TOLD: Final = 0.1
-
-#: Positions times orders up to which omitted orders are examined: 1000 places of a turn.
-_MOST: Final = 1_000_000
 
 
 class _Repeats(NamedTuple):
@@ -105,7 +99,8 @@ def covariance_with_repeats(
     added = _moved(sums, basis, (rounded, left), found.kind)
     wider = found.beside(added, freedom if left > rounded else math.inf)
     noise, all_of_it = np.diag(found.covariance)[1:].sum(), np.diag(wider.covariance)[1:].sum()
-    if left <= rounded or all_of_it <= (1.0 + _TOLD) * noise:
+    # Share of a variance from which the contribution of omitted orders is reported.
+    if left <= rounded or all_of_it <= 1.1 * noise:
         return wider
     said = (
         "omitted orders repeat at every position and leak into the fitted "
@@ -183,7 +178,8 @@ def _orders_left_out(problem: Problem, positions: Positions) -> Array | None:
         return None
     grid = uniform_grid(2.0 * math.pi * turns)
     count = round(turns.size / positions.span) if grid is None else grid.positions
-    if count * turns.size > _MOST:
+    # Positions times orders up to which omitted orders are examined: 1000 places of a turn.
+    if count * turns.size > 1_000_000:
         return None
     fitted = [s.cycles_per_turn * order for s in problem.shafts for order in s.orders]
     taken = {0.0, *(UniformGrid(count).folded(order) for order in fitted)}

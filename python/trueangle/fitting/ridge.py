@@ -38,12 +38,6 @@ from .problem import Problem
 #: Penalties tried, relative to the sum of weights: from "none" to "hardly any harmonics".
 _PENALTIES = [0.0, *np.logspace(-9.0, 0.0, 19).tolist()]
 
-#: Parts of the arc held out in turn when there is one run only.
-_BLOCKS = 10
-
-#: The same where the error does not repeat after a turn: a joint goes on to turns
-#: outside the fitted travel, so whole segments are held out.
-_STRETCHES = 4
 
 #: Bound of the sum of the amplitudes, in ranges of the measured error. On a full
 #: turn the sum of amplitudes of a smooth error is about half its range.
@@ -57,9 +51,6 @@ _STEEPNESS: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 #: Sizes looked at, relative to the greatest: four decades, 20 to each.
 _SIZES: Final = np.logspace(-4.0, 0.0, 81)
-
-#: Noise counts as at least this part of the greatest size: rounding, where there is no noise.
-_LEAST_NOISE: Final = 1e-9
 
 
 def choose_ridge(problem: Problem, weights: Sequence[Array | None]) -> float:
@@ -94,7 +85,9 @@ def _folds(problem: Problem, weights: Sequence[Array | None]) -> list[tuple[Arra
     several = len(problem.runs) > 1
     found: list[tuple[Array, float]] = []
     for run, weight, angles in zip(problem.runs, weights, problem.angles, strict=True):
-        ends = [] if several else _ends(angles, _BLOCKS if problem.is_periodic else _STRETCHES)
+        # Parts of the arc held out in turn; where the error does not repeat after a turn, whole
+        # segments: a joint goes on to turns outside the fitted travel.
+        ends = [] if several else _ends(angles, 10 if problem.is_periodic else 4)
         found += _core.folds(
             (run.reference, run.indicated, weight),
             problem.period,
@@ -158,7 +151,8 @@ def pattern_variances(
     """
     if not greatest > 0.0:
         return np.zeros(moment.size)
-    noise = max(variance, (_LEAST_NOISE * greatest) ** 2)
+    # Noise counts as at least this part of the greatest size: rounding, where there is no noise.
+    noise = max(variance, (1e-9 * greatest) ** 2)
     squares = (greatest * _SIZES) ** 2
     values, vectors = np.linalg.eigh(gram)
     seen = values > 1e-14 * values[-1]

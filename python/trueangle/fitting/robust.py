@@ -31,8 +31,6 @@ LOSSES: tuple[Loss, ...] = ("auto", "linear", "huber", "tukey")
 HUBER = 1.345
 TUKEY = 4.685
 
-#: Counts of a sensor up to which a reading differs from its neighbours by being rounded.
-WILD_COUNTS = 2.0
 
 #: Readings further off than this (robust standard deviations) are rare: 0.7 % of normal ones.
 FAR = 2.7
@@ -53,14 +51,9 @@ SETTLED = 1e-4
 STEPS = 50
 FEWEST_STEPS = 6
 _WORK = 4e9
-#: Readings for each unknown beyond which a solution takes them in one pass.
-_BY_ROWS = 32
 
-#: With this share of them a robust fit of several orders fails wherever they are ...
+#: With this share of them a robust fit of several orders fails wherever they are.
 _MOST: Final = 0.15
-#: ... and with `MANY` where neighbours in angle agree this many times better than the fit:
-#: the wrong readings are adjacent, and the model has bent towards them.
-_BENT: Final = 3.0
 
 
 class RobustFit(NamedTuple):
@@ -130,7 +123,8 @@ def rejected(weights: Sequence[Array], given: Sequence[Array | None]) -> int:
 def _rounds(problem: Problem) -> int:
     """Rounds of re-weighting that a problem may take."""
     unknowns = problem.unknowns + len(problem.runs)
-    work = unknowns**2 * min(problem.readings, _BY_ROWS * unknowns)
+    # Readings for each unknown beyond which a solution takes them in one pass.
+    work = unknowns**2 * min(problem.readings, 32 * unknowns)
     return max(FEWEST_STEPS, min(STEPS, int(_WORK / max(work, 1))))
 
 
@@ -190,7 +184,8 @@ def without_spikes(run: CalibrationRun) -> CalibrationRun:
     if wild.any():
         turns = run.unwrapped_reference * (2.0 * math.pi / run.period)
         count = sensor_lattice([run], turns)[0] * run.period / ARCSEC_PER_TURN
-        wild &= distance > WILD_COUNTS * count
+        # Counts of a sensor up to which a reading differs from its neighbours by being rounded.
+        wild &= distance > 2.0 * count
     if not wild.any():
         return run
     weights = given.copy()
@@ -319,7 +314,9 @@ def robust_breakdown_sentence(problem: Problem, weighted: RobustFit) -> str:
         return ""
     rest = problem.residuals(weighted.fitted)
     scale, near = robust_scale(_counted(problem, rest)), _between_neighbours(problem, rest)
-    bent = scale > _BENT * near
+    # `MANY` where neighbours in angle agree three times better than the fit: the wrong readings
+    # are adjacent, and the model has bent towards them.
+    bent = scale > 3.0 * near
     if robust and share > (MANY if bent else _MOST):
         return (
             f"{100.0 * share:.0f} % of the readings are beyond {FAR:g} robust standard "

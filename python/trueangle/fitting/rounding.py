@@ -28,9 +28,6 @@ from ..support.angles import ARCSEC_PER_TURN
 if TYPE_CHECKING:
     from .orders.noise import ReadingVariance
 
-#: Terms of the sum, and passes of the search for the noise.
-_TERMS: Final = 200
-_PASSES: Final = 60
 
 #: Readings up to which positions are separated, by sorting.
 COUNTED: Final = 20_000
@@ -52,14 +49,14 @@ def repeated_rounding_variance(step: float, scatter: float) -> float:
     >>> [round(repeated_rounding_variance(1.0, scatter), 3) for scatter in (0.0, 0.05, 0.2)]
     [0.083, 0.041, 0.0]
     """
-    k = np.arange(1, _TERMS + 1)
+    k = np.arange(1, 201)
 
     def repeated(sigma: float) -> float:
         damped = np.exp(-((2.0 * math.pi * k * sigma / step) ** 2)) / (2.0 * (math.pi * k) ** 2)
         return step**2 * float(damped.sum())
 
     low, high = 0.0, math.sqrt(scatter) + step
-    for _ in range(_PASSES):
+    for _ in range(60):
         sigma = 0.5 * (low + high)
         if sigma**2 + step**2 / 12.0 - repeated(sigma) < scatter:
             low = sigma

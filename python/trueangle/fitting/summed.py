@@ -15,9 +15,6 @@ from ..support.arrays import Array
 from .orders.harmonicsums import HarmonicSums
 from .orders.unitgroups import MOST_UNITS
 
-#: Orders this close to a whole multiple of the base shaft are one.
-_WHOLE = 1e-9
-
 
 @dataclass(frozen=True, eq=False)
 class SummedReadings:
@@ -77,7 +74,8 @@ def _sums_of_moments(moments: Moments, orders: Sequence[float]) -> HarmonicSums:
     """
     steps = np.asarray(orders, dtype=np.float64) / moments.cycles
     index = np.rint(steps).astype(np.int64)
-    if index.size and np.abs(steps - index).max() > _WHOLE * np.abs(steps).max():
+    # Orders this close to a whole multiple of the base shaft are one.
+    if index.size and np.abs(steps - index).max() > 1e-9 * np.abs(steps).max():
         raise ArgumentError(
             "one pass can only judge orders that are multiples of a common "
             "base order: fit in memory, or give orders of the other shafts"

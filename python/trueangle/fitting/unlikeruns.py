@@ -20,17 +20,10 @@ from .problem import Problem, SolvedProblem
 
 #: Readings of a run that are looked at, and runs.
 _READINGS: Final = 512
-_RUNS: Final = 512
 
-#: A run is unlike the others when their pattern misses this share of the energy that its own
-#: would explain (its coefficients are about half of the pattern off) ...
-_SHARE: Final = 0.2
 #: ... and by this many times the scatter that its noise, correlated as it is, gives coefficients.
 _SCATTER: Final = 25.0
 
-#: Where no direction of a run's design is shorter than this part of the longest, each
-#: coefficient of the run alone means something.
-_SPEAKS: Final = 0.1
 
 #: Runs that a sentence names.
 _NAMED: Final = 8
@@ -45,7 +38,7 @@ def unlike_runs(problem: Problem, fitted: SolvedProblem) -> list[int]:
     count = len(problem.runs)
     if count < 2 or not problem.shafts:
         return []
-    chosen = [i for i in range(0, count, max(1, count // _RUNS)) if not np.isnan(fitted.offsets[i])]
+    chosen = [i for i in range(0, count, max(1, count // 512)) if not np.isnan(fitted.offsets[i])]
     far = far_runs([_sums(problem, i) for i in chosen])
     return [chosen[i] for i, times in far if times > _SCATTER * _correlated(problem, chosen[i])]
 
@@ -83,7 +76,9 @@ def far_runs(runs: Sequence[NormalEquations]) -> list[tuple[int, float]]:
     if free.sum() < 1.0:
         return []
     noisy = noise.sum() / free.sum() * np.maximum(rank, 1.0)
-    far = np.flatnonzero((missed > _SHARE * own) & (missed > _SCATTER * noisy))
+    # A run is unlike the others when their pattern misses this share of the energy that its own
+    # would explain (its coefficients are about half of the pattern off) ...
+    far = np.flatnonzero((missed > 0.2 * own) & (missed > _SCATTER * noisy))
     return [(i, float(missed[i] / max(noisy[i], 1e-300))) for i in far.tolist()]
 
 
@@ -91,7 +86,9 @@ def _solved(sums: NormalEquations) -> tuple[Array, int, bool]:
     """Least squares from normal equations: its rank, and whether it is well determined."""
     found = sums.solved()
     values = np.linalg.eigvalsh(sums.gram)
-    clear = bool(values[0] > _SPEAKS**2 * values[-1])
+    # Where no direction of a run's design is shorter than a tenth of the longest, each
+    # coefficient of the run alone means something.
+    clear = bool(values[0] > 0.01 * values[-1])
     return found.coefficients[:, 0], found.rank, clear
 
 
@@ -166,13 +163,6 @@ def _correlated(problem: Problem, index: int) -> float:
     return (1.0 + near) / (1.0 - near)
 
 
-#: Runs from which on a line through their zeros can fail.
-_LEAST: Final = 3
-
-#: Probability below which zeros that do not follow the speed would do so.
-_LEVEL: Final = 1e-3
-
-
 def zeros_follow_speed(
     runs: Sequence[CalibrationRun], zeros: Array, std: Array
 ) -> tuple[float, float] | None:
@@ -188,7 +178,8 @@ def zeros_follow_speed(
     moving = [run.time is not None and np.ptp(run.time) > 0.0 for run in runs]
     timed = np.array(moving) & np.isfinite(zeros)
     known = [run for run, is_timed in zip(runs, timed, strict=True) if is_timed]
-    if len(known) < _LEAST:
+    # Runs from which on a line through their zeros can fail.
+    if len(known) < 3:
         return None
     ends = [
         (run.unwrapped_reference[[0, -1]], run.time[[0, -1]])
@@ -206,7 +197,8 @@ def zeros_follow_speed(
     rest = zero - slope * speed
     noise = max(float(rest @ rest) / freedom, float(np.nanmean(std[timed] ** 2)), 1e-300)
     chance = f_tail(slope**2 * energy / noise, 1.0, float(freedom))
-    return (-slope, chance) if chance < _LEVEL else None
+    # Probability below which zeros that do not follow the speed would do so.
+    return (-slope, chance) if chance < 1e-3 else None
 
 
 def zeros_follow_speed_sentence(delay: float, chance: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from ..support.display_units import error_unit, sine_of_rms
 
 if TYPE_CHECKING:
     from .result import FitResult
-
-#: Readings at whose places the two are compared.
-_LOOKED_AT: Final = 512
 
 
 def of_worth(fit: FitResult) -> FitResult:
@@ -40,7 +37,8 @@ def of_worth(fit: FitResult) -> FitResult:
     if model.covariance is None or (fit.amplitudes >= fit.amplitude_std).any():
         return fit
     places = np.concatenate(fit.problem.angles)
-    places = places[:: 1 + places.size // _LOOKED_AT]
+    # Readings at whose places the two are compared.
+    places = places[:: 1 + places.size // 512]
     shafts = [(shaft.cycles_per_turn, shaft.orders) for shaft in model.shafts]
     rows = design_matrix(places, shafts, model.period)
     rows = (rows - rows.mean(axis=0))[:, 1:]

@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 
 #: Aliases and explanations written at a dot; the table has them all.
 _MOST_ALIASES = 3
-#: Dots that get their aliases written, the largest first, and inches that each needs.
-_MOST_ANNOTATED = 12
-_LABEL_INCHES = 0.17
 
 #: Width of a group of one order, and the gap between two, in the unit of `_width`.
 _LEAST, _GAP = 2.5, 1.0
@@ -136,8 +133,9 @@ def draw_spectrum(
             label="needed to be significant",
         )
     largest = [int(i) for i in np.argsort(-amplitude) if kept[i]]
-    tall = _apart([i for i in largest if lines[i].aliases], place, axis.room(ax, _LABEL_INCHES))
-    tall = tall[:_MOST_ANNOTATED]
+    tall = _apart([i for i in largest if lines[i].aliases], place, axis.room(ax, 0.17))
+    # Dots that get their aliases written, the largest first, and inches that each needs.
+    tall = tall[:12]
     if name is not None:
         # Orders named on a page, the largest.
         for i in largest[:8]:

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 #: A small picture as part of the usual one, its dots per inch, and those that a page shows.
 _SMALL: float = 0.8
-_DOTS_PER_INCH: float = 120.0
-_ON_PAGE: float = 80.0
 #: Dots per inch of a page that draws vectors: those of CSS.
 ON_PAGE: float = 96.0
 _SCALE: ContextVar[float | None] = ContextVar("scale", default=None)
@@ -34,10 +32,6 @@ _MANY: int = 5
 #: Entries side by side of a legend that has to stay inside, and the height of a row of them
 #: as part of the axes'.
 _COLUMNS: int = 4
-_ROW: float = 0.09
-#: Steps of ticks on an axis of angles in degrees, and about how many there are to an inch.
-_ANGLES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 1800.0)
-_TICKS_PER_INCH: float = 1.2
 #: Letters of an entry, of which longer ones lose the middle.
 _LONGEST: int = 48
 
@@ -93,12 +87,12 @@ def as_image(drawn: Axes | Figure) -> str:
     """A figure as an element of a page, with its text alternative."""
     figure: Any = drawn if hasattr(drawn, "savefig") else drawn.get_figure(root=True)
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DOTS_PER_INCH)
+    figure.savefig(buffer, format="png", dpi=120.0)
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
     told = " ".join(text_alternative(ax) for ax in figure.axes)
     return (
         f'<img alt="{escape(told)}" style="max-width:100%" '
-        f'width="{figure.get_figwidth() * _ON_PAGE:.0f}" src="data:image/png;base64,{data}">'
+        f'width="{figure.get_figwidth() * 80.0:.0f}" src="data:image/png;base64,{data}">'
     )
 
 
@@ -150,8 +144,9 @@ def turn_axis(ax: Axes, low: float, high: float) -> None:
     if low == high:  # a joint at rest
         low, high = low - 0.5, high + 0.5
     ax.set_xlim(low, high)
-    span, most = high - low, _TICKS_PER_INCH * ax.get_figure(root=True).get_figwidth()  # type: ignore[union-attr]
-    for step in _ANGLES:
+    span, most = high - low, 1.2 * ax.get_figure(root=True).get_figwidth()  # type: ignore[union-attr]
+    # Steps of ticks on an axis of angles in degrees, and about how many there are to an inch.
+    for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 1800.0):
         if span / step <= most:
             ax.xaxis.set_major_locator(MultipleLocator(step))
             break
@@ -232,7 +227,7 @@ def legend(ax: Axes, title: str | None = None) -> None:
             break
     # Room above the data, so that no entry covers a reading.
     if ax.name != "polar":
-        _room_above(ax, 0.11 + _ROW * rows)
+        _room_above(ax, 0.11 + 0.09 * rows)
     _opaque(made)
 
 

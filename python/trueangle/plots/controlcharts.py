@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,12 +23,6 @@ if TYPE_CHECKING:
     from ..fleets.result import Fleet
     from ..model.monitor import WatchedWindow
 
-#: Limits beyond which a chart has a scale of logarithms.
-_FAR: Final = 10.0
-
-#: Orders of a watched joint that are plotted at most: those whose sums rose highest.
-_MOST: Final = 6
-
 
 def draw_sums(
     ax: Axes, x: Sequence[Any] | Array, sums: Array, limit: float, names: Sequence[str] = ()
@@ -42,7 +36,8 @@ def draw_sums(
             label=names[k] if names else None,
         )  # fmt: skip
     ax.axhline(limit, color=palette.ink(ax), linestyle="--", linewidth=1.0, label="limit")
-    if float(np.max(sums)) > _FAR * limit:
+    # Limits beyond which a chart has a scale of logarithms.
+    if float(np.max(sums)) > 10.0 * limit:
         ax.set_yscale("symlog", linthresh=limit)
     ax.set_ylim(0.0, 1.1 * max(limit, float(np.max(sums))))
     grid(ax)
@@ -124,7 +119,8 @@ def watched_windows(
     scale = arcsec(1.0, period)
     shown = error_unit(errors_in, scale * float(size.max()), period)
     figure, (upper, lower) = new_figure(2, 1, 7.5, 6.0, sharey=False)
-    drawn = np.sort(np.argsort(-sums.max(axis=0), kind="stable")[:_MOST])
+    # Orders of a watched joint that are plotted at most: those whose sums rose highest.
+    drawn = np.sort(np.argsort(-sums.max(axis=0), kind="stable")[:6])
     for k in drawn:
         look: dict[str, Any] = {"color": palette.run_colour(int(k)), "linewidth": 1.2}
         order = f"order {windows[0].orders[k].order:g}"

@@ -31,11 +31,6 @@ _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _PER_CYCLE, _FEWEST, _MOST_SAMPLES = 20, 361, 12001
 
 
-#: Periods from which on a curve fills the picture: it is plotted as an envelope...
-_DENSE: Final = 40.0
-#: ... where such orders make this part of the amplitudes; smaller ones are ripple on a line.
-_NOTABLE: Final = 0.1
-
 #: Places of an envelope.
 _PLACES: Final = 180
 
@@ -135,9 +130,11 @@ def strong_gear_order(
 ) -> float | None:
     """The strongest order whose periods fill a picture of ``span`` degrees; None without one."""
     pairs = list(zip(amplitudes, orders, strict=True))
-    fine = [(a, m) for a, m in pairs if m * span / 360.0 > _DENSE]
+    # Periods from which on a curve fills the picture: it is plotted as an envelope...
+    fine = [(a, m) for a, m in pairs if m * span / 360.0 > 40.0]
     part = sum(a for a, _ in fine) / (sum(a for a, _ in pairs) or 1.0)
-    return float(max(fine)[1]) if part > _NOTABLE else None
+    # ... where such orders make this part of the amplitudes; smaller ones are ripple on a line.
+    return float(max(fine)[1]) if part > 0.1 else None
 
 
 def curve_envelope(curve: ModelCurve) -> tuple[Array, Array, Array]:

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 _NO_GAIN = "no finding of this diagnosis has a gain that carries over to new runs"
 
-#: Small pictures side by side.
-_COLUMNS = 3
 
 #: What the values of a factor are, by their unit.
 _AXES = {
@@ -165,7 +163,8 @@ def factors(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto") -> Figure:
     if not shown:
         raise ArgumentError("the readings follow no factor beyond the simulation: nothing to draw")
     unit = error_unit(errors_in, max(factor.rms for factor in shown))
-    columns = min(_COLUMNS, len(shown))
+    # Small pictures side by side.
+    columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
     width, height = 3.0 * columns + 0.4, 2.4 * rows + 0.3
     figure, axes = new_figure(rows, columns, width=width, height=height, sharey=False)

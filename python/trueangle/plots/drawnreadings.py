@@ -47,10 +47,6 @@ if TYPE_CHECKING:
 
 #: Readings plotted in one picture: more do not show.
 _MOST: Final = 24_000
-#: Readings plotted of each run at least.
-_FEWEST: Final = 6
-#: Readings from which on dots are small and faint.
-_DENSE: Final = 2_000
 
 
 def error_curves(fit: FitResult, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
@@ -228,8 +224,10 @@ def draw_panel(ax: Axes, panel: Panel, most: int = _MOST) -> None:
 
 def _draw_clouds(ax: Axes, clouds: Sequence[Cloud], most: int = _MOST) -> None:
     """Dots of every cloud; each name once for the legend."""
-    share = max(_FEWEST, most // len(clouds))
-    dense = sum(min(cloud.points.y.size, share) for cloud in clouds) > _DENSE
+    # Readings plotted of each run at least.
+    share = max(6, most // len(clouds))
+    # Readings from which on dots are small and faint.
+    dense = sum(min(cloud.points.y.size, share) for cloud in clouds) > 2_000
     named: set[str] = set()
     for cloud in clouds:
         part = thinned_points(cloud.points, share, cloud.run)

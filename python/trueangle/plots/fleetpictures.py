@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 #: Radius that holds 95 % of a plane normal distribution, in standard deviations of a coordinate.
 RADIUS_OF_95: Final = math.sqrt(-2.0 * math.log(0.05))
 
-#: Orders whose phasors an overview has.
-_ORDERS: Final = 3
 
 #: Units whose patterns are plotted at most, those that need attention first, and in a row.
 _PATTERNS: Final = 20
@@ -253,7 +251,8 @@ def fleet_overview(fleet: Fleet, errors_in: ErrorsIn = "auto") -> Axes:
     matplotlib Axes
         The first of a new figure's: the sizes.
     """
-    spread = np.argsort([-row.std for row in fleet.between], kind="stable")[:_ORDERS]
+    # Orders whose phasors an overview has.
+    spread = np.argsort([-row.std for row in fleet.between], kind="stable")[:3]
     figure, (placeholder,) = new_figure(1, 1, 3.6 * len(spread), 7.2)
     placeholder.remove()
     layout = figure.add_gridspec(2, len(spread))

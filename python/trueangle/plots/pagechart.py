@@ -28,12 +28,8 @@ LOW: Final = "height:11rem"
 #: paints a stroke of no length only if its ends are round.
 _DOTS: Final = {"o": ("h0", (0, 0)), "s": ("h1", (1, 0)), "D": ("l2 2", (2, 2))}
 _SIGNS: Final = {"o": "●", "s": "■", "D": "◆", "ring": "○"}
-#: Rows of a legend beyond which the table of runs names them.
-_MOST_RUNS: Final = 6
 #: Part of the width at either border from which names are turned inwards.
 _EDGE: Final = 0.2
-#: Room at the axis for a letter of its numbers, em.
-_LETTER: Final = 0.62
 #: Letters of a point's name as part of the box's width, and its height.
 _WIDE, _HIGH = 0.011, 0.065
 
@@ -81,7 +77,8 @@ def page_chart(
         [f"M{_unit(at)} 0v{SIDE:.0f}" for at, _ in x["ticks"]]
         + [f"M0 {_unit(1.0 - at)}h{SIDE:.0f}" for at, _ in y["ticks"]]
     )
-    pad = _LETTER * max([1, *(len(text) for _, text in y["ticks"])]) + 0.7
+    # Room at the axis for a letter of its numbers, em.
+    pad = 0.62 * max([1, *(len(text) for _, text in y["ticks"])]) + 0.7
     return {
         "title": title,
         "grow": grow,
@@ -172,7 +169,8 @@ def _legend(ax: Axes) -> Iterator[dict[str, str]]:
     pairs = list(zip(*ax.get_legend_handles_labels(), strict=True))
     runs = sum(label.startswith("run ") for _, label in pairs)
     for handle, label in pairs:
-        if label.startswith("run ") and runs > _MOST_RUNS:
+        # Rows of a legend beyond which the table of runs names them.
+        if label.startswith("run ") and runs > 6:
             continue
         part: Any = handle[0] if isinstance(handle, tuple) else handle
         if hasattr(part, "get_marker"):

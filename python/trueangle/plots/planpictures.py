@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from ..planning.result import CalibrationPlan
     from ..rehearsal import Rehearsal, RehearsedCause
 
-#: Small pictures side by side.
-_COLUMNS = 4
-
 
 def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     """Positions of every mount (or tilt) within the first pitch.
@@ -134,7 +131,8 @@ def detection(rehearsal: Rehearsal) -> Figure:
     causes = [cause for cause in rehearsal.causes if cause.trials]
     if not causes:
         raise ArgumentError("nothing was hidden in this rehearsal: there is nothing to draw")
-    columns = min(_COLUMNS, len(causes))
+    # Small pictures side by side.
+    columns = min(4, len(causes))
     rows = -(-len(causes) // columns)
     figure, axes = new_figure(rows, columns, width=2.6 * columns + 0.6, height=2.1 * rows + 0.4)
     for ax, cause in zip(axes, causes, strict=False):

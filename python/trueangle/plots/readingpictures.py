@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from ..fitting.result import FitResult
     from ..simulation import Simulation
 
-#: Part of the way between two directions over which the runs are next to each other.
-_BESIDE: Final = 0.8
 
 #: What the colour of readings represents: their run, or what was done to them.
 _Role: TypeAlias = Literal["run", "before", "after", "measured", "simulated"]
@@ -229,7 +227,8 @@ def residual_picture(fit: FitResult, against: Signal, unit: ErrorUnit) -> PanelP
     numbers = {curves.run_label(run, number): number for number, run in enumerate(fit.runs)}
     if against == "direction":
         # Runs of one direction next to each other instead of on one line.
-        shift = _BESIDE * ((np.arange(len(parts)) + 0.5) / len(parts) - 0.5)
+        # Part of the way between two directions over which the runs are next to each other.
+        shift = 0.8 * ((np.arange(len(parts)) + 0.5) / len(parts) - 0.5)
         parts = [Points(p.label, p.x + s, p.y) for p, s in zip(parts, shift, strict=True)]
     scaled = [part.scaled(unit.per_arcsec) for part in parts]
     span = {"angle": curves.fitted_degrees(fit.model), "direction": (-1.5, 1.5)}.get(against)

@@ -48,8 +48,6 @@ _MOST_POINTS: Final = 3_000
 _MOST_RUNS: Final = 12
 #: Width of a chart that has the page, and of one next to another, inches.
 _WIDE, _NARROW = 7.5, 3.4
-#: Part of the measured error that a simulation must expect to be plotted with it.
-_FLAT: Final = 1e-3
 
 #: What a line of an output order is called.
 LineNames: TypeAlias = Callable[[float], str]
@@ -170,7 +168,8 @@ def figures_of_diagnosis(
     pairs = simulated_points(runs, sim)
     expected = max(float(np.ptp(simulated.y)) for _, simulated in pairs)
     found = {}
-    if expected > _FLAT * diagnosis.discrepancy.peak_to_peak:
+    # Part of the measured error that a simulation must expect to be plotted with it.
+    if expected > 1e-3 * diagnosis.discrepancy.peak_to_peak:
         picture = comparison_picture(pairs, scale.unit, diagnosis.extended)
         arrangement = "stacked" if len(picture.panels) == 2 else "above"
         found["measured-simulated"] = panel_figure(picture, arrangement, "height:16rem")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,6 @@ if TYPE_CHECKING:
     from ..fitting.orders.select import OrderSelection
     from ..fitting.result import FitResult
     from ..simulation import Simulation
-
-#: Correlations of coefficients below this are not worth a note.
-_NOTABLE: Final = 0.3
-_MOST_CORRELATIONS: Final = 5
 
 
 def model_content(fit: FitResult, name: LineNames) -> dict[str, Any]:
@@ -87,12 +83,13 @@ def _correlations(fit: FitResult, name: LineNames) -> list[dict[str, Any]]:
     with np.errstate(divide="ignore", invalid="ignore"):
         matrix = fit.covariance[1:, 1:] / np.outer(std, std)
     upper = np.triu(np.nan_to_num(np.abs(matrix)), k=1)
-    strongest = np.argsort(upper, axis=None)[::-1][:_MOST_CORRELATIONS]
+    strongest = np.argsort(upper, axis=None)[::-1][:5]
     pairs = zip(*np.unravel_index(strongest, upper.shape), strict=True)
     return [
         {"first": names[i], "second": names[j], "correlation": float(matrix[i, j])}
         for i, j in pairs
-        if upper[i, j] >= _NOTABLE
+        # Smaller correlations of coefficients are not worth a note.
+        if upper[i, j] >= 0.3
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,8 +22,6 @@ from .page import Page, filled_template
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Orders whose windows are plotted at most: those whose sums rose highest.
-_DRAWN: Final = 12
 #: Widths of charts, inches.
 _WIDE, _HALF = 7.5, 3.7
 
@@ -81,7 +79,8 @@ class WatchReport(Page):
 
     def _written(self) -> str:
         highest = np.argsort(-self._sums.max(axis=0), kind="stable")
-        drawn = np.sort(highest[:_DRAWN]).tolist()
+        # Orders whose windows are plotted at most: those whose sums rose highest.
+        drawn = np.sort(highest[:12]).tolist()
         return filled_template(
             "watched.html.j2",
             title=self.title,

@@ -26,12 +26,8 @@ _CONDITIONS: Final = (
     ("mount_deg", "mount", "deg"),
 )
 #: Digits of the largest of a column.
-_CONDITION_DIGITS: Final = 3
 _PLAIN: Final = ErrorUnit("", 1.0)
 
-
-#: Reduction, in percent, from which a correction is worth having.
-_WORTH: Final = 1.0
 
 #: Shown where there is no number.
 _NONE: Final = "\u2013"
@@ -67,7 +63,8 @@ def gain_verdict(content: dict[str, Any]) -> str:
         return "unchecked"
     low = gain["reduction_low_percent"]
     low = gain["reduction_percent"] if low is None else low
-    return "gain" if low >= _WORTH else "no-gain"
+    # Reduction, in percent, from which a correction is worth having.
+    return "gain" if low >= 1.0 else "no-gain"
 
 
 def as_sentence(text: str) -> str:
@@ -105,7 +102,7 @@ def conditions(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
     for key, name, unit in _CONDITIONS:
         values = [abs(run[key]) for run in runs if run[key] is not None]
         if values:
-            digits = _PLAIN.decimals(max(values), _CONDITION_DIGITS)
+            digits = _PLAIN.decimals(max(values), 3)
             known.append({"key": key, "name": name, "unit": unit, "digits": digits})
     return known
 

@@ -1,11 +1,9 @@
 """What is printed of logs one by one and together, against counts written out."""
 
 import argparse
-import importlib
 import itertools
 import json
 import re
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,7 +11,6 @@ import numpy as np
 import pytest
 
 import trueangle as ta
-from conftest import ROOT
 from trueangle.cli import main
 from trueangle.cli.correct import _print, _status, _total
 from trueangle.cli.diagnose import _written
@@ -168,67 +165,6 @@ def test_by_itself_it_is_in_degrees_from_one_on(scale, unit, readings):
     plain = json.loads(_line(window(turn, scale=scale), model, args))
     sizes = [row["amplitude_arcsec"] for row in plain["orders"]]
     np.testing.assert_allclose(sizes, np.array([0.2, 1.0, 0.9]) * scale * SIZE)
-
-
-def resolved(path):
-    """What a dotted path names; the longest part that is a module is imported."""
-    parts = path.split(".")
-    for cut in range(len(parts), 0, -1):
-        try:
-            found = importlib.import_module(".".join(parts[:cut]))
-        except ModuleNotFoundError as missing:
-            if missing.name is None or not missing.name.startswith("trueangle"):
-                return None  # an extra that is not installed
-            continue
-        for name in parts[cut:]:
-            found = getattr(found, name)
-        return found
-    raise AssertionError(f"{path}: no such module")
-
-
-def documented():
-    """Everything that the reference lists, members that are named included."""
-    sys.path.insert(0, str(ROOT / "docs"))
-    try:
-        from reference_pages import BLOCK, entries
-    finally:
-        sys.path.pop(0)
-    paths = []
-    for page in sorted((ROOT / "docs" / "reference").glob("*.md")):
-        for block in BLOCK.findall(page.read_text("utf-8")):
-            for name, members in entries(block):
-                paths.append(name)
-                paths += [f"{name}.{member.strip()}" for member in members.split(",") if member]
-    assert len(paths) > 50
-    return paths
-
-
-def told_in_changelog():
-    text = (ROOT / "CHANGELOG.md").read_text("utf-8")
-    paths = {
-        path.rstrip(".")
-        for quoted in re.findall(r"`([^`]+)`", text)
-        for path in re.findall(r"(?<![\w/-])(?:ta|trueangle)(?:\.[A-Za-z_]\w*)+", quoted)
-    }
-    return sorted({re.sub(r"^ta\b", "trueangle", path) for path in paths})
-
-
-@pytest.mark.parametrize("listed", [documented, told_in_changelog])
-def test_names_in_the_documentation_exist(listed):
-    missing = []
-    for path in listed():
-        try:
-            resolved(path)
-        except (AssertionError, AttributeError) as error:
-            missing.append(f"{path}: {error}")
-    assert not missing
-
-
-def test_an_unknown_name_is_refused():
-    with pytest.raises(ModuleNotFoundError, match=r"trueangle\.nothing"):
-        importlib.import_module("trueangle.nothing")
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        _ = ta.nothing
 
 
 @pytest.fixture

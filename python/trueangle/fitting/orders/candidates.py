@@ -25,22 +25,10 @@ SHAFT_HARMONICS: Final = (1, 2, 3, 4)
 #: Orders scanned beyond the low ones where the angles are free.
 HIGHEST_SCANNED: Final = 450
 
-#: Coherence from which two orders are hardly separated: they come half a cycle apart over the
-#: travel. Fitted jointly they nearly cancel, and differ again where nothing was read.
-_UNRESOLVED: Final = 2.0 / math.pi
-
-#: Coherence from which two orders are one at the positions, whatever the noise.
-_SAME: Final = 1.0 - 1e-9
-
-#: Aliases are listed at least up to this order.
-_LEAST_ALIAS: Final = 404
 
 #: Orders of a shaft that errors are known to have, and how likely each is; what is fitted in any
 #: case is certain but for rounding.
-_KNOWN: Final = (1, 2, 4)
 _LIKELY: Final = 0.25
-_UNKNOWN: Final = 0.2
-_CERTAIN: Final = 1.0 - 1e-9
 
 #: Side bands of a reference order: modulation by its eccentricity and tilt.
 _SIDE_BANDS: Final = (-2, -1, 1, 2)
@@ -101,7 +89,8 @@ class Candidates:
     def highest_alias(self) -> int:
         """Highest order listed as an alias: 4 motor turns' worth, at least 400."""
         ratio = max(COMMON_RATIOS) if self.gear_ratio is None else abs(self.gear_ratio)
-        return max(_LEAST_ALIAS, math.ceil(4.0 * ratio) + 4)
+        # Aliases are listed at least up to this order.
+        return max(404, math.ceil(4.0 * ratio) + 4)
 
     @property
     def whole(self) -> bool:
@@ -132,10 +121,12 @@ def prior_probabilities(
     orders: Sequence[float], cycles: Iterable[float], fitted: Iterable[float] = ()
 ) -> list[float]:
     """Of each order, given the shafts' cycles per turn; those ``fitted`` are certain."""
-    chance = min(_LIKELY, _UNKNOWN / max(1, len(orders)))
-    reasons = {k * f for k in _KNOWN for f in (1.0, *map(abs, cycles))}
+    chance = min(_LIKELY, 0.2 / max(1, len(orders)))
+    # Orders of a shaft that errors are known to have.
+    reasons = {k * f for k in (1, 2, 4) for f in (1.0, *map(abs, cycles))}
     certain = set(fitted)
-    return [_CERTAIN if k in certain else _LIKELY if k in reasons else chance for k in orders]
+    # What is fitted in any case is certain but for rounding.
+    return [1.0 - 1e-9 if k in certain else _LIKELY if k in reasons else chance for k in orders]
 
 
 def _effective_positions(positions: Positions) -> Positions:
@@ -231,14 +222,17 @@ def _unresolved(gear: Sequence[float], low: int, travelled: Array | None) -> dic
     for m in gear:
         nearest = min(max(round(m), 0), low)
         alike = abs(np.exp(2j * math.pi * (m - nearest) * travelled).mean())
-        if not m.is_integer() and alike > _UNRESOLVED:
+        # Coherence from which two orders are hardly separated: they come half a cycle apart over
+        # the travel. Fitted jointly they nearly cancel, and differ again where nothing was read.
+        if not m.is_integer() and alike > 2.0 / math.pi:
             found[m] = float(nearest)
     return found
 
 
 def _apart(positions: Positions, order: float, others: Sequence[float]) -> bool:
     """Whether the positions distinguish ``order`` from the constant and from all of ``others``."""
-    return bool(position_coherence(positions, order, [0.0, *others]).max() < _SAME)
+    # Coherence from which two orders are one at the positions, whatever the noise.
+    return bool(position_coherence(positions, order, [0.0, *others]).max() < 1.0 - 1e-9)
 
 
 def _checked(orders: Iterable[float], name: str) -> list[float]:

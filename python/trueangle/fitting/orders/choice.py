@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from ..summed import SummedReadings
 
 Method: TypeAlias = Literal["evidence", "paper"]
-
-#: Angles examined to determine whether a gear's orders are resolved over the travel.
-_LOOKED_AT: Final = 4096
 
 
 @one_blas_thread()
@@ -123,4 +120,5 @@ def _travelled(
     if are_whole(declared_cycles(gear_ratio, shafts)):
         return None
     turns = np.concatenate([over_turns(run).reference for run in runs]) / runs[0].period
-    return np.asarray(turns[:: max(1, turns.size // _LOOKED_AT)])
+    # Angles examined to determine whether a gear's orders are resolved over the travel.
+    return np.asarray(turns[:: max(1, turns.size // 4096)])

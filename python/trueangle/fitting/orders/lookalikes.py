@@ -21,13 +21,6 @@ from .zerogroups import ZeroGroupReadings
 #: likelihood ratio of e^5, about 150 to 1.
 DECISIVE: Final = 10.0
 
-#: From here on two orders are one at the positions, whatever the noise.
-_SAME: Final = 1.0 - 1e-9
-
-#: Only orders at least this coherent at the positions are tried: one below explains at most
-#: ``coherence^2`` of the other's energy and fails by itself.
-_ALIKE: Final = 0.9
-
 
 def find_lookalikes(
     units: Sequence[ZeroGroupReadings],
@@ -46,8 +39,11 @@ def find_lookalikes(
     for order in orders:
         coherence = position_coherence(positions, order, every.astype(np.float64))
         coherence[[int(k) - 1 for k in orders if k <= highest and k == int(k)]] = 0.0
-        same = {int(m): 0.0 for m in every[coherence > _SAME]}
-        alike = [int(m) for m in every[coherence > _ALIKE] if m not in same]
+        # From here on two orders are one at the positions, whatever the noise.
+        same = {int(m): 0.0 for m in every[coherence > 1.0 - 1e-9]}
+        # Only orders at least this coherent at the positions are tried: one below explains at most
+        # ``coherence^2`` of the other's energy and fails by itself.
+        alike = [int(m) for m in every[coherence > 0.9] if m not in same]
         losses = _substitution_losses(units, orders, order, alike) if alike else []
         tried = same | dict(zip(alike, losses, strict=True))
         found.append({m: tried[m] for m in sorted(tried) if tried[m] < DECISIVE * variance})

@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 from ...runs.aliasing import Positions
 from .zerogroups import ZeroGroupReadings
 
-#: Sweeps of alternating means (positions, zeros); whole grids need one.
-_SWEEPS: Final = 20
-
 #: Possible pairs of unit and position for each reading up to which they are counted.
 _ROOM: Final = 8
 
@@ -66,7 +63,8 @@ def pure_error(units: Sequence[ZeroGroupReadings], positions: Positions) -> Read
         return None
     unit_weight = np.bincount(unit, weights=w)
     e = y.copy()
-    for _ in range(_SWEEPS):
+    # Sweeps of alternating means (positions, zeros); whole grids need one.
+    for _ in range(20):
         e -= (np.bincount(unit, weights=w * e) / unit_weight)[unit]
         mean = np.bincount(place, weights=w * e) / place_weight
         e -= mean[place]

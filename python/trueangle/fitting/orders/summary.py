@@ -13,12 +13,6 @@ from ...support.layout import counted, laid_out, wrapped_lines
 from ...support.plainresult import finite_or_none
 from .table import OrderRow, OrderTable
 
-#: Least share of the noise's standard deviation from which a part of it is reported.
-_SHOWN: Final = 0.2
-
-#: Rejected orders listed in addition to the retained ones, the strongest first.
-_REJECTED = 8
-
 
 def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> str:
     """Table of the orders, the reasons and the notes; see `OrderSelection.summary`."""
@@ -39,7 +33,8 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
     ]
     others = [row for row in selection.table if not row.retained and row.verdict != "alias"]
     others.sort(key=lambda row: row.log10_false_alarm)
-    shown = sorted([*retained, *others[:_REJECTED]], key=lambda row: row.order)
+    # Rejected orders listed in addition to the retained ones, the strongest first.
+    shown = sorted([*retained, *others[:8]], key=lambda row: row.order)
     if shown:
         lines += ["", _HEADER, _units(unit), *(_line(row, period, unit) for row in shown)]
     hidden = len(selection.table) - len(shown)
@@ -102,7 +97,8 @@ def _source(selection: OrderTable, unit: ErrorUnit) -> str:
     noise = selection.noise
     if selection.estimate is not None:
         white, *drifts = (arcsec(math.sqrt(v), selection.period) for v in selection.estimate.noise)
-        least = _SHOWN * arcsec(noise.standard_deviation, selection.period)
+        # Least share of the noise's standard deviation from which a part of it is reported.
+        least = 0.2 * arcsec(noise.standard_deviation, selection.period)
         parts = [
             f"drift {unit.text(size)} over {length:g} readings"
             for size, length in zip(drifts, CORRELATION_TIMES, strict=True)

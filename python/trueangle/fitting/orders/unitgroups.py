@@ -20,12 +20,6 @@ from .zerogroups import ZeroGroupReadings
 MOST_UNITS: Final = 96
 GROUPS: Final = 32
 
-#: Powers of e^{ix} between two fresh evaluations.
-_RESEED: Final = 64
-
-#: Numbers in a block of units: small compared with the readings.
-_BLOCK: Final = 1 << 21
-
 
 def units_in_groups(units: Sequence[ZeroGroupReadings]) -> list[list[int]]:
     """Units of each group, dealt in turn, so that a slow change is in all of them."""
@@ -45,7 +39,8 @@ def _unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     power = np.ones(turns.size, dtype=np.complex128)
     last, step = math.nan, power
     for i, (order, by) in enumerate(zip(orders.tolist(), steps.tolist(), strict=True)):
-        if i % _RESEED == 0 or by != last:
+        # Powers of e^{ix} between two fresh evaluations.
+        if i % 64 == 0 or by != last:
             phase = order * turns
             power = np.exp(2j * math.pi * (phase - np.round(phase)))
             step, last = np.exp(2j * math.pi * by * turns), by
@@ -58,7 +53,8 @@ def _unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
 
 def sums_of_unit_means(units: Sequence[ZeroGroupReadings], orders: Array) -> Array:
     """``sum of weight x mean x mean'`` over the units, in blocks of them."""
-    size = max(1, _BLOCK // (2 * orders.size))
+    # Numbers in a block of units: small compared with the readings.
+    size = max(1, (1 << 21) // (2 * orders.size))
     total = np.zeros((2 * orders.size, 2 * orders.size))
     for begin, end in pairwise([*range(0, len(units), size), len(units)]):
         block = units[begin:end]

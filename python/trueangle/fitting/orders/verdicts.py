@@ -33,12 +33,6 @@ from .candidates import Candidates, choose_candidates
 from .result import OrderSelection
 from .table import OrderRow
 
-#: Share of the energy in the upper half of the orders from which under-sampling is reported.
-_UNDER_SAMPLED: Final = 0.25
-
-#: Largest noise factor with which mounts count as separating orders.
-_TELLING_FACTOR: Final = 5.0
-
 _VERDICTS: Final = {
     "noise": "is not significant",
     "negligible": "significant, but too small to change any reading",
@@ -178,7 +172,8 @@ def selection_notes(
             [row.amplitude for row in retained],
             positions.highest_order,
         )
-        if share > _UNDER_SAMPLED:
+        # Share of the energy in the upper half of the orders from which under-sampling is reported.
+        if share > 0.25:
             notes.append(
                 f"{100.0 * share:.0f} % of the energy lies in the upper half of the orders that "
                 "these positions resolve: there are probably higher orders that alias to them"
@@ -276,7 +271,8 @@ def _between(positions: Positions, candidates: Candidates) -> bool:
         return False
     offsets = 360.0 * np.asarray(grid.offsets)
     worst = float(mount_noise_factors(grid.divisions, offsets, orders).max())
-    return worst <= _TELLING_FACTOR
+    # Largest noise factor with which mounts count as separating orders.
+    return worst <= 5.0
 
 
 def _sentence(positions: Positions, candidates: Candidates) -> str:

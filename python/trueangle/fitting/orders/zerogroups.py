@@ -16,22 +16,12 @@ from ...runs.travel import over_turns
 from ...support.angles import wrap
 from ...support.arrays import Array
 
-#: Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
-_FOLDS: Final = 6
-_BLOCKS: Final = 24
-
 #: Readings in a row that are kept together of many, and the turn by which they are chosen evenly.
 _TOGETHER: Final = 256
 _GOLDEN: Final = 0.5 * (math.sqrt(5.0) - 1.0)
 
 #: Readings from which orders are chosen; of more, some blocks are taken.
 MOST_READINGS: Final = 8000
-
-#: Angles that represent the travel.
-_TOLD: Final = 2000
-
-#: Readings a run up to which the call of a function costs more than what it computes.
-_SHORT: Final = 1000
 
 
 class ZeroGroupReadings(NamedTuple):
@@ -102,7 +92,8 @@ def zero_groups(
 def some_angles(angles: Sequence[Array], period: float) -> Array:
     """Angles of the readings in radians, some thousand of them."""
     every = np.concatenate(angles)
-    return np.asarray(2.0 * math.pi / period * np.sort(every)[:: 1 + every.size // _TOLD])
+    # Angles that represent the travel.
+    return np.asarray(2.0 * math.pi / period * np.sort(every)[:: 1 + every.size // 2000])
 
 
 def some_readings(
@@ -128,7 +119,8 @@ def some_readings(
 def _centred(runs: Sequence[CalibrationRun]) -> Iterator[NDArray[np.float64]]:
     """Error of every run unfolded around its zero; of many short runs all at once."""
     sizes = np.array([len(run) for run in runs])
-    if sizes.mean() > _SHORT or len({run.period for run in runs}) > 1:
+    # Readings a run up to which the call of a function costs more than what it computes.
+    if sizes.mean() > 1000 or len({run.period for run in runs}) > 1:
         yield from (run.centred_error for run in runs)
         return
     period = runs[0].period
@@ -142,8 +134,9 @@ def _centred(runs: Sequence[CalibrationRun]) -> Iterator[NDArray[np.float64]]:
 
 def folds_of_run(unit: ZeroGroupReadings, positions: Positions) -> list[ZeroGroupReadings]:
     """Folds of a single run: blocks of neighbouring positions, dealt in turn."""
-    blocks = min(_BLOCKS, len(positions) // 2)
-    folds = min(_FOLDS, blocks)
+    blocks = min(24, len(positions) // 2)
+    # Folds of a single run: whole blocks of neighbouring positions, dealt in turn.
+    folds = min(6, blocks)
     if folds < 2:
         return []
     fold = (positions.index * blocks // len(positions)) % folds
