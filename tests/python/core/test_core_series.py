@@ -310,12 +310,6 @@ def test_threads_do_not_change_results(series, threads, n):
     )
 
 
-def test_threads_must_be_positive(series):
-    for threads in (0, -1):
-        with pytest.raises(ArgumentError, match="threads must be 1 or more"):
-            series.error(np.zeros(3), threads=threads)
-
-
 def test_paths(series):
     theta = np.linspace(-720.0, 720.0, 1001)
     direct = series.error(theta, path="direct")

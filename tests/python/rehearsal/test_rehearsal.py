@@ -34,7 +34,7 @@ from trueangle.rehearsal.detection import (
     size_range,
 )
 from trueangle.rehearsal.rehearse import next_sizes
-from trueangle.rehearsal.trial import Trial, TrialOutcome, measured_signals, run_trial
+from trueangle.rehearsal.trial import Trial, measured_signals, run_trial
 from trueangle.rehearsal.workers import THREADS, WorkerError, Workers
 from trueangle.simulation import Backlash, Harmonic, Joint, RunDesign, Simulation
 
@@ -166,17 +166,6 @@ def test_a_diagnosis_that_never_names_changes_the_result(monkeypatch):
     assert found.named_50 is None
     assert "named" not in found.told
     assert sum(found.told.values()) == found.trials == 8
-
-
-def test_what_is_taken_for_another_is_told(monkeypatch):
-    monkeypatch.setattr(
-        "trueangle.rehearsal.workers.run_trial",
-        lambda sim, signals, trial, seed: TrialOutcome(
-            "taken_for_another", ("latency", "scale_error")
-        ),
-    )
-    found = rehearse(SIM, causes=["backlash"], seeds=3, workers=1)["backlash"]
-    assert found.confused_with == {"latency": 3, "scale_error": 3}
 
 
 def test_the_number_of_workers_changes_nothing():

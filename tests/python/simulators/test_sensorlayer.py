@@ -234,21 +234,6 @@ def test_noise_is_white_and_of_the_stated_size():
     assert again.read(data)[0] == noise[0]
 
 
-@pytest.mark.parametrize(
-    ("models", "message"),
-    [
-        ({"elbw": PLAIN}, r"no joint 'elbw'; it has elbow, wrist, rail; did you mean elbow\?"),
-        ({"rail": PLAIN}, "is not a hinge"),
-        ({"clock": PLAIN}, "is not a jointpos"),
-        ({"elbow": 1.0}, "must be a HarmonicModel, got float"),
-        ({}, "must name a joint at least"),
-    ],
-)
-def test_what_is_no_joint_is_refused(models, message):
-    with pytest.raises(ArgumentError, match=message):
-        SensorLayer(robot(), models)
-
-
 def test_signals_that_mujoco_does_not_have_are_asked_for():
     mj = robot()
     data = mujoco.MjData(mj)
