@@ -48,17 +48,18 @@ def held_out_gains(
     size, every = len(chosen), both.size
     base = np.concatenate([np.arange(size), np.arange(size) + every])
     other = np.stack([np.arange(size, every), np.arange(size, every) + every], axis=1)
-    grams = [sums.gram(u, both) for u in range(sums.units)]
+    grams = [sums.gram(u, chosen, both) for u in range(sums.units)]
+    blocks = [sums.blocks(u, both[size:]) for u in range(sums.units)]
     rhs = [sums.rhs(u, both) for u in range(sums.units)]
-    total, whole = np.sum(grams, axis=0), np.sum(rhs, axis=0)
+    total, whole, every_block = (np.sum(part, axis=0) for part in (grams, rhs, blocks))
     model = 0.0
     dropped, added = np.zeros(size), np.zeros(len(outside))
-    for gram, mine, squares in zip(grams, rhs, sums.squares, strict=True):
+    for gram, block, mine, squares in zip(grams, blocks, rhs, sums.squares, strict=True):
         train, score = total - gram, whole - mine
-        inverse = pseudo_inverse(train[np.ix_(base, base)])
+        inverse = pseudo_inverse(train[:, base])
         fitted = inverse @ score[base]
-        here = gram[np.ix_(base, base)]
-        left = mine - gram[:, base] @ fitted
+        here = gram[:, base]
+        left = mine - fitted @ gram
         error = float(squares - fitted @ (mine[base] + left[base]))
         model += error
         # Dropping order j moves all coefficients by -inverse_j inverse_jj^-1 fitted_j.
@@ -67,22 +68,19 @@ def held_out_gains(
         back = np.einsum("bki,kij,kj->bk", inverse[:, pairs], own, fitted[pairs])
         dropped += error + 2.0 * left[base] @ back + np.einsum("bk,bk->k", back, here @ back)
         # Adding an order moves the others by -slope times its own coefficients.
-        slope = (inverse @ train[np.ix_(base, other.ravel())]).reshape(2 * size, len(outside), 2)
-        flat = train[np.ix_(base, other.ravel())].reshape(2 * size, len(outside), 2)
-        blocks = train[other[:, :, None], other[:, None, :]] - np.einsum(
-            "bki,bkj->kij", flat, slope
-        )
+        flat = train[:, other]
+        slope = (inverse @ train[:, other.ravel()]).reshape(flat.shape)
+        alone = every_block - block - np.einsum("bki,bkj->kij", flat, slope)
         step = np.einsum(
             "kij,kj->ki",
-            np.linalg.pinv(blocks, rcond=COLLINEAR, hermitian=True),
+            np.linalg.pinv(alone, rcond=COLLINEAR, hermitian=True),
             score[other] - np.einsum("bki,b->ki", flat, fitted),
         )
         move = np.einsum("bki,ki->bk", slope, step)
         linear = np.einsum("ki,ki->k", step, left[other]) - left[base] @ move
-        mixed = gram[np.ix_(base, other.ravel())].reshape(2 * size, len(outside), 2)
         square = (
-            np.einsum("ki,kij,kj->k", step, gram[other[:, :, None], other[:, None, :]], step)
-            - 2.0 * np.einsum("bk,bki,ki->k", move, mixed, step)
+            np.einsum("ki,kij,kj->k", step, block, step)
+            - 2.0 * np.einsum("bk,bki,ki->k", move, gram[:, other], step)
             + np.einsum("bk,bk->k", move, here @ move)
         )
         added += square - 2.0 * linear

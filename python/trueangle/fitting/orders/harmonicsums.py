@@ -96,6 +96,18 @@ class HarmonicSums:
         means = self._means[unit]
         return np.asarray(gram - (self.weight[unit] * means[rows])[:, None] * means[columns])
 
+    def blocks(self, unit: int, index: NDArray[np.intp]) -> Array:
+        """``X' W X`` of each order by itself about its means, shape (orders, 2, 2)."""
+        pairs = self.columns(index).reshape(2, -1)
+        if self._grams is not None:
+            return np.asarray(self._grams[unit][pairs.T[:, :, None], pairs.T[:, None, :]])
+        assert self._spectra is not None
+        spectrum, means = 0.5 * self._spectra[unit], self._means[unit][pairs]
+        twice = spectrum[2 * self._places[index].astype(np.intp)]
+        whole = np.array([[twice.real, twice.imag], [twice.imag, -twice.real]])
+        whole += spectrum[0].real * np.eye(2)[..., None]
+        return np.moveaxis(whole - self.weight[unit] * means[:, None] * means, -1, 0)
+
     @staticmethod
     def whole(spectrum: NDArray[np.complex128], mine: Array, theirs: Array) -> Array:
         """``X' W X`` of whole orders about no mean, by the spectrum of the positions."""
@@ -196,7 +208,7 @@ def _in_groups(
     centre: list[float],
 ) -> HarmonicSums:
     """As `_from_spectra`, many units taken together: one normal matrix a group."""
-    index = np.asarray(orders, dtype=np.int64)
+    index, places = np.asarray(orders, dtype=np.int64), np.asarray(orders, dtype=np.float64)
     highest, size = int(index.max(initial=0)), index.size
     grams, moments, groups = [], [], units_in_groups(units)
     for members in groups:
@@ -209,17 +221,8 @@ def _in_groups(
         )
         spectrum, values = _spectra(together, 0.0, highest)
         moments.append(np.concatenate([values[index].real, values[index].imag]))
-        bare = HarmonicSums(
-            orders,
-            np.zeros(1),
-            np.zeros(1, dtype=np.int64),
-            np.zeros(1),
-            np.zeros((1, 2 * size)),
-            None,
-            spectrum[None, :],
-            np.zeros((1, 2 * size)),
-        )
-        grams.append(bare.gram(0, np.arange(size)) - sums_of_unit_means(group, index.astype(float)))
+        whole = HarmonicSums.whole(spectrum, places, places)
+        grams.append(whole - sums_of_unit_means(group, places))
     sums = [np.array([v[m].sum() for m in groups]) for v in (weight, count, squares)]
     means = np.zeros((len(groups), 2 * size))
     return HarmonicSums(orders, sums[0], sums[1], sums[2], np.array(moments), grams, None, means)

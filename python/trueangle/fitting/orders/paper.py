@@ -122,7 +122,7 @@ def select_by_paper(
     mean = each.mean(axis=0)
     amplitude = np.abs(mean)
     scatter = (np.abs(each - mean) ** 2).sum(axis=0) / (2.0 * (len(training) - 1) * len(training))
-    spread = np.array([circular_range_deg(np.angle(each[:, n])) for n in range(len(orders))])
+    spread = circular_range_deg(np.angle(each))
     prominent = amplitude >= PROMINENCE * amplitude.max()
     kept = prominent & (spread <= PHASE_RANGE_DEG)
     gains = _gains(held, orders, mean, kept)

@@ -8,25 +8,28 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...estimation.linear import pseudo_inverse
 from ...support.arrays import Array
-from .chosen import fit_chosen_orders
 from .harmonicsums import HarmonicSums
 
 
-def circular_range_deg(phases: ArrayLike) -> float:
-    """Smallest arc in degrees that holds all phases (radians); NaN for fewer than two.
+def circular_range_deg(phases: ArrayLike) -> Array:
+    """Smallest arcs in degrees that hold all phases (radians) along the first axis.
+
+    NaN for fewer than two.
 
     Examples
     --------
-    >>> round(circular_range_deg(np.radians([355.0, 5.0, 1.0])), 6)
+    >>> float(circular_range_deg(np.radians([355.0, 5.0, 1.0])).round(6))
     10.0
     """
-    found = np.asarray(phases, dtype=np.float64)
-    found = np.sort(np.mod(found[np.isfinite(found)], 2.0 * math.pi))
-    if found.size < 2:
-        return math.nan
-    gaps = np.diff(found, append=found[0] + 2.0 * math.pi)
-    return float(np.degrees(2.0 * math.pi - gaps.max()))
+    found = np.mod(np.asarray(phases, dtype=np.float64), 2.0 * math.pi)
+    first = np.fmin.reduce(found, axis=0, keepdims=True)
+    # What is not seen is put where another one is.
+    around = np.sort(np.where(np.isfinite(found), found, first), axis=0)
+    gaps = np.diff(around, axis=0, append=first + 2.0 * math.pi)
+    seen = np.isfinite(found).sum(axis=0)
+    return np.where(seen < 2, math.nan, np.degrees(2.0 * math.pi - gaps.max(axis=0)))
 
 
 def _unit_coefficients(
@@ -36,24 +39,16 @@ def _unit_coefficients(
 
     Both of shape (units, orders), NaN where the unit does not see the order.
     """
-    index = np.asarray(orders, dtype=np.intp)
-    size, n = len(chosen), index.size
-    both = np.concatenate([index, np.asarray(chosen, dtype=np.intp)])
-    mine = np.stack([np.arange(n), np.arange(n) + both.size], axis=1)
-    theirs = np.concatenate([np.arange(n, both.size), np.arange(n, both.size) + both.size])
-    coefficients, _, _ = fit_chosen_orders(sums, chosen)
-    common = np.zeros((n, 2))
-    for j, k in enumerate(orders):
-        if k in chosen:
-            place = list(chosen).index(k)
-            common[j] = coefficients[[place, place + size]]
-    result = np.full((sums.units, n, 2), math.nan)
-    for unit in range(sums.units):
-        gram = sums.gram(unit, both)
-        score = sums.rhs(unit, index).reshape(2, n).T - np.einsum(
-            "kib,b->ki", gram[mine[:, :, None], theirs], coefficients
-        )
-        blocks = gram[mine[:, :, None], mine[:, None, :]]
+    index, units = np.asarray(orders, dtype=np.intp), range(sums.units)
+    gram = np.sum([sums.gram(unit, chosen) for unit in units], axis=0)
+    coefficients = pseudo_inverse(gram) @ np.sum([sums.rhs(u, chosen) for u in units], axis=0)
+    common = np.zeros((index.size, 2))
+    for place, k in enumerate(chosen):
+        common[index == k] = coefficients[[place, place + len(chosen)]]
+    result = np.full((sums.units, index.size, 2), math.nan)
+    for unit in units:
+        left = sums.rhs(unit, index) - sums.gram(unit, index, chosen) @ coefficients
+        blocks, score = sums.blocks(unit, index), left.reshape(2, -1).T
         trace = np.trace(blocks, axis1=1, axis2=2)
         seen = np.linalg.eigvalsh(blocks)[:, 0] > 1e-9 * trace
         step = np.linalg.solve(blocks[seen], score[seen][..., None])[..., 0]

@@ -168,7 +168,7 @@ class EvidenceSelection:
     ) -> OrderSelection:
         shown = sorted({*chosen, *dropped, *self.candidates.main_indices})
         gains, model = self._gains(chosen, shown)
-        phases = unit_phases(self.sums, chosen, shown)
+        spread = circular_range_deg(unit_phases(self.sums, chosen, shown))
         lookalikes = find_lookalikes(
             self.units,
             self.positions,
@@ -198,7 +198,7 @@ class EvidenceSelection:
                     statistic=own.statistic,
                     log10_false_alarm=self._false_alarm(own.statistic),
                     holdout_gain=float(gains[n]),
-                    phase_spread_deg=circular_range_deg(phases[:, n]),
+                    phase_spread_deg=float(spread[n]),
                     aliases=tuple(aliases.get(i, ())),
                     needed=std * needed[i] if math.isfinite(std) else math.nan,
                     probability=float(chance[i]),
