@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
+from ..effects.blindspots import blind_spots
 from ..effects.effect import ScatterFinding
 from ..effects.noiselaw import NEW_SCATTER
 from ..estimation.regression import Regression
@@ -20,7 +21,7 @@ from .delay import Delay, error_before_delay, find_delay
 from .exchange import exchanged_causes
 from .gearedlines import GearedLines, GearedLinesRatio
 from .gearratio import find_ratio, near_ratio, signals_at_ratio
-from .identifiability import blind_spots, in_common_form
+from .identifiability import in_common_form
 from .judgedbeliefs import effects_as_measured
 from .penalty import NEW_CAUSE, misfit_of_scatter, total_penalty
 from .rounding import account_beyond_rounding, is_rounding_only, unrounded

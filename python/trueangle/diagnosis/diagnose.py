@@ -188,7 +188,7 @@ def _diagnosis(
     # What a curve shows is no change of what is believed.
     curves = named.curves
     judged = _as_extended(chosen, findings, curves, sim) if curves else chosen
-    beliefs, corrected = judged_beliefs(judged, sim, account.believed, spots, gain, named.explained)
+    beliefs, corrected = judged_beliefs(judged, sim, account.believed, spots, gain, named.moved)
     # What has no name may be what scatters.
     in_doubt = any(not factor.named_by for factor in factors)
     in_doubt |= any(spot.supported and not spot.common for spot in spots)

@@ -7,19 +7,10 @@ from dataclasses import replace
 
 from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
-from ..effects.blindspots import blind_spot_place, blind_spots
+from ..effects.blindspots import blind_spot_place
 from ..estimation.regression import Extension, Regression
 from .candidates import propose_candidates
 from .penalty import finding_groups, regression_without
-
-__all__ = [
-    "Ambiguity",
-    "ambiguity_of_cause",
-    "blind_spots",
-    "in_common_form",
-    "open_origins",
-    "with_open_origins",
-]
 
 #: Factors in the order in which they cast doubt on what another cause explains.
 DOUBTS = ("grid", "mount", "torque", "velocity")

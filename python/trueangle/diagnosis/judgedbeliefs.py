@@ -111,14 +111,14 @@ def judged_beliefs(
     believed: Simulation,
     spots: list[Ambiguity],
     with_gain: bool,
-    explained: Set[float] = frozenset(),
+    moved: Set[float] = frozenset(),
 ) -> tuple[list[Belief], Simulation]:
     """Verdicts on every line and effect, and the simulation with refuted ones as measured.
 
-    Lines that something else acts on (``explained``), or that may hide behind another cause in
+    Lines that something else acts on (``moved``), or that may hide behind another cause in
     these runs, are not judged; the latter become entries of what is not identifiable.
     """
-    lines, harmonics = _lines(with_unseen_orders(regression), sim, spots, with_gain, explained)
+    lines, harmonics = _lines(with_unseen_orders(regression), sim, spots, with_gain, moved)
     effects: list[Belief] = []
     refuted: list[tuple[int, tuple[Array, Array]]] = []
     for old, new in zip(sim.effects, believed.effects, strict=True):
@@ -180,7 +180,7 @@ def _lines(
     sim: Simulation,
     spots: list[Ambiguity],
     with_gain: bool,
-    explained: Set[float],
+    moved: Set[float],
 ) -> tuple[list[Belief], tuple[Harmonic, ...]]:
     pattern, joint = regression.belief.pattern, regression.belief.joint
     if pattern.orders.size == 0 or any(EFFECTS[t.cause].changes_lines for t in regression.terms):
@@ -190,7 +190,7 @@ def _lines(
     refuted: list[tuple[int, slice]] = []
     harmonics = list(sim.harmonics)
     for k, order in enumerate(pattern.orders):
-        if order in acted_on | explained:
+        if order in acted_on | moved:
             continue  # modulation takes from its carrier what it gives to the sidebands
         where = slice(1 + 2 * k, 3 + 2 * k)
         shaft, number = joint.name_order(float(order)) or ("output", float(order))

@@ -40,7 +40,7 @@ class NamedCauses:
     factors : list of Factor
     lost : list of int
         Terms of findings whose form is not better than the free function of its factors.
-    explained : set of float
+    moved : set of float
         Lines of the simulation whose change is a part of what the readings follow.
     """
 
@@ -50,7 +50,7 @@ class NamedCauses:
     spots: list[Ambiguity]
     factors: list[Factor]
     lost: list[int]
-    explained: set[float]
+    moved: set[float]
 
     @property
     def curves(self) -> list[Curve]:
@@ -197,13 +197,13 @@ def _named(
         rest = unexplained_remainder(others, sigma)
         if rest.found:
             findings = reconsidered_findings(chosen, findings, rest)
-    held, factors, explained = stated_factors(chosen, findings)
+    held, factors, moved = stated_factors(chosen, findings)
     # Causes that are not distinguished, or were not tried, predict different errors in other
     # runs: no curve represents them.
     seen = [spot for spot in spots if spot.supported]
-    kept = [] if at.cut else [f for f in factors if not any(_is_either(spot, f) for spot in seen)]
+    kept = [f for f in factors if not (at.cut or any(_is_either(spot, f) for spot in seen))]
     kept = _less_left(kept, chosen.readings.residual[account_rows(chosen)])
     factors = [f if any(f is other for other in kept) else replace(f, effects=()) for f in factors]
     both = zip(findings, held, strict=True)
     lost = [k for one, other in both if one.confirmed and not other.confirmed for k in one.group]
-    return NamedCauses(chosen, rest, held, spots, factors, lost, explained)
+    return NamedCauses(chosen, rest, held, spots, factors, lost, moved)

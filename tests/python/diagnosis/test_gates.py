@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.diagnosis import gates
 from trueangle.diagnosis.confirmation import CONFIRMED, NOT_CONFIRMED
 from trueangle.diagnosis.finding import Finding
-from trueangle.diagnosis.gates import (
-    MANY,
-    alike_columns,
-    gated_findings,
-    many_causes,
-    not_the_only_ratio,
-)
 from trueangle.estimation.quantity import quantity
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
@@ -57,7 +51,7 @@ def test_two_causes_that_are_one_column_are_not_told_apart(fitted):
     findings = [
         dataclasses.replace(finding(term.cause), group=(k,)) for k, term in enumerate(fitted.terms)
     ]
-    pairs = [*alike_columns(fitted, findings)]
+    pairs = [*gates.alike_columns(fitted, findings)]
     assert [(i, j) for i, j, _ in pairs] == [(0, 1)]
     # By lstsq: what each adds to the zero and to the third.
     beside = np.column_stack([fitted.base, fitted.terms[2].columns])
@@ -66,7 +60,7 @@ def test_two_causes_that_are_one_column_are_not_told_apart(fitted):
         for x in (fitted.terms[0].columns[:, 0], fitted.terms[1].columns[:, 0])
     ]
     assert pairs[0][2] == pytest.approx(np.corrcoef(own)[0, 1], abs=1e-9)
-    told, spots, shared = gated_findings(fitted, findings)
+    told, spots, shared = gates.gated_findings(fitted, findings)
     assert [f.status for f in told] == [NOT_CONFIRMED, NOT_CONFIRMED, CONFIRMED]
     assert "with latency" in told[0].reason
     assert "with backlash" in told[1].reason
@@ -86,24 +80,24 @@ def test_columns_are_one_from_a_correlation_on(correlation, alike):
     terms = [start.propose(cause, {}, column[:, None])
              for cause, column in (("backlash", own[0]), ("latency", other))]  # fmt: skip
     findings = [dataclasses.replace(finding(t.cause), group=(k,)) for k, t in enumerate(terms)]
-    pairs = [*alike_columns(start.with_terms(terms), findings)]
+    pairs = [*gates.alike_columns(start.with_terms(terms), findings)]
     assert [(i, j) for i, j, _ in pairs] == [(0, 1)] * alike
 
 
 def test_many_causes_are_said_to_be_implausible_with_what_they_share():
     causes = ["backlash", "presliding_hysteresis", "missing_order", "thermal_drift"]
     found = [finding(cause) for cause in causes]
-    assert many_causes(found[:MANY]) == ""
+    assert gates.many_causes(found[: gates.MANY]) == ""
     # Lines count once, and what is not confirmed does not count.
-    assert many_causes([*found[:MANY], finding("missing_order")]) == ""
+    assert gates.many_causes([*found[: gates.MANY], finding("missing_order")]) == ""
     doubtful = dataclasses.replace(found[3], status=NOT_CONFIRMED)
-    assert many_causes([*found[:MANY], doubtful]) == ""
-    told = many_causes(found)
+    assert gates.many_causes([*found[: gates.MANY], doubtful]) == ""
+    told = gates.many_causes(found)
     assert told.startswith("4 causes at once are unlikely in one joint")
     assert "backlash, presliding_hysteresis all follow the direction of travel" in told
     # One that follows a factor alone shares it with none.
     apart = ["backlash", "missing_order", "thermal_drift", "latency"]
-    assert "all follow" not in many_causes([finding(cause) for cause in apart])
+    assert "all follow" not in gates.many_causes([finding(cause) for cause in apart])
 
 
 def test_a_ratio_that_is_one_of_several_is_not_confirmed():
@@ -111,8 +105,8 @@ def test_a_ratio_that_is_one_of_several_is_not_confirmed():
         parameters = {"gear_ratio": quantity(51.0)}
         if aliases is not None:
             parameters["aliases"] = quantity(aliases)
-        told = not_the_only_ratio(finding("wrong_gear_ratio", parameters))
+        told = gates.not_the_only_ratio(finding("wrong_gear_ratio", parameters))
         assert told.startswith(f"at these positions {said} would give") == bool(said)
         assert (told == "") == (not said)
         # Of other causes aliases are told, and are no doubt.
-        assert not_the_only_ratio(finding("non_integer_order", parameters)) == ""
+        assert gates.not_the_only_ratio(finding("non_integer_order", parameters)) == ""

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trueangle.diagnosis.identifiability import ambiguity_of_cause, blind_spots, open_origins
+from trueangle.diagnosis.identifiability import ambiguity_of_cause, open_origins
+from trueangle.effects.blindspots import blind_spots
 from trueangle.effects.missing_order import MissingOrder
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -224,17 +224,20 @@ def _scale(y: Array, cuts: Sequence[int]) -> float:
 
 
 def factors_of(
-    account: FactorAccount, shafts: dict[str, float], beside: Sequence[float] | None = None
+    account: FactorAccount,
+    shafts: dict[str, float],
+    named: Container[float],
+    beside: Sequence[float] | None = None,
 ) -> list[Factor]:
     """The factors that are in, strongest first.
 
     Of a model with names, of variances ``beside``, the functions are those of what these leave.
+    Lines of the place that are not ``named`` are parts of products with them.
     """
     shown = account if beside is None else account.less(beside, account.tau)
     _, mean, covariance = shown.sums.posterior(shown.tau)
     lines = [k for k, group in enumerate(account.groups) if group.factor == "place"]
-    if beside is not None:
-        account = _with_constants(account, mean)
+    account = _with_constants(account, mean, named)
     base = account.evidence(account.tau)
     kinds: dict[tuple[str, str | None], list[int]] = {}
     for k in account.inside:
@@ -278,7 +281,7 @@ def factors_of(
     return sorted(found, key=lambda f: (-f.rms, FACTORS.index(f.factor)))
 
 
-def _with_constants(account: FactorAccount, mean: Array) -> FactorAccount:
+def _with_constants(account: FactorAccount, mean: Array, named: Container[float]) -> FactorAccount:
     """Lines of the place that are what products with them are on average, as parts of these."""
     groups, bounds = list(account.groups), account.bounds
     sizes = {
@@ -287,7 +290,8 @@ def _with_constants(account: FactorAccount, mean: Array) -> FactorAccount:
     }
     for k in account.inside:
         products = [j for j in account.inside if groups[j].is_of_line(account.groups[k].orders)]
-        if account.groups[k].factor == "place" and len(groups[k].orders) == 1 and products:
+        is_line = groups[k].factor == "place" and len(groups[k].orders) == 1
+        if is_line and products and groups[k].orders[0] not in named:
             groups[k] = groups[k].as_constant_of(groups[max(products, key=sizes.__getitem__)])
     return replace(account, groups=groups)
 
@@ -346,7 +350,8 @@ def _alike(
             kinds.setdefault(group.factor, []).append(k)
     losses, _, instead = account.sums.changes(account.tau)
     orders = {m for k in members for m in groups[k].orders}
-    means = [k for k in lines if rest[k] == 0.0 and orders & {*groups[k].orders}]
+    is_line = groups[members[0]].factor == "place"
+    means = [k for k in lines if not (is_line or rest[k]) and orders & {*groups[k].orders}]
     width = sum(groups[k].columns.shape[1] for k in members)
     found = []
     for kind, others in kinds.items():

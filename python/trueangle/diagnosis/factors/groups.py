@@ -94,7 +94,7 @@ def factor_groups(
     for axis in _axes(signals):
         groups.append(axis.alone())
         for product in axis.products:
-            asked = [*ALWAYS, *known[:LOW]]
+            asked = [*ALWAYS, *known[:LOW], *drawn]
             for column in product(axis.x).T:
                 asked += spectrum.peaks(spectrum.powers(left * (column - column.mean())))
             groups += [axis.times(theta, order, product) for order in dict.fromkeys(asked)]

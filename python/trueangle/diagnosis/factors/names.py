@@ -215,10 +215,8 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
             worst = (freed - score, asked, free)
     if worst is not None:
         better, group, other = worst
-        reason = (
-            f"{_followed(names, other, tau) or 'a free function'} explains the readings better "
-            f"(log Bayes factor {better:.0f})"
-        )
+        what = _followed(names, other, tau) or "a free function"
+        reason = f"{what} explains the readings better (log Bayes factor {better:.0f})"
         return dict.fromkeys(group, reason)
     for k in sure:
         follows = [f for f in EFFECTS[found[k].cause].form_of if f != TRANSITION]

@@ -36,9 +36,6 @@ from .names import (
 MOST_EVENTS: Final = 4
 WINDOWS, NEAREST = 40, 3
 
-#: Lines of shafts that are looked at, most of them.
-MOST_LINES: Final = 24
-
 
 def stated_factors(
     chosen: Regression, findings: Sequence[Finding]
@@ -58,7 +55,7 @@ def stated_factors(
     -------
     findings : list of Finding
     factors : list of Factor
-    explained : set of float
+    moved : set of float
         Lines of the simulation whose change is a part of what the readings follow.
     """
     rows = account_rows(chosen)
@@ -88,9 +85,9 @@ def stated_factors(
     changes = [Finding(MissingOrder.kind, {}, {}, None, []) for _ in named[count:]]
     found = names_by_form(names, [*findings, *changes])
     lost = [k for k in range(count, len(found)) if not found[k].confirmed]
-    explained = {groups[places[k]].orders[0] for k in lost}
+    moved = {groups[places[k]].orders[0] for k in lost}
     shafts = {name: abs(cycles) for name, cycles in chosen.belief.joint.shafts.items()}
-    return found[:count], _factors(names, found, count, shafts), explained
+    return found[:count], _factors(names, found, count, shafts), moved
 
 
 def _factors(
@@ -100,7 +97,9 @@ def _factors(
     account, sure = names.account, confirmed_names(names, found)
     given, tau = names.given(sure), names.beside(sure)[1]
     stated, named = [], set()
-    for factor in factors_of(account, shafts):
+    orders = [names.places[k] for k in sure if found[k].cause == MissingOrder.kind]
+    lines = {m for k in orders for m in account.groups[k].orders}
+    for factor in factors_of(account, shafts, lines):
         own = [k for k in sure if factor.factor in EFFECTS[found[k].cause].form_of]
         if causes := dict.fromkeys(found[k].cause for k in own if k < count):
             stated.append(replace(factor, named_by=tuple(causes)))
@@ -108,7 +107,7 @@ def _factors(
             if left < (1.0 - TAKES) * (left + taken):
                 named.add(factor.factor)
     rest = replace(account, tau=np.maximum(given, tau).tolist())
-    stated += [f for f in factors_of(rest, shafts, given) if f.factor not in named]
+    stated += [f for f in factors_of(rest, shafts, lines, given) if f.factor not in named]
     return sorted(stated, key=lambda factor: -factor.rms)
 
 
@@ -124,8 +123,14 @@ def _less_what_no_factor_is(regression: Regression) -> Array:
 
 
 def account_rows(regression: Regression) -> NDArray[np.int64]:
-    """Readings that take part: no glitches (what lasts is none), and of many only every n-th."""
-    rows = np.flatnonzero(~short_segments(regression.outlying, regression.bounds))
+    """Readings that take part: no glitches, and of many only every n-th.
+
+    What lasts is no glitch, nor what other passes of the place show.
+    """
+    glitches = short_segments(regression.outlying, regression.bounds)
+    by_place = np.argsort(regression.signals.degrees % 360.0, kind="stable")
+    glitches[by_place] &= short_segments(regression.outlying[by_place], [(0, regression.n)])
+    rows = np.flatnonzero(~glitches)
     if rows.size <= MOST_READINGS:
         return rows
     edges = np.linspace(0, rows.size, MOST_READINGS + 1).astype(np.int64)
@@ -182,9 +187,15 @@ def _orders(regression: Regression, *, drawn: bool) -> list[float]:
 
 
 def _resolved(regression: Regression, orders: Iterable[float]) -> list[float]:
-    """Orders, whole ones in the place of those that the travel does not distinguish from them."""
-    turns = 2.0 * float(regression.signals.run_turns().max())
-    return [round(m) if abs(m - round(m)) * turns < 1.0 else m for m in orders]
+    """Orders, whole ones in the place of those of which they leave as little as a name may.
+
+    ::
+
+        (2 pi (m - k) T)^2 / 12    of an order m over T turns
+    """
+    turns = float(regression.signals.run_turns().max())
+    most = np.sqrt(12.0 * (1.0 - TAKES)) / (2.0 * np.pi * turns)
+    return [round(m) if abs(m - round(m)) < most else m for m in orders]
 
 
 def _lines(regression: Regression) -> list[float]:
@@ -193,4 +204,4 @@ def _lines(regression: Regression) -> list[float]:
     found = _orders(regression, drawn=False) + regression.belief.pattern.orders.tolist()
     found += [abs(joint.output_order(name, k)) for name, k in joint.gear_orders()]
     highest = 0.5 * len(regression.signals)
-    return [m for m in dict.fromkeys(found) if 0.0 < m < highest][:MOST_LINES]
+    return [m for m in dict.fromkeys(found) if 0.0 < m < highest][:24]
