@@ -4,7 +4,7 @@ use super::model::Model;
 use super::whitening::{Noise, VARIANCES};
 
 /// Standard deviation of the logarithm of each variance of the noise.
-const SPREAD: f64 = 4.0;
+const SPREAD: f64 = 2.5;
 
 /// Share of the variance of residuals at which the white variance and each of the terms are centred.
 const SHARES: [f64; VARIANCES] = [0.5, 0.003, 0.003, 0.003, 0.003, 0.003];

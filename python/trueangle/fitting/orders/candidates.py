@@ -28,7 +28,7 @@ HIGHEST_SCANNED: Final = 450
 
 #: Orders of a shaft that errors are known to have, and how likely each is; what is fitted in any
 #: case is certain but for rounding.
-_LIKELY: Final = 0.25
+LIKELY: Final = 0.25
 
 #: Side bands of a reference order: modulation by its eccentricity and tilt.
 _SIDE_BANDS: Final = (-2, -1, 1, 2)
@@ -120,13 +120,20 @@ class Candidates:
 def prior_probabilities(
     orders: Sequence[float], cycles: Iterable[float], fitted: Iterable[float] = ()
 ) -> list[float]:
-    """Of each order, given the shafts' cycles per turn; those ``fitted`` are certain."""
-    chance = min(_LIKELY, 0.2 / max(1, len(orders)))
+    """Of each order, given the shafts' cycles per turn; those ``fitted`` are certain.
+
+    Orders without a known cause are the likelier the lower they are, as ``1 / k``: an error may
+    have any scale.
+    """
+    unknown = 0.2 / max(sum(1.0 / k for k in orders), 1.0)
     # Orders of a shaft that errors are known to have.
     reasons = {k * f for k in (1, 2, 4) for f in (1.0, *map(abs, cycles))}
     certain = set(fitted)
     # What is fitted in any case is certain but for rounding.
-    return [1.0 - 1e-9 if k in certain else _LIKELY if k in reasons else chance for k in orders]
+    return [
+        1.0 - 1e-9 if k in certain else LIKELY if k in reasons else min(LIKELY, unknown / k)
+        for k in orders
+    ]
 
 
 def _effective_positions(positions: Positions) -> Positions:

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...estimation.evidence import Alone, EvidenceEstimate, estimate_by_evidence
+from ...joint.gear import HIGHEST_LOW_ORDER
 from ...model.validity import greatest_slope
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
 from ...support.arrays import Array
 from ...support.display_units import brief_number
 from ..rounding import rounding_step
-from .candidates import Candidates
+from .candidates import LIKELY, Candidates
 from .chosen import held_out_gains
 from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
@@ -24,6 +25,7 @@ from .noise import ReadingVariance
 from .phases import circular_range_deg, unit_phases
 from .result import OrderSelection
 from .table import IN_MODEL, OrderRow
+from .timelines import lines_in_time
 from .verdicts import drift_of_a_sweep, row_with_verdict, selection_notes, verdict_reason
 from .zerogroups import folds_of_run, some_angles, some_readings, zero_groups
 
@@ -92,6 +94,7 @@ class EvidenceSelection:
         readings = [unit.given() for unit in self.units]
         estimate = estimate_by_evidence(readings, self.orders, self.candidates.probabilities())
         chosen, dropped = self._carriers(estimate)
+        chosen, dropped = self._at_places(chosen, dropped, estimate)
         unknowns = len(self.units) + 2 * len(chosen)
         freedom = max(sum(unit.turns.size for unit in self.units) - unknowns, 1)
         noise = ReadingVariance(float(estimate.noise.sum()), freedom, "evidence")
@@ -134,6 +137,20 @@ class EvidenceSelection:
             left, last = left[:-1], int(left[-1])
             gone.append(places[last])
         return gone
+
+    def _at_places(
+        self, chosen: list[int], dropped: dict[int, str], estimate: EvidenceEstimate
+    ) -> tuple[list[int], dict[int, str]]:
+        """Without the high orders of no known cause that lines in time hold better."""
+        mine = {self.orders[i]: i for i in [*chosen, *dropped]}
+        chances = zip(self.orders, self.candidates.probabilities(), strict=True)
+        unknown = {k: p for k, p in chances if k > HIGHEST_LOW_ORDER and p < LIKELY}
+        tested = [k for k in mine if k in unknown]
+        # As likely as one of these orders, and two to a cycle.
+        chance = 0.5 * sum(unknown.values()) / max(len(unknown), 1)
+        lines = lines_in_time(estimate, list(mine), tested, chance)
+        dropped |= {mine[k]: "in time" for k in lines}
+        return [i for i in chosen if self.orders[i] not in lines], dropped
 
     def _beyond_rounding(
         self, chosen: list[int], dropped: dict[int, str], estimate: EvidenceEstimate

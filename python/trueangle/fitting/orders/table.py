@@ -19,7 +19,7 @@ from .noise import ReadingVariance
 IN_MODEL: Final = ("retained", "shared")
 
 #: Verdicts of orders that are in the error and that no model shall have.
-LEFT_OUT: Final = ("reference", "too long", "negligible", "too steep", "rounding")
+LEFT_OUT: Final = ("reference", "too long", "negligible", "too steep", "rounding", "in time")
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class OrderRow:
     retained : bool
     verdict : str
         ``"retained"``, ``"noise"``, ``"negligible"``, ``"too steep"``, ``"alias"``,
-        ``"reference"``, ``"rounding"``, ``"shared"``, ``"too long"``; with method
+        ``"reference"``, ``"rounding"``, ``"shared"``, ``"too long"``, ``"in time"``; with method
         ``"paper"`` also ``"small"`` and ``"phase varies"``.
     cosine, sine : float
         Coefficients A and B, fitted jointly with all retained orders.

@@ -42,6 +42,8 @@ _VERDICTS: Final = {
     "positions is the same each time: read at other positions, too",
     "shared": "orders are collinear over this travel: it is needed for the "
     "curve, but may not be real",
+    "in time": "a line of a fixed frequency in time explains it better: a vibration or an "
+    "electrical line, and no error of a place",
     "small": "has no prominent amplitude",
     "phase varies": "its phase varies from run to run",
     "too long": "over so short a travel, passed once, it cannot be distinguished from drift in "

@@ -106,10 +106,47 @@ def test_two_that_are_alike_share_their_probability(
         chance = {k: found.row(k).probability for k in (8, 28)}
         assert chance[order] > 0.5
         assert 0.8 < sum(chance.values()) < 1.1
-        assert left(order) < left(36 - order)
+        # The lower is the likelier before any reading, as 1 / k.
+        mine, other = (
+            left(k) / (2.0 * found.noise.variance) + math.log(k) for k in (order, 36 - order)
+        )
+        assert mine < other
         told.add(order)
         (row,) = [row for row in found.table if row.retained]
         other = 36 - row.order
         cost = left(other) - left(row.order)
         assert (other in row.aliases) == (cost < 10.0 * found.noise.variance)
     assert true in told
+
+
+@pytest.mark.parametrize("frequency", [None, 81.4])
+def test_a_line_of_a_fixed_frequency_is_no_order_of_one_run(frequency):
+    """The speed varies: an order keeps its place, a line in time its frequency."""
+    rng = np.random.default_rng(5)
+    time = np.linspace(0.0, 1.0, 900)
+    theta = 360.0 * (time + 0.01 * np.sin(2.0 * np.pi * time))
+    place = 81.0 * np.radians(theta) if frequency is None else 2.0 * np.pi * frequency * time
+    error = 0.3 * np.cos(np.radians(theta)) + 0.05 * np.cos(place) + rng.normal(0.0, 0.02, 900)
+    run = ta.CalibrationRun(theta, theta + error, 360.0, time=time)
+    found = ta.select_orders([run])
+    near = {row.order: row.verdict for row in found.table if 75 < row.order < 88}
+    if frequency is None:
+        assert found.orders == (1, 81)
+    else:
+        assert found.orders == (1,)
+        assert "in time" in near.values()
+        left = run.indicated - run.reference - ta.fit([run]).model.error(run.reference)
+        assert np.std(left) > 0.035  # the line is not corrected
+
+
+def test_each_run_of_the_magnetic_encoder_corrects_the_others(data_dir):
+    """A line of 255 Hz is in every run, and orders 1 to 5; with them a table of 64 is 0.082 deg."""
+    runs = ta.read_runs(data_dir / "rm44_repeat.csv")
+    for k, run in enumerate(runs[::3]):
+        model = ta.fit([run]).model
+        left = [
+            other.centred_error - model.error(other.reference)
+            for other in runs
+            if other is not runs[3 * k]
+        ]
+        assert np.std([part - part.mean() for part in left]) < 0.09
