@@ -1,13 +1,17 @@
 """``python -m trueangle``, and where the command ``trueangle`` starts."""
 
-import signal
-from typing import NoReturn
+# Ctrl-C ends it without a traceback: nothing slow is imported before that is so.
+try:
+    import signal
 
-
-def start() -> NoReturn:
-    """Run one command as a process; until it works, Ctrl-C ends it without a traceback."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
+except KeyboardInterrupt:
+    raise SystemExit(130) from None
+
+
+def start() -> None:
+    """Run one command as a process."""
     from .cli import process
 
     process()

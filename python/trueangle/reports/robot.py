@@ -66,9 +66,8 @@ def fitted_rank(
     if isinstance(found, Exception):
         return JointRank(joint, _before(runs), None, f"no model: {found}", None)
     model = found.model
-    largest = max(zip(found.amplitudes.tolist(), _names(found), strict=True), default=(0.0, None))[
-        1
-    ]
+    each = zip(found.amplitudes.tolist(), _names(found), strict=True)
+    _, largest = max(each, default=(0.0, None))
     left = arcsec(found.residual_std, model.period)
     return JointRank(joint, _before(runs), left, "calibrated", largest)
 
@@ -77,7 +76,9 @@ def diagnosed_rank(joint: str, found: Diagnosis) -> JointRank:
     """The rank of a joint that was diagnosed."""
     causes = [finding.cause for finding in found.findings if finding.confirmed]
     open_ = found.unexplained is not None and found.unexplained.found
-    verdict = "unexplained" if open_ else "explained" if causes else "simulation is enough"
+    unnamed = found.findings or found.in_question or found.factors
+    verdict = "differs, not named" if unnamed else "simulation is enough"
+    verdict = "unexplained" if open_ else "explained" if causes else verdict
     left = found.gain.get("rms_after_arcsec") if found.gain else None
     size = found.discrepancy.peak_to_peak
     return JointRank(joint, size, left, verdict, causes[0] if causes else None)

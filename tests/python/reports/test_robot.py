@@ -39,7 +39,7 @@ def test_the_verdict_is_what_a_diagnosis_found_and_left(found, named, left):
     open_ = replace(finding, status="not_confirmed")
     case = replace(found, findings=[open_, *[finding] * named], unexplained=rest)
     rank = diagnosed_rank("elbow", case)
-    wanted = "explained" if named else "simulation is enough"
+    wanted = "explained" if named else "differs, not named"
     assert rank.verdict == ("unexplained" if left else wanted)
     assert rank.first_cause == (finding.cause if named else None)
     assert rank.peak_to_peak_before_arcsec == pytest.approx(2.0 * SIZE, abs=8.0 * NOISE)
@@ -86,7 +86,7 @@ def test_what_cannot_be_used_stands_first_then_the_largest():
     [
         ([("a", True), ("b", True), ("c", True)], "a", "explained"),
         ([("a", False), ("b", True), ("c", True)], "b", "explained"),
-        ([("a", False)], None, "simulation is enough"),
+        ([("a", False)], None, "differs, not named"),
         ([], None, "simulation is enough"),
     ],
 )
@@ -97,6 +97,8 @@ def test_the_first_confirmed_cause_is_the_first(findings, first, verdict, is_ope
         unexplained=SimpleNamespace(found=is_open),
         gain={"rms_after_arcsec": 3.0},
         discrepancy=SimpleNamespace(peak_to_peak=17.0),
+        in_question=[],
+        factors=[],
     )
     row = diagnosed_rank("knee", found)
     assert row.first_cause == first

@@ -95,7 +95,8 @@ class Stream:
         bursts has no gaps between them.
         """
         longest = length = GAP * self.step
-        rough = max(self._off_line(2.0 * self.step) or 0.0, self.resolution)
+        # Nine of ten of rounded readings are nearer than twice that to lines between two others.
+        rough = max(self._off_line(2.0 * self.step) or 0.0, 2.0 * self.resolution)
         while 2.0 * _WINDOWS * length <= np.ptp(self.time):
             length *= 2.0
             off = self._off_line(length)
