@@ -22,8 +22,8 @@ use super::rows::Rows;
 use super::whitening::{Factor, Noise, State};
 use crate::{interrupt, threads};
 
-/// Numbers of a block of rows: it stays in the second cache.
-const CELLS: usize = 1 << 15;
+/// Orders whose columns are made at once: what a whitening carries on stays in the first cache.
+const ORDERS: usize = 128;
 
 /// The columns that are in, as places of orders, with their posterior.
 pub(super) struct Inside<'a> {
@@ -44,89 +44,83 @@ impl Inside<'_> {
     }
 }
 
-/// Sums of a run: products of its columns with the zero, the residual and the columns that are in,
-/// a row each, and of each order's own two.
+/// Sums of some orders in a run: products of zero, columns that are in and residual, a row each, with
+/// the zero and the orders' columns; squares of the latter, and their products with the next one.
+#[derive(Clone)]
 struct Part {
     products: Vec<f64>,
-    squares: Vec<[f64; 3]>,
+    squares: Vec<f64>,
 }
 
 impl Readings {
     /// Of all orders, beside those that are in; of an order that is in, beside the others.
     pub(super) fn candidates(&self, noise: Noise, inside: &Inside) -> Vec<Candidate> {
-        let columns = self.columns();
-        let pair = |&place: &usize| [2 * place + 1, 2 * place + 2];
-        let own: Vec<usize> = inside.places.iter().flat_map(pair).collect();
-        let stride = Rows::width(columns);
-        let work = |r: usize| self.alone(&self.runs()[r], noise, inside.mean, &own);
-        let parts = threads::map_parts(self.runs().len(), self.threads(), work);
-        let (m, orders) = (own.len(), self.orders().len());
-        let mut squares = vec![[0.0; 3]; orders];
-        let mut residual = vec![0.0; 2 * orders];
-        let mut cross = DMatrix::zeros(m, 2 * orders);
-        for part in parts {
-            let row = |i: usize| &part.products[i * stride..][..stride];
-            let (zero, left) = (row(0), row(1));
-            let (n, level) = (zero[0], left[0]);
-            for (k, s) in squares.iter_mut().enumerate() {
-                let c = &zero[2 * k + 1..][..2];
-                let both = [c[0] * c[0], c[0] * c[1], c[1] * c[1]];
-                for i in 0..3 {
-                    s[i] += part.squares[k][i] - both[i] / n;
-                }
-            }
-            for c in 0..2 * orders {
-                residual[c] += left[c + 1] - zero[c + 1] * level / n;
-                for i in 0..m {
-                    cross[(i, c)] += row(i + 2)[c + 1] - zero[own[i]] * zero[c + 1] / n;
-                }
-            }
-        }
-        let each = (0..orders).map(|k| {
+        let own = self.among(inside.places);
+        let all: Vec<usize> = (0..self.orders().len()).collect();
+        let some: Vec<Self> = all.chunks(ORDERS).map(|part| self.among(part)).collect();
+        let work = |r: usize| own.alone(&self.runs()[r], noise, inside.mean, &some);
+        let runs = threads::map_parts(self.runs().len(), self.threads(), work);
+        let runs: Vec<Vec<Part>> = runs.collect();
+        let each = all.iter().map(|&k| {
             if let Some(own) = inside.without(k) {
                 return own;
             }
-            let [a, b, c] = squares[k];
-            let reach = cross.columns(2 * k, 2);
-            let s = DMatrix::from_row_slice(2, 2, &[a, b, b, c]);
-            let taken = reach.tr_mul(&(inside.covariance * reach));
-            Candidate::new(s - taken, DVector::from_row_slice(&residual[2 * k..][..2]))
+            let (part, c) = (k / ORDERS, 2 * (k % ORDERS) + 1);
+            let stride = Rows::width(some[part].columns());
+            let m = inside.mean.len();
+            let (mut s, mut q) = (DMatrix::zeros(2, 2), DVector::zeros(2));
+            let mut reach = DMatrix::zeros(m, 2);
+            for run in &runs {
+                let Part { products, squares } = &run[part];
+                let zero = &products[..stride];
+                let left = |i: usize, c: usize| {
+                    let row = &products[i * stride..];
+                    row[c] - row[0] * zero[c] / zero[0]
+                };
+                for i in 0..2 {
+                    for j in 0..2 {
+                        let square = squares[(i ^ j) * stride + c + i * j];
+                        s[(i, j)] += square - zero[c + i] * zero[c + j] / zero[0];
+                    }
+                    q[i] += left(m + 1, c + i);
+                    for own in 0..m {
+                        reach[(own, i)] += left(own + 1, c + i);
+                    }
+                }
+            }
+            Candidate::new(s - reach.tr_mul(&(inside.covariance * &reach)), q)
         });
         each.collect()
     }
 
-    fn alone(&self, run: &Run, noise: Noise, mean: &[f64], own: &[usize]) -> Part {
+    /// Sums of a run beside these orders, whose coefficients are `mean`.
+    fn alone(&self, run: &Run, noise: Noise, mean: &[f64], some: &[Self]) -> Vec<Part> {
         let factor = Factor::new(noise, run.decays());
         let columns = self.columns();
-        let mut state = State::new(columns);
-        let mut part = Part {
-            products: vec![0.0; (own.len() + 2) * Rows::width(columns)],
-            squares: vec![[0.0; 3]; self.orders().len()],
+        let width = |part: &Self| Rows::width(part.columns());
+        let sums = |part: &Self| Part {
+            products: vec![0.0; columns * width(part)],
+            squares: vec![0.0; 2 * width(part)],
         };
-        let most = (CELLS / columns).max(1);
-        let blocks = (0..run.len()).step_by(most);
-        for (start, count) in blocks.map(|start| (start, most.min(run.len() - start))) {
+        let mut parts: Vec<Part> = some.iter().map(sums).collect();
+        let state = |part: &Self| State::new(part.columns());
+        let (mut before, mut states) = (state(self), some.iter().map(state).collect::<Vec<_>>());
+        for (start, count) in run.chunks() {
             interrupt::point();
-            let mut rows = self.rows(run, start, count);
-            factor.whiten(start, &mut rows, &mut state);
-            let mut beside = Rows::zeros(count, own.len() + 2);
+            let mut beside = self.rows(run, start, count);
+            factor.whiten(start, &mut beside, &mut before);
             for i in 0..count {
-                let row = rows.row(i);
-                let taken: f64 = own.iter().zip(mean).map(|(&c, b)| row[c] * b).sum();
-                let target = beside.row_mut(i);
-                target[0] = row[0];
-                target[1] = row[columns - 1] - taken;
-                for (x, &c) in target[2..].iter_mut().zip(own) {
-                    *x = row[c];
-                }
-                for (sums, pair) in part.squares.iter_mut().zip(row[1..].chunks_exact(2)) {
-                    sums[0] += pair[0] * pair[0];
-                    sums[1] += pair[0] * pair[1];
-                    sums[2] += pair[1] * pair[1];
-                }
+                let row = beside.row_mut(i);
+                let taken: f64 = row[1..].iter().zip(mean).map(|(x, b)| x * b).sum();
+                row[columns - 1] -= taken;
             }
-            beside.add_products(&rows, &mut part.products);
+            for ((orders, state), part) in some.iter().zip(&mut states).zip(&mut parts) {
+                let mut rows = orders.rows(run, start, count);
+                factor.whiten(start, &mut rows, state);
+                beside.add_products(&rows, &mut part.products);
+                rows.add_squares(&mut part.squares);
+            }
         }
-        part
+        parts
     }
 }

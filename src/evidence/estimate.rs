@@ -25,8 +25,11 @@ const WINDOW: f64 = 6.0;
 /// Models that count at most, the best.
 const MODELS: usize = 64;
 
-/// Rounds of noise and search at most.
-const ROUNDS: usize = 5;
+/// Searches for a mode at most.
+const ROUNDS: usize = 10;
+
+/// Predicted increase of the log evidence below which noise is known well enough for a first search.
+const ROUGH: f64 = 0.1;
 
 /// Strongest orders that the second search starts from.
 const STRONGEST: usize = 6;
@@ -157,20 +160,16 @@ impl Readings {
         prior: &Prior,
         noise_prior: NoisePrior,
         (looked, total): (&[usize], f64),
-        (mut set, mut model): (Vec<usize>, Model),
+        mut now: (Vec<usize>, Model),
         known: &[Mode],
     ) -> Option<Option<Mode>> {
         let is_known = |fit: &NoiseFit| known.iter().any(|m| !m.fit.is_far_from(&fit.position));
         let mut looked = looked.to_vec();
-        let mut start = noise_prior.start();
-        let mut active = None;
-        let mut round = 1;
-        loop {
-            let fit = self.among(&set).noise(&model, noise_prior, start)?;
-            if round > 1 && is_known(&fit) {
-                return Some(None);
-            }
-            start = fit.position;
+        let mut tried = None;
+        let start = noise_prior.start();
+        let sought = self.among(&now.0);
+        let mut fit = sought.noise_within(&now.1, noise_prior, start, ROUGH)?;
+        for round in 1.. {
             let part = self.among(&looked);
             let grams = part.grams(fit.noise);
             let own = prior.among(&looked);
@@ -182,18 +181,23 @@ impl Readings {
             } else {
                 first.model
             };
-            let posterior = best.posterior(&grams)?;
             let has: Vec<usize> = (0..looked.len()).filter(|&k| best.has(k)).collect();
-            set = has.iter().map(|&k| looked[k]).collect();
-            model = best.among(&has);
-            let shared: Vec<usize> = best.active().iter().map(|&k| looked[k]).collect();
+            let found = (has.iter().map(|&k| looked[k]).collect(), best.among(&has));
+            // The first noise is rough, and of orders that nothing supports yet.
+            if (round == 1 || found != now) && round < ROUNDS {
+                now = found;
+                let sought = self.among(&now.0);
+                fit = sought.noise(&now.1, noise_prior, fit.position)?;
+                if is_known(&fit) {
+                    return Some(None);
+                }
+                continue;
+            }
+            let posterior = best.posterior(&grams)?;
+            let active = best.active();
             let inside = Inside {
-                places: &shared,
-                tau: &best
-                    .active()
-                    .iter()
-                    .map(|&k| best.tau[k])
-                    .collect::<Vec<_>>(),
+                places: &active.iter().map(|&k| looked[k]).collect::<Vec<_>>(),
+                tau: &active.iter().map(|&k| best.tau[k]).collect::<Vec<_>>(),
                 mean: posterior.mean.as_slice(),
                 covariance: &posterior.covariance(),
             };
@@ -202,13 +206,11 @@ impl Readings {
                 |(k, other): (usize, &Candidate)| other.best(&prior.sizes).1 + prior.log_in(k);
             let scores: Vec<f64> = others.iter().enumerate().map(score).collect();
             let more = self.standing_out(&scores, &looked);
-            let is_same = active.replace(set.clone()) == Some(set.clone());
-            if more.is_empty() && is_same || round == ROUNDS {
-                let fit = self.among(&set).noise(&model, noise_prior, start)?;
-                let is_new = !is_known(&fit);
+            // Where none of the last was taken, none of the weaker ones would be.
+            if more.is_empty() || tried.as_ref() == Some(&now.0) || round >= ROUNDS {
                 search.widen()?;
                 let models = search.models();
-                return Some(is_new.then_some(Mode {
+                return Some(Some(Mode {
                     fit,
                     looked,
                     models,
@@ -216,10 +218,11 @@ impl Readings {
                     scores,
                 }));
             }
+            tried = Some(now.0.clone());
             looked.extend(more);
             looked.sort_unstable();
-            round += 1;
         }
+        None
     }
 
     /// Orders looked at first: the lowest, which slow noise resembles, and the strongest.
@@ -314,7 +317,7 @@ impl Readings {
         let mut places: Vec<usize> = modes.iter().flat_map(own).collect();
         places.sort_unstable();
         places.dedup();
-        let readings = self.among(&places);
+        let readings = self.among(&places).holding();
         let some = prior.among(&places);
         let mut parts = Vec::new();
         for (m, mode) in modes.iter().enumerate() {

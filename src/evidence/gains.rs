@@ -54,6 +54,18 @@ impl Candidate {
 
     /// What the group fits with this variance, which grows with it, and what its volume costs.
     fn parts(&self, tau: f64) -> (f64, f64) {
+        if let [a, b] = *self.q.as_slice() {
+            // An order's two columns, without a factor.
+            let s = &self.s;
+            let (x, y, z) = (
+                1.0 + tau * s[(0, 0)],
+                tau * s[(0, 1)],
+                1.0 + tau * s[(1, 1)],
+            );
+            let volume = f64::max(x * z - y * y, f64::EPSILON);
+            let square = (z * a * a - 2.0 * y * a * b + x * b * b) / volume;
+            return (0.5 * tau * square, 0.5 * volume.ln());
+        }
         let (mut upper, mut z) = (self.s.clone(), self.q.clone());
         upper *= tau;
         // Cholesky and solution at once, by columns, which lie in one piece.

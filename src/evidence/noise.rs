@@ -6,6 +6,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::gram::{Gram, Whitened};
+use super::information::Information;
 use super::model::Model;
 use super::posterior::Posterior;
 use super::prior::NoisePrior;
@@ -21,6 +22,9 @@ const LONGEST: f64 = 2.0;
 
 /// Predicted increase of the log evidence below which the maximum is reached.
 const CLOSE: f64 = 1e-5;
+
+/// The same within a step.
+const ROUGH: f64 = 1e-7;
 
 /// Dampings tried before a step is given up.
 const TRIES: usize = 12;
@@ -98,18 +102,15 @@ impl Readings {
         let mut damping = 0.0;
         for step in 0.. {
             let found = held.information_of(model, &now.grams, &now.posterior, &now.whitened)?;
-            let (mut gradient, mut precision) = (found.gradient, found.average);
-            let slopes = prior.slopes(&now.position);
-            for j in 0..VARIANCES {
-                // A slope is curvature in the logarithm, too: its part is added where it is positive.
-                precision[(j, j)] += prior.precision() + f64::max(-gradient[j], 0.0);
-                gradient[j] += slopes[j];
-            }
+            let near = Near {
+                position: now.position,
+                found,
+                prior,
+            };
             let mut better = None;
             for _ in 0..TRIES {
                 interrupt::point();
-                let own = (&gradient, &precision, damping);
-                let (next, gain) = newton(&now.position, own, (low, high))?;
+                let (next, gain) = near.best(damping)?;
                 if gain < close || step == STEPS {
                     break;
                 }
@@ -131,7 +132,7 @@ impl Readings {
                         noise: now.noise,
                         grams: now.grams,
                         value: now.value,
-                        precision,
+                        precision: near.slopes(&near.position, 0.0).1,
                     });
                 }
             }
@@ -140,23 +141,85 @@ impl Readings {
     }
 }
 
-/// A damped Newton step within bounds, and the increase that it predicts.
+/// The log evidence and log prior near a position.
+///
+/// With the average information `A`, the relative change `f` of each variance, and its logarithm's
+/// where it grows: `g' f - 1/2 f' A f`. A variance that goes to 0 takes the evidence to a limit, which a
+/// parabola in its logarithm does not have.
+struct Near {
+    position: [f64; VARIANCES],
+    found: Information,
+    prior: NoisePrior,
+}
+
+impl Near {
+    /// Changes of the variances at a position, and their slopes.
+    fn changes(&self, at: &[f64; VARIANCES]) -> (DVector<f64>, DVector<f64>) {
+        let apart = DVector::from_fn(VARIANCES, |j, _| at[j] - self.position[j]);
+        (
+            apart.map(|s| s.min(s.exp_m1())),
+            apart.map(|s| s.exp().min(1.0)),
+        )
+    }
+
+    /// Gradient and curvature, with the other sign, the latter where it is positive.
+    fn slopes(&self, at: &[f64; VARIANCES], damping: f64) -> (DVector<f64>, DMatrix<f64>) {
+        let (change, slope) = self.changes(at);
+        let each = (&self.found.gradient - &self.found.average * change).component_mul(&slope);
+        let mut gradient = each.clone() + DVector::from(self.prior.slopes(at).to_vec());
+        let scale = DMatrix::from_diagonal(&slope);
+        let mut precision = &scale * &self.found.average * &scale;
+        for j in 0..VARIANCES {
+            let apart = at[j] - self.position[j];
+            let own = self.found.average[(j, j)] + f64::max(-self.found.gradient[j], 0.0);
+            let held = damping * (own + self.prior.precision());
+            gradient[j] -= held * apart;
+            // A slope is curvature in the logarithm, too.
+            let bend = if apart > 0.0 {
+                0.0
+            } else {
+                f64::max(-each[j], 0.0)
+            };
+            precision[(j, j)] += self.prior.precision() + bend + held;
+        }
+        (gradient, precision)
+    }
+
+    /// Where it is greatest when damped, and the increase that it predicts.
+    fn best(&self, damping: f64) -> Option<([f64; VARIANCES], f64)> {
+        let (low, high) = self.prior.bounds();
+        let least = self.position.map(|x| low.max(x - LONGEST));
+        let most = self.position.map(|x| high.min(x + LONGEST));
+        let mut at = self.position;
+        for _ in 0..STEPS {
+            let (gradient, precision) = self.slopes(&at, damping);
+            let (next, gain) = newton(&at, (&gradient, precision), (&least, &most))?;
+            at = next;
+            if gain < ROUGH {
+                break;
+            }
+        }
+        let (change, _) = self.changes(&at);
+        let bend = 0.5 * change.dot(&(&self.found.average * &change));
+        let prior = self.prior.log_density(&at) - self.prior.log_density(&self.position);
+        Some((at, self.found.gradient.dot(&change) - bend + prior))
+    }
+}
+
+/// A Newton step within bounds, and half of what its slope predicts.
 fn newton(
     position: &[f64; VARIANCES],
-    (gradient, precision, damping): (&DVector<f64>, &DMatrix<f64>, f64),
-    (low, high): (f64, f64),
+    (gradient, precision): (&DVector<f64>, DMatrix<f64>),
+    (least, most): (&[f64; VARIANCES], &[f64; VARIANCES]),
 ) -> Option<([f64; VARIANCES], f64)> {
     // At a bound that the gradient points beyond, a variance stays.
     let is_free = |j: &usize| {
         let (x, slope) = (position[*j], gradient[*j]);
-        !(x <= low && slope < 0.0 || x >= high && slope > 0.0)
+        !(x <= least[*j] && slope < 0.0 || x >= most[*j] && slope > 0.0)
     };
     let free: Vec<usize> = (0..VARIANCES).filter(is_free).collect();
-    let mut own = precision.select_rows(&free).select_columns(&free);
-    for i in 0..free.len() {
-        own[(i, i)] *= 1.0 + damping;
-    }
-    let slopes = DVector::from_iterator(free.len(), free.iter().map(|&j| gradient[j]));
+    let own = precision.select_rows(&free).select_columns(&free);
+    let slopes = gradient.select_rows(&free);
     let mut step = Cholesky::new(own)?.solve(&slopes);
     let longest = step.amax();
     if longest > LONGEST {
@@ -164,13 +227,10 @@ fn newton(
     }
     let mut next = *position;
     for (i, &j) in free.iter().enumerate() {
-        next[j] = (position[j] + step[i]).clamp(low, high);
+        next[j] = (position[j] + step[i]).clamp(least[j], most[j]);
     }
-    let gain = 0.5
-        * (0..VARIANCES)
-            .map(|j| gradient[j] * (next[j] - position[j]))
-            .sum::<f64>();
-    Some((next, gain))
+    let moved = |j| gradient[j] * (next[j] - position[j]);
+    Some((next, 0.5 * (0..VARIANCES).map(moved).sum::<f64>()))
 }
 
 impl NoiseFit {

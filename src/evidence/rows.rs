@@ -85,6 +85,12 @@ impl Rows {
         dispatch(InstructionSet::best(), work);
     }
 
+    /// Adds the square of each column to the first row of `sums`, and its product with the next one to
+    /// the second.
+    pub(super) fn add_squares(&self, sums: &mut [f64]) {
+        dispatch(InstructionSet::best(), Squares { rows: self, sums });
+    }
+
     #[inline(always)]
     pub(super) fn load<L: Lanes>(values: &[f64], at: usize) -> L {
         let some: &[f64; MOST_LANES] = values[at..at + MOST_LANES].try_into().expect("eight");
@@ -145,6 +151,33 @@ impl Kernel for Products<'_> {
                             }
                         }
                     }
+                }
+            }
+        }
+    }
+}
+
+struct Squares<'a> {
+    rows: &'a Rows,
+    sums: &'a mut [f64],
+}
+
+impl Kernel for Squares<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { rows, sums } = self;
+        for c in (0..rows.stride).step_by(L::N) {
+            let mut totals = [L::splat(0.0); 2];
+            for i in 0..rows.len() {
+                let own = Rows::load::<L>(&rows.values, i * rows.stride + c);
+                let next = Rows::load::<L>(rows.row(i), c + 1);
+                totals = [own.mul_add(own, totals[0]), own.mul_add(next, totals[1])];
+            }
+            for k in 0..2 {
+                let mut found = [0.0; MOST_LANES];
+                totals[k].to_array(&mut found);
+                for lane in 0..L::N {
+                    sums[k * rows.stride + c + lane] += found[lane];
                 }
             }
         }
