@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import trueangle as ta
 from asked import Case, Chance, Pull, Told, generator, scored
 from fleets import made
-from fleets.test_repeats import drift, memory, nothing
+from fleets.test_outliers import drift, memory, nothing
 
 Array = NDArray[np.float64]
 Noise: TypeAlias = Callable[[np.random.Generator, int], Array]
