@@ -203,7 +203,7 @@ def scatter_doubt(item: ScatterFinding, fault: DataFault | None = None) -> Ambig
     because, measure = (
         "the error that the readings show has no certain cause yet, so what scatters about it "
         "has none either",
-        "the measurements named above, then diagnose again",
+        "measure more runs, in both directions and at two speeds, then diagnose again",
     )
     if fault is not None:
         because = f"{fault.fault}: the faulty readings cause the scatter"

@@ -159,8 +159,8 @@ class Deadline:
         if self.within is not None:
             return f"the {self.within:g} s given were up"
         return (
-            f"the work that is done by default ({self._bound:.2g} numbers) was done (a time can be "
-            "given, as within)"
+            f"the usual work ({self._bound:.2g} numbers) was done (for more: --within 60s, in "
+            "Python within=60)"
         )
 
     @contextlib.contextmanager

@@ -95,6 +95,9 @@ def json_value(path: Path, text: str, kind: type[FileError], what: str) -> Any:
     try:
         return json.loads(text, object_pairs_hook=pairs, parse_constant=constant)
     except json.JSONDecodeError as cause:
+        if (first := text.lstrip()[:1]) and first not in "{[":
+            problem = f"is not {what} (it begins with {first!r})"
+            raise kind(path, f"{problem}; for readings: trueangle check {path}") from None
         raise kind(
             path,
             f"is not complete JSON ({cause.msg}): truncated or not {what}; save it again",
