@@ -72,7 +72,7 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
             "patterns of this size, on average over the travel."
         )
     if weighted.wild:
-        rows = ", ".join(f"reading {row + 1} of run {label}" for label, row in fit.wild[:3])
+        rows = ", ".join(f"reading {row + 1} of run {label}" for label, row in sorted(fit.wild)[:3])
         rows += ", ..." * (weighted.wild > 3)
         yield f"{counted(weighted.wild, 'outlier')} rejected: {rows}."
     if fit.uncertainty.note:

@@ -159,8 +159,8 @@ class Deadline:
         if self.within is not None:
             return f"the {self.within:g} s given were up"
         return (
-            f"the usual work ({self._bound:.2g} numbers) was done (for more: --within 60s, in "
-            "Python within=60)"
+            f"the usual work ({self._bound:.2g} numbers) was done (for more give `within`, a time "
+            "in seconds)"
         )
 
     @contextlib.contextmanager

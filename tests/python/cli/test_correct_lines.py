@@ -297,6 +297,7 @@ def leg(tmp_path, monkeypatch):
         asked.append(number)
         return SimpleNamespace(
             findings=found, unexplained=None, gain={}, correction=correction,
+            in_question=(), factors=(),
             discrepancy=SimpleNamespace(peak_to_peak=10.0 * number),
             summary=lambda *_, **__: f"account {number}", to_dict=lambda: {"number": number},
         )  # fmt: skip
@@ -313,7 +314,7 @@ def test_joints_are_ranked_and_those_with_a_cause_are_corrected(leg, capsys):
     assert [line.split() for line in told[3:7]] == [
         ["toe", "40.00", "-", "explained", "cause1"],
         ["ankle", "30.00", "-", "simulation", "is", "enough", "-"],
-        ["knee", "20.00", "-", "simulation", "is", "enough", "-"],
+        ["knee", "20.00", "-", "differs,", "not", "named", "-"],
         ["hip", "10.00", "-", "explained", "cause0"],
     ]
     assert [line for line in told[7:] if line] == [

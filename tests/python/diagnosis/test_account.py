@@ -67,7 +67,7 @@ def test_a_play_whose_turning_points_read_the_other_side_is_no_spring() -> None:
         width = result.findings[0].parameters["half_width_arcsec"]
         assert abs(width.value - HALF) < 4.0 * width.std
         assert result.readings_used == result.readings - 16
-        assert "none at a turning point" in " ".join(result.summary().split())
+        assert "without turning points" in " ".join(result.summary().split())
 
 
 def test_weights_do_not_change_what_causes_are_counted_from() -> None:

@@ -145,9 +145,8 @@ def test_over_an_arc_a_belief_that_may_be_right_stays_and_the_rest_is_a_curve(
         return order + smooth * ((theta - middle) / (0.5 * span)) ** 3
 
     found = ta.diagnose(arc_runs(rng, error, span), believed)
-    (belief,) = found.beliefs
     if not refuted:
-        assert belief.verdict == "confirmed"
+        assert [belief.verdict for belief in found.beliefs] == ["confirmed"]
     theta = np.linspace(30.0, 30.0 + span, 200)
     fresh = ta.CalibrationRun(theta, theta, period=360.0)
     left = error(theta) - found.extended.predict(fresh)

@@ -43,8 +43,9 @@ def test_play_does_not_turn_the_delay_round(play, sign, seed):
     runs = measured(play, delay, 3, (7.0, 33.0) * 4, rng)
     result = ta.diagnose(runs, Simulation(Joint(gear_ratio=1.0, pole_pairs=3)))
     found = {f.cause: f for f in result.findings if f.confirmed}
-    assert {*found} == {"channel_skew", *(["backlash"] if play else [])}
-    assert {f.cause for f in result.findings} == {*found}
+    # A small play may be the speed's as well, with its step at rest: then it is not confirmed.
+    assert {*found} - {"backlash"} == {"channel_skew"}
+    assert {f.cause for f in result.findings} == {"channel_skew", *(["backlash"] if play else [])}
     told = found["channel_skew"].parameters["delay_s"]
     # The arctangent and its first order differ by a share of the angle turned meanwhile.
     assert abs(told.value - delay) < 4.0 * told.std

@@ -42,7 +42,7 @@ def test_a_delay_is_confirmed_where_its_gain_excludes_zero(
     result = ta.diagnose(stale(), ta.Simulation())
     (found,) = [finding for finding in result.findings if finding.cause == "latency"]
     assert found.confirmed == (low > 0.0)
-    assert ("exclude zero" in found.reason) == (low < 0.0)
+    assert ("includes zero" in found.reason) == (low < 0.0)
     told = [effect.kind for effect in result.extended.effects]
     assert ("latency" in told) == (low > 0.0)
     speed = next(one for one in result.factors if one.factor == "speed")

@@ -262,7 +262,7 @@ def test_servo_has_a_reversal_error_and_an_offset_under_load(servo, tmp_path) ->
     place = found["direction_dependent_pattern"]["amplitudes"].value
     assert half < 0.0
     assert 0.5 < max(place) / -half < 2.0
-    assert "direction_dependent_pattern" in result.summary()
+    assert "direction_dependent_pattern" in result.summary(verbose=True)
 
 
 def test_a_line_in_time_is_no_order(data_dir):

@@ -236,8 +236,8 @@ def test_noise_beyond_the_stated_is_never_nothing():
     truth = replace(SIM, sigma_arcsec=1.5, runs=tuple(runs))
     said = ta.diagnose(ta.simulate(truth, 21), replace(truth, sigma_arcsec=1.0)).summary()
     assert "Nothing beyond" not in said
-    assert said.startswith("No pattern beyond the simulation, but the noise differs:")
-    assert "where the simulation states 1" in said
+    assert said.startswith("No pattern beyond the simulation, but the noise differs.")
+    assert "(1.000 in the simulation" in said
     same = ta.diagnose(ta.simulate(truth, 22), truth).summary()
     assert same.startswith("Nothing beyond the simulation")
 

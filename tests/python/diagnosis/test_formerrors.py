@@ -112,16 +112,15 @@ def test_errors_are_widened_by_what_a_form_leaves_and_only_then() -> None:
             space = space_of(loaded_runs(np.random.default_rng([44, seed]), loop=loop))
             effect = EFFECTS["torsional_compliance"]
             fitted = space.with_terms([effect.propose(space)], 0.0)
-            errors = np.sqrt(
-                [r.robust_covariance(0)[0, 0] for r in (fitted, with_form_errors(fitted))]
-            )
+            widened = with_form_errors(fitted).robust_covariance(0)
+            errors = np.sqrt([fitted.covariance(0)[0, 0], widened[0, 0]])
             kept.append([(fitted.coefficients[-1] + 8.0) / e for e in errors] + [*errors])
     wide, exact = np.array(wide), np.array(exact)
     # A loop takes some percent of the slope: far outside of the errors without it.
     assert np.abs(wide[:, 0]).min() > 3.0
     assert np.abs(wide[:, 1]).max() < 3.0
     assert np.abs(wide[:, 1]).max() > 0.2
-    assert np.median(exact[:, 3] / exact[:, 2]) == pytest.approx(1.0, abs=0.05)
+    assert np.median(exact[:, 3] / exact[:, 2]) == pytest.approx(1.0, abs=0.1)
     assert form_error_columns(space).shape[1] == 0
 
 

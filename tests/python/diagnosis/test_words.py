@@ -34,8 +34,8 @@ def test_a_headline_says_which_line_and_how_large(geared):
     first = " ".join(geared.summary().split())  # at whatever width
     one, two = (f.parameters["amplitude_arcsec"] for f in geared.findings)
     assert first.startswith(
-        f"Confirmed: missing_order output order 1 ({one.value:.3f} +- {one.std:.3f} arcsec), "
-        f"2 ({two.value:.3f} +- {two.std:.3f} arcsec). Follows the place "
+        f"Confirmed: missing_order output order 1 ({one.value:.2f} +- {one.std:.2f} arcsec), "
+        f"2 ({two.value:.2f} +- {two.std:.2f} arcsec). Follows the place "
     )
     # One unit for all of a joint.
     in_degrees = geared.summary(errors_in="deg")

@@ -65,7 +65,6 @@ def test_a_gear_that_is_told_over_the_travel_is_looked_for():
     assert found.ridge == 0.0
 
 
-@pytest.mark.xfail(strict=True, reason="two orders pass for the slow drift of one run")
 def test_the_gear_pair_is_no_worse_than_without_correction(data_dir):
     train = ta.read_runs(data_dir / "gear_pair_fit.csv")
     test = ta.read_runs(data_dir / "gear_pair_test.csv")

@@ -363,7 +363,7 @@ def _alike(
             found.append(kind)
             continue
         beside = [*others, *also]
-        if max(instead[k, j] / max(losses[k], 1e-9) for k in members for j in beside) < TRIED:
+        if all(instead[k, j] < TRIED * max(losses[k], 1e-9) for k in members for j in beside):
             continue
         score, tau = account.best_beside(rest, beside)
         if score > own - ALIKE and any(tau[k] > 0.0 for k in others):

@@ -193,7 +193,7 @@ def _resolved(regression: Regression, orders: Iterable[float]) -> list[float]:
 
         (2 pi (m - k) T)^2 / 12    of an order m over T turns
     """
-    turns = float(regression.signals.run_turns().max())
+    turns = max(float(regression.signals.run_turns().max()), 1e-9)
     most = np.sqrt(12.0 * (1.0 - TAKES)) / (2.0 * np.pi * turns)
     return [round(m) if abs(m - round(m)) < most else m for m in orders]
 

@@ -118,22 +118,22 @@ class Candidates:
 
 
 def prior_probabilities(
-    orders: Sequence[float], cycles: Iterable[float], fitted: Iterable[float] = ()
+    orders: Sequence[float], cycles: Sequence[float], fitted: Iterable[float] = ()
 ) -> list[float]:
     """Of each order, given the shafts' cycles per turn; those ``fitted`` are certain.
 
-    Orders without a known cause are the likelier the lower they are, as ``1 / k``: an error may
-    have any scale.
+    Orders without a known cause are the likelier the lower they are among those of a shaft, as
+    ``1 / k``: an error may have any scale. A wave generator turns once more than the motor.
     """
-    unknown = 0.2 / max(sum(1.0 / k for k in orders), 1.0)
+    turning = [t for f in map(abs, cycles) for t in (f, f + 1.0)]
+    chances = {k: 1.0 / min([k, *(k / f for f in turning if k % f == 0.0)]) for k in orders}
+    share = 0.2 / max(sum(chances.values()), 1.0)
+    unknown = {k: min(LIKELY, share * chance) for k, chance in chances.items()}
     # Orders of a shaft that errors are known to have.
     reasons = {k * f for k in (1, 2, 4) for f in (1.0, *map(abs, cycles))}
     certain = set(fitted)
     # What is fitted in any case is certain but for rounding.
-    return [
-        1.0 - 1e-9 if k in certain else LIKELY if k in reasons else min(LIKELY, unknown / k)
-        for k in orders
-    ]
+    return [1.0 - 1e-9 if k in certain else LIKELY if k in reasons else unknown[k] for k in orders]
 
 
 def _effective_positions(positions: Positions) -> Positions:
