@@ -96,7 +96,7 @@ def test_a_diagnosis_has_the_same_unit_convention_and_digits(runs, fit) -> None:
     sim = replace(JOINT, harmonics=())
     found = ta.diagnose(runs, sim, gain=False)
     # Without readings no further runs are planned, which takes ten times as long as the rest.
-    text = replace(found, runs=[]).summary("arcsec")
+    text = replace(found, runs=[]).summary("arcsec", verbose=True)
     at = {float(order): n for n, order in enumerate(fit.orders)}
     told = 0
     for finding in found.findings:
