@@ -13,7 +13,7 @@ SEED = 83_110
 #: Angles of a few hundred degrees in other units differ by their rounding, 1e-10 arcsec; what is
 #: computed of them by a thousand times that.
 ABSOLUTE = 1e-6
-RELATIVE = 1e-9
+RELATIVE = 1e-6  # the noise is searched to where a step gains 1e-5
 
 #: The variance that zeros are drawn from is found by a search that ends at a hundred-millionth,
 #: and so are the rivals' parameters; of a difference of deviances ten times that is left.

@@ -33,7 +33,7 @@ def test_what_was_rehearsed_is_said(plan):
     assert first.causes == ("backlash", "latency")
     assert first.trials == 6
     assert first.chance_named == 1.0
-    assert "named in 100 % (6 simulated)" in " ".join(plan.summary().split())
+    assert "100 % of the cases (6 simulated)" in " ".join(plan.summary().split())
 
 
 def test_equal_seeds_give_equal_plans(plan):
