@@ -8,6 +8,7 @@ import numpy as np
 
 from ..._core import Groups
 from ...estimation.evidence import EvidenceEstimate
+from ...joint.pattern import lines_columns
 
 
 def lines_in_time(
@@ -28,18 +29,17 @@ def lines_in_time(
     travel = np.ptp(theta)
     clock = (time - time[0]) / np.ptp(time) * travel
     near = {k + 2.0 * np.pi / travel * s for k in tested for s in np.arange(-1.5, 2.0, 0.5)}
-    waves = [k * theta for k in orders] + [f * clock for f in sorted(near)]
-    columns = np.column_stack([f(wave) for wave in waves for f in (np.cos, np.sin)])
+    given = (theta, [*orders]), (clock, sorted(near))
+    columns = np.hstack([lines_columns(at, np.array(lines, float)) for at, lines in given])
     columns -= columns.mean(axis=0)
     known = dict(zip(estimate.orders, estimate.prior.tolist(), strict=True))
     chances = [min(known[k], 0.99) for k in orders] + [chance] * len(near)
     total = float(np.var(error))
-    groups = Groups([(columns, error - error.mean(), time)], [2] * len(waves))
-    sums = groups.sums(estimate.noise, total)
-    none = [0.0] * len(waves)
+    readings = [(columns, error - error.mean(), time)]
+    sums = Groups(readings, [2] * len(chances)).sums(estimate.noise, total)
+    none = [0.0] * len(chances)
     found = max(
         sums.search(none, chances, [total] * len(orders) + [0.0] * len(near)),
         sums.search(none, chances, none),
     )
-    held = {k for k, size in zip(orders, found[1], strict=False) if size > 0.0}
-    return set(tested) - held
+    return set(tested) - {k for k, size in zip(orders, found[1], strict=False) if size > 0.0}
