@@ -6,9 +6,8 @@ from collections.abc import Collection
 
 import numpy as np
 
-from ..._core import Groups
+from ..._core import Groups, line_columns
 from ...estimation.evidence import EvidenceEstimate
-from ...joint.pattern import lines_columns
 
 
 def lines_in_time(
@@ -30,7 +29,7 @@ def lines_in_time(
     clock = (time - time[0]) / np.ptp(time) * travel
     near = {k + 2.0 * np.pi / travel * s for k in tested for s in np.arange(-1.5, 2.0, 0.5)}
     given = (theta, [*orders]), (clock, sorted(near))
-    columns = np.hstack([lines_columns(at, np.array(lines, float)) for at, lines in given])
+    columns = np.hstack([line_columns(at, np.array(lines, float)) for at, lines in given])
     columns -= columns.mean(axis=0)
     known = dict(zip(estimate.orders, estimate.prior.tolist(), strict=True))
     chances = [min(known[k], 0.99) for k in orders] + [chance] * len(near)
