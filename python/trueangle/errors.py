@@ -110,17 +110,7 @@ class NoModelError(TrueAngleError):
 
 
 class NoOrderError(NoModelError):
-    """The data support no order at all.
-
-    Attributes
-    ----------
-    readings : int
-        How many there were; 0 where that is not the cause.
-    """
-
-    def __init__(self, message: str, readings: int = 0) -> None:
-        super().__init__(message)
-        self.readings = readings
+    """The data support no order at all."""
 
 
 class NoCurveError(NoModelError):

@@ -77,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         Input,
         "a correction model to extend by what is confirmed, in place of a new one",
     )
-    add_shared(parser, "argument")
+    add_shared(parser, "argument", "run")
     add_joint(parser)
     add_robot(parser)
     add(
@@ -98,7 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the diagnosis."""
     from ..diagnosis import diagnose
-    from .run_lists import read_checked_runs
+    from .run_lists import read_selected_runs
 
     if args.model is not None and args.corrected_model is None:
         raise ArgumentError(
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
         model = load_model(args.model)
     own = [entry for entry in args.signal or () if entry[0] == "simulated"]
     args.signal = [entry for entry in args.signal or () if entry[0] != "simulated"]
-    runs = read_checked_runs(args)
+    runs = read_selected_runs(args)
     simulated = None
     if args.simulated is not None:
         simulated = _minus_simulated(runs, args, own)
@@ -203,7 +203,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
     """Diagnose every joint against its simulation, or an empty one of its gear."""
     from ..diagnosis import diagnose
     from ..reports.robot import diagnosed_rank
-    from .run_lists import read_checked_runs
+    from .run_lists import read_selected_runs
 
     single = (args.simulated, args.extend, args.extend_into, args.model, args.plan)
     if any(given is not None for given in single):
@@ -214,7 +214,7 @@ def _robot(name: str, joints: list[JointAsked], args: argparse.Namespace) -> int
 
     def work(joint: JointAsked) -> Diagnosis:
         simulation = _believed(joint.args, empty=True)
-        runs = read_checked_runs(joint.args)
+        runs = read_selected_runs(joint.args)
         return diagnose(runs, simulation, within=args.within, progress=args.progress)
 
     found, _ = each_joint(joints, work)

@@ -75,7 +75,7 @@ _SHARED: Final[dict[str, tuple[str, Kind, str, dict[str, Any]]]] = {
     "run": (
         "--run GLOB",
         str,
-        "use the runs of this label only, or of those that match (fwd-*)",
+        "use the runs of this label only, or of those that match (fwd-*); '!LABEL': all but these",
         {"many": True},
     ),
     "progress": (

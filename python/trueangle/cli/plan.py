@@ -229,14 +229,14 @@ def _run_after(args: argparse.Namespace) -> int:
     from ..planning.limits import load_limits
     from ..rehearsal.after import plan_after
     from ..simulation import load_simulation
-    from .run_lists import read_checked_runs
+    from .run_lists import read_selected_runs
 
     if args.simulation is None:
         raise ArgumentError("--after needs the assumed joint: add --simulation FILE")
     refuse_given(args, _OF_OTHERS, "does not go with --after; leave one of them out")
     args.runs = args.after
     plan = plan_after(
-        read_checked_runs(args),
+        read_selected_runs(args),
         load_simulation(args.simulation),
         between=args.between,
         limits=None if args.limits is None else load_limits(args.limits),

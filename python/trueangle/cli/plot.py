@@ -85,12 +85,12 @@ def _of_model(args: argparse.Namespace) -> Axes:
 def _of_runs(args: argparse.Namespace) -> Axes:
     from ..fitting.fit import fit
     from ..plots import fit_plot
-    from .run_lists import read_checked_runs
+    from .run_lists import read_selected_runs
 
     refuse_given(args, ("joint",), "is of the model file of a robot, and these are runs")
     args.runs = args.files
     found = fit(
-        read_checked_runs(args),
+        read_selected_runs(args),
         orders=orders_by_shaft(args.orders, declared_shafts(args.shaft)),
         gear_ratio=args.gear_ratio,
         fixed_member=args.fixed_member,

@@ -130,9 +130,9 @@ def _fleet(args: argparse.Namespace) -> int:
 def _made(args: argparse.Namespace, path: str | None, title: str | None = None) -> Any:
     """The report or certificate that is requested, written to ``path``."""
     from ..reports import report
-    from .run_lists import read_checked_runs
+    from .run_lists import read_selected_runs
 
-    runs = read_checked_runs(args)
+    runs = read_selected_runs(args)
     simulation = None
     if args.simulation is not None:
         from ..simulation import load_simulation

@@ -18,44 +18,44 @@ __all__ = ["listed_names", "read_selected_runs"]
 def read_selected_runs(args: argparse.Namespace) -> list[CalibrationRun]:
     """Runs of a command's files, those of ``--run`` only where labels or patterns are given.
 
+    Faults of their data are reported on stderr, in the words of ``check``.
+
     Raises
     ------
     ArgumentError
         A label that no run has; names those there are.
     """
-    runs = read_checked_runs(args)
-    labels: list[str] = args.run or []
-    if not labels:
+    from ..runs.checks.check import data_faults
+    from ..runs.checks.record import records_of
+
+    runs = _selected(read_runs(args.runs, **reading_options(args)), getattr(args, "run", None))
+    for fault in data_faults(records_of(runs)):
+        told = of_joint(str(fault), getattr(args, "of_joint", None))
+        print(f"trueangle: warning: {told}", file=sys.stderr)
+    return runs
+
+
+def _selected(runs: list[CalibrationRun], patterns: list[str] | None) -> list[CalibrationRun]:
+    if not patterns:
         return runs
     known = list(dict.fromkeys(run.label for run in runs if run.label is not None))
-    found = {label: [name for name in known if _is_meant(name, label)] for label in labels}
-    missing = [label for label in labels if not found[label]]
-    if missing and not known:
+    found = {p: {name for name in known if _is_meant(name, p.removeprefix("!"))} for p in patterns}
+    missing = next((pattern for pattern in patterns if not found[pattern]), None)
+    if missing is not None and not known:
         raise ArgumentError(
-            f"--run {missing[0]}: the files name no runs (there is no column 'run'): "
+            f"--run {missing}: the files name no runs (there is no column 'run'): "
             "leave --run out, or name the column of their labels with --signal run=NAME"
         )
-    if missing:
+    if missing is not None:
         raise ArgumentError(
-            f"--run {missing[0]}: no such run; the runs are "
-            f"{listed_names(known)}{did_you_mean(missing[0], known)}"
+            f"--run {missing}: no such run; the runs are "
+            f"{listed_names(known)}{did_you_mean(missing.removeprefix('!'), known)}"
         )
-    chosen = {name for names in found.values() for name in names}
-    return [run for run in runs if run.label in chosen]
+    omitted = {name for p in patterns if p.startswith("!") for name in found[p]}
+    wanted = {name for p in patterns if not p.startswith("!") for name in found[p]} or {*known}
+    return [run for run in runs if run.label in wanted - omitted]
 
 
 def _is_meant(name: str, label: str) -> bool:
     """Whether ``label`` is a name or a pattern (``fwd-*``) that matches it."""
     return name == label or fnmatchcase(name, label)
-
-
-def read_checked_runs(args: argparse.Namespace) -> list[CalibrationRun]:
-    """Runs of the files; faults of the data are reported on stderr, in the words of ``check``."""
-    from ..runs.checks.check import data_faults
-    from ..runs.checks.record import records_of
-
-    runs = read_runs(args.runs, **reading_options(args))
-    for fault in data_faults(records_of(runs)):
-        told = of_joint(str(fault), getattr(args, "of_joint", None))
-        print(f"trueangle: warning: {told}", file=sys.stderr)
-    return runs

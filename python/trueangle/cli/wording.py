@@ -59,6 +59,7 @@ _COMMANDS: Final = {
     "fit_logs": "fit --one-pass",
     "import_model": "import",
     "diagnosis.plan()": "--plan FILE",
+    "plan_arc": "plan --arc 0:360",
     "plan_encoder": "plan --reference encoder",
     "plan_mounts": "plan",
     "plan_self": "plan --self",
@@ -77,9 +78,6 @@ _OWN = frozenset(
 
 #: What a diagnosis may do where no order is supported: there may be no model at all.
 _PERHAPS = "; a diagnosis names other causes, and --corrected-model FILE writes the corrected model"
-
-#: Fewest readings of a diagnosis (`diagnosis.diagnose.LEAST_READINGS`, which takes numpy).
-_LEAST_READINGS = 20
 
 
 class Wording:
@@ -226,9 +224,8 @@ def command_that_helps(error: TrueAngleError, args: argparse.Namespace, build: _
     if not words:
         return ""
     perhaps = ""
-    if isinstance(error, NoOrderError):
-        more = f"; take {_LEAST_READINGS} readings or more"
-        perhaps = _PERHAPS if words[0] == "diagnose" else more
+    if isinstance(error, NoOrderError) and words[0] == "diagnose":
+        perhaps = _PERHAPS
     return f"{perhaps}; run: {join(['trueangle', *words])}"
 
 
@@ -246,9 +243,7 @@ def _words(error: TrueAngleError, args: argparse.Namespace, build: _Build) -> li
         return _plan(error, args) if command == "selfcal" else []
     if isinstance(error, RankError):
         return _again(build, args, "orders", (), (), without=("orders",))
-    if isinstance(error, NoOrderError) and 0 < error.readings < _LEAST_READINGS:
-        return ["plan", "--arc", "0:360", "--readings", str(_LEAST_READINGS)]
-    if isinstance(error, NoModelError):
+    if isinstance(error, NoModelError) and "plan_arc" not in str(error):  # the error has it
         # Without a gear nothing but the output turns, and the command states that.
         known = args.gear_ratio is not None
         bare = () if known else ("--gear-ratio", "1", "--fixed-member", "none")

@@ -283,10 +283,8 @@ def _used(runs: list[CalibrationRun]) -> int:
 
 def _incomplete(at: Deadline, gain: bool) -> str:
     """That the account was ended, while what, and what that means."""
-    means = "causes may be missing or wrong"
-    if gain:
-        means += ", and what was not held out is not confirmed"
-    return f"INCOMPLETE: {at.why} while {at.cut}; {means}"
+    means = "; causes may be missing or wrong" + ", few were tested on held-out data" * gain
+    return f"INCOMPLETE: {at.why} while {at.cut}{means}"
 
 
 def _ratio_finding(ratio: GearedLinesRatio) -> Finding:

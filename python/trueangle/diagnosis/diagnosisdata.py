@@ -158,8 +158,9 @@ class DiagnosisData(Correctable):
     @property
     def next_steps(self) -> list[str]:
         """What to do: about the data, with what is confirmed, about what is open."""
-        if self.data_faults:
-            return ["remove the faults of the data and diagnose again"]
+        more = [] if self.complete else ["allow more time (`within=300`)"]
+        if more or self.data_faults:
+            return [*(fault.mend for fault in self.data_faults), *more, "diagnose again"]
         steps = []
         sure = [finding for finding in self.findings if finding.confirmed]
         curves = [curve for factor in self.factors for curve in factor.effects]

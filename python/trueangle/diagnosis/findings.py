@@ -28,7 +28,7 @@ from .rivals import alike_causes, ambiguity_in_doubt, dependence, equal_causes, 
 RIVALLED = 4
 
 #: Why a finding of an account that was ended early is not confirmed.
-NOT_HELD_OUT = "the account was ended before its gain on the readings held out was measured"
+NOT_HELD_OUT = "the diagnosis ended before its gain on held-out readings was measured"
 
 
 def findings_of(

@@ -204,6 +204,7 @@ def _ambiguity_entries(diagnosis: DiagnosisData, verbose: bool, unit: ErrorUnit)
         yield f"- {_head(spot)}: {spot.because}.{how}", 2, 0
         yield from ((text, 6, 4) for text in _if_it_is(spot, unit))
     named = {finding.cause for finding in diagnosis.findings}
+    named |= {cause for spot in shown for cause in spot.causes}
     rest = dict.fromkeys(cause for spot in spots if spot not in shown for cause in spot.causes)
     names = ", ".join(cause for cause in rest if cause not in named)
     if names:

@@ -40,6 +40,8 @@ class Comparison(PlainResult):
     std_arcsec : float or None
         Standard deviation of the difference over a turn, without its zero, from the
         covariances of both; None where neither states one.
+    each_std_arcsec : list of float or None
+        The same of the first and of the second model.
     zero_deg : float
         Difference of the constants.
     argument : str
@@ -65,6 +67,7 @@ class Comparison(PlainResult):
     rms_arcsec: float
     max_abs_arcsec: float
     std_arcsec: float | None
+    each_std_arcsec: list[float | None]
     zero_deg: float
     argument: str
     differ_in: list[str]
@@ -94,12 +97,10 @@ class Comparison(PlainResult):
             number is the counts of a turn.
         """
         unit = error_unit(errors_in, self.max_abs_arcsec)
-        verdicts = {"changed": "Changed: ", "same": "Not distinguishable in their noise: "}
         lines = [
-            f"{verdicts.get(self.verdict or '', '')}difference {unit.text(self.rms_arcsec)} rms, "
-            f"{unit.number(self.max_abs_arcsec)} max abs, zero {zero_text(self.zero_deg, 360.0)}"
-            + ("" if self.std_arcsec is None else f"; known to {unit.text(self.std_arcsec)}"),
-            *self._verdict(),
+            *self._verdict(unit),
+            f"Largest difference {unit.text(self.max_abs_arcsec)}; zero of B less that of A "
+            f"{zero_text(self.zero_deg, 360.0)} (not tested).",
             *self._arithmetic(unit),
             f"  order  {f'amplitude/{unit.name}':>16}  phase/deg  {f'+-/{unit.name}':>10}",
         ]
@@ -118,19 +119,28 @@ class Comparison(PlainResult):
         lines += [f"not compared: {kind}" for kind in self.differ_in]
         return laid_out(lines)
 
-    def _verdict(self) -> list[str]:
+    def _verdict(self, unit: ErrorUnit) -> list[str]:
+        """Whether the models differ, by how much, and which of them to use."""
+        size = f"{unit.text(self.rms_arcsec)} rms over the turn"
+        if self.std_arcsec is not None:
+            size += f", uncertain by {unit.text(self.std_arcsec)}"
         if self.verdict is None or self.p is None:
-            return []
-        below = f"below {self.false_alarms:g} it counts as changed (without the zero)"
-        return [f"p {'< 1e-12' if self.p < 1e-12 else f'= {self.p:.2g}'}; {below}"]
+            return [f"Difference {size}; not tested: that needs the covariance of both models."]
+        a, b = (std or 0.0 for std in self.each_std_arcsec)
+        known = f"the uncertainty of A is {unit.text(a)} rms, that of B {unit.text(b)}"
+        if self.verdict == "same":
+            lines = [f"No significant difference: {size}.", f"Use {'BA'[a <= b]}: {known}."]
+        else:
+            lines = [f"Changed: the difference is significant, {size}.", f"Of them {known}."]
+            lines.append("Which is right now: trueangle watch READINGS --model A, then B.")
+        p = f"p {'< 1e-12' if self.p < 1e-12 else f'= {self.p:.2g}'} by noise alone"
+        return [*lines, f"{p}; below {self.false_alarms:g} is a change."]
 
     def _arithmetic(self, unit: ErrorUnit) -> list[str]:
         if self.table_max_abs_arcsec is None or self.table_rms_arcsec is None:
             return []
-        return [
-            f"the table's own arithmetic adds at most {unit.text(self.table_max_abs_arcsec)}, "
-            f"{unit.number(self.table_rms_arcsec)} rms: lines between its entries, whole numbers"
-        ]
+        sizes = f"{unit.text(self.table_max_abs_arcsec)}, {unit.number(self.table_rms_arcsec)} rms"
+        return [f"Interpolation and whole numbers of the table add at most {sizes}."]
 
 
 @told_kinds
@@ -213,36 +223,28 @@ def compare(
             z = complex(spectrum[round(order)].conjugate())
         else:
             z = complex(2.0 * np.mean(difference * np.exp(2j * np.pi * order * x)))
-        rows.append(
-            {
-                "order": order,
-                "amplitude_arcsec": abs(z) * ARCSEC_PER_TURN,
-                "phase_deg": math.degrees(math.atan2(z.real, z.imag)) % 360.0,
-                "std_arcsec": _std(first, second, order),
-            }
-        )
-    tables = [m.fit.table for m in (first, second) if m.fit is not None and m.fit.table is not None]
-    per_unit = [ARCSEC_PER_TURN / m.period for m in (first, second) if m.fit and m.fit.table]
-    terms = [
-        kind
-        for kind in dict.fromkeys(t.kind for t in (*first.terms, *second.terms))
-        if _terms(first, kind) != _terms(second, kind)
+        size = {"order": order, "amplitude_arcsec": abs(z) * ARCSEC_PER_TURN}
+        phase = math.degrees(math.atan2(z.real, z.imag)) % 360.0
+        rows.append({**size, "phase_deg": phase, "std_arcsec": _std(first, second, order)})
+    tables = [
+        (m.fit.table, ARCSEC_PER_TURN / m.period) for m in (first, second) if m.fit and m.fit.table
     ]
+    kinds = dict.fromkeys(t.kind for t in (*first.terms, *second.terms))
+    terms = [kind for kind in kinds if _terms(first, kind) != _terms(second, kind)]
+    each = [pattern.uncertainty_arcsec for pattern in (one, two)]
+    known = [std for std in each if std is not None]
     told: Equality | None = pattern_equality(first, second) if same else None
     return Comparison(
         orders=rows,
         rms_arcsec=float(np.sqrt(np.mean(difference**2))) * ARCSEC_PER_TURN,
         max_abs_arcsec=float(np.max(np.abs(difference))) * ARCSEC_PER_TURN,
-        std_arcsec=_over_a_turn(one, two),
+        std_arcsec=math.hypot(*known) if known else None,
+        each_std_arcsec=each,
         zero_deg=_signed(two.zero - one.zero + zero) * 360.0,
         argument="indicated" if at_readings else first.argument if same else "reference",
         differ_in=terms,
-        table_rms_arcsec=math.hypot(*(t.rms * u for t, u in zip(tables, per_unit, strict=True)))
-        if tables
-        else None,
-        table_max_abs_arcsec=sum(t.max_abs * u for t, u in zip(tables, per_unit, strict=True))
-        if tables
-        else None,
+        table_rms_arcsec=math.hypot(*(t.rms * u for t, u in tables)) if tables else None,
+        table_max_abs_arcsec=sum(t.max_abs * u for t, u in tables) if tables else None,
         verdict=None if told is None else told.verdict,
         p=None if told is None else told.p,
     )
@@ -292,11 +294,6 @@ def _std(first: HarmonicModel, second: HarmonicModel, order: float) -> float | N
                     total += float(variance) / model.period**2
                 at += 2
     return math.sqrt(total) * ARCSEC_PER_TURN if known else None
-
-
-def _over_a_turn(one: TurnPattern, two: TurnPattern) -> float | None:
-    known = [p.uncertainty_arcsec for p in (one, two) if p.uncertainty_arcsec is not None]
-    return math.hypot(*known) if known else None
 
 
 def _terms(model: HarmonicModel, kind: str) -> list[Any]:

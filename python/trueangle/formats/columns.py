@@ -85,9 +85,8 @@ def find_columns(path: object, header: Sequence[str], wanted: Wanted) -> dict[st
         candidates = [c for c in _by_name(header, role) if c.name not in taken]
         if len(candidates) > 1:
             names = " and ".join(c.name for c in candidates)
-            problem = (
-                f"units are mixed: {names}; keep one, or name it with {role_code(role, unit=None)}"
-            )
+            first = role_code(role, candidates[0].name, None)
+            problem = f"{len(candidates)} columns for the role {role}: {names}; choose one: {first}"
             raise FileError(path, problem, line=1, column=candidates[1].name)
         if candidates:
             found[role] = candidates[0]

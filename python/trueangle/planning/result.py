@@ -74,20 +74,21 @@ class ArcPlan(PlainResult):
         """The plan as text: a table to follow at the rig."""
         each = f": {sum(self.counts)} in each of {self.runs} runs" if self.runs > 1 else ""
         way = ", half from either side" if self.both_directions else ""
-        lines = [
-            f"{self.readings} readings over {self.start_deg:g} to {self.stop_deg:g} deg{each}{way}",
+        arc = f"{self.start_deg:g} to {self.stop_deg:g} deg"
+        lines = [f"{self.readings} readings over {arc}{each}{way}"]
+        if self.uncertainty_arcsec is not None:
+            size = f"{self.uncertainty_arcsec:.3g} arcsec"
+            lines.append(f"  uncertainty (k = 2)    {size} at the worst place")
+        lines += [
             *place_table(self.places_deg, self.counts),
             f"  D-efficiency           {self.d_efficiency:.3f} of the best possible",
             f"  of even spacing        {self.efficiency_of_even_spacing:.3f}",
+            f"  noise factor per order {_FACTOR}",
             "  order  noise factor  with even spacing",
         ]
         for order, factor in self.noise_factors.items():
             even = self.even_noise_factors[order]
             lines.append(f"  {order:5g}  {_factor(factor):>12}  {_factor(even):>17}")
-        if self.uncertainty_arcsec is not None:
-            lines.append(
-                f"  uncertainty (k = 2)    {self.uncertainty_arcsec:.3g} arcsec at the worst place"
-            )
         lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)
 
@@ -96,6 +97,10 @@ class ArcPlan(PlainResult):
             f"{self.readings} readings at {counted(self.places_deg, 'place')}, "
             f"worst factor {self.worst_noise_factor:.3g}"
         )
+
+
+#: What a noise factor compares with.
+_FACTOR = "(1: as from as many readings over whole turns)"
 
 
 def _factor(factor: float) -> str:
@@ -165,31 +170,32 @@ class CalibrationPlan(PlainResult):
         offsets = ", ".join(f"{o:.4g}" for o in self.mount_offsets_deg)
         if self.kind == "encoder":
             lines = [
-                f"{self.positions} jittered positions of a free reference encoder",
-                f"  clamp it at            {offsets} deg",
+                f"{self.readings or self.positions} readings at {self.positions} jittered "
+                f"positions of a free reference encoder, clamped at {offsets} deg in turn"
             ]
         else:
-            what = "mounts" if self.kind == "mounts" else "tilts"
+            each = self.positions * len(self.mount_offsets_deg)
+            rounds = "" if self.readings is None else f", {self.readings // each} times each"
+            total = f"{self.readings or each} readings in all{rounds}"
+            mounts = counted(self.mount_offsets_deg, self.kind.removesuffix("s"))
             lines = [
-                f"{len(self.mount_offsets_deg)} {what} of {self.positions} positions",
-                f"  offsets                {offsets} deg",
-                f"  tolerance              {self.tolerance_deg:.2g} deg, known to 0.01 deg",
+                f"{mounts} of {self.positions} positions, offset by {offsets} deg: {total}",
+                f"  tolerance              offsets within {self.tolerance_deg:.2g} deg of these, "
+                "measured to 0.01 deg",
             ]
         if self.kind == "mounts":
             shifts = ", ".join(str(s) for s in self.facet_shifts)
             facet = self.facet_noise_factor
             factor = f"{facet:.2f}" if math.isfinite(facet) else "impossible with one mount"
             lines += [
-                f"  facet shifts           {shifts} facets",
+                f"  turn the artefact by   {shifts} facets, one for each mount",
                 f"  artefact fitted too    factor {factor}",
             ]
         lines += [
             f"  worst noise factor     {self.worst_noise_factor:.2f}",
-            "  noise factor per order",
+            f"  noise factor per order {_FACTOR}",
             *factor_table(self.noise_factors),
         ]
-        if self.readings is not None:
-            lines.append(f"  readings needed        {self.readings}")
         lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)
 
@@ -274,25 +280,22 @@ class SelfPlan(PlainResult):
 
     def summary(self) -> str:
         """The plan as text."""
-        lines = [f"{self.method}, without a reference"]
-        if self.angles_deg:
-            lines.append(
-                f"  angles                 {', '.join(f'{a:g}' for a in self.angles_deg)} deg"
-            )
+        parts = {
+            f"{self.method} at {{}} deg": ", ".join(f"{a:g}" for a in self.angles_deg),
+            "coast until {:g} times slower": self.speed_ratio,
+            f"record {{:.3g}} turn{'s' * (self.turns != 1.0)}": self.turns,
+            "{} readings": self.readings,
+            "{:.3g} s": self.seconds,
+        }
+        steps = ", ".join(text.format(value) for text, value in parts.items() if value)
+        lines = [f"{self.method}, without a reference: {steps}"]
         if self.speed_ratio is not None:
             table = ", ".join(f"{r:g}: {f:.2g}" for r, f in self.speed_ratio_factors.items())
             lines += [
-                f"  speed ratio            {self.speed_ratio:g}",
                 f"  factor by ratio        {table}",
                 f"  knots per turn         at most {self.knots_per_turn:g}, in the slowest part",
             ]
         lines.append(f"  worst noise factor     {self.worst_noise_factor:.2f}")
-        if self.turns is not None:
-            lines.append(f"  turns                  {self.turns:.3g}")
-        if self.readings is not None:
-            lines.append(f"  readings needed        {self.readings}")
-        if self.seconds is not None:
-            lines.append(f"  seconds                {self.seconds:.3g}")
         if self.given:
             given: Any = self.given
             names = ", ".join(f"{k:g}" for k in given["blind_orders"])
@@ -303,7 +306,7 @@ class SelfPlan(PlainResult):
                 if names
                 else f"  the given angles       factor {factor}, {worse}"
             )
-        lines += ["  noise factor per order", *factor_table(self.noise_factors)]
+        lines += [f"  noise factor per order {_FACTOR}", *factor_table(self.noise_factors)]
         lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)
 

@@ -31,7 +31,7 @@ SEEDS = 10
 WITHIN = 10.0
 
 #: What is reported where there was no time for them.
-UNTRIED = "not rehearsed: the time limit was reached; give a longer one (`within`) to count how "
+UNTRIED = "not rehearsed: the time limit was reached; give a longer one (`within=60`) to count how "
 UNTRIED += "often the true cause is named"
 
 #: Factor of the readings where simulated diagnoses do not name the cause often enough.

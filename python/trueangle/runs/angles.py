@@ -277,9 +277,10 @@ def _check_alike(error: Callable[[str, str], FileError], found: Mapping[str, Rol
     suffixes = [c.name == f"{c.role}_{c.unit}" for c in (reference, indicated)]
     differ = reference.unit != indicated.unit and "count" not in (reference.unit, indicated.unit)
     if differ and by_name and all(suffixes):
+        told = ", ".join(f'"{c.role}": ("{c.name}", "{c.unit}")' for c in (reference, indicated))
         raise error(
-            f"units are mixed: reference in {reference.unit}, indicated in {indicated.unit}; "
-            "convert one, or name both with `signals=`",
+            f"units are mixed by the columns' names: {reference.unit} and {indicated.unit}; if "
+            f"that is so, state it: `signals={{{told}}}`; if not, state the true units there",
             indicated.name,
         )
 

@@ -158,10 +158,7 @@ class Deadline:
             return "it was interrupted"
         if self.within is not None:
             return f"the {self.within:g} s given were up"
-        return (
-            f"the usual work ({self._bound:.2g} numbers) was done (for more give `within`, a time "
-            "in seconds)"
-        )
+        return "the usual limit of work was reached"
 
     @contextlib.contextmanager
     def bounded(self, items: int) -> Iterator[None]:

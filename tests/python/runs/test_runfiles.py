@@ -69,7 +69,7 @@ REFUSED = {
     "infinity": (GOOD.replace("90.5", "inf"), r"line 3, column 'indicated_deg'.*inf"),
     "short line": (GOOD.replace(",y", ""), "line 3: 4 values where the header has 5"),
     "time": (GOOD.replace("90.5,1", "90.5,-1"), r"line 3, column 'time_s'.*backwards"),
-    "two units": ("reference_deg,reference_rad,indicated_deg\n1,1,1\n", "units are mixed"),
+    "two units": ("reference_deg,reference_rad,indicated_deg\n1,1,1\n", "2 columns for"),
     "mixed units": ("reference_deg,indicated_rad\n1,1\n", "units are mixed.*deg.*rad"),
     "reference in counts": ("reference_count,indicated_deg\n1,1\n", "reference_count"),
     "doubled column": ("reference_deg,indicated_deg,indicated_deg\n1,1,1\n", "twice"),

@@ -144,7 +144,7 @@ class Factor(PlainResult):
         range_ = f"{n(self.low)} to" if self.low else "at most"
         text += f", {n(self.rms)} {unit.name} rms ({range_} {n(self.high)})"
         held = "; the extended simulation contains its curve" if self.effects else ""
-        return f"{text}: {', '.join(self.named_by) or f'no known cause fits{held}'}"
+        return f"{text}: {', '.join(self.named_by) or f'cause not determined{held}'}"
 
     def _brief(self) -> str:
         return f"{self.factor}, {self.rms:.3g} arcsec rms, {', '.join(self.named_by) or 'no name'}"

@@ -16,6 +16,7 @@ from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
 from ...support.arrays import Array
 from ...support.display_units import brief_number
+from ...support.layout import counted
 from ..rounding import rounding_step
 from .candidates import LIKELY, Candidates
 from .chosen import held_out_gains
@@ -31,6 +32,9 @@ from .zerogroups import folds_of_run, some_angles, some_readings, zero_groups
 
 if TYPE_CHECKING:
     from ..summed import SummedReadings
+
+#: Readings from which a choice among orders is sound: fewer are refused with a plan.
+FEW: Final = 20
 
 #: Probability, over the whole search, of an order made by a coarse sensor's rounding alone.
 FALSE_ALARM: Final = 0.005
@@ -79,15 +83,14 @@ class EvidenceSelection:
         self.sums = harmonic_sums(self.units, self.orders)
         self.folds: HarmonicSums | None = self.sums
         if len(self.units) > 1:
-            self.holdout = "one run at a time"
-            if len(self.units) > len(runs):
-                self.holdout = "one mount at a time"
+            what = "mount" if len(self.units) > len(runs) else "run"
             if self.sums.units < len(self.units):
-                self.holdout = f"one of {self.sums.units} groups of runs at a time"
+                what = f"of {self.sums.units} groups of runs"
         else:
-            self.holdout = "blocks of neighbouring positions of the single run"
+            what = "block of neighbouring positions"
             parts = folds_of_run(units[0], self.positions) if len(units) == 1 else []
             self.folds = harmonic_sums(parts, self.orders) if parts else None
+        self.holdout = f"each {what} predicted by a fit to the others"
 
     def result(self) -> OrderSelection:
         """The selection with its table."""
@@ -222,6 +225,8 @@ class EvidenceSelection:
                 )
             )
         retained = {row.order: row.amplitude for row in rows if row.verdict in IN_MODEL}
+        if not retained and self.samples <= len(self.units) + 2:  # no reading for the noise
+            rows = []
         rows = [row_with_verdict(row, self.candidates, self.positions, retained) for row in rows]
         orders = tuple(retained)
         selection = OrderSelection(
@@ -243,21 +248,24 @@ class EvidenceSelection:
 
     def _refusal(self, rows: Sequence[OrderRow], estimate: EvidenceEstimate) -> str:
         """Why nothing was retained."""
+        plan = f"run: `ta.plan_arc(0, 360, readings={FEW})`"
         if not rows:
+            read = f"{counted(self.samples, 'reading')} at {counted(self.positions, 'position')}"
+            zeros = counted(self.units, "zero")
             return (
-                f"{len(self.positions)} distinct positions cannot separate an order from the zero: "
-                "read at three positions or more"
+                f"too few readings: {read}; {zeros} and one order need {len(self.units) + 3}, "
+                f"a choice among orders {FEW}; {plan}"
             )
         best = max(rows, key=lambda row: row.probability)
-        beside = f"the strongest of {len(self.orders)} orders searched, {best.order:g},"
+        beside = f"order {best.order:g}, the strongest of {len(self.orders)},"
         if best.verdict == "reference":
             return "the only significant orders are the reference's own"
         if best.verdict not in ("noise", "alias"):
             return f"{beside} {verdict_reason(best.verdict)}"
-        told = (
-            f"{beside} is not significant (probability {brief_number(100.0 * best.probability)} %)"
-        )
-        return "; ".join([told, *drift_of_a_sweep(self.runs, estimate.noise)])
+        chance = f"(probability {brief_number(100.0 * best.probability)} %)"
+        steps = [f"take {FEW} readings or more; {plan}"] if self.samples < FEW else []
+        why = [f"{beside} is not significant {chance}"]
+        return "; ".join([*why, *drift_of_a_sweep(self.runs, estimate.noise), *steps])
 
     def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> tuple[Array, float]:
         """Reduction of the held-out mean square by each order; that of the chosen orders."""

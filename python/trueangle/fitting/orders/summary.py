@@ -9,8 +9,8 @@ from typing import Any, Final
 from ...estimation.evidence import CORRELATION_TIMES
 from ...support.angles import arcsec
 from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, rounded_phase, sine_of_rms
-from ...support.layout import counted, laid_out, wrapped_lines
-from ...support.plainresult import finite_or_none
+from ...support.layout import counted, laid_out, order_ranges, wrapped_lines
+from ...support.plainresult import finite_or_none, plain_fields
 from .table import OrderRow, OrderTable
 
 
@@ -21,16 +21,17 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
     before, after = (arcsec(v, period) for v in selection.holdout_rms)
     unit = selection_error_unit(selection, errors_in)
     noise_std = noise / math.sqrt(2.0 * max(1.0, selection.noise.degrees_of_freedom))
-    runs = f"{selection.runs} run{'s' if selection.runs != 1 else ''}"
     retained = [row for row in selection.table if row.retained]
-    lines = [
-        f"{counted(retained, 'order')} retained: held-out error {unit.number(before)} -> "
-        f"{unit.text(after)} rms ({selection.holdout}).",
-        f"Orders of the angle error ({selection.method})",
-        f"  {selection.samples} readings in {runs}, {selection.positions.describe()}",
-        f"  noise of one reading  {unit.number(noise, noise_std)} {unit.name}"
-        f"{_source(selection, unit)}",
-    ]
+    head = f"NO ORDER RETAINED: {selection.reason}."
+    if retained:
+        sizes = f"{unit.number(before)} -> {unit.text(after)}"
+        head = f"{counted(retained, 'order')} retained: held-out error {sizes} rms "
+        head += f"({selection.holdout})."
+    read = f"{counted(selection.samples, 'reading')} in {counted(selection.runs, 'run')}"
+    lines = [head, f"  {read}, {selection.positions.describe()}"]
+    if selection.table:
+        size = f"{unit.number(noise, noise_std)} {unit.name}"
+        lines.append(f"  noise of one reading  {size}{_source(selection, unit)}")
     others = [row for row in selection.table if not row.retained and row.verdict != "alias"]
     others.sort(key=lambda row: row.log10_false_alarm)
     # Rejected orders listed in addition to the retained ones, the strongest first.
@@ -39,11 +40,10 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
         lines += ["", _HEADER, _units(unit), *(_line(row, period, unit) for row in shown)]
     hidden = len(selection.table) - len(shown)
     if hidden:
-        lines.append(f"  ... and {hidden} weaker orders, not retained")
-    lines.append("")
-    if not retained:
-        lines.append(f"NO ORDER RETAINED: {selection.reason}")
-    lines += _explanations(retained)
+        lines.append(f"  ... and {counted(hidden, 'weaker order')}, not retained")
+    if shown:
+        lines += wrapped_lines(_LEGEND, 2, 2)
+    lines += ["", *_explanations(retained, selection)]
     for row in selection.table:
         if row.doubtful or row.verdict == "reference":
             text = row.reason if row.doubtful else f"{row.order:g}: {row.reason}"
@@ -61,7 +61,12 @@ def selection_error_unit(selection: OrderTable, errors_in: ErrorsIn = "auto") ->
 
 _COLUMNS: Final = "  {:>5} {:>9} {:>7} {:>7} {:>5} {:>6} {:>11} {:>8}  {}"
 _HEADER: Final = _COLUMNS.format(
-    "order", "amplitude", "+-", "phase", "+-", "spread", "probability", "held out", "verdict"
+    "order", "amplitude", "+-", "phase", "+-", "range", "probability", "held out", "verdict"
+)
+
+_LEGEND: Final = (
+    "range: of the phase over the runs; gain: share of the mean square error that the order "
+    "removes from readings not fitted"
 )
 
 
@@ -76,19 +81,22 @@ def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
     chance = f"{row.probability:.3f}" if math.isfinite(row.probability) else "-"
     spread = f"{row.phase_spread_deg:.0f}" if math.isfinite(row.phase_spread_deg) else "-"
     phase, phase_std = rounded_phase(row.phase_deg, row.phase_error_deg)
-    gain = f"{100.0 * row.holdout_gain:.1f}"
+    gain = f"{100.0 * row.holdout_gain:z.1f}"
     order = f"{row.order:g}"
     return _COLUMNS.format(order, size, std, phase, phase_std, spread, chance, gain, row.verdict)
 
 
-def _explanations(rows: Sequence[OrderRow]) -> list[str]:
+def _explanations(rows: Sequence[OrderRow], selection: OrderTable) -> list[str]:
     """Possible causes of each retained order; its aliases are reported separately."""
-    lines = []
-    for row in rows:
-        names = [e.name for e in row.explanations if e.order == row.order and not e.assumed]
-        if names:
-            text = f"{row.order:g}: {'; or '.join(names)}"
-            lines += wrapped_lines(text, 5, 2)
+    known = {
+        row.order: [e.name for e in row.explanations if e.order == row.order and not e.assumed]
+        for row in rows
+    }
+    told = [f"{order:g}: {'; or '.join(names)}" for order, names in known.items() if names]
+    if unknown := [order for order, names in known.items() if not names]:
+        gear = "" if selection.gear_ratio else "; with a gear, state its ratio: `gear_ratio=R`"
+        told.append(f"{order_ranges(unknown)}: no known cause{gear}")
+    lines = [line for text in told for line in wrapped_lines(text, 5, 2)]
     return ["What they may be:", *lines, ""] if lines else []
 
 
@@ -107,11 +115,9 @@ def _source(selection: OrderTable, unit: ErrorUnit) -> str:
         if not parts:
             return ", white"
         return f": {', '.join([f'white {unit.text(white)}', *parts])}"
-    what = {
-        "repeats": "repeats at the same positions",
-        "residual": "the residual of all candidates",
-    }[noise.source]
-    return f", from {what} ({noise.degrees_of_freedom} degrees of freedom)"
+    repeats = "repeats at the same positions"
+    what = repeats if noise.source == "repeats" else "the residual of all candidates"
+    return f", from {what} ({counted(noise.degrees_of_freedom, 'degree')} of freedom)"
 
 
 def plain_selection(selection: OrderTable) -> dict[str, Any]:
@@ -121,35 +127,25 @@ def plain_selection(selection: OrderTable) -> dict[str, Any]:
     return {
         "distinct_positions": len(selection.positions),
         "positions": selection.positions.describe(),
-        "samples": selection.samples,
-        "runs": selection.runs,
-        "method": selection.method,
-        "argument": selection.argument,
+        **plain_fields(selection, "samples runs method argument"),
         "noise_arcsec": finite_or_none(scale * selection.noise.standard_deviation),
         "noise_source": selection.noise.source,
         "holdout": selection.holdout,
         "holdout_rms_before_arcsec": finite_or_none(scale * before),
         "holdout_rms_after_arcsec": finite_or_none(scale * after),
-        "reason": selection.reason,
-        "notes": list(selection.notes),
+        **plain_fields(selection, "reason notes"),
         "orders": [_row(row, scale) for row in selection.table],
     }
 
 
 def _row(row: OrderRow, scale: float) -> dict[str, Any]:
+    phase = "phase_std_deg=phase_error_deg phase_spread_deg"
     return {
-        "order": row.order,
-        "retained": row.retained,
-        "verdict": row.verdict,
-        "probability": finite_or_none(row.probability),
+        **plain_fields(row, "order retained verdict probability"),
         "amplitude_arcsec": finite_or_none(scale * row.amplitude),
         "phase_deg": finite_or_none(row.phase_deg % 360.0),
         "std_arcsec": finite_or_none(scale * row.standard_error),
-        "phase_std_deg": finite_or_none(row.phase_error_deg),
-        "phase_spread_deg": finite_or_none(row.phase_spread_deg),
-        "log10_false_alarm": finite_or_none(row.log10_false_alarm),
-        "holdout_gain": finite_or_none(row.holdout_gain),
-        "aliases": list(row.aliases),
+        **plain_fields(row, f"{phase} log10_false_alarm holdout_gain aliases"),
         "explanations": [str(e) for e in row.explanations],
         "reason": row.reason,
     }

@@ -35,19 +35,19 @@ from .table import OrderRow
 
 _VERDICTS: Final = {
     "noise": "is not significant",
-    "negligible": "significant, but too small to change any reading",
+    "negligible": "is significant, but too small to change any reading",
     "too steep": "with it several true angles give one reading: it "
     "can be corrected with argument='indicated' only",
     "rounding": "may be made by the sensor's rounding to whole steps, which at evenly spaced "
     "positions is the same each time: read at other positions, too",
-    "shared": "orders are collinear over this travel: it is needed for the "
-    "curve, but may not be real",
-    "in time": "a line of a fixed frequency in time explains it better: a vibration or an "
+    "shared": "is collinear with others over this travel: needed for the curve, but perhaps not "
+    "real",
+    "in time": "follows the time better, as a line of a fixed frequency: a vibration or an "
     "electrical line, and no error of a place",
     "small": "has no prominent amplitude",
-    "phase varies": "its phase varies from run to run",
-    "too long": "over so short a travel, passed once, it cannot be distinguished from drift in "
-    "time (fitted jointly, not kept): run it there and back, or declare the orders",
+    "phase varies": "varies in phase from run to run",
+    "too long": "cannot be distinguished from drift in time over so short a travel, passed once "
+    "(fitted jointly, not kept): run it there and back, or declare the orders",
     "alias": "cannot be distinguished from retained orders at these positions",
 }
 

@@ -188,14 +188,11 @@ def duplicate_runs(records: list[Record]) -> Iterator[DataFault]:
             same.setdefault(hashlib.sha256(data).digest(), []).append(record.label)
     for labels in same.values():
         if len(labels) > 1:
-            yield DataFault.of(
-                "duplicate_runs",
-                labels,
-                (),
-                f"runs {_listed(labels)} hold the same readings, to the last digit: "
-                "noise and repeatability would come out too good",
-                "keep one of them",
-            )
+            says = f"runs {', '.join(labels[:-1])} and {labels[-1]} hold the same readings, to the "
+            says += "last digit: noise and repeatability would come out too good"
+            others = " ".join(f"--run '!{label}'" for label in labels[1:])
+            mend = f"keep the first (of a command: {others})"
+            yield DataFault.of("duplicate_runs", labels, (), says, mend)
 
 
 def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
@@ -232,7 +229,3 @@ def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
                 f"the last digit (first: row {rows[0]}): uncertainties would come out too small",
                 "drop the copies",
             )
-
-
-def _listed(labels: list[str]) -> str:
-    return f"{', '.join(labels[:-1])} and {labels[-1]}"
