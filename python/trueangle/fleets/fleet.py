@@ -302,12 +302,10 @@ def _among_tails(count: int) -> str:
 def _outlying(units: Units, u: int, found: Deviates, joint: Joint) -> str:
     """Which orders, and what they are likely to be."""
     places = found.orders(u)
-    told = [
-        f"order {units.orders[k]:g} is {found.size[u, k]:.1f} standard deviations from the others"
-        for k in places[:3]
-    ]
-    cause = joint.explanations(float(units.orders[places[0]]))[0]
-    return f"{', '.join(told)}: {cause}"
+    first, *others = (f"order {units.orders[k]:g} is {found.size[u, k]:.1f}" for k in places[:3])
+    told = ", ".join([f"{first} standard deviations from the others", *others])
+    whose = f"; order {units.orders[places[0]]:g}" if others else ""
+    return f"{told}{whose}: {joint.explanations(float(units.orders[places[0]]))[0]}"
 
 
 def _moved(units: Units, u: int, change: Change, joint: Joint) -> tuple[Verdict, str]:

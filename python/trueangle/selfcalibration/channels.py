@@ -198,7 +198,7 @@ def _table(channels: Channels, found: ChannelEstimate) -> list[OrderEstimate]:
 def _blind(channels: Channels, unit: float, known: set[float]) -> list[Blind]:
     """Orders whose sign the curve does not show: offset against an eccentric magnet, and so on."""
     p = float(channels.periods_per_turn)
-    measure = "`fit` with a reference, or record time_s over five turns and more of smooth motion"
+    measure = "fit with a reference, or record time_s over five turns and more of smooth motion"
     rows = [
         (
             1.0,

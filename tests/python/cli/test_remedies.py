@@ -224,27 +224,22 @@ def few() -> list[ta.CalibrationRun]:
     return one_run(theta, np.random.default_rng(6).normal(0.0, 5.0, theta.size))
 
 
+def three() -> list[ta.CalibrationRun]:
+    return one_run(np.arange(3.0), np.arange(3.0) ** 2)
+
+
 #: What is refused: readings, the command, words of the message, the command that helps.
 REFUSALS: dict[str, tuple[Callable[[], list[ta.CalibrationRun]], list[str], str, str]] = {
     "no order": (noise, ["fit", "R", "-o", "m.json"], "no order is supported", "diagnose"),
-    "no order, few readings": (
-        few,
-        ["fit", "R", "-o", "m.json"],
-        "take 20 readings or more",
-        "plan",
-    ),
+    "no order, few readings": (few, ["fit", "R", "-o", "m.json"], "take 20 readings", "plan"),
+    "no order, 3 readings": (three, ["fit", "R", "-o", "m.json"], "1 zero and one order", "plan"),
     "no order, a gear": (
         noise,
         ["fit", "R", "-o", "m.json", "--gear-ratio", "50.5", "--fixed-member", "none"],
         "no order is supported",
         "diagnose",
     ),
-    "too steep": (
-        steep,
-        ["fit", "R", "-o", "m.json", "--orders", "24"],
-        "may reach",
-        "fit",
-    ),
+    "too steep": (steep, ["fit", "R", "-o", "m.json", "--orders", "24"], "may reach", "fit"),
     "too steep, diagnosed": (
         steep,
         ["diagnose", "R", "--gear-ratio", "1", "--corrected-model", "m.json"],

@@ -252,8 +252,9 @@ class EvidenceSelection:
         if not rows:
             read = f"{counted(self.samples, 'reading')} at {counted(self.positions, 'position')}"
             zeros = counted(self.units, "zero")
+            what = "readings" if self.samples <= len(self.units) + 2 else "positions"
             return (
-                f"too few readings: {read}; {zeros} and one order need {len(self.units) + 3}, "
+                f"too few {what}: {read}; {zeros} and one order need {len(self.units) + 3}, "
                 f"a choice among orders {FEW}; {plan}"
             )
         best = max(rows, key=lambda row: row.probability)
