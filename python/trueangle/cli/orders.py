@@ -81,5 +81,7 @@ def _in_one_pass(args: argparse.Namespace) -> OrderSelection:
     from ..logs.fitting import select_log_orders
 
     if args.orders is not None or args.method != "evidence":
-        raise ArgumentError("--orders and --method do not go with logs in one pass")
+        raise ArgumentError(
+            "--orders and --method need all readings in memory, not logs in one pass"
+        )
     return select_log_orders(args.runs, **log_options(args))

@@ -102,9 +102,9 @@ def _refuse_beyond_limit(found: ChannelEstimate, named: str) -> None:
         return
     unit = math.degrees(1.0) / found.channels.periods_per_turn
     raise NoCurveError(
-        f"{named}: {found.coverage:.0f} deg of the channels' period determine the angle to "
-        f"{found.limit * unit:.2g} deg, and the correction is {found.takes * unit:.2g} deg: turn "
-        "the shaft 120 deg or more, or average readings"
+        f"{named}: the correction, {found.takes * unit:.2g} deg, is uncertain by "
+        f"{found.limit * unit:.2g} deg: the readings cover {found.coverage:.0f} deg of the "
+        "channels' period only; turn the shaft 120 deg or more, or average readings"
     )
 
 

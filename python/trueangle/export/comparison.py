@@ -193,8 +193,8 @@ def compare(
     orders = sorted({*one.lines, *two.lines})
     if not (one.is_periodic and two.is_periodic) and first.argument != second.argument:
         raise ArgumentError(
-            "models of other arguments, with shafts that do not come back to their start after "
-            "one output turn, cannot be compared per order: fit both with the same `argument=`"
+            "one model follows the reference and one the indicated angle, and a shaft is not "
+            "periodic in one output turn: fit both with the same `argument=`"
         )
     at_readings = _is_looked_up(first) or _is_looked_up(second)
     same = first.argument == second.argument and not at_readings

@@ -48,7 +48,7 @@ def run_phases(fit: FitResult) -> list[Phases]:
         labels.append(run.label or str(number + 1))
         coefficients.append((alone.amplitudes, alone.phases))
     if not labels:
-        raise RankError("no run holds these orders by itself: their phases cannot be compared")
+        raise RankError("no run alone determines these orders and their phases: fit longer runs")
     factor = ARCSEC_PER_TURN / fit.model.period
     amplitude = factor * np.array([a for a, _ in coefficients])
     phase = np.array([p for _, p in coefficients])

@@ -167,7 +167,7 @@ def posterior(problem: Problem, prior: Prior, loss: str) -> tuple[RobustFit, Pos
         Another loss than these two.
     """
     if loss not in ("auto", "linear"):
-        raise ArgumentError(f"loss must be 'auto' or 'linear' with prior=, got {loss!r}")
+        raise ArgumentError(f"loss must be 'auto' or 'linear' with `prior=`, got {loss!r}")
     prior = prior.among(problem.shafts)
     weights = list(problem.base)
     found, taken = _solved(problem, prior, weights)
@@ -284,7 +284,7 @@ def fitted_with_prior(
     """See `trueangle.fit` with ``prior``."""
     for name, value in asked.items():
         if not (value is None or value == _USUAL[name]):
-            raise ArgumentError(f"{name} does not go with prior=; leave one of them out")
+            raise ArgumentError(f"{name} does not go with `prior=`; leave one of them out")
     check_choice("argument", argument, ARGUMENTS)
     check_usable(runs)
     known = fleet_prior(prior, runs[0].period)

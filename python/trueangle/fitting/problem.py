@@ -326,9 +326,7 @@ class SummedProblem(Problem):
     def products(self, weights: Sequence[Array | None], index: int, count: int) -> list[Array]:
         """As of readings in memory; of whole runs only."""
         if count != 1:
-            raise ArgumentError(
-                "one pass does not keep segments of runs: take covariance='cluster'"
-            )
+            raise ArgumentError("one pass keeps no segments of runs: take `covariance='cluster'`")
         moments = self.summed.moments
         orders = [k * shaft.cycles_per_turn for shaft in self.shafts for k in shaft.orders]
         steps = np.rint(np.asarray(orders) / moments.cycles).astype(np.int64)

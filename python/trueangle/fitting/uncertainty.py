@@ -96,8 +96,8 @@ def check_covariance(kind: str, runs: int) -> None:
     check_choice("covariance", kind, COVARIANCES)
     if kind == "cluster" and runs < 2:
         raise ArgumentError(
-            "covariance='cluster' takes whole runs as clusters and needs two at least: measure "
-            "further runs, or take 'hac'"
+            "`covariance='cluster'` takes whole runs as clusters and needs two at least: measure "
+            "further runs, or take `covariance='hac'`"
         )
 
 

@@ -189,8 +189,8 @@ def plan_unit(
     check_arc(start, stop)
     if (uncertainty is None) == (readings is None):
         raise ArgumentError(
-            "give uncertainty= (how few readings are enough) or readings= (what they are enough "
-            "for), one of them"
+            "give either `uncertainty=` (how few readings are enough) or `readings=` (what they "
+            "are enough for)"
         )
     known = Spread.of(prior, orders, noise, start / 360.0, stop / 360.0)
     check_sizes(uncertainty=uncertainty)

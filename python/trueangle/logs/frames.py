@@ -266,8 +266,8 @@ def _from_dask_array(da: Any, data: Any, settings: LogSettings) -> Any:
         raise ArgumentError(_OUT_OF_ORDER.format("a Dask array", "compute it first"))
     if data.ndim != 1:
         raise ArgumentError(
-            "the model's error does not repeat after one turn: turns are counted along arrays "
-            f"of one dimension, got {data.ndim}"
+            "the model's error does not repeat after one turn, so turns are counted along the "
+            f"array: give one of one dimension, got {data.ndim}"
         )
     return _in_order(da, data, settings, kind)
 

@@ -408,7 +408,7 @@ def _joint(
     if "indicated" in signals:
         if column is not None:
             raise ArgumentError(
-                "column= and signals={'indicated': ...} both name the angle; give one"
+                "`column=` and `signals={'indicated': 'NAME'}` both name the angle; give one"
             )
         column, unit = signals.pop("indicated")
     if isinstance(entry, HarmonicModel):

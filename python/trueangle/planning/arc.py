@@ -252,7 +252,7 @@ def _spread(turns: Array, apart: float, columns: OrthonormalColumns) -> Array:
     if (turns.size - 1) * apart > stop - start:
         raise ArgumentError(
             f"{turns.size} places cannot be {apart * 360.0:g} deg apart on "
-            f"{(stop - start) * 360.0:g} deg: fewer `readings`, or a smaller `apart`"
+            f"{(stop - start) * 360.0:g} deg: lower `readings=` or `apart=`"
         )
     ordered = np.sort(turns)
     # Groups around their places, then pushed from either end: distances stay, the order too.

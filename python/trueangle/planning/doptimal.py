@@ -62,7 +62,7 @@ class OrthonormalColumns:
         if values[-1] < _SINGULAR * values[0]:
             raise ArgumentError(
                 f"orders {', '.join(f'{k:g}' for k in orders)} are collinear over "
-                f"{(stop - start) * 360.0:g} deg: use fewer `orders`, or a longer arc"
+                f"{(stop - start) * 360.0:g} deg: use fewer orders (`orders=`), or a longer arc"
             )
         self._turned = turned.T * (math.sqrt(self.grid.size) / values)
         self.log_scale = 2.0 * float(np.sum(np.log(values / math.sqrt(self.grid.size))))

@@ -115,7 +115,7 @@ def plan_after(
     of_type("sim", sim, Simulation, "a trueangle.Simulation (trueangle.load_simulation reads one)")
     names = None if between is None else list(dict.fromkeys(between))
     if names is not None and not names:
-        raise ArgumentError("no causes to distinguish: name two, or omit between for all")
+        raise ArgumentError("no causes to distinguish: name two, or omit `between=` for all")
     for name in names or ():
         check_choice("between", name, EFFECTS)
     for name, value, least in (("seeds", seeds, 0), ("seed", seed, 0)):

@@ -185,7 +185,7 @@ def _checked(
             raise ArgumentError(f"{name} must be a whole number from {least}, got {value!r}")
     names = list(EFFECTS) if causes is None else list(dict.fromkeys(causes))
     if not names:
-        raise ArgumentError("no cause to hide: name one at least, or leave causes out for all")
+        raise ArgumentError("no cause to hide: name one at least, or omit `causes=` for all")
     for name in names:
         check_choice("causes", name, EFFECTS)
     return names

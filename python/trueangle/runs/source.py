@@ -103,7 +103,7 @@ def checked_reading_options(given: Mapping[str, Any]) -> ReadingOptions:
     if by is not None and not isinstance(by, str):
         raise KindError(f"by must be the name of a column, got {by!r:.60}")
     if by is not None and "run" in (signals or {}):
-        raise ArgumentError("by= and signals={'run': ...} both name the column of runs; give one")
+        raise ArgumentError("`by=` and `signals={'run': 'NAME'}` both name the runs; give one")
     found = ReadingOptions(
         signals={**(signals or {}), **({} if by is None else {"run": by})},
         period=given.get("period"),

@@ -97,7 +97,7 @@ def reference_free_model(
         raise NotInvertibleError(
             f"the pattern is not that of an encoder: its slope reaches {error.slope:.3g}, and from "
             "1 on several angles give one reading. Does the shaft turn through these readings, "
-            "and are unit and period right? `check` shows both",
+            "and are unit and period right? `ta.check(...)` shows both",
             error.slope,
         ) from None
 

@@ -108,7 +108,7 @@ def test_what_does_not_go_with_a_prior_is_refused():
     run = few(rng, MEAN, 12)
     with pytest.raises(KindError, match="prior must be"):
         ta.fit(run, prior={})
-    with pytest.raises(ArgumentError, match="nuisance does not go with prior"):
+    with pytest.raises(ArgumentError, match="nuisance does not go with `prior="):
         ta.fit(run, prior=fleet, nuisance="auto")
     with pytest.raises(ArgumentError, match="loss must be"):
         ta.fit(run, prior=fleet, loss="huber")

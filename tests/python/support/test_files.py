@@ -264,7 +264,7 @@ def test_a_pipe_that_goes_on_is_left(tmp_path):
 
     writer = threading.Thread(target=pour)
     writer.start()
-    with pytest.raises(FileError, match="goes on after 3 MiB, the most that is read of a model"):
+    with pytest.raises(FileError, match="is longer than 3 MiB, the most that is read of a model"):
         files.read_whole(pipe, 3 << 20, "a model")
     writer.join()
 

@@ -113,7 +113,7 @@ def read_whole(path: str | PathLike[str], limit: int, what: str) -> bytes:
             if total > limit:
                 raise FileError(
                     path,
-                    f"goes on after {_size(limit)}, the most that is read of {what}",
+                    f"is longer than {_size(limit)}, the most that is read of {what}",
                 )
     return parts[0] if len(parts) == 1 else b"".join(parts)
 
