@@ -23,7 +23,7 @@ pub struct Posterior {
     /// `s - g' S g`.
     pub residual: DMatrix<f64>,
     /// `L^-1 T`, whose square is the covariance.
-    root: DMatrix<f64>,
+    pub(super) root: DMatrix<f64>,
 }
 
 impl Posterior {
