@@ -276,25 +276,28 @@ class Monitor(ShownResult):
     def _because(self, closed: Any) -> str:
         """Orders that moved, by how much and since when, and what makes such orders."""
         scale = arcsec(1.0, self.model.period)
-        told, names = [], []
+        names = ["the zero", *(f"order {order}" for order in self._orders)]
+        told, unlike = [], sorted(closed.unlike, key=lambda row: -row[1])[:3]
         for at, size, std, since in closed.moved:
-            error = f"{scale * size:.3g} arcsec (+- {scale * std:.2g} arcsec)"
-            if at == 0:
-                told.append(f"the zero moved by {error} from the window before")
-                continue
-            names.append(self._orders[at - 1])
             when = f"for the last {int(since)} windows" if since > 1 else "in this window"
-            told.append(f"order {names[-1]} moved by {error} {when}")
-        for at, size, std, _ in closed.unlike:
-            names.append(self._orders[at - 1])
-            error = f"{scale * size:.3g} arcsec (+- {scale * std:.2g} arcsec)"
-            told.append(f"order {names[-1]} is not the model's since the start: {error} off")
-        if names:
-            told[-1] += f": {Joint().explanations(float(names[0]))[0]}"
+            when = when if at else "from the window before"
+            told.append(f"{names[at]} moved by {_size(scale * size, scale * std)} {when}")
+        for at, size, std, _ in unlike:
+            error = _size(scale * size, scale * std)
+            told.append(f"{names[at]} differs from the model by {error} since the start")
+        at = next((row[0] for row in (*closed.moved, *unlike) if row[0]), 0)
+        if at:
+            cause = Joint().explanations(float(self._orders[at - 1]))[0]
+            told[-1] += f": {cause}" if len(told) == 1 else f"; {names[at]} may be: {cause}"
         return "; ".join(told)
 
     def _brief(self) -> str:
         return f"{counted(self._orders, 'order')}, {counted(self.windows, 'window')}"
+
+
+def _size(size: float, std: float) -> str:
+    """An error in arcsec and its standard deviation, both rounded."""
+    return f"{float(f'{size:.3g}'):g} arcsec (+- {float(f'{std:.2g}'):g} arcsec)"
 
 
 def _flat(values: ArrayLike) -> NDArray[np.float64]:

@@ -135,7 +135,7 @@ def test_a_joint_that_is_not_the_models_from_the_start_is_told():
     angle, error = readings(rng, 12)
     found = ta.Monitor(model()).update(angle, error + 0.002 * np.cos(np.radians(angle)))
     assert found[0].window == 8
-    assert "order 1 is not the model's since the start" in found[0].because
+    assert "order 1 differs from the model by" in found[0].because
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -109,7 +109,7 @@ def test_what_was_never_the_models_is_an_alarm():
     angle, error = readings(12)
     error = error + 0.004 * np.sin(4.0 * np.radians(angle))
     found = ta.Monitor(model()).update(angle, error)
-    assert any("order 4 is not the model's since the start: 14" in one.because for one in found)
+    assert any("order 4 differs from the model by 14" in one.because for one in found)
     assert all(one.alarm for one in found)
 
 
@@ -205,9 +205,9 @@ def test_what_was_never_the_models_is_told_as_surely_as_eight_windows_know_it():
         angle, error = readings(10, seed=[ALARM_SEED, 100 + seed])
         error = error + 0.004 * np.sin(4.0 * np.radians(angle))
         found = ta.Monitor(model()).update(angle, error)
-        first = next(one for one in found if "order 4 is not the model's" in one.because)
+        first = next(one for one in found if "order 4 differs from the model" in one.because)
         pattern = (
-            r"order 4 is not the model's since the start: (\S+) arcsec \(\+- (\S+) arcsec\) off"
+            r"order 4 differs from the model by (\S+) arcsec \(\+- (\S+) arcsec\) since the start"
         )
         size, std = map(float, re.search(pattern, first.because).groups())
         sizes.append(size)
