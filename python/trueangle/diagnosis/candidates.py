@@ -49,7 +49,7 @@ def candidate_extensions(
     found: list[Candidate] = []
     places: list[int] = []
     at = current_deadline()
-    beside = f" further causes (after {len(regression.terms)})" if regression.terms else ""
+    beside = f" ({len(regression.terms)} chosen so far)" if regression.terms else ""
     gains = {extension.cause: extension.bic_gain for extension, _, _ in before}
     for tried, cause in enumerate(sorted(causes, key=lambda cause: -gains.get(cause, 0.0))):
         then = AFTER_CHOICE * at.seconds if beside else 0.0

@@ -80,8 +80,8 @@ def path_evidence(regression: Regression) -> Evidence | None:
         "free path in time",
         deviance,
         0.5 * chi_squared_tail(deviance, 1.0),
-        f"the residual follows {FREE_PATH}, {brief_number(rms)} arcsec rms and new in every run: "
-        "noise that drifts, or something bound to time that has no name",
+        f"the residual drifts in time by {brief_number(rms)} arcsec rms, anew in every run: "
+        "noise that drifts, or an unknown effect of time",
         rms=rms,
         looks_like=FREE_PATH,
     )

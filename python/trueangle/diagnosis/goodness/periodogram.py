@@ -266,7 +266,7 @@ def time_test(left: Leftover, correlation: float = 0.0) -> Evidence | None:
         found.statistic,
         found.p,
         f"a line of {found.peak:.5g} {unit}{detail}, about {brief_number(found.amplitude)} arcsec, "
-        "its phase new in every run",
+        "with a new phase in every run",
         looks_like="a line in time",
         rms=float(found.amplitude / np.sqrt(2.0)),
         at=found.peak,
@@ -283,8 +283,8 @@ def order_test(left: Leftover, top: float, correlation: float = 0.0) -> Evidence
         "place within runs",
         found.statistic,
         found.p,
-        f"a line of order {found.peak:.5g}, about {brief_number(found.amplitude)} arcsec, comes "
-        "back at the same place within runs and not between them",
+        f"a line of order {found.peak:.5g}, about {brief_number(found.amplitude)} arcsec, repeats "
+        "within a run, with a new phase in every run",
         looks_like="a line whose size changes in time",
         rms=float(found.amplitude / np.sqrt(2.0)),
         at=found.peak,

@@ -121,10 +121,10 @@ def _modulators(left: Leftover) -> list[_Modulator]:
         if spread <= CHANGES * float(np.abs(values).max(initial=0.0)) or spread == 0.0:
             continue
         g = (values - values.mean()) / spread
-        text = f"comes back at the same place and follows the {name}"
+        text = f"at the same places changes with the {name}"
         found.append(_Modulator(f"place x {name}", g, text, f"follows the {name}"))
         if both and name not in ALONE:
-            text = f"differs between the directions of travel, the more so the {name} differs"
+            text = f"differs between the directions by an amount that changes with the {name}"
             looks_like = f"follows the {name} by direction"
             by_both = g * left.direction
             found.append(_Modulator(f"place x direction x {name}", by_both, text, looks_like))
