@@ -233,7 +233,8 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
     largest = max(filter(math.isfinite, sizes), default=0.0)
     unit = error_unit(errors_in, largest, result.model.period)
     rms = math.sqrt(0.5) * math.hypot(*(o.amplitude for o in result.orders))
-    answer = f"Encoder error {unit.text(rms)} rms; " if result.orders else ""
+    answer = "" if result.channels else "NO CORRECTION: no order is the encoder's alone; "
+    answer = f"Encoder error {unit.text(rms)} rms; " if result.orders else answer
     lines = [
         f"{answer}calibrated without a reference ({result.method}): {result.readings} readings, "
         f"{result.turns:.1f} turns, noise {unit.text(result.noise_arcsec)}",

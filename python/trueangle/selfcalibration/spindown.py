@@ -189,12 +189,7 @@ def _sorted_out(
     with_current: bool,
 ) -> tuple[list[OrderEstimate], list[OrderEstimate], list[Blind]]:
     """Numbers that are the encoder's, numbers of several things, and the blind orders."""
-    blind = [
-        Blind.zero(
-            "no reading without a reference shows it; order k turns by k times the "
-            "difference of two zeros"
-        )
-    ]
+    blind = [Blind.zero("no reading without a reference shows it")]
     orders = [o.order for o in table]
     slowest = float(np.quantile(readings.speed, 0.02))
     followed: tuple[float, ...] = ()

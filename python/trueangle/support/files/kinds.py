@@ -104,7 +104,7 @@ a model (JSON); name it joint.json
         if better != Path(path):
             promised = promised_format(path)
             why = (
-                f"is none of {self.what} ({listed_names(self.endings)})"
+                f"is not that of {self.what}: {listed_names(self.endings)}"
                 if promised is None
                 else f"means {promised}, but what is written is {self.what}"
             )
