@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "runs, or what the fit leaves",
         default="errors",
     )
-    add_shared(parser, "orders")
+    add_shared(parser, "orders", "run")
     add_joint(parser)
     add("--joint NAME", str, "of the model file of a robot, this joint")
     add_shared(parser, "errors-in")

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
     )
     add("--simulation FILE", Input, "diagnose the runs with this simulation")
-    add_shared(parser, "orders")
+    add_shared(parser, "orders", "run")
     add_joint(parser)
     add_robot(parser)
     add("--title", str, "heading of the report")

@@ -191,7 +191,7 @@ def duplicate_runs(records: list[Record]) -> Iterator[DataFault]:
             says = f"runs {', '.join(labels[:-1])} and {labels[-1]} hold the same readings, to the "
             says += "last digit: noise and repeatability would come out too good"
             others = " ".join(f"--run '!{label}'" for label in labels[1:])
-            mend = f"keep the first (of a command: {others})"
+            mend = f"keep the first (option {others})"
             yield DataFault.of("duplicate_runs", labels, (), says, mend)
 
 
