@@ -44,7 +44,7 @@ const MORE: usize = 12;
 /// Weight over the greatest below which a model under a noise does not count.
 const LIGHT: f64 = 1e-4;
 
-/// Smallest variance of residuals over that of errors: sums of squares hold no less.
+/// Smallest variance of residuals and of white noise over that of errors: sums hold no less.
 const EXACT: f64 = 1e-12;
 
 /// Smallest variance of errors that is distinguished from zero.
@@ -105,6 +105,7 @@ impl Readings {
         let looked = self.first(&prior, total);
         let noise_prior = NoisePrior {
             scale: self.among(&looked).left(total)?,
+            least: EXACT * total,
         };
         let every = Model::of_orders(looked.len(), total);
         let mut starts = vec![

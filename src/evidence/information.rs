@@ -94,7 +94,10 @@ impl Readings {
         let average = DMatrix::from_fn(VARIANCES, VARIANCES, |i, j| {
             0.5 * sizes[i] * sizes[j] * left[(i, j)]
         });
-        Some(Information { gradient, average })
+        Some(Information {
+            gradient,
+            average: positive(average)?,
+        })
     }
 
     /// The part of one run.
@@ -177,6 +180,19 @@ impl Readings {
             squares: left,
         }
     }
+}
+
+/// A matrix that is positive but for rounding, which grows as columns become one.
+fn positive(matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    if !matrix.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let mut axes = matrix.clone().symmetric_eigen();
+    if axes.eigenvalues.min() >= 0.0 {
+        return Some(matrix);
+    }
+    axes.eigenvalues.apply(|power| *power = power.max(0.0));
+    Some(axes.recompose())
 }
 
 /// Posterior of a run's zero and of its coefficients `b + d_r`.

@@ -96,9 +96,8 @@ impl Readings {
         start: [f64; VARIANCES],
         close: f64,
     ) -> Option<NoiseFit> {
-        let (low, high) = prior.bounds();
         let held = self.holding();
-        let mut now = held.at(model, prior, start.map(|x| x.clamp(low, high)))?;
+        let mut now = held.at(model, prior, prior.within(start))?;
         let mut damping = 0.0;
         for step in 0.. {
             let found = held.information_of(model, &now.grams, &now.posterior, &now.whitened)?;
@@ -187,9 +186,8 @@ impl Near {
 
     /// Where it is greatest when damped, and the increase that it predicts.
     fn best(&self, damping: f64) -> Option<([f64; VARIANCES], f64)> {
-        let (low, high) = self.prior.bounds();
-        let least = self.position.map(|x| low.max(x - LONGEST));
-        let most = self.position.map(|x| high.min(x + LONGEST));
+        let least = self.prior.within(self.position.map(|x| x - LONGEST));
+        let most = self.prior.within(self.position.map(|x| x + LONGEST));
         let mut at = self.position;
         for _ in 0..STEPS {
             let (gradient, precision) = self.slopes(&at, damping);

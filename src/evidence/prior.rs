@@ -154,6 +154,8 @@ impl Count {
 pub struct NoisePrior {
     /// Variance of residuals, which they are relative to.
     pub scale: f64,
+    /// Variance that white noise has at least: the rounding of sums.
+    pub least: f64,
 }
 
 impl NoisePrior {
@@ -185,14 +187,16 @@ impl NoisePrior {
         1.0 / (SPREAD * SPREAD)
     }
 
-    /// The smallest and greatest logarithm of a variance.
-    pub fn bounds(&self) -> (f64, f64) {
-        (self.scale.ln() + RANGE.0, self.scale.ln() + RANGE.1)
+    /// The position within the smallest and greatest variances that is nearest.
+    pub fn within(&self, position: [f64; VARIANCES]) -> [f64; VARIANCES] {
+        let [low, high] = [RANGE.0, RANGE.1].map(|end| self.scale.ln() + end);
+        let mut within = position.map(|x| x.clamp(low, high));
+        within[0] = within[0].max(self.least.ln());
+        within
     }
 
     /// The noise at a position within the bounds.
     pub fn noise(&self, position: &[f64; VARIANCES]) -> Noise {
-        let (low, high) = self.bounds();
-        Noise::of(position.map(|x| x.clamp(low, high).exp()))
+        Noise::of(self.within(*position).map(f64::exp))
     }
 }

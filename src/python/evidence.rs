@@ -123,7 +123,7 @@ impl PyEvidence {
                 format!("scale must be above 0 and finite, got {scale}"),
             ));
         }
-        let (model, prior) = (self.model(tau, omega)?, NoisePrior { scale });
+        let (model, prior) = (self.model(tau, omega)?, NoisePrior { scale, least: 0.0 });
         let found = detached(py, || self.0.noise(&model, prior, prior.centre()))?;
         let found = found.ok_or_else(|| argument_error(py, LOST.into()))?;
         vector(py, &found.noise.variances())

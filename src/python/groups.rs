@@ -75,7 +75,7 @@ impl PyGroups {
         }
         let groups = self.0.widths();
         check(&tau, groups.len())?;
-        let prior = NoisePrior { scale };
+        let prior = NoisePrior { scale, least: 0.0 };
         let inside: Vec<usize> = (0..tau.len()).filter(|&k| tau[k] > 0.0).collect();
         let found = detached(py, || {
             let model = Model::of_groups(groups, tau).among(&inside);

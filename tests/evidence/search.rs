@@ -188,7 +188,10 @@ fn the_search_finds_the_best_of_all_models() {
 #[test]
 fn no_noise_near_the_maximum_has_more_evidence() {
     let readings = readings(&cases(&[150, 260]), &ORDERS);
-    let prior = NoisePrior { scale: 1.0 };
+    let prior = NoisePrior {
+        scale: 1.0,
+        least: 0.0,
+    };
     let starts = [prior.centre(), prior.start(), [2.0; VARIANCES]];
     for (model, start) in models().iter().flat_map(|m| starts.map(|start| (m, start))) {
         let found = readings.noise(model, prior, start).unwrap();
@@ -283,6 +286,32 @@ fn readings_without_noise() {
     let apart = found.mean - DVector::from_column_slice(&wanted);
     assert!(apart.amax() < 1e-5);
     assert!(found.noise.total() < 1e-9);
+}
+
+/// Over part of a turn many columns are nearly one: the sums hold their differences to rounding alone.
+#[test]
+fn readings_without_noise_over_arcs() {
+    let orders: Vec<f64> = (1..30).map(f64::from).collect();
+    for (count, arcs) in [
+        (90, vec![(0.0, 0.5), (0.5, 0.5)]),
+        (250, vec![(0.1, 0.7), (0.3, 0.7), (0.8, 0.2)]),
+    ] {
+        let run = |&(from, width): &(f64, f64)| {
+            let turn = |i| std::f64::consts::TAU * (from + width * i as f64 / count as f64);
+            let theta: Vec<f64> = (0..count).map(turn).collect();
+            let error: Vec<f64> = theta.iter().map(|x| (2.0 * x + 0.3).cos() + from).collect();
+            Run::new(&theta, &error, None).unwrap()
+        };
+        let readings = Readings::new(arcs.iter().map(run).collect(), orders.clone()).unwrap();
+        let found = readings.estimate(&[0.1; 29]).unwrap();
+        assert!(found.probabilities[1] > 0.99, "{:?}", found.probabilities);
+        let at = 2 * found.places.iter().position(|&k| k == 1).unwrap();
+        assert!(
+            (found.mean[at] - 0.3_f64.cos()).abs() < 1e-4,
+            "{}",
+            found.mean[at]
+        );
+    }
 }
 
 #[test]

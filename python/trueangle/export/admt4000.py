@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance, TableRecord
@@ -17,7 +17,6 @@ from ..support.angles import ARCSEC_PER_TURN
 from ..support.arrays import Array
 from ..support.files import FileKind, InputFile, sha256_of
 from .pattern import TurnPattern
-from .reading import table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: Order: address of magnitude and phase on page 2, bits of the magnitude.
@@ -118,7 +117,7 @@ class Admt4000(Target):
             if found is not None:
                 codes.setdefault(int(found[1]), {})[found[2]] = int(found[4], 16)
         if not codes or any(set(code) != {"MAG", "PH"} for code in codes.values()):
-            raise table_error(
+            raise FileError(
                 path, "lines such as 'H1MAG 0x15 0x123' and 'H1PH 0x16 0x045' are wanted"
             )
         orders = sorted(codes)

@@ -6,13 +6,12 @@ import re
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.files import FileKind
 from .channelform import ChannelTarget, about_offsets, made_of_channels, model_of_channels
 from .pattern import TurnPattern
-from .reading import table_error
 from .target import CommentBlock, Made, Option
 
 #: Millivolts that a command takes, at most.
@@ -52,7 +51,7 @@ class Ax2000(ChannelTarget):
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         found = {name: int(value) for name, value in _LINE.findall(text)}
         if len(found) < 2:
-            raise table_error(path, "has no lines HISOFFS and HICOFFS with millivolts")
+            raise FileError(path, "has no lines HISOFFS and HICOFFS with millivolts")
         unit = options["volts_per_count"] * 1e3
         sine, cosine = found["HISOFFS"] / unit, found["HICOFFS"] / unit
         return model_of_channels(Channels(offset_sine=sine, offset_cosine=cosine, period=360.0))

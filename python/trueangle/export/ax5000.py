@@ -8,14 +8,13 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
 from ..support.files import FileKind
 from .channelform import ChannelTarget, Decode, made_of_channels, model_of_channels
 from .pattern import TurnPattern
-from .reading import table_error
 from .target import CommentBlock, Made, Option
 
 _NAMES: Final = ("Sin offset", "Cos offset", "Sin gain", "Cos gain")
@@ -63,7 +62,7 @@ class Ax5000(ChannelTarget):
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         found = {name: float(value) for name, value in _LINE.findall(text)}
         if len(found) < len(_NAMES) or not min(found["Sin gain"], found["Cos gain"]) > 0.0:
-            raise table_error(path, f"has not all of {', '.join(_NAMES)}, gains above zero")
+            raise FileError(path, f"has not all of {', '.join(_NAMES)}, gains above zero")
         return model_of_channels(
             Channels(
                 offset_sine=found["Sin offset"],

@@ -11,10 +11,9 @@ from typing import Final
 
 import numpy as np
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
-from .reading import table_error
 
 _FOLDER = Path(__file__).parent / "code"
 
@@ -95,7 +94,7 @@ def longest_array(text: str, path: str, name: str) -> tuple[Array, int, int]:
     plain = re.sub(r"//[^\n]*|/\*.*?\*/", lambda m: "\n" * m[0].count("\n"), text, flags=re.S)
     found = max(re.finditer(r"\{([^{}]*)\}", plain), key=lambda m: len(m[1]), default=None)
     if found is None:
-        raise table_error(path, f"holds no array in braces: the table of {name} is wanted")
+        raise FileError(path, f"holds no array in braces: the table of {name} is wanted")
     line = plain.count("\n", 0, found.start()) + 1
     numbers, decimals, at = [], 0, line
     for cell in re.split(r"(,)", found[1]):
@@ -103,12 +102,12 @@ def longest_array(text: str, path: str, name: str) -> tuple[Array, int, int]:
         if cell != "," and word:
             if not _NUMBER.fullmatch(word) or not math.isfinite(float(word)):
                 at += cell.count("\n", 0, len(cell) - len(cell.lstrip()))
-                raise table_error(path, f"{word[:30]!r} is not a number of a table", at)
+                raise FileError(path, f"{word[:30]!r} is not a number of a table", line=at)
             numbers.append(float(word))
             decimals = max(decimals, len(re.split(r"[eE]", word)[0].partition(".")[2]))
         at += cell.count("\n")
     if len(numbers) < 4:
-        raise table_error(path, f"a table of {len(numbers)} numbers is none of {name}", line)
+        raise FileError(path, f"a table of {len(numbers)} numbers is none of {name}", line=line)
     return np.array(numbers), line, decimals
 
 

@@ -11,14 +11,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.files import FileKind
 from .knots import linear_knots
 from .pattern import TurnPattern
 from .proof import Correction, Places, enough_bits
-from .reading import sampled_model, table_error
+from .reading import sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: Distance of two printed numbers, in degrees: 9 decimals.
@@ -74,25 +74,27 @@ class CsvTable(Target):
         try:
             rows = list(csv.reader(text.splitlines()))
         except csv.Error as cause:
-            raise table_error(path, f"is no table: {cause}") from cause
+            raise FileError(path, f"is no table: {cause}") from cause
         if not rows or [cell.strip() for cell in rows[0]] != ["indicated_deg", "correction_deg"]:
-            raise table_error(path, "the header of such a table is indicated_deg,correction_deg", 1)
+            raise FileError(
+                path, "the header of such a table is indicated_deg,correction_deg", line=1
+            )
         numbers = []
         for i, row in enumerate(rows[1:], 2):
             try:
                 place, value = map(float, row)
             except ValueError:
-                raise table_error(
-                    path, f"two numbers are needed, got {','.join(row)!r}", i
+                raise FileError(
+                    path, f"two numbers are needed, got {','.join(row)!r}", line=i
                 ) from None
             if not (math.isfinite(place) and math.isfinite(value)):
-                raise table_error(path, f"finite numbers are needed, got {','.join(row)!r}", i)
+                raise FileError(path, f"finite numbers are needed, got {','.join(row)!r}", line=i)
             numbers.append((place, value))
         table = np.array(numbers)
         if len(table) < 5 or not np.allclose(
             table[:, 0], np.arange(len(table)) * 360.0 / (len(table) - 1), atol=1e-6
         ):
-            raise table_error(path, "lines must be equally spaced from 0 to 360 degrees")
+            raise FileError(path, "lines must be equally spaced from 0 to 360 degrees")
         values = table[:-1, 1]
         return sampled_model(
             values / 360.0, path, self, _interpolated(values), step=_LAST_DIGIT / 360.0

@@ -20,7 +20,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from .._core import __version__
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.file import embedded_model
 from ..model.model import HarmonicModel
 from ..model.term import Term
@@ -30,7 +30,6 @@ from .codetext import code_file, code_parts, decoding, filled_code
 from .cstep import DOUBLE, c_search, c_state, wave_tables
 from .pattern import TurnPattern
 from .proof import Proof
-from .reading import table_error
 from .runtimeterms import RunTimeTerms, is_own_signal
 from .target import CommentBlock, Made, Option, TablePart, Target
 
@@ -126,7 +125,7 @@ class Fmu(Target):
 
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         if not text:
-            raise table_error(path, f"holds no {_MODEL}: no functional mock-up unit of trueangle")
+            raise FileError(path, f"holds no {_MODEL}: no functional mock-up unit of trueangle")
         return embedded_model(text, path)
 
 

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..estimation.linear import least_squares
 from ..model.model import HarmonicModel
 from ..support.angles import ARCSEC_PER_TURN
@@ -24,7 +24,7 @@ from ..support.files import FileKind, read_whole
 from .knots import linear_knots, rounded_knots
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import ReadTable, function_model, table_error
+from .reading import ReadTable, function_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: Counts to a turn, and knots that Klipper solves.
@@ -188,18 +188,18 @@ def _list_of(text: str, path: str, section: str | None) -> tuple[str, Array]:
     chosen = {n: v for n, v in found.items() if section is None or n == section}
     if len(chosen) != 1:
         have = ", ".join(f"[{n}]" for n in found) or "none"
-        raise table_error(
+        raise FileError(
             path, f"one section with a calibrate list is wanted, {have} there; give `section=`"
         )
     ((name, (at, cells)),) = chosen.items()
     try:
         readings = np.array([float(cell) for cell in cells.split(",") if cell.strip()])
     except ValueError:
-        raise table_error(path, "calibrate holds something that is not a number", at) from None
+        raise FileError(path, "calibrate holds something that is not a number", line=at) from None
     if len(readings) < KNOTS or not np.all((readings >= 0.0) & (readings < TURN)):
-        raise table_error(
+        raise FileError(
             path, f"calibrate must hold one reading from 0 to 65536 per full step, got "
-            f"{len(readings)} numbers", at
+            f"{len(readings)} numbers", line=at
         )  # fmt: skip
     return name, readings
 

@@ -6,12 +6,12 @@ import json
 from collections.abc import Mapping
 from typing import Any, ClassVar, Final
 
+from ..errors import FileError
 from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.files import FileKind
 from .channelform import ChannelTarget, ellipse_of, made_of_channels, model_of_channels
 from .pattern import TurnPattern
-from .reading import table_error
 from .target import CommentBlock, Made, Option
 
 #: Full scale of the converter, and the middle that is subtracted first.
@@ -73,7 +73,7 @@ class LeRobot(ChannelTarget):
             size = a * d - b * c
             ellipse = complex(x, y), complex(d, b) / size, complex(a, -c) / size
         except (KeyError, TypeError, ValueError, ZeroDivisionError):
-            raise table_error(
+            raise FileError(
                 path, f"is no calibration with one joint, or with the joint {options['joint']!r}"
             ) from None
         return model_of_channels(Channels.of_amplitudes(*ellipse, direction=-1, period=360.0))

@@ -8,13 +8,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..support.files import FileKind
 from .knots import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
-from .reading import table_error
 from .setpoint import (
     ENDS,
     NOMINAL_DECIMALS,
@@ -104,19 +103,19 @@ class LinuxCnc(Target):
             except ValueError:
                 rest = [part.strip() for part in text.split("\n")[number - 1 :]]
                 if any(part and part[0] not in "#;" for part in rest):
-                    raise table_error(
+                    raise FileError(
                         path,
                         f"three numbers are wanted, got {line.strip()[:40]!r}: LinuxCNC stops "
                         "reading here",
-                        number,
+                        line=number,
                     ) from None
                 break
             if rows and triplet[0] <= rows[-1][0]:
-                raise table_error(path, "nominal positions must increase", number)
+                raise FileError(path, "nominal positions must increase", line=number)
             rows.append(triplet)
             decimals = max(decimals, *(len(word.partition(".")[2]) for word in words[:3]))
         if not 4 <= len(rows) <= MOST:
-            raise table_error(path, f"{len(rows)} lines: LinuxCNC takes 4 to {MOST} here")
+            raise FileError(path, f"{len(rows)} lines: LinuxCNC takes 4 to {MOST} here")
         table = np.array(rows)
         if options["type"] == "0":
             table[:, 1:] = table[:, :1] - table[:, 1:]

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
+from ..errors import FileError
 from ..model.model import HarmonicModel
 from ..support.files import FileKind
 from .codetext import number_rows
 from .pattern import TurnPattern
-from .reading import table_error
 from .target import CommentBlock, Made, Option
 from .tinymovr import Tinymovr, Whole
 
@@ -51,5 +51,5 @@ class MiniCheetah(Tinymovr):
         model = super().read(text, path, {"bits": _BITS})
         entries = 0 if model.fit is None else model.fit.samples
         if entries != _ENTRIES:
-            raise table_error(path, f"holds {entries} numbers: offset_lut has {_ENTRIES}")
+            raise FileError(path, f"holds {entries} numbers: offset_lut has {_ENTRIES}")
         return model

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.files import FileKind
@@ -18,7 +18,7 @@ from .channelform import about_offsets, channels_of, made_of_channels, model_of_
 from .knots import one_turn_knots, rounded_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import sampled_model, table_error
+from .reading import sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 ENTRIES = 256
@@ -117,24 +117,24 @@ class Moteus(Target):
                 if not np.isfinite(value):
                     raise ValueError
             except ValueError:
-                raise table_error(path, f"{found[4]!r} is not a number", number) from None
+                raise FileError(path, f"{found[4]!r} is not a number", line=number) from None
             if found[3]:
                 scale = value
             elif int(found[2]) >= ENTRIES or value not in _INT8:
-                raise table_error(
-                    path, f"{line.strip()!r} is not an entry of a table of int8", number
+                raise FileError(
+                    path, f"{line.strip()!r} is not an entry of a table of int8", line=number
                 )
             else:
                 table[int(found[2])] = value
                 seen += 1
         if seen != ENTRIES:
-            raise table_error(
+            raise FileError(
                 path,
                 f"{seen} of {ENTRIES} lines of motor_position.sources.{source}."
                 "compensation_table are there; write them by moteus_tool --dump-config",
             )
         if abs(scale) > float(np.finfo(np.float32).max):
-            raise table_error(path, f"a scale of {scale:g} is none of the firmware's floats")
+            raise FileError(path, f"a scale of {scale:g} is none of the firmware's floats")
         return sampled_model(
             -table * scale / 127.0,
             path,
@@ -236,6 +236,6 @@ def _read_common_mode(text: str, path: str, aux: int) -> HarmonicModel:
     """What a port's common-mode value corrects."""
     found = [m[2] for m in _COMMON_LINE.finditer(text) if int(m[1]) == aux]
     if not found or not found[-1].isdigit():
-        raise table_error(path, f"has no line aux{aux}.sine_cosine.common with counts")
+        raise FileError(path, f"has no line aux{aux}.sine_cosine.common with counts")
     common = float(found[-1])
     return model_of_channels(Channels(offset_sine=common, offset_cosine=common, period=360.0))

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 from xml.sax.saxutils import quoteattr
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.file import embedded_model
 from ..model.model import HarmonicModel
 from ..model.term import Term
@@ -17,7 +17,6 @@ from ..model.writing import model_text
 from ..support.files import FileKind
 from .pattern import TurnPattern
 from .proof import Proof
-from .reading import table_error
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 #: Of the text element that holds the model of a joint, before the joint's name.
@@ -128,7 +127,7 @@ class MuJoCo(Target):
         try:
             root = ElementTree.fromstring(text)
         except ElementTree.ParseError as error:
-            raise table_error(path, f"is not XML: {error}", error.position[0]) from None
+            raise FileError(path, f"is not XML: {error}", line=error.position[0]) from None
         found = {
             str(element.get("name"))[len(TEXT_NAME) :]: str(element.get("data"))
             for element in root.iter("text")
@@ -138,7 +137,7 @@ class MuJoCo(Target):
         if len(found) == 1 and joint not in found:
             joint = next(iter(found))
         if joint not in found:
-            raise table_error(
+            raise FileError(
                 path, f"holds no model of joint {joint!r}; it has {', '.join(found) or 'none'}"
             )
         return embedded_model(found[joint], path)

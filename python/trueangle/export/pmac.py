@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..support.files import FileKind
 from .knots import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
-from .reading import ReadTable, function_model, table_error
+from .reading import ReadTable, function_model
 from .setpoint import SetpointTravel
 from .table import TURN
 from .target import CommentBlock, Made, Option, Target
@@ -123,18 +123,22 @@ class Pmac(Target):
         plain = "\n".join(line.partition(";")[0] for line in text.split("\n"))
         found = _DEFINE.search(plain)
         if found is None:
-            raise table_error(path, f"no DEFINE COMP: no table of {self.name}")
+            raise FileError(path, f"no DEFINE COMP: no table of {self.name}")
         count, span = int(found[1]), int(found[2])
         line = plain.count("\n", 0, found.start()) + 1
         words = plain[found.end() :].split()
         try:
             values = np.array([int(word) for word in words[:count]])
         except ValueError as error:
-            raise table_error(path, f"entries are whole numbers: {error}", line) from None
+            raise FileError(path, f"entries are whole numbers: {error}", line=line) from None
         if not 4 <= count <= _MOST or len(values) != count or not 1 <= span <= _LARGEST:
-            raise table_error(path, f"DEFINE COMP {count},{span} with {len(values)} entries", line)
+            raise FileError(
+                path, f"DEFINE COMP {count},{span} with {len(values)} entries", line=line
+            )
         if np.max(np.abs(values)) > _LARGEST:
-            raise table_error(path, f"an entry is beyond {_LARGEST}: no table of {self.name}", line)
+            raise FileError(
+                path, f"an entry is beyond {_LARGEST}: no table of {self.name}", line=line
+            )
         counts = options["counts_per_turn"] or span
         turned = np.append(values[-1], values) / (SIXTEENTHS * counts)
         places = np.arange(count + 1) / count

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..model.term import Term
 from ..support.angles import ARCSEC_PER_TURN
@@ -20,7 +20,7 @@ from ..support.arrays import Array
 from .chain import Chain, make_chain, source_identifier
 from .pattern import TurnPattern
 from .proof import lost_orders
-from .reading import Function, ReadTable, function_model, table_error
+from .reading import Function, ReadTable, function_model
 from .runtimeterms import DIRECTIONS, RunTimeTerms, is_own_signal
 from .table import METHODS, NUMBERS, TURN, Table
 from .target import CommentBlock, Made, Option, TablePart, Target
@@ -256,11 +256,11 @@ def _portable_model(text: str, path: str, target: Target) -> HarmonicModel:
     found = list(_TABLE.finditer(flowing))
     zero = _ZERO.search(flowing)
     if not found or zero is None:
-        raise table_error(path, "no export of trueangle: its comment names no table")
+        raise FileError(path, "no export of trueangle: its comment names no table")
     at_indicated = "all tables at the same" in flowing
     whole = int(zero[1])
     if abs(whole) >= 1 << 63:
-        raise table_error(path, f"its zero is beyond 64 bits: {zero[1][:30]}")
+        raise FileError(path, f"its zero is beyond 64 bits: {zero[1][:30]}")
     # Before turns were counted, the zero was written modulo one.
     whole -= 1 << 32 if whole >= 1 << 31 else 0
     tables, read = [], []
@@ -280,7 +280,7 @@ def _portable_model(text: str, path: str, target: Target) -> HarmonicModel:
             if len(knots) != wide * (entries + 1):
                 raise ValueError
         except (TypeError, ValueError, OverflowError):
-            raise table_error(
+            raise FileError(
                 path, f"the table of shaft {shaft} does not hold {wide * (entries + 1)} numbers"
             ) from None
         table = Table(
@@ -323,7 +323,7 @@ def _stated(match: re.Match[str], path: str) -> tuple[int, int, float]:
     except ValueError:
         cycles = math.nan
     if not 0.0 < cycles < 1 << 31 or shift > _LARGEST_SHIFT:
-        raise table_error(
+        raise FileError(
             path,
             f"the table of shaft {match['shaft']} states a shift of "
             f"{match['shift'][:20]} (0 to {_LARGEST_SHIFT}) and {match['cycles'][:30]} cycles",

@@ -61,11 +61,6 @@ class ReadTable(NamedTuple):
     forward: bool = False
 
 
-def table_error(path: str, problem: str, line: int | None = None) -> FileError:
-    """The error of a file that is not what its target reads."""
-    return FileError(path, problem, line=line)
-
-
 def sampled_model(
     values: Array,
     path: str,
@@ -120,7 +115,7 @@ def function_model(
         return _model(tables, path, target, device, zero, at_indicated, *more)
     except NotInvertibleError:
         if len(tables) > 1 or tables[0].forward or at_indicated:
-            raise table_error(path, "the tables are too steep to be corrected by") from None
+            raise FileError(path, "the tables are too steep to be corrected by") from None
     return _model(tables, path, target, device, zero, True, *more)
 
 
@@ -142,7 +137,7 @@ def _model(
         try:
             cosine, sine, mean = _harmonics(table, at_indicated)
         except NotInvertibleError as error:
-            raise table_error(path, f"is not a correction: {error}") from None
+            raise FileError(path, f"is not a correction: {error}") from None
         constant += mean
         sigma = table.step / math.sqrt(12.0)
         std = sigma * math.sqrt(2.0 / table.entries)

@@ -8,20 +8,20 @@ column for each direction of travel.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..support.arrays import Array
 from .knots import linear_knots
 from .pattern import TurnPattern
 from .proof import Correction, lost_orders
-from .reading import ReadTable, function_model, table_error
+from .reading import ReadTable, function_model
 from .table import TURN
 from .target import Option, TablePart, Target
 
@@ -49,11 +49,6 @@ _GRID = 1 << 18
 #: Points to an entry on which the way back over a partial travel is laid, and entries at most: it
 #: is one cubic, however close the entries are.
 _WAY_BACK, _MOST_ENTRIES = 8, 1 << 14
-
-
-def _usual(allowed: Sequence[int], usual: int) -> int:
-    """The usual number of entries, else the largest that is allowed below it, or at all."""
-    return max((n for n in allowed if n <= usual), default=max(allowed, default=usual))
 
 
 @dataclass(frozen=True)
@@ -113,7 +108,9 @@ class SetpointTravel:
         allowed = [
             n for n in range(max(pattern.least_entries(), 4), largest + 1) if not divided % n
         ]
-        entries = _usual(allowed, usual) if options["entries"] is None else options["entries"]
+        entries = options["entries"]
+        if entries is None:  # the largest that is allowed up to the usual number, else at all
+            entries = max((n for n in allowed if n <= usual), default=max(allowed, default=usual))
         if not 4 <= entries <= _MOST:
             raise ArgumentError(f"entries must be from 4 to {_MOST} a turn, got {entries}")
         pattern.check_orders(entries, target, min(allowed, default=None), largest)
@@ -279,9 +276,7 @@ def travel_model(
     pattern = (ahead + back) / 2.0
     places, values = nominal, pattern
     if len(nominal) < 4:
-        raise table_error(
-            path, f"holds {len(nominal)} points over {travel:.6g} deg: four are needed"
-        )
+        raise FileError(path, f"holds {len(nominal)} points over {travel:.6g} deg: four are needed")
     if partial:
         places, values = _closed(nominal, pattern, spacing)
     elif travel < 360.0:  # the last line is not given again

@@ -9,12 +9,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..errors import FileError
 from ..model.model import HarmonicModel
 from ..support.files import FileKind
 from .knots import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
-from .reading import table_error
 from .setpoint import ENDS, POSITIONS, SetpointTravel, travel_model
 from .target import CommentBlock, Made, Option, Target
 
@@ -115,18 +115,18 @@ class Siemens840d(Target):
                 if setting[3] == (axis or setting[3]):
                     settings[setting[1]] = float(setting[4])
             elif plain.startswith("$AA_ENC_COMP"):
-                raise table_error(
-                    path, f"{line.strip()[:50]!r} is not a value of $AA_ENC_COMP", number
+                raise FileError(
+                    path, f"{line.strip()[:50]!r} is not a value of $AA_ENC_COMP", line=number
                 )
         missing = [key for key in ("STEP", "MIN", "MAX") if key not in settings]
         if not points or missing:
             what = f"$AA_ENC_COMP_{missing[0]}" if missing else "$AA_ENC_COMP"
-            raise table_error(path, f"no table of {self.name}: {what} is missing")
+            raise FileError(path, f"no table of {self.name}: {what} is missing")
         step = settings["STEP"]
         steps = (settings["MAX"] - settings["MIN"]) / step if step > 0.0 else 0.0
         count = round(steps) + 1 if abs(steps) < MOST else 0  # a damaged span may be endless
         if not 4 <= count <= MOST or any(i not in points for i in range(count)):
-            raise table_error(
+            raise FileError(
                 path,
                 f"STEP, MIN and MAX are of {steps + 1:.6g} points, and {len(points)} are there",
             )

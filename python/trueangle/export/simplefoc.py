@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.angles import ARCSEC_PER_TURN
@@ -21,7 +21,7 @@ from .codetext import longest_array, number_rows
 from .knots import one_turn_knots, rounded_knots, rounding_floor, without_mean
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import sampled_model, table_error
+from .reading import sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 Single = NDArray[np.float32]
@@ -179,18 +179,18 @@ class SimpleFoc(Target):
         declared = re.search(r"\bn_lut\s*=\s*(\d+)", text)
         entries = int(declared[1]) if declared else len(numbers)
         if len(numbers) not in (entries, entries + 1):
-            raise table_error(
-                path, f"n_lut is {entries}, the table has {len(numbers)} numbers", line
+            raise FileError(
+                path, f"n_lut is {entries}, the table has {len(numbers)} numbers", line=line
             )
         numbers = numbers[:entries]
         whole = bool(np.all(numbers == np.rint(numbers)) and np.ptp(numbers) > 1.0)
         if whole != (variant == "minus-u16"):
-            raise table_error(
+            raise FileError(
                 path,
                 f"these are {'whole numbers' if whole else 'radians'}, not a table of variant "
                 f"{variant}; give `variant={'minus-u16' if whole else 'minus-float'!r}`"
                 f"{'' if whole else ' or plus-float'}",
-                line,
+                line=line,
             )
         if variant == "minus-u16":
             table: NDArray[Any] = numbers.astype(np.uint16)
@@ -294,7 +294,7 @@ def _read_linear_hall(text: str, path: str) -> HarmonicModel:
     """What a constructor's centres correct."""
     found = _CALL.search(text)
     if found is None:
-        raise table_error(path, "has no LinearHall(pin, pin, centre, centre, pole pairs)")
+        raise FileError(path, "has no LinearHall(pin, pin, centre, centre, pole pairs)")
     sine, cosine, periods = map(int, found.groups())
     return model_of_channels(
         Channels(

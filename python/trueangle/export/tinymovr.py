@@ -8,14 +8,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..support.files import FileKind
 from .codetext import longest_array, number_rows
 from .knots import one_turn_knots, rounded_knots, rounding_floor
 from .pattern import TurnPattern
 from .proof import Correction, Places
-from .reading import sampled_model, table_error
+from .reading import sampled_model
 from .target import CommentBlock, Made, Option, TablePart, Target
 
 Whole = NDArray[np.int64]
@@ -89,7 +89,7 @@ class Tinymovr(Target):
     def read(self, text: str, path: str, options: Mapping[str, Any]) -> HarmonicModel:
         table, line, _ = longest_array(text, path, self.name)
         if len(table) & (len(table) - 1) or np.any(table != np.rint(table)):
-            raise table_error(path, "the table holds whole ticks, a power of two of them", line)
+            raise FileError(path, "the table holds whole ticks, a power of two of them", line=line)
         ticks = 1 << options["bits"]
         device = _device(table.astype(np.int64), options["bits"])
         return sampled_model(-table / ticks, path, self, device, step=1.0 / ticks)

@@ -12,13 +12,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..support.files import FileKind
 from .knots import rounding_floor
 from .pattern import TurnPattern
 from .proof import enough_bits
-from .reading import table_error
 from .setpoint import ENDS, POSITIONS, SetpointTravel, travel_model
 from .target import CommentBlock, Made, Option, Target
 
@@ -142,12 +141,12 @@ def _cnc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
         found = _LINE.match(line)
         if found is None:
             if line.strip().startswith("kw.ssfk."):
-                raise table_error(
-                    path, f"{line.strip()[:50]!r} is not a whole number of a key", number
+                raise FileError(
+                    path, f"{line.strip()[:50]!r} is not a whole number of a key", line=number
                 )
             continue
         if len(found[4]) > _DIGITS:
-            raise table_error(path, f"{found[4][:_DIGITS]}... is no number of a key", number)
+            raise FileError(path, f"{found[4][:_DIGITS]}... is no number of a key", line=number)
         if found[2] is None:
             settings[found[1]] = int(found[4])
         else:
@@ -158,7 +157,7 @@ def _cnc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     points = columns.get("setpoint", {})
     interval = settings.get("interval", 0)
     if count < 4 or any(set(c) != set(range(count)) for c in (pos, neg)):
-        raise table_error(
+        raise FileError(
             path, f"kw_nr_max is {count}, but pos has {len(pos)} and neg {len(neg)} lines"
         )
     if interval:
@@ -166,11 +165,9 @@ def _cnc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     elif set(points) == set(range(count)):
         nominal = np.array([points[i] for i in range(count)])
     else:
-        raise table_error(
-            path, "interval is 0 or missing, and not every table entry has a setpoint"
-        )
+        raise FileError(path, "interval is 0 or missing, and not every table entry has a setpoint")
     if np.any(np.diff(nominal) <= 0):
-        raise table_error(path, "positions must increase")
+        raise FileError(path, "positions must increase")
     values = [[-column[i] for i in range(count)] for column in (pos, neg)]
     return np.array([nominal, *values]).T / 1e4
 
@@ -185,12 +182,12 @@ def _nc_table(text: str, path: str) -> np.ndarray[Any, np.dtype[np.float64]]:
             if len(values) not in (2, 3) or not all(map(math.isfinite, values)):
                 raise ValueError
         except ValueError:
-            raise table_error(
-                path, f"Position,Compensation is wanted, got {row!r}", number
+            raise FileError(
+                path, f"Position,Compensation is wanted, got {row!r}", line=number
             ) from None
         if rows and values[0] <= rows[-1][0]:
-            raise table_error(path, "positions must increase", number)
+            raise FileError(path, "positions must increase", line=number)
         rows.append((*values, values[-1])[:3])
     if len(rows) < 4:
-        raise table_error(path, f"holds {len(rows)} points: no table of {TwinCat.name}")
+        raise FileError(path, f"holds {len(rows)} points: no table of {TwinCat.name}")
     return np.array(rows)

@@ -9,14 +9,13 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, FileError
 from ..model.model import HarmonicModel
 from ..runs.rawchannels import Channels
 from ..support.arrays import Array
 from ..support.files import FileKind
 from .channelform import ChannelTarget, Decode, decimals, made_of_channels, model_of_channels
 from .pattern import TurnPattern
-from .reading import table_error
 from .target import CommentBlock, Made, Option
 
 #: The configuration keeps thousandths in 16 bits.
@@ -95,17 +94,17 @@ class Vesc(ChannelTarget):
         found = {m[1]: m[2] for m in _ENTRY.finditer(text)}
         missing = [name for name in _NAMES if name not in found]
         if missing:
-            raise table_error(path, f"has no entry {missing[0]}: a motor configuration has")
+            raise FileError(path, f"has no entry {missing[0]}: a motor configuration has")
         values = []
         for name in _NAMES:
             try:
                 values.append(float(found[name]))
             except ValueError:
-                raise table_error(path, f"{name}: {found[name]!r} is not a number") from None
+                raise FileError(path, f"{name}: {found[name]!r} is not a number") from None
         offset, size, offset_cosine, amplitude, phase = values
         volts = options["volts_per_count"]
         if not (amplitude and size):
-            raise table_error(path, "has an amplitude of zero: it was not calibrated")
+            raise FileError(path, "has an amplitude of zero: it was not calibrated")
         return model_of_channels(
             Channels(
                 offset_sine=offset / volts,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping
 from os import PathLike
@@ -16,8 +17,6 @@ from ..runs.rawchannels import CONSTANTS, Channels
 from ..support.argumentkinds import told_kinds
 from ..support.arrays import Array
 from ..support.decoding import (
-    MAX_LINE_ORDERS,
-    MAX_LINES,
     MAX_ORDER,
     json_value,
     read_text,
@@ -28,6 +27,7 @@ from ..support.layout import counted
 from .model import HarmonicModel
 from .records import MAX_TERMS, MOST_TURNS, RecordReader
 from .term import Term
+from .validity import check_lines
 from .writing import FORMAT as FORMAT
 from .writing import ROBOT_FORMAT
 from .writing import VERSION as VERSION
@@ -155,8 +155,10 @@ class _ModelReader(RecordReader):
                 "period",
             )
         shafts = self.shafts(content["shafts"], MOST_TURNS * period)
-        if argument == "reference":
-            self.check_steepness(shafts, period)
+        try:
+            check_lines(shafts, period if argument == "reference" else math.inf)
+        except ArgumentError as cause:
+            raise self.error(str(cause), "shafts") from None
         try:
             model = HarmonicModel(
                 shafts=shafts,
@@ -178,27 +180,6 @@ class _ModelReader(RecordReader):
         except ValueError as cause:  # the model's own checks, under the file's name
             raise self.error(str(cause)) from None
         return model
-
-    def check_steepness(self, shafts: tuple[Shaft, ...], period: float) -> None:
-        """Refuse steep models of so high orders that nobody waits for their proof."""
-        harmonics = sum(len(shaft.orders) for shaft in shafts)
-        highest = max((s.cycles_per_turn * max(s.orders, default=0) for s in shafts), default=0.0)
-        # Highest order times number of harmonics up to which the greatest slope of a steep model is
-        # looked for: a second of work.
-        if harmonics * highest <= 3e5:
-            return
-        slope = sum(
-            float(np.dot(np.asarray(s.orders) * s.cycles_per_turn, sizes))
-            for s in shafts
-            if (sizes := _sizes(s)).size == len(s.orders)
-        )
-        if slope * 2.0 * np.pi / period >= 1.0:
-            raise self.error(
-                f"|error'| may reach {slope * 2.0 * np.pi / period:.3g}, and {harmonics} "
-                f"harmonics of up to {highest:.6g} cycles per turn are too many to look for its "
-                "greatest value; use fewer or lower orders",
-                "shafts",
-            )
 
     def check_finite(self, model: HarmonicModel) -> None:
         """Terms whose numbers leave no finite correction at a joint's normal signals."""
@@ -296,7 +277,6 @@ class _ModelReader(RecordReader):
 
     def shafts(self, value: Any, most: float) -> tuple[Shaft, ...]:
         shafts = []
-        harmonics, highest = 0, 0.0
         for i, entry in enumerate(self.items(value, "shafts", "shafts")):
             where = f"shafts[{i}]"
             table = self.table(entry, dict.fromkeys(_SHAFT_KEYS, True), where)
@@ -307,18 +287,6 @@ class _ModelReader(RecordReader):
             orders = tuple(
                 self.whole(k, f"{where}.orders[{j}]", 1, 2**32 - 1) for j, k in enumerate(listed)
             )
-            harmonics += len(orders)
-            highest = max(highest, cycles * max(orders, default=0))
-            if highest > MAX_ORDER:
-                raise self.error(
-                    f"{highest:.6g} cycles per output turn are more than {MAX_ORDER:.0f}", where
-                )
-            if harmonics > MAX_LINES or harmonics * highest > MAX_LINE_ORDERS:
-                raise self.error(
-                    f"{harmonics} harmonics of up to {highest:.6g} cycles per turn are too many: "
-                    f"at most {MAX_LINES}, and {MAX_LINE_ORDERS:.0g} of their product",
-                    "shafts",
-                )
             shafts.append(
                 Shaft(
                     self.text(table["name"], f"{where}.name"),
@@ -378,9 +346,3 @@ class _ModelReader(RecordReader):
             elif self.number(entry, f"{key}[{i}]") > MAX_ORDER and key.endswith("orders"):
                 raise self.error(f"more than {MAX_ORDER:.0f} cycles per turn", f"{key}[{i}]")
         return found
-
-
-def _sizes(shaft: Shaft) -> Array:
-    """Amplitudes; none where cosines and sines differ in number, which is refused elsewhere."""
-    same = len(shaft.cosine) == len(shaft.sine)
-    return np.asarray(np.hypot(shaft.cosine, shaft.sine)) if same else np.empty(0)

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 import trueangle._core as _core
 
 from ..errors import ArgumentError, NotInvertibleError
+from ..joint.shafts import Shaft
+from ..support.decoding import MAX_LINE_ORDERS, MAX_LINES, MAX_ORDER
 from .records import MOST_TURNS, FitRecord
 
 #: What a condition number may be below 1 by rounding.
@@ -37,6 +39,38 @@ def check_invertible(slope: float) -> None:
             "which cannot be corrected. Check the gear ratio, use fewer or lower orders, or "
             "`argument='indicated'`",
             slope,
+        )
+
+
+def check_lines(shafts: Sequence[Shaft], period: float) -> None:
+    """Raise `ArgumentError` for harmonics of which a file is not read back.
+
+    Those of a model that must be invertible may be steep only where it does not take long to find
+    the greatest slope; ``period`` is infinite for another one.
+    """
+    harmonics = sum(len(shaft.orders) for shaft in shafts)
+    highest = max((s.cycles_per_turn * max(s.orders, default=0) for s in shafts), default=0.0)
+    if highest > MAX_ORDER:
+        raise ArgumentError(f"{highest:.6g} cycles per output turn are more than {MAX_ORDER:.0f}")
+    if harmonics > MAX_LINES or harmonics * highest > MAX_LINE_ORDERS:
+        raise ArgumentError(
+            f"{harmonics} harmonics of up to {highest:.6g} cycles per turn are too many: "
+            f"at most {MAX_LINES}, and {MAX_LINE_ORDERS:.0g} of their product"
+        )
+    # Highest order times number of harmonics up to which the greatest slope of a steep model is
+    # looked for: a second of work.
+    if harmonics * highest <= 3e5:
+        return
+    rates = (
+        s.cycles_per_turn * order * math.hypot(cosine, sine)
+        for s in shafts
+        for order, cosine, sine in zip(s.orders, s.cosine, s.sine, strict=False)
+    )
+    bound = 2.0 * math.pi / period * sum(rates)
+    if bound >= 1.0:
+        raise ArgumentError(
+            f"|error'| may reach {bound:.3g}, and {harmonics} harmonics of up to {highest:.6g} "
+            "cycles per turn are too many to look for its greatest value; use fewer or lower orders"
         )
 
 

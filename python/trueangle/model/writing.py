@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import asdict, replace
@@ -13,6 +14,7 @@ from ..support.files import MODEL, MODEL_BYTES, written_atomically
 from ..support.plainresult import pretty_json
 from .errormodel import ErrorModel
 from .records import FitRecord
+from .validity import check_lines
 
 FORMAT = "trueangle-model"
 ROBOT_FORMAT = "trueangle-robot"
@@ -58,7 +60,14 @@ def save_model(model: ErrorModel, path: str | PathLike[str]) -> None:
 
 
 def _readable(model: ErrorModel, path: str | PathLike[str], models: int) -> ErrorModel:
-    """The model, without a covariance that makes a file of ``models`` longer than is read back."""
+    """The model, without a covariance that makes a file of ``models`` longer than is read back.
+
+    Raises
+    ------
+    ArgumentError
+        Harmonics of which no file is read back.
+    """
+    check_lines(model.shafts, model.period if model.argument == "reference" else math.inf)
     covariance = model.covariance
     if covariance is None or models * FLOAT_BYTES * covariance.size <= MODEL_BYTES:
         return model

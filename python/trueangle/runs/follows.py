@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import permutations
 
 import numpy as np
@@ -13,7 +13,7 @@ import trueangle._core as _core
 
 from ..errors import ArgumentError, UnitWarning
 from ..support.angles import wrap
-from ..support.arrays import Array, quantile
+from ..support.arrays import quantile
 from ..support.roles import role_code
 from .checks.angles import (
     BLOCKS,
@@ -27,7 +27,8 @@ from .checks.angles import (
     bending,
     ratio_suggestion,
 )
-from .checks.record import records_of
+from .checks.fault import DataFault
+from .checks.record import Record, records_of
 from .run import CalibrationRun
 
 #: Readings looked at; a mistake of unit shows in any few.
@@ -72,16 +73,23 @@ def check_follows(run: CalibrationRun) -> None:
     UnitWarning
         Angles whose error repeats with 360, and not with 2 pi.
     """
-    reference, indicated = run.reference, run.indicated
-    stride = reference.size // _SAMPLE
-    if stride > 1:
-        reference = np.ascontiguousarray(reference[::stride])
-        indicated = np.ascontiguousarray(indicated[::stride])
-    if reference.size < 4:
-        return
-    if run.period == _TURNS["radians"] and reference[reference.argmax()] > _MANY:
-        _warn_of_degrees(run, reference, indicated)
-    if _core.resultant(indicated, reference, run.period) >= _FOLLOWS:
+    if run.period == _TURNS["radians"] and run.reference[run.reference.argmax()] > _MANY:
+        _warn_of_degrees(_some_of(run))
+    for says, remedy in _unrelated(run, _of(run)):
+        raise ArgumentError(f"{says}: {remedy}")
+
+
+def unrelated_angles(records: list[Record]) -> Iterator[DataFault]:
+    """Records whose two angles no fit takes."""
+    for record in records:
+        for found in _unrelated(record.run, f" of run {record.label}"):
+            yield record.fault("unrelated_angles", (), *found)
+
+
+def _unrelated(run: CalibrationRun, which: str) -> Iterator[tuple[str, str]]:
+    """That the indicated angle does not follow the reference, and the remedy."""
+    some = _some_of(run)
+    if len(some) < 4 or _core.resultant(some.indicated, some.reference, run.period) >= _FOLLOWS:
         return
     ratio = _ratio(run)
     # By the travel where readings are dense enough to follow it; else, where steps of more
@@ -92,14 +100,14 @@ def check_follows(run: CalibrationRun) -> None:
         if (
             abs(factor * ratio - 1.0) < _NEAR
             if ratio is not None
-            else _core.resultant(factor * indicated, reference, run.period) > _REMEDIED
+            else _core.resultant(factor * some.indicated, some.reference, run.period) > _REMEDIED
         )
     )
-    remedy = next(found, None) or _moves(ratio)
-    raise ArgumentError(
-        f"the indicated angle{_of(run)} does not follow the reference "
-        f"(their differences are spread over the whole turn): {remedy}"
+    says = (
+        f"the indicated angle{which} does not follow the reference "
+        "(their differences are spread over the whole turn)"
     )
+    yield says, next(found, None) or _moves(ratio)
 
 
 def check_usable(runs: Sequence[CalibrationRun]) -> None:
@@ -120,7 +128,7 @@ def check_usable(runs: Sequence[CalibrationRun]) -> None:
         return
     for run in runs:
         check_follows(run)
-    records = records_of(map(_thinned, runs, strides))
+    records = records_of(map(_some_of, runs, strides))
     for test in UNUSABLE_ANGLES:
         for fault in test(records):
             raise ArgumentError(f"the data must not be used as they are: {fault}")
@@ -156,7 +164,9 @@ def _are_plain(runs: Sequence[CalibrationRun], strides: Sequence[int]) -> bool:
     return len(sizes) == 1 or min(sizes) > max(sizes) * OTHER_UNIT
 
 
-def _thinned(run: CalibrationRun, stride: int) -> CalibrationRun:
+def _some_of(run: CalibrationRun, stride: int | None = None) -> CalibrationRun:
+    """Every ``stride``-th reading; about `_SAMPLE` of them by default."""
+    stride = stride or max(len(run) // _SAMPLE, 1)
     return CalibrationRun(
         run.reference[::stride], run.indicated[::stride], run.period, label=run.label
     )
@@ -166,12 +176,12 @@ def _of(run: CalibrationRun) -> str:
     return f" of run {run.label}" if run.label else ""
 
 
-def _warn_of_degrees(run: CalibrationRun, reference: Array, indicated: Array) -> None:
+def _warn_of_degrees(run: CalibrationRun) -> None:
     """Warn where low orders of 360 explain the error, and those of 2 pi do not.
 
     A motor of some sixty turns to one of its output shows much the same: no error then.
     """
-    left = {}
+    left, reference, indicated = {}, run.reference, run.indicated
     for period in (_TURNS["radians"], _TURNS["degrees"]):
         error = wrap(indicated - reference, period)
         angle = np.outer(reference, np.arange(1, _HIGHEST + 1)) * (2.0 * math.pi / period)

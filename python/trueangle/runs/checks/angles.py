@@ -129,23 +129,14 @@ def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
         labels = [label for label, _ in found]
         value = float(median([slope for _, slope in found]))
         which = "all runs" if len(found) == len(records) else f"run {', '.join(labels[:4])}"
-        if kind == "wrong_sign":
-            yield DataFault.of(
-                kind,
-                labels,
-                (),
-                f"in {which} the indicated angle falls where the reference rises",
-                f"give {code} to change the sign of one of the two columns",
+        says = "falls where the reference rises"
+        mend = f"give {code} to change the sign of one of the two columns"
+        if kind != "wrong_sign":
+            says = (
+                f"moves {value:.6g} times as far as the reference: {ratio_suggestion(value, 0.0)}"
             )
-        else:
-            yield DataFault.of(
-                kind,
-                labels,
-                (),
-                f"in {which} the indicated angle moves {value:.6g} times as far as the "
-                f"reference: {ratio_suggestion(value, 0.0)}",
-                f"divide the indicated angle by {value:.6g}, or give the right unit",
-            )
+            mend = f"divide the indicated angle by {value:.6g}, or give the right unit"
+        yield DataFault.of(kind, labels, (), f"in {which} the indicated angle {says}", mend)
 
 
 def mixed_units(records: list[Record]) -> Iterator[DataFault]:
@@ -192,9 +183,8 @@ def _parts_in_other_units(record: Record) -> Iterator[DataFault]:
     if other.any() and not other.all():
         first = int(np.flatnonzero(other)[0])
         rows = np.concatenate([record.rows[edges[j] : edges[j + 1]] for j in np.flatnonzero(other)])
-        yield DataFault.of(
+        yield record.fault(
             "mixed_units",
-            [record.label],
             rows.tolist(),
             f"a part of run {record.label} (from about row {record.rows[edges[first]]}) looks "
             "like radians among degrees",
@@ -228,9 +218,8 @@ def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:
         if not at_ends.all() or not _stays(record, jumps, slip[jumps]):
             continue
         period = float(median(np.abs(reference - ahead)[jumps]))
-        yield DataFault.of(
+        yield record.fault(
             "wrapped_reference",
-            [record.label],
             record.rows[jumps + 1].tolist(),
             f"the reference of run {record.label} wraps after {period:.4g} deg, which is not "
             "a turn: one number means several places",

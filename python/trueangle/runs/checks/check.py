@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import ArgumentError
 from ...support.argumentkinds import told_kinds
+from ..follows import unrelated_angles
 from ..run import runs_or_data
 from ..source import ReadingOptions
 from .angles import (
@@ -17,7 +18,7 @@ from .angles import (
     swapped_channels,
     told_ratio,
 )
-from .fault import DataFault
+from .fault import UNUSABLE, DataFault
 from .record import Record, read_records, records_of
 from .rows import duplicate_rows, duplicate_runs, missed_counts, outliers
 from .still import stuck_readings
@@ -70,12 +71,10 @@ def check(data: Any, **reading: Unpack[ReadingOptions]) -> Check:
     can, cannot = extent_verdicts(extent)
     unused = sorted({name for record in records for name in record.deviations})
     if unused:
-        entry = {
-            "what": "the true angle where the reference is nominal (a polygon)",
-            "because": f"column '{unused[0]}' is not used",
-            "measure": "nothing new: give it the role reference_offset",
-        }
-        cannot.append(entry)
+        what = "the true angle where the reference is nominal (a polygon)"
+        because = f"column '{unused[0]}' is not used"
+        measure = "nothing new: give it the role reference_offset"
+        cannot.append({"what": what, "because": because, "measure": measure})
     clocks = sorted({name for record in records for name in record.clocks})
     for entry in cannot if clocks else ():
         if entry["because"] == "no time stamps":
@@ -83,6 +82,8 @@ def check(data: Any, **reading: Unpack[ReadingOptions]) -> Check:
             entry["measure"] = "nothing new: give it the role time, with its unit"
     faults = data_faults(records)
     ratio, suggestion = told_ratio(records)
+    if any(fault.fault == "unrelated_angles" for fault in faults):
+        suggestion = "they do not follow each other"
     return Check(
         (*faults, *outliers(records, faults)),
         ratio,
@@ -109,9 +110,8 @@ def unsorted_time(records: list[Record]) -> Iterator[DataFault]:
         back = np.flatnonzero(np.diff(record.time) < 0.0) + 1
         if back.size:
             k = int(back[0])
-            yield DataFault.of(
+            yield record.fault(
                 "unsorted_time",
-                [record.label],
                 record.rows[back].tolist(),
                 f"time runs backwards in run {record.label}, {back.size} time"
                 f"{'s' * (back.size > 1)} (first in row {record.rows[k]}: "
@@ -139,6 +139,7 @@ TESTS = (
     unsorted_time,
     channel_faults,
     *UNUSABLE_ANGLES,
+    unrelated_angles,
     swapped_channels,
     duplicate_runs,
     duplicate_rows,
@@ -151,7 +152,9 @@ def data_faults(records: list[Record]) -> list[DataFault]:
     """Faults of the data; where units are mixed, consequences of that are not reported."""
     found: list[DataFault] = []
     for test in TESTS:
-        mixed = {label for fault in found if fault.fault in UNSURE for label in fault.runs}
+        # Of angles that are known to be wrong it is said once.
+        unsure = UNUSABLE if test is unrelated_angles else UNSURE
+        mixed = {label for fault in found if fault.fault in unsure for label in fault.runs}
         angles = test not in (
             duplicate_runs,
             duplicate_rows,

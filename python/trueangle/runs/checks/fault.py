@@ -14,6 +14,7 @@ UNUSABLE = (
     "wrong_sign",
     "wrong_gear_ratio",
     "wrapped_reference",
+    "unrelated_angles",
     "dead_channel",
     "wrapped_counter",
     "short_arc",
@@ -34,9 +35,9 @@ class DataFault(NamedTuple):
     ----------
     fault : str
         Of the fixed vocabulary: duplicate_runs, duplicate_rows, stale_samples,
-        unsorted_time, mixed_units, wrong_sign, swapped_channels, wrong_gear_ratio,
-        saturated_travel, wrapped_reference, missed_counts, outliers; of raw channels
-        dead_channel, wrapped_counter, short_arc, partial_arc, clipping, dropouts, resting,
+        unsorted_time, mixed_units, wrong_sign, unrelated_angles, swapped_channels,
+        wrong_gear_ratio, saturated_travel, wrapped_reference, missed_counts, outliers; of raw
+        channels dead_channel, wrapped_counter, short_arc, partial_arc, clipping, dropouts, resting,
         no_centre.
     runs : tuple of str
         Labels of the runs that have it.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -18,6 +18,7 @@ from ..files import read_columns
 from ..readings import FileReadings
 from ..run import CalibrationRun
 from ..source import checked_reading_options
+from .fault import DataFault
 
 #: Readings that a run must have to be compared as a whole, and a level to be more than noise.
 LEAST_READINGS = 3
@@ -83,6 +84,10 @@ class Record:
             alone = np.flatnonzero(step[:-1] & step[1:] & across) + 1
             indicated[alone] = self.reference[alone] + error[alone - 1]
         return unwrapped(self.reference, 360.0), unwrapped(indicated, 360.0)
+
+    def fault(self, fault: str, rows: Sequence[int], says: str, mend: str) -> DataFault:
+        """A fault of it."""
+        return DataFault.of(fault, [self.label], rows, says, mend)
 
     @cached_property
     def run(self) -> CalibrationRun:

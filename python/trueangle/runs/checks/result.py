@@ -11,11 +11,13 @@ import numpy as np
 from ...support.arrays import Array, median, quantile
 from ...support.layout import counted, laid_out, wrapped_lines
 from ...support.plainresult import PlainResult, plain_fields
+from .angles import BLOCKS
 from .fault import DataFault
 from .record import LEAST_READINGS, Record
 
 #: Levels are apart by this share of their range, and by so much at least.
-_LEAST_GAP = {"speed": 0.5, "load": 0.05, "temperature": 1.0, "mount": 0.5}
+_LEAST_GAP = {"torque": 0.05, "temperature": 1.0, "mount": 0.5, "speed": 0.5}
+_SIGNALS = ("torque", "temperature", "mount")
 
 #: Share of the widest gap within which readings are of one place, and of a turn that all such
 #: gaps together may have.
@@ -38,8 +40,11 @@ class Extent:
     directions : tuple of int
         Of -1 and +1 those that were travelled.
     speeds, loads, temperatures, mounts : tuple of float
-        Levels, also within a run: deg/s, Nm, Celsius, degrees; empty where not recorded.
+        Levels, also within a run: deg/s, Nm, Celsius, degrees; empty where not recorded. Of a
+        signal that goes from one to another without a gap both ends.
     timed : bool
+    swept : tuple of str
+        Of torque, temperature and mount those that go so within a run.
     """
 
     readings: int
@@ -52,28 +57,25 @@ class Extent:
     temperatures: tuple[float, ...]
     mounts: tuple[float, ...]
     timed: bool
+    swept: tuple[str, ...] = ()
 
 
 def extent_of(records: list[Record]) -> Extent:
     """Extent of some records."""
     places = np.concatenate([np.mod(record.reference, 360.0) for record in records])
-    travels, directions, speeds = [], set(), []
+    travels, directions, speeds = [], set[int](), []
     for record in records:
         reference, _ = record.unwrapped
         travels.append(float(np.ptp(reference)) / 360.0)
         steps = np.diff(reference)
-        moving = (
-            steps[np.abs(steps) > 0.25 * float(quantile(np.abs(steps), 0.9, axis=0))]
-            if (steps.size)
-            else steps
-        )
-        for sign in (-1, 1):
-            if np.mean(np.sign(moving) == sign) > 0.05 if moving.size else False:
-                directions.add(sign)
+        least = 0.25 * float(quantile(np.abs(steps), 0.9)) if steps.size else 0.0
+        moving = np.sign(steps[np.abs(steps) > least])
+        directions |= {sign for sign in (-1, 1) if (moving == sign).sum() > 0.05 * moving.size}
         if record.velocity is not None:
             speeds.append(float(median(np.abs(record.velocity))))
         elif record.time is not None and np.ptp(record.time) > 0.0:
             speeds.append(float(np.abs(steps).sum() / np.ptp(record.time)))
+    loads, temperatures, mounts = found = [_signal_levels(records, name) for name in _SIGNALS]
     return Extent(
         sum(len(record) for record in records),
         len(records),
@@ -81,10 +83,11 @@ def extent_of(records: list[Record]) -> Extent:
         max(travels, default=0.0),
         tuple(sorted(directions)),
         _levels_of(speeds, "speed"),
-        _signal_levels([record.torque for record in records], "load"),
-        _signal_levels([record.temperature for record in records], "temperature"),
-        _signal_levels([record.mount for record in records], "mount"),
+        loads[0],
+        temperatures[0],
+        mounts[0],
         all(record.time is not None for record in records),
+        tuple(name for name, (_, swept) in zip(_SIGNALS, found, strict=True) if swept),
     )
 
 
@@ -140,16 +143,29 @@ def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
     return can, cannot
 
 
-def _signal_levels(signals: list[Array | None], kind: str) -> tuple[float, ...]:
-    """Levels of a signal over all runs; one run may hold several."""
-    found: list[float] = []
-    for values in signals:
-        if values is not None:
-            groups = _groups(values, kind)
-            # Single readings apart from the others are noise, not a level.
-            held = [group for group in groups if group.size >= LEAST_READINGS]
-            found += [float(np.mean(group)) for group in held or [values]]
-    return _levels_of(found, kind)
+def _signal_levels(records: list[Record], name: str) -> tuple[tuple[float, ...], bool]:
+    """Levels of a signal over all runs, and whether one run goes through all between two of them.
+
+    One run may hold several.
+    """
+    found, swept = list[float](), False
+    for values in (getattr(record, name) for record in records):
+        groups = [] if values is None else _groups(values, name)
+        # Single readings apart from the others are noise, not a level.
+        for group in [own for own in groups if own.size >= LEAST_READINGS] or groups:
+            inside = values[(values >= group[0]) & (values <= group[-1])]
+            if np.ptp(_medians(inside, BLOCKS)) > _LEAST_GAP[name]:
+                ends, swept = _medians(inside, inside.size // LEAST_READINGS), True
+                found += [float(ends.min()), float(ends.max())]
+            else:
+                found.append(float(np.mean(group)))
+    return _levels_of(found, name), swept
+
+
+def _medians(values: Array, blocks: int) -> Array:
+    """Medians of blocks of consecutive readings, in which single ones do not show."""
+    parts = np.array_split(values, min(blocks, values.size))
+    return np.array([median(part) for part in parts])
 
 
 def _levels_of(values: list[float], kind: str) -> tuple[float, ...]:
@@ -225,7 +241,7 @@ class Check(PlainResult):
         ]
         return {
             **plain_fields(self, "data_faults usable ratio ratio_suggests=suggests"),
-            **plain_fields(self.extent, f"readings runs span_deg turns {moved}"),
+            **plain_fields(self.extent, f"readings runs span_deg turns {moved} swept"),
             "columns": columns,
             **plain_fields(self, "can cannot"),
         }
@@ -260,8 +276,9 @@ class Check(PlainResult):
             f"covered, longest run {e.turns:.4g} turns.",
             f"Indicated per reference: {ratio} ({self.suggests}).",
             f"Directions: {_levels(e.directions)}; speeds: {_levels(e.speeds, 'deg/s')}; "
-            f"loads: {_levels(e.loads, 'Nm')}; "
-            f"temperatures: {_levels(e.temperatures, 'C')}; mounts: {_levels(e.mounts, 'deg')}.",
+            f"loads: {_levels(e.loads, 'Nm', 'torque' in e.swept)}; "
+            f"temperatures: {_levels(e.temperatures, 'C', 'temperature' in e.swept)}; "
+            f"mounts: {_levels(e.mounts, 'deg', 'mount' in e.swept)}.",
             "",
         ]
         lines += wrapped_lines(f"Identifiable: {'; '.join(self.can)}.", 2)
@@ -280,7 +297,8 @@ def _reversed(role: str, name: str) -> str:
     return " (a reversed sensor: models keep indicated_sign -1)" if is_reversed else ""
 
 
-def _levels(values: tuple[float, ...] | tuple[int, ...], unit: str = "") -> str:
+def _levels(values: tuple[float, ...], unit: str = "", swept: bool = False) -> str:
     if not values:
         return "not recorded"
-    return f"{', '.join(f'{value:g}' for value in values)} {unit}".rstrip()
+    told = f"{', '.join(f'{value:g}' for value in values)} {unit}".rstrip()
+    return told + ", also between them within a run" * swept

@@ -61,9 +61,8 @@ def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
                 continue
             rows = slice((row - 1) * apart, row * apart + 1)
             k = rows.start + _largest((record.indicated - record.reference)[rows], lost)
-            yield DataFault.of(
+            yield record.fault(
                 "missed_counts",
-                [record.label],
                 [int(record.rows[k])],
                 f"the error of run {record.label} jumps by {brief_number(lost)} deg at row "
                 f"{record.rows[k]} and stays there: steps or counts were lost",
@@ -152,9 +151,8 @@ def outliers(records: Iterable[Record], faults: Iterable[DataFault]) -> Iterator
         rows = record.rows[far]
         if rows.size:
             most = int(np.argmax(np.where(far, distance, 0.0)))
-            yield DataFault.of(
+            yield record.fault(
                 "outliers",
-                [record.label],
                 rows.tolist(),
                 f"{rows.size} reading{'s' * (rows.size > 1)} of run {record.label} "
                 f"{'are' if rows.size > 1 else 'is'} far off the neighbours in angle: row "
@@ -202,8 +200,7 @@ def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
     agree there may come from a coarse resolution.
     """
     for record in records:
-        timed = record.time is not None
-        columns = [record.indicated, record.reference, *([record.time] if timed else [])]
+        columns = [record.indicated, record.reference, record.time]
         table = np.stack([column for column in columns if column is not None])
         if distinct(table[-1]).size == len(record):
             continue
@@ -211,19 +208,17 @@ def duplicate_rows(records: list[Record]) -> Iterator[DataFault]:
         same = np.diff(table[:, order]) == 0.0
         again = same.all(axis=0)
         rows = np.sort(record.rows[order[1:][again]])
-        if timed and rows.size:
-            yield DataFault.of(
+        if record.time is not None and rows.size:
+            yield record.fault(
                 "duplicate_rows",
-                [record.label],
                 rows.tolist(),
                 f"{rows.size} row{'s' * (rows.size > 1)} of run {record.label} (first: row "
                 f"{rows[0]}) are there twice, time stamp and readings",
                 "drop the second of each",
             )
         elif rows.size >= LEAST_READINGS and np.array_equal(again, same[-1]):
-            yield DataFault.of(
+            yield record.fault(
                 "duplicate_rows",
-                [record.label],
                 rows.tolist(),
                 f"{rows.size} of {len(record)} readings of run {record.label} repeat others to "
                 f"the last digit (first: row {rows[0]}): uncertainties would come out too small",

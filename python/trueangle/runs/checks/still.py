@@ -113,9 +113,8 @@ def _stuck(record: Record, name: str, own: Array, other: Array) -> Iterator[Data
     if limit:
         rows = record.rows[np.array(limit)]
         value = float(own[limit[0]])
-        yield DataFault.of(
+        yield record.fault(
             "saturated_travel",
-            [record.label],
             rows.tolist(),
             f"the {name} angle of run {record.label} stays at {value:g} deg, the end of its "
             f"range, in {rows.size} rows (first: row {rows[0]}) while the joint moves on",
@@ -125,9 +124,8 @@ def _stuck(record: Record, name: str, own: Array, other: Array) -> Iterator[Data
     # more than once; at one place a command that is held would do.
     if len(stale) >= (3 if times > 1 else _HELD):
         rows = record.rows[np.array(stale)]
-        yield DataFault.of(
+        yield record.fault(
             "stale_samples",
-            [record.label],
             rows.tolist(),
             f"{rows.size} {name} readings of run {record.label} (first: row {rows[0]}) repeat "
             "the one before while the joint moves: old samples were logged again",

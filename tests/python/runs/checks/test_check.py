@@ -177,7 +177,7 @@ def test_measured_data(data_dir: Path) -> None:
 
 @pytest.mark.parametrize("mounts", [(0.0, 105.0), (-30.0, 17.5, 80.0)])
 def test_levels_within_one_run_are_reported(mounts: tuple[float, ...]) -> None:
-    """A mean of two levels is no level; a drift and noise are one level."""
+    """A mean of two levels is no level; noise is one, and a drift has both of its ends."""
     rng = np.random.default_rng(41)
     place = np.arange(0.0, 360.0, 12.0)
     rows = [(x, m, 20.0 + 11.0 * i) for i, m in enumerate(mounts) for x in place]
@@ -194,8 +194,10 @@ def test_levels_within_one_run_are_reported(mounts: tuple[float, ...]) -> None:
     assert found.extent.mounts == mounts
     expected = 20.0 + 11.0 * np.arange(len(mounts))
     assert found.extent.temperatures == pytest.approx(expected, abs=0.2)
-    assert found.extent.loads == (1.5,)
-    assert {"thermal drift", "the reference's own error apart from the joint's"} <= {*found.can}
+    assert found.extent.loads == pytest.approx((1.0, 2.0), abs=0.04)
+    assert found.extent.swept == ("torque",)
+    assert "Nm, also between them within a run" in " ".join(found.summary().split())
+    assert {"compliance", "thermal drift"} <= {*found.can}
 
 
 def test_one_column_is_label_and_mount(tmp_path: Path) -> None:

@@ -229,7 +229,8 @@ def test_what_was_moved_and_measured_is_told() -> None:
         [0.0, 3.0],
         [0.0, 90.0],
     )
-    assert told["temperatures"] == [21.25]
+    assert told["temperatures"] == pytest.approx([20.0, 22.5], abs=0.02)
+    assert told["swept"] == ["temperature"]
     # Without a velocity the speed is the way gone over the time, there and back.
     silent = [replace(run, velocity=None) for run in runs_of()]
     assert ta.check(silent).extent.speeds == pytest.approx((10.0, 40.0), rel=0.01)
