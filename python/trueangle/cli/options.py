@@ -60,10 +60,10 @@ _SHARED: Final[dict[str, tuple[str, Kind, str, dict[str, Any]]]] = {
     ),
     "covariance": (
         "--covariance",
-        ("auto", "white", "cluster", "hac"),
+        ("auto", "white", "cluster", "correlated"),
         "standard errors of independent readings (white), by the scatter between runs "
-        "(cluster) or between segments of readings (hac). Default: cluster for three runs "
-        "and more; else white, or hac where correlation is found",
+        "(cluster) or of noise that is correlated in time (correlated). Default: cluster for "
+        "three runs and more; else white, or correlated where that has the greater evidence",
         {"default": "auto"},
     ),
     "orders": (

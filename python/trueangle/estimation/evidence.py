@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -318,6 +319,80 @@ def estimate_by_evidence(
     )
 
 
+@dataclass(frozen=True)
+class ReadingNoise:
+    """Noise of equally spaced readings that is of most evidence.
+
+    Attributes
+    ----------
+    readings : Groups
+        Columns of a fit and what it leaves, run by run: whole runs, up to 12 000 readings.
+    tau : list of float
+        Prior variance of the coefficients, as good as flat.
+    scale : float
+        Variance of what is left, above 0.
+    """
+
+    readings: Groups
+    tau: list[float]
+    scale: float
+
+    @classmethod
+    def of(cls, columns: Sequence[Array], left: Sequence[Array], scale: float) -> ReadingNoise:
+        """From the columns and what a fit of them leaves, run by run."""
+        pairs, room = [], 12_000
+        for x, y in zip(columns, left, strict=True):
+            if room > 0:
+                pairs.append((x[:room], y[:room], None))
+                room -= len(y)
+        readings = Groups(pairs, [columns[0].shape[1]])
+        return cls(readings, [1e6 * scale * sum(map(len, left))], scale)
+
+    @cached_property
+    def variances(self) -> Array:
+        """Of its white part, and of the terms with the correlation times `CORRELATION_TIMES`."""
+        return self.readings.noise(self.tau, self.scale)
+
+    @property
+    def odds(self) -> float:
+        """Logarithm of its evidence over that of white noise."""
+        white = np.zeros_like(self.variances)
+        white[0] = self.scale
+        own, other = (
+            self.readings.sums(noise, self.scale).posterior(self.tau)[0]
+            for noise in (self.variances, white)
+        )
+        return float(own - other)
+
+    def correlation(self, count: int) -> Array:
+        """Of readings 0 to ``count - 1`` steps apart."""
+        decay = np.exp(-np.arange(count)[:, None] / np.array(CORRELATION_TIMES))
+        found = decay @ self.variances[1:]
+        found[0] += self.variances[0]
+        return np.asarray(found / found[0])
+
+    def covariance_times(self, rows: Array) -> Array:
+        """Its covariance times columns of a run, by a cyclic convolution."""
+        count = len(rows)
+        size = 1 << (2 * count - 1).bit_length()
+        near = float(self.variances.sum()) * self.correlation(count)
+        around = np.zeros(size)
+        around[:count], around[size - count + 1 :] = near, near[:0:-1]
+        spectrum = np.fft.rfft(around)
+        back = [np.fft.irfft(spectrum * np.fft.rfft(x, size), size)[:count] for x in rows.T]
+        return np.column_stack(back)
+
+    def share(self, count: int) -> float:
+        """Degrees of freedom of a variance of ``count`` readings over their number.
+
+        ::
+
+            (tr C)² / n tr C² = 1 / (2 Σ_l (1 - l/n) ρ_l² - 1)
+        """
+        squares = self.correlation(count) ** 2 * (1.0 - np.arange(count) / count)
+        return float(1.0 / (2.0 * squares.sum() - 1.0))
+
+
 def noise_information(
     columns: Array, left: Array, bounds: Sequence[tuple[int, int]], scale: float
 ) -> Array:
@@ -327,8 +402,7 @@ def noise_information(
 
         X' C^-1 X,    C = w I + sum_j a_j exp(-|dt| / T_j)   in every run
 
-    with the variances of most evidence for what a fit of the columns leaves. Equally spaced
-    readings; of many the noise is that of the first 12 000.
+    with the variances of most evidence for what a fit of the columns leaves (`ReadingNoise`).
 
     Parameters
     ----------
@@ -339,14 +413,10 @@ def noise_information(
     scale : float
         Variance of what is left, above 0.
     """
-    some = [(a, min(b, 12_000)) for a, b in bounds if a < 12_000]
-    first, every = (
-        Groups([(columns[a:b], left[a:b], None) for a, b in parts], [columns.shape[1]])
-        for parts in (some, bounds)
-    )
-    # A prior that is as good as flat.
-    noise = first.noise([1e6 * scale * len(left)], scale)
-    return every.sums(noise, scale).information()
+    parts, rests = ([values[a:b] for a, b in bounds] for values in (columns, left))
+    noise = ReadingNoise.of(parts, rests, scale)
+    pairs = [(x, y, None) for x, y in zip(parts, rests, strict=True)]
+    return Groups(pairs, [columns.shape[1]]).sums(noise.variances, scale).information()
 
 
 def _column(values: Array | None) -> Array | None:

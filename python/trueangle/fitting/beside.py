@@ -68,7 +68,7 @@ class BesideProblem(Problem):
         """The zero of a run, and a separate drift."""
         return np.hstack([super().private(index), self._own[index]])
 
-    def products(self, weights: Sequence[Array | None], index: int, count: int) -> list[Array]:
+    def products(self, weights: Sequence[Array | None], index: int) -> Array:
         """As of a problem, of columns and errors less what the run's own nuisances explain."""
         run, weight = self.runs[index], weights[index]
         target = np.column_stack([self.columns(index), run.centred_error])
@@ -76,8 +76,7 @@ class BesideProblem(Problem):
         rest = target - own @ least_squares(own, target, weight)
         rows = np.column_stack([np.ones(len(run)), rest])
         given = rows if weight is None else weight[:, None] * rows
-        parts = np.array_split(np.arange(len(run)), count)
-        return [rows[part].T @ given[part] for part in parts]
+        return np.asarray(rows.T @ given)
 
     def jointly(
         self, fitted: SolvedProblem, weights: Sequence[Array | None], penalty: float = 0.0
@@ -88,7 +87,7 @@ class BesideProblem(Problem):
         squares = solution.residual_variance * solution.degrees_of_freedom
         variance = squares / left if left > 0.0 else np.inf
         used = [i for i in range(len(self.runs)) if not np.isnan(fitted.offsets[i])]
-        parts = [self.products(weights, i, 1)[0] for i in used]
+        parts = [self.products(weights, i) for i in used]
         gram = np.sum(parts, axis=0)[1:-1, 1:-1]
         means = []
         for i in used:

@@ -94,12 +94,12 @@ def fit(
         Tikhonov penalty relative to the sum of weights. By default 0 on a full turn, and
         chosen by held-out error on partial travel and where orders of several shafts nearly
         cancel over the travel (`trueangle.fitting.ridge.choose_ridge`).
-    covariance : {"auto", "white", "cluster", "hac"}
+    covariance : {"auto", "white", "cluster", "correlated"}
         ``"white"``: independent readings; ``"cluster"``: by the scatter between whole runs,
-        right for any correlation within them; ``"hac"``: by segments of readings, right
-        where the correlation dies out. ``"auto"``: by the scatter between three runs and more,
-        that of each coefficient moderated by the others; of one or two runs white unless the
-        residuals correlate in time, then segments. Intervals: `FitResult.interval`.
+        right for any correlation within them; ``"correlated"``: by noise that is correlated in
+        time, estimated by its evidence. ``"auto"``: by the scatter between three runs and more,
+        that of each coefficient moderated by the others; of one or two runs white unless
+        correlated noise has by far the greater evidence. Intervals: `FitResult.interval`.
     nuisance : {"none", "auto"} or iterable of str
         What is fitted jointly with the pattern and kept out of the model (`FitResult.nuisance`):
         ``"ramp"`` in the angle, ``"direction"``, ``"velocity"``, ``"drift"`` in time.

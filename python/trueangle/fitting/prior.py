@@ -200,7 +200,7 @@ def posterior(problem: Problem, prior: Prior, loss: str) -> tuple[RobustFit, Pos
 def _solved(
     problem: Problem, prior: Prior, weights: Sequence[Array | None]
 ) -> tuple[SolvedProblem, Posterior]:
-    products = [problem.products(weights, i, 1)[0] for i in range(len(problem.runs))]
+    products = [problem.products(weights, i) for i in range(len(problem.runs))]
     means = np.array([part[0] / part[0, 0] for part in products])
     of_runs = [NormalEquations.of_products(part) for part in products]
     sums = total(of_runs)

@@ -220,26 +220,18 @@ class Problem:
         """Columns that a run has for itself: its zero."""
         return np.ones((len(self.runs[index]), 1))
 
-    def products(self, weights: Sequence[Array | None], index: int, count: int) -> list[Array]:
-        """Sums of products of ``[1, columns, error]`` of a run, in ``count`` segments."""
-        run, weight = self.runs[index], weights[index]
-        zero = circular_mean(run.indicated - run.reference, self.period)
-        found = []
-        for part in np.array_split(np.arange(len(run)), count) if count > 1 else [slice(None)]:
-            rows = _core.triangle(
-                (
-                    run.reference[part],
-                    run.indicated[part],
-                    None if weight is None else weight[part],
-                ),
-                self.period,
-                *self.design,
-                self.argument,
-                zero,
-                self.threads,
-            )
-            found.append(rows.T @ rows)
-        return found
+    def products(self, weights: Sequence[Array | None], index: int) -> Array:
+        """Sums of products of ``[1, columns, error]`` of a run."""
+        run = self.runs[index]
+        rows = _core.triangle(
+            (run.reference, run.indicated, weights[index]),
+            self.period,
+            *self.design,
+            self.argument,
+            circular_mean(run.indicated - run.reference, self.period),
+            self.threads,
+        )
+        return np.asarray(rows.T @ rows)
 
     def residuals(self, fitted: SolvedProblem) -> list[Array]:
         """Measured less fitted error of every run, each around its own zero."""
@@ -323,10 +315,8 @@ class SummedProblem(Problem):
     def _weight(self, weights: Sequence[Array | None]) -> float:
         return float(self.summed.moments.count)
 
-    def products(self, weights: Sequence[Array | None], index: int, count: int) -> list[Array]:
-        """As of readings in memory; of whole runs only."""
-        if count != 1:
-            raise ArgumentError("one pass keeps no segments of runs: take `covariance='cluster'`")
+    def products(self, weights: Sequence[Array | None], index: int) -> Array:
+        """As of readings in memory."""
         moments = self.summed.moments
         orders = [k * shaft.cycles_per_turn for shaft in self.shafts for k in shaft.orders]
         steps = np.rint(np.asarray(orders) / moments.cycles).astype(np.int64)
@@ -342,4 +332,4 @@ class SummedProblem(Problem):
         found[0, -1] = error[0].real
         found[:, 0], found[:, -1] = found[0], found[-1]
         found[-1, 0] = found[0, -1] = error[0].real
-        return [found]
+        return found

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +32,12 @@ from ..runs.aliasing import Positions, distinct_positions
 from ..runs.run import CalibrationRun
 from ..support.arrays import Array
 from ..support.distributions import f_tail
-from .correlation import SCATTER
 from .problem import Problem, SolvedProblem
 from .rounding import COUNTED, rounding_variance
 from .uncertainty import CovarianceKind, Uncertainty
+
+#: p-value of a scatter below which it is not that of white noise.
+SCATTER: Final = 1e-3
 
 
 class _Repeats(NamedTuple):

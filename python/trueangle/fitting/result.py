@@ -42,7 +42,7 @@ class FitResult(FittedCoefficients):
         Gear ratio (or None) and fixed member, as given.
     remarks : tuple of str
         What the choice of the angle, of the weights and of the runs found; among `notes`.
-    covariance_asked : {"auto", "white", "cluster", "hac"}
+    covariance_asked : {"auto", "white", "cluster", "correlated"}
         The covariance requested; `uncertainty` has the one taken.
     nuisance : Nuisance or None
         Effects other than the pattern that were removed from the readings: `runs` are without them.

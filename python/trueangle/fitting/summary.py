@@ -91,7 +91,7 @@ _KINDS = {
     "white": "for white noise",
     "evidence": "with correlated noise and the choice of orders allowed for",
     "cluster": "by the scatter between runs",
-    "hac": "by the scatter of segments of the readings",
+    "correlated": "with noise that is correlated in time",
 }
 
 

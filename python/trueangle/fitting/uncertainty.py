@@ -9,34 +9,31 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from ..errors import ArgumentError
+from ..estimation.evidence import ReadingNoise
 from ..estimation.linear import (
     FEWEST_RUNS,
     LEVELS,
     NormalEquations,
     cluster_covariance,
+    linear_residual,
     moderated_covariance,
+    pseudo_inverse,
     total,
 )
 from ..support.arrays import Array, median
 from ..support.suggestions import check_choice
 from .beside import BesideProblem
-from .correlation import (
-    ENOUGH_RUNS,
-    FEWEST_STRETCHES,
-    clusters_of,
-    correlation_found,
-    residual_memory,
-    runs_together,
-    weight_sum,
-)
 from .problem import Problem, SolvedProblem
 from .robust import Sandwich, sandwich
 
 if TYPE_CHECKING:
     from .nuisance import Nuisance
 
-CovarianceKind: TypeAlias = Literal["auto", "white", "cluster", "hac"]
-COVARIANCES: tuple[CovarianceKind, ...] = ("auto", "white", "cluster", "hac")
+CovarianceKind: TypeAlias = Literal["auto", "white", "cluster", "correlated"]
+COVARIANCES: tuple[CovarianceKind, ...] = ("auto", "white", "cluster", "correlated")
+
+#: Fewest runs that show by themselves how coefficients scatter.
+_ENOUGH_RUNS: Final = 8
 
 #: Readings of one or two runs from which a correlation of 0.2 would be found.
 _TELLING: Final = 300
@@ -49,7 +46,7 @@ class Uncertainty(NamedTuple):
     None for those of ``freedom``.
     """
 
-    kind: Literal["white", "cluster", "hac", "evidence"]
+    kind: Literal["white", "cluster", "correlated", "evidence"]
     covariance: Array
     freedom: Array
     note: str = ""
@@ -97,7 +94,7 @@ def check_covariance(kind: str, runs: int) -> None:
     if kind == "cluster" and runs < 2:
         raise ArgumentError(
             "`covariance='cluster'` takes whole runs as clusters and needs two at least: measure "
-            "further runs, or take `covariance='hac'`"
+            "further runs, or take `covariance='correlated'`"
         )
 
 
@@ -118,10 +115,9 @@ def coefficient_uncertainty(
 
     The scatter of few runs is moderated by white noise and by what the coefficients have in common
     (`trueangle.estimation.linear.moderated_covariance`). One or two runs are white noise unless
-    correlation is found: then the clusters are segments eight correlation times of the residuals
-    long: right where the correlation decays within a run, which one run cannot prove, so that a
-    note states it. The bias of a penalty is added to either
-    (`trueangle.fitting.ridge`).
+    the evidence for correlated noise is by far greater: then that noise holds, of which a slow
+    drift is no part that one run could prove, so that a note states it. The bias of a penalty is
+    added to either (`trueangle.fitting.ridge`).
     """
     bent = sandwich(problem, fitted, weights, loss)
     beside = None if nuisance is None else BesideProblem.of(problem, nuisance)
@@ -150,68 +146,103 @@ def _noise(
     solution = fitted.solution
     white = bent.white * np.asarray(solution.covariance)
     freedom = np.full(len(white), solution.degrees_of_freedom)
+    plain = Uncertainty("white", white, freedom)
     if kind == "white" or not np.isfinite(white).all() or len(white) == 1:
-        return Uncertainty("white", white, freedom)
+        return plain
+    if not (solution.residual_variance > 0.0 and solution.degrees_of_freedom > 0.0):
+        return plain
     used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
-    said = note = ""
-    if kind == "auto" and len(used) < FEWEST_RUNS:
-        said = correlation_found(problem, fitted, weights, used)
-        if not said:
-            return Uncertainty("white", white, freedom, _untold(problem, used))
-        kind, said = "hac", f"the residuals are not white noise ({said}): "
-    if kind == "hac":
-        memory, stretches = residual_memory(problem, fitted, weights, used)
-        if problem.summed or min(stretches) < FEWEST_STRETCHES:
-            why = _SUMMED if problem.summed else _SHORT
-            unknowns = problem.unknowns + len(used)
-            return _thinned(white, problem.readings / memory, unknowns, memory, said, why)
-        parts = zip(used, stretches, strict=True)
-        clusters = [one for i, n in parts for one in clusters_of(problem, fitted, weights, i, n)]
-        note = (
-            f"{said}standard errors by the scatter of {len(clusters)} segments of the readings, "
-            f"correlated over about {memory:.0f} readings. A slower drift cannot be estimated from "
-            f"{'one run' if len(used) == 1 else f'{len(used)} runs'}: measure "
-            f"{ENOUGH_RUNS} runs and more"
-        )
-    else:
-        clusters = runs_together([clusters_of(problem, fitted, weights, i, 1)[0] for i in used])
     try:
+        noise = plain
+        few = len(used) < FEWEST_RUNS
+        # Blocks of readings at random, which sums keep, do not show the noise of whole runs.
+        if kind == "correlated" or (kind == "auto" and (few or not problem.summed)):
+            noise = _correlated(problem, fitted, weights, used, penalty, kind, plain)
+        if kind == "correlated" or (kind == "auto" and few):
+            return noise
+        runs = [clusters_of(problem, fitted, weights, i) for i in used]
+        # At most this many clusters: further runs are added to the first ones in turn.
+        clusters = [total(runs[i::128]) for i in range(min(len(runs), 128))]
         weight = sum(weight_sum(weights[i], len(problem.runs[i])) for i in used)
         scatter = cluster_covariance(clusters, penalty * weight)
         scatter = scatter._replace(covariance=bent.bread * scatter.covariance)
         if kind == "auto":
-            kind = "cluster"
             # Runs that scatter by nothing are copies, or what they leave is a pattern.
             if not (np.diag(scatter.covariance) > LEVELS[0] * np.diag(white)[1:]).any():
-                return Uncertainty("white", white, freedom)
-            scatter = moderated_covariance(scatter, white[1:, 1:], solution.degrees_of_freedom)
+                return plain
+            scatter = moderated_covariance(scatter, noise.covariance[1:, 1:], noise.fewest)
     except np.linalg.LinAlgError:
-        return Uncertainty("white", white, freedom, _CANCEL)
-    return Uncertainty(kind, *_with_constant(white, *scatter), note)
+        return plain._replace(note=_CANCEL)
+    return Uncertainty("cluster", *_with_constant(white, *scatter))
 
 
-_SHORT: Final = "The runs are too short for their correlation time"
-_SUMMED: Final = "One pass keeps no segments"
+#: Logarithm of the odds from which noise is correlated: 95 % of the probability.
+_CORRELATED: Final = math.log(19.0)
 
 
-def _thinned(
-    white: Array, independent: float, unknowns: int, memory: float, said: str, why: str
+def _correlated(
+    problem: Problem,
+    fitted: SolvedProblem,
+    weights: Sequence[Array | None],
+    used: Sequence[int],
+    penalty: float,
+    kind: CovarianceKind,
+    plain: Uncertainty,
 ) -> Uncertainty:
-    """As if every ``memory`` correlated readings were one independent reading.
+    """Under the noise of most evidence; ``plain`` where that is white, unless asked for.
 
-    The scatter of a few segments has fewer directions than there are coefficients: its
-    standard errors may come out arbitrarily small.
+    ::
+
+        cov b = G⁻¹ X̃' C X̃ G⁻¹,    G = X̃' X̃
+
+    with the covariance C of the readings in the order of time, and the columns X̃ less what is
+    each run's own, its zero.
     """
-    told = "standard errors as for independent readings"
-    if round(memory) > 1:
-        told = f"{memory:.0f} readings carry the information of one"
-    note = (
-        f"{said}{told}. {why}, and the covariance is not known: measure {ENOUGH_RUNS} runs and more"
-    )
-    # The fit takes its unknowns from the independent readings, which makes the residuals smaller.
-    left = max(independent - unknowns, 1.0)
-    wider = memory * max(independent / left, 1.0)
-    return Uncertainty("hac", white * wider, np.full(len(white), left), note)
+    columns, left = [], []
+    rests = problem.residuals(fitted)
+    for i in used:
+        x, own, weight = problem.columns(i), problem.private(i), weights[i]
+        root = np.ones(len(x)) if weight is None else np.sqrt(weight)
+        counted = root > 0.0
+        columns.append((root[:, None] * linear_residual(own, x, weight))[counted])
+        left.append((root * rests[i])[counted])
+    noise = ReadingNoise.of(columns, left, fitted.solution.residual_variance)
+    if kind == "auto" and noise.odds < _CORRELATED:
+        return plain._replace(note=_untold(problem, used))
+    held = penalty * sum(weight_sum(weights[i], len(problem.runs[i])) for i in used)
+    gram = np.sum([x.T @ x for x in columns], axis=0)
+    inverse = pseudo_inverse(gram + held * np.eye(len(gram)))
+    meat = np.sum([x.T @ noise.covariance_times(x) for x in columns], axis=0)
+    before, after = (inverse @ form @ inverse for form in (noise.scale * gram, meat))
+    # Of sums the covariance is that of all readings, and the noise that of some.
+    wider = np.sqrt(np.diag(after) / np.diag(before))
+    covariance = plain.covariance[1:, 1:] * np.outer(wider, wider)
+    count = max(map(len, columns))
+    freedom = np.maximum(plain.freedom[1:] * noise.share(count), 1.0)
+    near = f"{noise.correlation(2)[1]:.2f}"
+    note = f"neighbours in time correlate by {near}: standard errors allow for it"
+    if len(used) < _ENOUGH_RUNS:
+        runs = "one run" if len(used) == 1 else f"{len(used)} runs"
+        more = f"measure {_ENOUGH_RUNS} runs and more"
+        note += f". A slower drift cannot be estimated from {runs}: {more}"
+    return Uncertainty("correlated", *_with_constant(plain.covariance, covariance, freedom), note)
+
+
+def weight_sum(weights: Array | None, size: int) -> float:
+    """Sum of the weights of ``size`` readings."""
+    return float(size) if weights is None else float(weights.sum())
+
+
+def clusters_of(
+    problem: Problem, fitted: SolvedProblem, weights: Sequence[Array | None], index: int
+) -> NormalEquations:
+    """Sums of a run about its mean and the fit."""
+    solution = fitted.solution
+    a, b = (np.concatenate([np.zeros(0), *part]) for part in (solution.cosine, solution.sine))
+    found = np.column_stack([a, b]).ravel()
+    sums = NormalEquations.of_products(problem.products(weights, index))
+    # Of nuisances nothing is left in the readings.
+    return sums.about(np.concatenate([found, np.zeros(len(sums.moment) - found.size)]))
 
 
 def _bias(
@@ -221,7 +252,7 @@ def _bias(
     from .ridge import REACH, bias_covariance, error_range, pattern_variances
 
     used = [i for i in range(len(problem.runs)) if not np.isnan(fitted.offsets[i])]
-    parts = [problem.products(weights, i, 1)[0] for i in used]
+    parts = [problem.products(weights, i) for i in used]
     means = [part[0] / part[0, 0] for part in parts]
     sums = total([NormalEquations.of_products(part) for part in parts])
     lowest = [min(shaft.orders, default=1.0) for shaft in problem.shafts]
@@ -250,7 +281,7 @@ def _untold(problem: Problem, used: Sequence[int]) -> str:
     return (
         f"{count} readings in {len(used)} run{'s' if len(used) > 1 else ''} cannot show whether "
         "neighbours correlate: the standard errors hold only if they do not; "
-        f"measure {ENOUGH_RUNS} runs and more"
+        f"measure {_ENOUGH_RUNS} runs and more"
     )
 
 

@@ -118,8 +118,7 @@ def unlike_runs_sentence(labels: Sequence[str], count: int) -> str:
 
 def _sums(problem: Problem, index: int) -> NormalEquations:
     if problem.summed is not None:
-        (products,) = problem.products(problem.base, index, 1)
-        sums = NormalEquations.of_products(products)
+        sums = NormalEquations.of_products(problem.products(problem.base, index))
         return sums.share(min(1.0, _READINGS / sums.readings))
     rows, used = _rows(problem, index)
     return replace(NormalEquations.of_rows(rows[:, :-1], rows[:, -1]), readings=used)

@@ -71,8 +71,7 @@ def fit_logs(
         omitted and counted.
     orders : iterable of int, mapping of shaft to orders, "auto" or None
     gear_ratio, fixed_member, shafts, argument, covariance
-        As in `fit`. ``"hac"`` needs segments of runs, which sums do not keep: standard errors are
-        those of fewer independent readings, by the correlation time of the residuals.
+        As in `fit`; how noise correlates is seen in the readings that are kept.
     loss : {"auto", "linear"}
         As in `fit`: ``"auto"`` rejects outliers, which takes a second pass where there are
         some.

@@ -476,7 +476,7 @@ def noted(period=360.0):
     yield ta.fit([run(theta, wrong=5.0), run(theta)], orders=[1])
     yield ta.fit([run(theta, 0.01) for _ in range(4)], orders=[1])
     yield ta.fit([run(theta, 0.01) for _ in range(9)], orders=[1])
-    yield ta.fit([run(np.arange(0.0, 360.0, 0.5), 0.01)], orders=[1], covariance="hac")
+    yield ta.fit([run(np.arange(0.0, 360.0, 0.5), 0.01)], orders=[1], covariance="correlated")
     yield ta.fit([run(theta, 0.003) for _ in range(2)], orders=[1], nuisance="drift")
     yield ta.fit(
         [run(theta) for _ in range(2)], orders={"output": [1], "motor": [1]}, gear_ratio=1.5

@@ -349,17 +349,17 @@ def test_a_folder_of_unlike_units_raises_a_warning_that_names_them(tmp_path):
 
 def test_one_pass_takes_the_scatter_between_runs_under_correlated_noise(tmp_path):
     logs_of(tmp_path, [SAME] * 8, memory=0.95)
-    found = ta.fit_logs(tmp_path, [1, 2])
+    assert ta.fit_logs(tmp_path, [1, 2]).uncertainty.kind == "cluster"
+    found = ta.fit_logs(tmp_path, [1, 2], covariance="cluster")
     runs = ta.read_runs([tmp_path / f"unit{i}.parquet" for i in range(8)])
-    expected = ta.fit(runs, [1, 2])
-    assert found.uncertainty.kind == "cluster"
+    expected = ta.fit(runs, [1, 2], covariance="cluster")
     # Elements that vanish by symmetry are the rounding of two different orders of summation.
     nothing = 1e-12 * np.abs(expected.covariance).max()
     np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-6, atol=nothing)
     np.testing.assert_allclose(found.interval(), expected.interval(), rtol=0, atol=1e-9)
     assert ta.fit_logs(tmp_path, [1, 2], covariance="white").uncertainty.kind == "white"
-    found = ta.fit_logs(tmp_path, [1, 2], covariance="hac")
-    assert any("One pass keeps no segments" in note for note in found.notes)
+    found = ta.fit_logs(tmp_path, [1, 2], covariance="correlated")
+    assert any("eighbours in time correlate by 0.9" in note for note in found.notes)
 
 
 def test_one_pass_and_memory_print_the_same_json(tmp_path, capsys, monkeypatch):

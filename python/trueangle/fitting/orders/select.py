@@ -67,7 +67,7 @@ def select_orders(
     argument : {"auto", "reference", "indicated"}
         Which angle the orders are sought in. ``"auto"``: the true angle, unless every run has
         an arbitrary zero of the reference (`trueangle.fitting.argument.choose_argument`).
-    covariance : {"auto", "white", "cluster", "hac"}
+    covariance : {"auto", "white", "cluster", "correlated"}
         Of the coefficients of retained orders, as in `trueangle.fit`.
     shafts : mapping of str to float, optional
         Further shafts and their cycles per output turn (a worm: 144): once, twice, three and
