@@ -320,7 +320,7 @@ def estimate_by_evidence(
 
 
 @dataclass(frozen=True)
-class ReadingNoise:
+class CorrelatedNoise:
     """Noise of equally spaced readings that is of most evidence.
 
     Attributes
@@ -338,7 +338,7 @@ class ReadingNoise:
     scale: float
 
     @classmethod
-    def of(cls, columns: Sequence[Array], left: Sequence[Array], scale: float) -> ReadingNoise:
+    def of(cls, columns: Sequence[Array], left: Sequence[Array], scale: float) -> CorrelatedNoise:
         """From the columns and what a fit of them leaves, run by run."""
         pairs, room = [], 12_000
         for x, y in zip(columns, left, strict=True):
@@ -402,7 +402,7 @@ def noise_information(
 
         X' C^-1 X,    C = w I + sum_j a_j exp(-|dt| / T_j)   in every run
 
-    with the variances of most evidence for what a fit of the columns leaves (`ReadingNoise`).
+    with the variances of most evidence for what a fit of the columns leaves (`CorrelatedNoise`).
 
     Parameters
     ----------
@@ -414,7 +414,7 @@ def noise_information(
         Variance of what is left, above 0.
     """
     parts, rests = ([values[a:b] for a, b in bounds] for values in (columns, left))
-    noise = ReadingNoise.of(parts, rests, scale)
+    noise = CorrelatedNoise.of(parts, rests, scale)
     pairs = [(x, y, None) for x, y in zip(parts, rests, strict=True)]
     return Groups(pairs, [columns.shape[1]]).sums(noise.variances, scale).information()
 

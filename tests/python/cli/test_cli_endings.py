@@ -60,18 +60,10 @@ def run(arguments, **more):
 # -- anything unexpected
 
 
-class Panic(BaseException):
-    """As a panic of the core arrives: no Exception."""
-
-
 @pytest.mark.parametrize(
     ("error", "said"),
     [
         (KeyError("orders"), "unexpected KeyError: 'orders'; this is a defect of trueangle"),
-        (RecursionError("too\ndeep"), "unexpected RecursionError: too deep; this is a defect"),
-        (Panic("index out of bounds"), "unexpected Panic: index out of bounds; this is a defect"),
-        (MemoryError("Unable to allocate 37 GiB"), "out of memory (Unable to allocate 37 GiB)"),
-        (MemoryError(), "out of memory (no more is available)"),
         (OSError(5, "Input/output error", "a.csv"), "a.csv: Input/output error"),
     ],
 )

@@ -9,7 +9,7 @@ from scipy import linalg, optimize, special, stats
 import trueangle as ta
 from trueangle.cli import main
 from trueangle.errors import ArgumentError
-from trueangle.estimation.evidence import CORRELATION_TIMES, ReadingNoise
+from trueangle.estimation.evidence import CORRELATION_TIMES, CorrelatedNoise
 from trueangle.estimation.linear import (
     ClusterCovariance,
     NormalEquations,
@@ -142,7 +142,7 @@ def test_correlated_noise_moves_coefficients_as_its_matrix_does():
         columns -= np.average(columns, axis=0, weights=run.weights)
         rows.append(np.sqrt(run.weights)[:, None] * columns)
         left.append(np.sqrt(run.weights) * rest)
-    noise = ReadingNoise.of(rows, left, found.residual_variance)
+    noise = CorrelatedNoise.of(rows, left, found.residual_variance)
     inverse = np.linalg.inv(sum(x.T @ x for x in rows))
     own = inverse @ sum(x.T @ dense(noise, len(x)) @ x for x in rows) @ inverse
     np.testing.assert_allclose(np.diag(found.covariance)[1:], np.diag(own), rtol=1e-9)
@@ -159,7 +159,7 @@ def test_the_odds_of_correlated_noise_are_those_of_two_normal_densities():
     rng = np.random.default_rng(63)
     x = rng.normal(size=(80, 2))
     y = correlated(rng, 0.7, 80)
-    noise = ReadingNoise.of([x], [y], 1.3)
+    noise = CorrelatedNoise.of([x], [y], 1.3)
     free = np.column_stack([x, np.ones(80)])
     logs = []
     for c in (dense(noise, 80), 1.3 * np.eye(80)):
@@ -317,12 +317,12 @@ def test_moderated_variances_have_the_moments_of_the_mixture(tied):
 
 
 @pytest.mark.parametrize("apart", [0.0, 2.0])
-@pytest.mark.parametrize("count", [3, 4, 6, 10])
+@pytest.mark.parametrize("count", [3, 6])
 def test_intervals_hold_what_runs_share_where_each_has_a_part_of_its_own(count, apart):
     """In standard errors of one run. Where no test found a difference, they held too little."""
     hit, wide, theta = [], [], np.arange(60) * 6.0
     std = SIGMA * np.sqrt(2.0 / 60.0)
-    for seed in range(2 * SETS):
+    for seed in range(SETS):
         rng = np.random.default_rng([74, count, seed])
         runs = []
         for _ in range(count):

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 import trueangle as ta
-from trueangle.export.equality import FALSE_ALARMS, pattern_equality
+from trueangle.export.comparison import FALSE_ALARMS, pattern_equality
 from trueangle.model.records import FitRecord
 
 SEED = 91

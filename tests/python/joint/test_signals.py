@@ -10,8 +10,13 @@ import pytest
 
 from trueangle import CalibrationRun
 from trueangle.joint.earlier import earlier_signals
-from trueangle.joint.signals import Signals, _dead_zone_direction, join_runs
-from trueangle.joint.turning import direction_at_turns, velocity_at_turns
+from trueangle.joint.signals import (
+    Signals,
+    _dead_zone_direction,
+    direction_at_turns,
+    join_runs,
+    velocity_at_turns,
+)
 
 UNITS = (360.0, 2.0 * math.pi, 1.0, 4096.0)
 SAMPLED = ("theta", "run", "row", "direction", "travel", "segment", "clock")

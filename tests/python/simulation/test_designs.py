@@ -27,8 +27,8 @@ from trueangle.simulation import (
     simulate,
     simulate_along,
 )
+from trueangle.simulation.designs import ARCSEC_PER_RAD, RotorDrive, rotor_angle
 from trueangle.simulation.measured import design_of
-from trueangle.simulation.rotor import ARCSEC_PER_RAD, RotorDrive, rotor_angle
 
 N = 4_000
 
@@ -229,7 +229,7 @@ def test_a_friction_that_wanders_pushes_by_its_size_and_forgets():
     """Each reading's own, until the next; its correlation falls by e in its memory."""
     time = np.arange(40_000) * 0.05
     drive = NOTHING._replace(friction_deg_s2=3.0, memory_s=0.5)
-    from trueangle.simulation.rotor import _drift
+    from trueangle.simulation.designs import _drift
 
     pushed = _drift(drive, time, np.random.default_rng(7))
     assert np.std(pushed) == pytest.approx(3.0, rel=0.05)

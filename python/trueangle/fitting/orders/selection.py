@@ -1,16 +1,20 @@
-"""Selection of orders by evidence, step by step."""
+"""Selection of orders by evidence, without those of rounding and of lines in time."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._core import Groups, line_columns
 from ...estimation.evidence import Alone, EvidenceEstimate, estimate_by_evidence
+from ...estimation.factor import orthonormal_basis
+from ...estimation.rounded import fit_rounded, is_rounding_visible
 from ...joint.gear import HIGHEST_LOW_ORDER
+from ...joint.pattern import lines_columns
 from ...model.validity import greatest_slope
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
@@ -26,12 +30,95 @@ from .noise import ReadingVariance
 from .phases import circular_range_deg, unit_phases
 from .result import OrderSelection
 from .table import IN_MODEL, OrderRow
-from .timelines import lines_in_time
 from .verdicts import drift_of_a_sweep, row_with_verdict, selection_notes, verdict_reason
-from .zerogroups import folds_of_run, some_angles, some_readings, zero_groups
+from .zerogroups import ZeroGroupReadings, folds_of_run, some_angles, some_readings, zero_groups
 
 if TYPE_CHECKING:
     from ..summed import SummedReadings
+
+
+def orders_beyond_rounding(
+    units: Sequence[ZeroGroupReadings],
+    step: float,
+    orders: Sequence[float],
+    limit: float,
+    forced: int = 0,
+) -> list[int]:
+    """Places of the orders that rounding alone does not explain, the strongest first.
+
+    Parameters
+    ----------
+    units : sequence of ZeroGroupReadings
+    step : float
+        Of the sensor, in the unit of the errors.
+    orders : sequence of float
+        Strongest first; the first ``forced`` of them are always in the model and not returned.
+    limit : float
+        Log of the p-value below which an order is accepted: by the likelihood ratio for both of its
+        coefficients, which without it is χ² with two degrees of freedom.
+    """
+    error = np.concatenate([unit.error for unit in units])
+    theta = 2.0 * np.pi * np.concatenate([unit.turns for unit in units])
+    zeros = np.repeat(np.eye(len(units)), [unit.turns.size for unit in units], axis=0)
+    lines = lines_columns(theta, np.asarray(orders, dtype=np.float64))
+
+    def columns(places: Sequence[int]) -> Array:
+        return np.hstack([zeros, *(lines[:, 2 * k : 2 * k + 2] for k in places)])
+
+    left = error - _fitted(columns(range(len(orders))), error)
+    about = error - _fitted(zeros, error)
+    if not is_rounding_visible(step**2 / 12.0, float(np.var(left)), float(np.var(about))):
+        return list(range(forced, len(orders)))
+    told = list(range(forced))
+    fit = fit_rounded(orthonormal_basis(columns(told)), error, step)
+    for k in range(forced, len(orders)):
+        if fit.within:
+            break
+        other = fit_rounded(orthonormal_basis(columns([*told, k])), error, step)
+        if fit.log_likelihood - other.log_likelihood < limit:
+            told.append(k)
+            fit = other
+    return told[forced:]
+
+
+def _fitted(columns: Array, error: Array) -> Array:
+    basis = orthonormal_basis(columns)
+    return np.asarray(basis @ (basis.T @ error))
+
+
+def lines_in_time(
+    estimate: EvidenceEstimate, orders: Collection[float], tested: Collection[float], chance: float
+) -> set[float]:
+    """Those of the orders ``tested`` that lines in time hold better than places do.
+
+    Where the speed varies, a line of a fixed frequency is no order, and several orders next to one
+    another are needed for it. Both compete under the noise of the estimate: the ``orders`` that
+    are in, with the probability that they had, and lines at every half cycle of the run near
+    those tested, each with the probability ``chance``. Of several runs that is not asked: there
+    the phase of such a line differs from run to run.
+    """
+    theta, error, time, _ = estimate.runs[0]
+    if len(estimate.runs) > 1 or time is None or not tested:
+        return set()
+    # Time in turns of the mean speed: a line near order k has k cycles in one of them.
+    travel = np.ptp(theta)
+    clock = (time - time[0]) / np.ptp(time) * travel
+    near = {k + 2.0 * np.pi / travel * s for k in tested for s in np.arange(-1.5, 2.0, 0.5)}
+    given = (theta, [*orders]), (clock, sorted(near))
+    columns = np.hstack([line_columns(at, np.array(lines, float)) for at, lines in given])
+    columns -= columns.mean(axis=0)
+    known = dict(zip(estimate.orders, estimate.prior.tolist(), strict=True))
+    chances = [min(known[k], 0.99) for k in orders] + [chance] * len(near)
+    total = float(np.var(error))
+    readings = [(columns, error - error.mean(), time)]
+    sums = Groups(readings, [2] * len(chances)).sums(estimate.noise, total)
+    none = [0.0] * len(chances)
+    found = max(
+        sums.search(none, chances, [total] * len(orders) + [0.0] * len(near)),
+        sums.search(none, chances, none),
+    )
+    return set(tested) - {k for k, size in zip(orders, found[1], strict=False) if size > 0.0}
+
 
 #: Readings from which a choice among orders is sound: fewer are refused with a plan.
 FEW: Final = 20
@@ -162,7 +249,6 @@ class EvidenceSelection:
         mine = [i for i in chosen if i not in self.forced]
         if not (self.step and mine):
             return chosen, dropped
-        from .rounding import orders_beyond_rounding  # most readings are fine enough
 
         beside = [*self.candidates.reference, *(self.orders[i] for i in dropped)]
         mean, _ = estimate.among([self.orders[i] for i in mine], self.travel, beside)

@@ -9,7 +9,7 @@ import pytest
 
 import trueangle as ta
 from coarse import Sensor, any_sensor
-from trueangle.fitting.orders.rounding import orders_beyond_rounding
+from trueangle.fitting.orders.selection import orders_beyond_rounding
 from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 
