@@ -25,7 +25,7 @@ _CALLS: Final = 10_000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    declare(parser, "--samples N", int, "batch size", default=100_000)
+    declare(parser, "--samples N", int, "readings in a batch", default=100_000)
     declare(parser, "--rounds", int, "rounds of each measurement", default=5)
     declare(parser, "--json", bool, "print the medians as JSON")
 

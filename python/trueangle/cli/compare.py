@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = partial(declare, parser)
     add("first A", Input, "model file: today's table, or the joint before a repair")
     add("second B", Input, "model file: the new calibration; B less A is printed")
-    add("--joint NAME", str, "of the file of a robot, this joint")
+    add("--joint NAME", str, "joint to take from the file of a robot")
     add_shared(parser, "errors-in")
     add("--json", bool, "print the result as JSON")
 

@@ -15,7 +15,7 @@ EXAMPLE = "trueangle completion bash >~/.local/share/bash-completion/completions
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    declare(parser, "shell", tuple(SHELLS), "of which the script is")
+    declare(parser, "shell", tuple(SHELLS), "shell that the script is for")
 
 
 def run(args: argparse.Namespace) -> int:

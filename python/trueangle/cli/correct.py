@@ -48,15 +48,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--column [JOINT=]NAME",
         str,
-        "of the angle (default: indicated_*, of a joint JOINT_indicated_* or the like)",
+        "column of the angle (default: indicated_*, of a joint JOINT_indicated_* or the like)",
         many=True,
     )
     add(
         "--unit",
         ("deg", "rad", "turn", "count", "arcsec", "arcmin"),
-        "of the angle (default: the ending of its name, else the model's)",
+        "unit of the angle (default: the ending of its name, else the model's)",
     )
-    add("--counts-per-turn N", float, "of an angle in counts")
+    add("--counts-per-turn N", float, "counts in one turn of the output, for an angle in counts")
     add_signals(parser, counts=False, runs=False, reference=False, channels=False)
     add(
         "--output-topic NAME",
@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--progress",
         ("auto", "text", "json", "none"),
-        "on stderr (default: text on a terminal; one JSON object a line with --json)",
+        "progress on stderr (default: text on a terminal; one JSON object a line with --json)",
         default="auto",
     )
     add_shared(parser, "errors-in")

@@ -29,7 +29,7 @@ EXAMPLE = "trueangle demo --report demo.html"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    declare(parser, "--seed", int, "of the simulated noise (default: 0)", default=0)
+    declare(parser, "--seed", int, "seed of the simulated noise (default: 0)", default=0)
     declare(parser, "--report FILE", Output.of(REPORT), "also write a report of the diagnosis")
     told = "calibrate a sine and a cosine channel instead, without a reference"
     declare(parser, "--channels", bool, told)

@@ -84,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--within TIME",
         seconds,
         "time limit, as 10s, 2min or seconds; the result lists what was not "
-        "done (default: three times the work of usual readings, on any machine)",
+        "done (default: a limit on the work, equal on any machine)",
     )
     add_shared(parser, "progress", "errors-in")
     add("--json", bool, "print the diagnosis as JSON")

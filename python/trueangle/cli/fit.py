@@ -48,7 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--loss",
         ("auto", "linear", "huber", "tukey"),
-        "auto (default): least squares; outliers are rejected and reported",
+        "auto (default): least squares without outliers, which are reported; linear: with "
+        "all readings; huber, tukey: with weights that fall with the residual",
         default="auto",
     )
     add_shared(parser, "run")
@@ -143,8 +144,8 @@ def add_one_pass(parser: argparse.ArgumentParser) -> None:
     add(
         "--one-pass",
         bool,
-        "constant memory: sums of all readings and some 65 000 of them as they are, where "
-        "there are more than 2^20; so by itself for more than 2^24, and with a --scheduler",
+        "constant memory: sums of all readings, and some 65 000 of them where there are more "
+        "than 2^20 (default: for more than 2^24, and with --scheduler)",
     )
     add(
         "--scheduler tcp://HOST:PORT",
@@ -154,7 +155,7 @@ def add_one_pass(parser: argparse.ArgumentParser) -> None:
     add(
         "--progress",
         ("auto", "text", "json", "none"),
-        "of a fit in one pass, on stderr (default: text on a terminal)",
+        "progress of a fit in one pass, on stderr (default: text on a terminal)",
         default="auto",
     )
 

@@ -29,18 +29,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "what identifies a unit (default: the column unit; without one, the runs)",
         default="unit",
     )
-    add("--orders 1-4", str, "orders looked at (default: those above the noise)")
+    add("--orders 1-4", str, "orders compared (default: those above the noise)")
     add(
         "--share P",
         float,
-        "of the units that the tolerance limits bound (default: %(default)s)",
+        "share of the units within the tolerance limits (default: %(default)s)",
         default=0.95,
     )
-    add("--confidence G", float, "of the tolerance limits (default: %(default)s)", default=0.95)
+    add("--confidence G", float, "confidence of these limits (default: %(default)s)", default=0.95)
     add(
         "--permitted-arcsec E",
         float,
-        "error from which a calibration is due: gives the day of the next",
+        "largest permitted error: gives the day of the next calibration",
     )
     add_joint(parser)
     add(

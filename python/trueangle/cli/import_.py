@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--from TARGET",
         tuple(TARGETS),
-        f"what it is of: {', '.join(TARGETS)}",
+        f"target of the table: {', '.join(TARGETS)}",
         required=True,
         dest="source",
     )

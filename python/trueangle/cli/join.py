@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "seconds to add to the time of the indicated log to get that of the reference "
         "(default: from the motion; 0 for one clock)",
     )
-    add("--rate PPM", float, "of the reference's clock against the other")
+    add("--rate PPM", float, "rate of the reference's clock against the other")
     add(
         "--max-gap S",
         float,

@@ -28,7 +28,7 @@ _SHARED: Final[dict[str, tuple[str, Kind, str, dict[str, Any]]]] = {
     "fixed-member": (
         "--fixed-member",
         FIXED_MEMBERS,
-        "of the strain wave gear (default: circular_spline)",
+        "fixed member of the strain wave gear (default: circular_spline)",
         {"default": "circular_spline"},
     ),
     "shaft": (
@@ -81,7 +81,7 @@ _SHARED: Final[dict[str, tuple[str, Kind, str, dict[str, Any]]]] = {
     "progress": (
         "--progress",
         STYLES,
-        "on stderr after one second (default: text on a terminal, nothing elsewhere)",
+        "progress on stderr after one second (default: text on a terminal, nothing elsewhere)",
         {"default": "auto"},
     ),
     "errors-in": (

@@ -106,7 +106,7 @@ def _add_self_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--count N", int, "heads or shifts (default: 3)")
     add("--angles 0,90,180", str, "angles of heads or shifts that are there")
-    add("--speed-ratio R", float, "start over end speed (5)")
+    add("--speed-ratio R", float, "start speed over end speed (default: 5)")
     add("--start-speed F", float, "turns per second at the start")
     add("--rate HZ", float, "readings per second")
 

@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_shared(parser, "orders", "run")
     add_joint(parser)
-    add("--joint NAME", str, "of the model file of a robot, this joint")
+    add("--joint NAME", str, "joint to take from the model file of a robot")
     add_shared(parser, "errors-in")
     add("--json", bool, "print the plotted data as JSON")
 
@@ -75,7 +75,7 @@ def _of_model(args: argparse.Namespace) -> Axes:
         )
     of_runs = ("gear_ratio", "shaft", "signal", "counts_per_turn_reference", "periods_per_turn")
     says = "is of a picture of runs, and this is of a model"
-    refuse_given(args, (*of_runs, "topic", "facets", "unit_from"), says)
+    refuse_given(args, (*of_runs, "run", "topic", "facets", "unit_from"), says)
     if args.orders != "auto":
         raise ArgumentError(f"--orders {says}")
     refuse_joint(args.joint, args.files)

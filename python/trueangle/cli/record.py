@@ -37,9 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "reference, are joined by the time of arrival",
     )
     add_shared(parser, "runs-output")
-    add("--append", bool, "add a run to an output that is there")
+    add("--append", bool, "add a run to an existing output")
     add("--label NAME", str, "label of the run (default: the next number)")
-    add("--for 60s", seconds, "end after so long", dest="seconds")
+    add("--for 60s", seconds, "end after this time", dest="seconds")
     add(
         "--until",
         ("orders", "coverage"),
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--progress",
         ("auto", "text", "json", "none"),
-        "on stderr (default: a screen of text on a terminal)",
+        "progress on stderr (default: a screen of text on a terminal)",
         default="auto",
     )
     add_shared(parser, "errors-in")

@@ -49,18 +49,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "write a calibration certificate (PDF); this TOML file gives the item, the "
         "laboratory and the type B uncertainties",
     )
-    add("--positions N", int, "nominal positions of a certificate (36)")
+    add("--positions N", int, "nominal positions of a certificate (default: 36)")
     add(
         "--fleet",
         bool,
-        "of the units against each other, as the command fleet judges them: one page",
+        "compare the units with each other, as trueangle fleet does, on one page",
     )
     add(
         "--by",
         ("unit", "run"),
         "what identifies a unit of --fleet (default: the column unit; without one, the runs)",
     )
-    add("--permitted-arcsec E", float, "with --fleet: error from which a calibration is due")
+    add("--permitted-arcsec E", float, "with --fleet: largest permitted error")
     add_shared(parser, "errors-in")
     add("--pdf FILE", Output.of(PDF), "print it to a PDF too, by an installed browser")
     add_shared(parser, "progress")
@@ -115,7 +115,7 @@ def _fleet(args: argparse.Namespace) -> int:
     from ..reports.fleet import FleetReport
     from .fleet import requested_fleet
 
-    single = ("certificate", "pdf", "model", "simulation", "robot", "joint", "positions")
+    single = ("certificate", "pdf", "model", "simulation", "robot", "joint", "positions", "run")
     refuse_given(args, single, "is of one joint, and --fleet is a report on many units")
     args.by = args.by or "unit"
     args.orders = None if args.orders == "auto" else args.orders

@@ -56,7 +56,7 @@ def add_robot(parser: argparse.ArgumentParser) -> None:
         "about each of them; `trueangle robot` writes one. --signal JOINT.ROLE=NAME does as well",
     )
     declare(
-        parser, "--joint NAME", str, "of the robot, this joint only (may be repeated)", many=True
+        parser, "--joint NAME", str, "only this joint of the robot (may be repeated)", many=True
     )
 
 

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "was the speed held by a loop closed on this encoder? (default: %(default)s)",
         default="unknown",
     )
-    add("--loop-bandwidth HZ", float, "of that loop")
+    add("--loop-bandwidth HZ", float, "bandwidth of that loop")
     add("--gear-ratio R", float, "motor turns per output turn: stays as given")
     add("--fit-ratio", bool, "estimate the gear ratio jointly with orders 1 and 2 of the output")
     add(

@@ -53,9 +53,9 @@ def add_signals(
         f"{role.removesuffix(' ...')}=" for role in ROLES.split(", ")
     )
     if counts:
-        add("--counts-per-turn N", float, "of an indicated angle in counts")
+        add("--counts-per-turn N", float, "counts per turn of an indicated angle in counts")
     if reference:
-        add("--counts-per-turn-reference N", float, "of a reference in counts")
+        add("--counts-per-turn-reference N", float, "counts per turn of a reference in counts")
     if channels:
         add(
             "--periods-per-turn P[,P2]",
@@ -184,7 +184,7 @@ def source_argument(text: str) -> str:
 def add_source_options(parser: argparse.ArgumentParser) -> None:
     """Declare what sources are opened with, and how their lines are read."""
     add = partial(declare, parser)
-    add("--baud N", int, "of a serial port (default: 115200)")
+    add("--baud N", int, "baud rate of a serial port (default: 115200)")
     add(
         "--dbc FILE",
         Input,

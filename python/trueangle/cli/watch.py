@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--shift S",
         float,
-        "shift looked for, in standard deviations of a window (default: %(default)g)",
+        "shift to detect, in standard deviations of a window (default: %(default)g)",
         default=1.0,
     )
     add(

@@ -220,7 +220,7 @@ def _lines(data: bytes, file: IO[bytes], header: Header, line: int) -> Iterator[
 def _wrong_width(header: Header, width: int, line: int) -> FileError:
     return FileError(
         header.path,
-        f"{width} value{'s'[: width != 1]} where the header has {len(header.names)} columns; mend "
-        "or delete the row",
+        f"{width} value{'s'[: width != 1]} where the header has {len(header.names)} columns; "
+        "correct or delete the row",
         line=line,
     )

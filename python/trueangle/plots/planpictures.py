@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
-    """Positions of every mount (or tilt) within the first pitch.
+    """Positions of every mount (or tilt), the first three.
 
     All pitches of a mount are equivalent; what separates orders is where the mounts are
     within one. A bar at each position is the tolerance of the plan.
@@ -61,7 +61,7 @@ def plan_positions(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     return described(
         ax,
         f"{what.capitalize()}s of a plan of {plan.positions} positions: {offsets} deg.",
-        f"Positions of every {what} within the first pitch",
+        f"Positions of every {what}, the first three",
     )
 
 

@@ -231,7 +231,7 @@ def _notes(
     else:
         notes.append("the mean of the heads keeps none of the orders given")
     if turns < 0.95:
-        notes.append(f"only {turns:.2f} turns were travelled: orders hang together")
+        notes.append(f"only {turns:.2f} turns were travelled: orders are correlated")
     return [*notes, *fit.notes]
 
 
