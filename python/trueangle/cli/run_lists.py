@@ -12,8 +12,6 @@ from ..runs.run import CalibrationRun
 from ..support.suggestions import did_you_mean, listed_names
 from .signal_options import of_joint, reading_options
 
-__all__ = ["listed_names", "read_selected_runs"]
-
 
 def read_selected_runs(args: argparse.Namespace) -> list[CalibrationRun]:
     """Runs of a command's files, those of ``--run`` only where labels or patterns are given.

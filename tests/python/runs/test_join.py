@@ -166,8 +166,8 @@ def test_what_was_discarded_leads_and_a_longer_gap_keeps_it(tmp_path, capsys):
     paths = [*map(str, logs(tmp_path, 1)), "-o", str(tmp_path / "runs.csv")]
     assert main(["join", *paths]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert re.match(r"15\d of 6000 readings discarded: at their time the reference pauses", told)
-    assert "give --max-gap or --offset where more is known 58" in told
+    assert re.match(r"58\d\d of 6000 readings joined in 1 run: at the time of the others", told)
+    assert "give --max-gap or --offset where more is known offset" in told
     assert main(["join", *paths, "--max-gap", "2"]) == 0
     assert capsys.readouterr().out.startswith("6000 readings joined in 1 run\n")
 

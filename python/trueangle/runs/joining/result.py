@@ -85,15 +85,14 @@ class Joined(PlainResult):
 
         unit = error_unit(errors_in, self.std_arcsec)
         found = self.to_dict()
-        lines = []
+        every = f" of {self.left_out + found['readings']}" if self.left_out else ""
+        lines = [f"{found['readings']}{every} readings joined in {counted(self.runs, 'run')}"]
         if self.left_out:
-            lines.append(
-                f"{self.left_out} of {self.left_out + found['readings']} readings discarded: at "
-                "their time the reference pauses, has not begun or has ended; give "
-                "`max_gap_s=` or `offset_s=` where more is known"
+            lines[0] += (
+                ": at the time of the others the reference pauses, has not begun or has ended; "
+                "give `max_gap_s=` or `offset_s=` where more is known"
             )
         lines += [
-            f"{found['readings']} readings joined in {counted(self.runs, 'run')}",
             f"  offset    {told(self.offset_s, self.offset_std_s, 's')}",
             f"  rate      {told(self.rate_ppm, self.rate_std_ppm, 'ppm')}",
             f"  joining   adds {unit.text(self.std_arcsec)} standard deviation",

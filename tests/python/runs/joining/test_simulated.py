@@ -187,10 +187,9 @@ def test_every_figure_stands_with_its_own_error(errors_in, per) -> None:
     added = re.fullmatch(rf"adds (\S+) {errors_in} standard deviation", said["joining"])
     assert float(added[1]) == pytest.approx(per * plain["std_arcsec"], rel=1e-3)
     assert int(said["gaps"]) == len(plain["gaps"]) == 2
-    counts = re.match(r"(\d+) of (\d+) readings discarded: at their time", text)
-    assert [*map(int, counts.groups())] == [17, 17 + plain["readings"]]
-    counts = re.search(r"^(\d+) readings joined in (\d+) runs$", text, re.M)
-    assert [*map(int, counts.groups())] == [plain[k] for k in ("readings", "runs")]
+    counts = re.match(r"(\d+) of (\d+) readings joined in (\d+) runs", text)
+    readings, runs = (plain[key] for key in ("readings", "runs"))
+    assert [*map(int, counts.groups())] == [readings, 17 + readings, runs]
     kept = replace(FOUND, left_out=0).summary(errors_in)
     assert kept.startswith("56 readings joined in 2 runs")
     assert (plain["readings"], plain["left_out"]) == (56, 17)
