@@ -279,8 +279,8 @@ def _check_alike(error: Callable[[str, str], FileError], found: Mapping[str, Rol
     if differ and by_name and all(suffixes):
         told = ", ".join(f'"{c.role}": ("{c.name}", "{c.unit}")' for c in (reference, indicated))
         raise error(
-            f"units are mixed by the columns' names: {reference.unit} and {indicated.unit}; if "
-            f"that is so, state it: `signals={{{told}}}`; if not, state the true units there",
+            f"units are mixed: the columns' names state {reference.unit} and {indicated.unit}; if "
+            f"both are right, add `signals={{{told}}}`; if not, add it with the true units",
             indicated.name,
         )
 

@@ -340,8 +340,8 @@ class EvidenceSelection:
             zeros = counted(self.units, "zero")
             what = "readings" if self.samples <= len(self.units) + 2 else "positions"
             return (
-                f"too few {what}: {read}; {zeros} and one order need {len(self.units) + 3}, "
-                f"a choice among orders {FEW}; {plan}"
+                f"too few {what}: {read}; {zeros} and one order need {len(self.units) + 3} "
+                f"readings, a choice among orders {FEW}; {plan}"
             )
         best = max(rows, key=lambda row: row.probability)
         beside = f"order {best.order:g}, the strongest of {len(self.orders)},"
