@@ -12,6 +12,7 @@ import numpy as np
 
 from .._core import Evidence, Groups
 from ..support.arrays import Array
+from .linear import pseudo_inverse
 
 #: Correlation times of the noise's exponential terms, in median steps of a run's time.
 CORRELATION_TIMES = tuple(Evidence.CORRELATION_TIMES)
@@ -381,6 +382,21 @@ class CorrelatedNoise:
         spectrum = np.fft.rfft(around)
         back = [np.fft.irfft(spectrum * np.fft.rfft(x, size), size)[:count] for x in rows.T]
         return np.column_stack(back)
+
+    def widening(self, columns: Sequence[Array], held: float = 0.0) -> Array:
+        """Standard errors of least-squares coefficients over those of independent readings.
+
+        ::
+
+            cov b = (G + h)⁻¹ X' C X (G + h)⁻¹,    G = X' X
+
+        with the columns X of every run less what is its own, its zero, and a penalty h.
+        """
+        gram = np.sum([x.T @ x for x in columns], axis=0)
+        inverse = pseudo_inverse(gram + held * np.eye(len(gram)))
+        meat = np.sum([x.T @ self.covariance_times(x) for x in columns], axis=0)
+        before, after = (np.diag(inverse @ form @ inverse) for form in (self.scale * gram, meat))
+        return np.sqrt(after / before)
 
     def share(self, count: int) -> float:
         """Degrees of freedom of a variance of ``count`` readings over their number.

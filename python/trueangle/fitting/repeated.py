@@ -26,6 +26,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.linear import pseudo_inverse
 from ..estimation.reference import design_matrix
 from ..joint.lattice import UniformGrid, uniform_grid
 from ..runs.aliasing import Positions, distinct_positions
@@ -89,8 +90,6 @@ def covariance_with_repeats(
     if rounded == 0.0 and basis is None:
         return found
     sums = _repeats(problem, fitted, positions, weights, penalty)
-    if sums is None:
-        return found
     left, freedom = 0.0, math.inf
     if basis is not None:
         left, freedom = _left_out(sums, basis)
@@ -118,8 +117,8 @@ def _repeats(
     positions: Positions,
     weights: Sequence[Array | None],
     penalty: float,
-) -> _Repeats | None:
-    """The sums; None where the positions do not separate the coefficients."""
+) -> _Repeats:
+    """The sums over the readings."""
     place = positions.index
     sizes = [len(run) for run in problem.runs]
     run = np.repeat(np.arange(len(sizes)), sizes)
@@ -144,10 +143,7 @@ def _repeats(
     scores = np.column_stack([of_pair / whole[pair_run] / used.sum(), moved])
     at = _added(pair_place, scores, len(positions))
     gram = at[:, 1:].T @ x + penalty * w.sum() * np.eye(x.shape[1])
-    try:
-        inverse = np.linalg.inv(gram)
-    except np.linalg.LinAlgError:
-        return None
+    inverse = pseudo_inverse(gram)
     solve = np.zeros((len(inverse) + 1, len(inverse) + 1))
     solve[0, 0], solve[1:, 1:] = 1.0, inverse
     solve[0, 1:] = -means[used].mean(axis=0) @ inverse

@@ -30,6 +30,7 @@ import numpy as np
 
 import trueangle._core as _core
 
+from ..estimation.linear import pseudo_inverse
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
 from ..support.arrays import Array
@@ -183,6 +184,6 @@ def bias_covariance(gram: Array, means: Array, penalty: float, variances: Array)
     ``means`` are those of every regressor over the readings (of the runs), ``penalty`` is what the
     diagonal of ``gram`` gets, ``variances`` are those of `pattern_variances`.
     """
-    taken = penalty * np.linalg.inv(gram + penalty * np.eye(len(gram)))
+    taken = penalty * pseudo_inverse(gram + penalty * np.eye(len(gram)))
     taken = np.vstack([-means @ taken, taken])
     return np.asarray((taken * variances) @ taken.T)

@@ -285,15 +285,7 @@ def _correlated(
     kind: CovarianceKind,
     plain: Uncertainty,
 ) -> Uncertainty:
-    """Under the noise of most evidence; ``plain`` where that is white, unless asked for.
-
-    ::
-
-        cov b = G⁻¹ X̃' C X̃ G⁻¹,    G = X̃' X̃
-
-    with the covariance C of the readings in the order of time, and the columns X̃ less what is
-    each run's own, its zero.
-    """
+    """Under the noise of most evidence; ``plain`` where that is white, unless asked for."""
     columns, left = [], []
     rests = problem.residuals(fitted)
     for i in used:
@@ -306,12 +298,8 @@ def _correlated(
     if kind == "auto" and noise.odds < _CORRELATED:
         return plain._replace(note=_untold(problem, used))
     held = penalty * sum(weight_sum(weights[i], len(problem.runs[i])) for i in used)
-    gram = np.sum([x.T @ x for x in columns], axis=0)
-    inverse = pseudo_inverse(gram + held * np.eye(len(gram)))
-    meat = np.sum([x.T @ noise.covariance_times(x) for x in columns], axis=0)
-    before, after = (inverse @ form @ inverse for form in (noise.scale * gram, meat))
     # Of sums the covariance is that of all readings, and the noise that of some.
-    wider = np.sqrt(np.diag(after) / np.diag(before))
+    wider = noise.widening(columns, held)
     covariance = plain.covariance[1:, 1:] * np.outer(wider, wider)
     count = max(map(len, columns))
     freedom = np.maximum(plain.freedom[1:] * noise.share(count), 1.0)

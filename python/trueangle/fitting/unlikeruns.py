@@ -10,7 +10,8 @@ import numpy as np
 
 import trueangle._core as _core
 
-from ..estimation.linear import NormalEquations, least_squares, total
+from ..estimation.evidence import CorrelatedNoise
+from ..estimation.linear import NormalEquations, linear_residual, total
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, wrap
 from ..support.arrays import Array, median
@@ -146,20 +147,15 @@ def _rows(problem: Problem, index: int) -> tuple[Array, float]:
 
 
 def _correlated(problem: Problem, index: int) -> float:
-    """By how much correlated neighbours widen the scatter of a run's own coefficients."""
+    """By how much correlated noise widens the variances of a run's own coefficients."""
     run = problem.runs[index]
-    rows, _ = _rows(problem, index)
-    own = least_squares(rows[:, :-1], rows[:, -1])
-    left = run.centred_error - run.zero
-    place = 2.0 * np.pi / problem.period * problem.angles[index]
-    orders = [k * s.cycles_per_turn for s in problem.shafts for k in s.orders]
-    for order, (a, b) in zip(orders, own.reshape(-1, 2).tolist(), strict=True):
-        left = left - a * np.cos(order * place) - b * np.sin(order * place)
-    left = left - left.mean()
-    energy = float(left @ left)
-    near = float(left[1:] @ left[:-1]) / energy if energy > 0.0 else 0.0
-    near = min(max(near, 0.0), 1.0 - 1.0 / len(run))
-    return (1.0 + near) / (1.0 - near)
+    both = np.column_stack([problem.columns(index), run.centred_error])
+    both -= both.mean(axis=0)
+    columns, left = both[:, :-1], linear_residual(both[:, :-1], both[:, -1])
+    scale = float(left @ left) / len(run)
+    if not scale > 0.0:
+        return 1.0
+    return float(np.mean(CorrelatedNoise.of([columns], [left], scale).widening([columns]) ** 2))
 
 
 def zeros_follow_speed(

@@ -212,7 +212,7 @@ def _newton(columns: OrthonormalColumns, places: Array) -> Array:
     curvature = -(first * first.T)
     curvature[np.diag_indices(places.size)] += np.diag(second)
     # A turn of all places together may change nothing.
-    step = np.linalg.lstsq(curvature[np.ix_(inner, inner)], np.diag(first)[inner], rcond=1e-9)[0]
+    step = least_squares(curvature[np.ix_(inner, inner)], np.diag(first)[inner])
     found = places.copy()
     found[inner] -= step
     inside = found.min() >= start and found.max() <= stop and np.diff(found).min() > 0.0
