@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 MOST = 3
 
 #: Of what is not bracketed.
-OPEN = "Sizes with their 95 % intervals; ? where the sizes tried do not bracket them."
+OPEN = (
+    "Sizes from which on a cause is named in 50 % and 95 % of the trials, with 95 % intervals; "
+    "? where the sizes tried do not bracket them:"
+)
 
 #: Shares of the trials that are reported.
 SHARES = (0.5, 0.95)
@@ -203,7 +206,9 @@ class Rehearsal(PlainResult):
         )
         tried = [cause for cause in self.causes if cause.ever_named]
         if tried:
-            lines += ["", *_table(tried), "", OPEN]
+            lines += ["", *wrapped_lines(OPEN, 2)]
+            for cause in tried:
+                lines += wrapped_lines(f"- {_found(cause)}", 2)
         never = [cause for cause in self.causes if not cause.ever_named]
         if never:
             lines += ["", "Not named in these runs:"]
@@ -228,25 +233,14 @@ class Rehearsal(PlainResult):
         return figure
 
 
-def _table(causes: list[RehearsedCause]) -> list[str]:
-    """Sizes by cause, with intervals and trials, and what it is confused with below them."""
-    rows = [("cause, size", "named in 50 %", "named in 95 %", "trials", "else")]
-    for c in causes:
-        rows.append(
-            (
-                f"{c.cause}, {c.size_name}",
-                _size(c, 0.5),
-                _size(c, 0.95),
-                str(c.trials),
-                ", ".join([*c.confused_with][:MOST]) or _else(c),
-            )
-        )
-    widths = [max(len(row[k]) for row in rows) for k in range(4)]
-    lines = []
-    for row in rows:
-        cells = [text.ljust(width) for text, width in zip(row, widths, strict=False)]
-        lines.append("  ".join([*cells, row[4]]).rstrip())
-    return lines
+def _found(cause: RehearsedCause) -> str:
+    """The sizes from which on a cause is named, and what it is taken for else."""
+    half, most = (_size(cause, share) for share in (0.5, 0.95))
+    sizes = f"{half} in 50 %, {most} in 95 %, of {cause.trials}"
+    if len(cause.tried) == 1:
+        sizes = half
+    instead = ", ".join([*cause.confused_with][:MOST]) or _else(cause)
+    return f"{cause.cause}, {cause.size_name}: {sizes}{'; else ' if instead else ''}{instead}"
 
 
 def _size(cause: RehearsedCause, share: float) -> str:
@@ -272,8 +266,8 @@ def _end(size: float | None) -> str:
 
 def _else(cause: RehearsedCause) -> str:
     """The other answers of the diagnosis."""
-    other = [verdict.replace("_", " ") for verdict in cause.told if verdict != "named"]
-    return ", ".join(other)
+    other = ", ".join(verdict for verdict in cause.told if verdict != "named")
+    return other.replace("told_apart", "distinguished").replace("_", " ")
 
 
 def _never(cause: RehearsedCause) -> str:
