@@ -12,7 +12,7 @@ from scipy.sparse import csc_matrix
 import trueangle as ta
 from trueangle.errors import FileError
 from trueangle.formats.formats import find_format
-from trueangle.formats.matlabelements import check_elements
+from trueangle.formats.matlab import check_elements
 
 X = np.linspace(0.0, 360.0, 50)
 EVERY_CLASS = {

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from trueangle.runs.joining.clocks import Clocks, _as_quartzes, _inflation, estimated_clocks
+from trueangle.runs.joining.simulated import TravelledError
 from trueangle.runs.joining.stream import Stream
-from trueangle.runs.joining.travel import TravelledError
 
 
 def curve(time: np.ndarray) -> np.ndarray:
