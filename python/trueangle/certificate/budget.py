@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Final, Self
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,29 +47,6 @@ class Estimates:
     values: Array
     covariance: Array
     degrees_of_freedom: float = np.inf
-
-    @classmethod
-    def from_observations(cls, observations: ArrayLike) -> Self:
-        """Means of simultaneous observations (Type A, JCGM 100, 4.2 and 5.2.3).
-
-        ::
-
-            u(q̄, r̄) = Σ_k (q_k - q̄)(r_k - r̄) / (n (n - 1))
-
-        Parameters
-        ----------
-        observations : array_like, shape (k, n)
-            k >= 2 observations of each of n quantities, taken together.
-        """
-        sets = np.asarray(observations, dtype=np.float64)
-        if sets.ndim != 2 or sets.shape[0] < 2:
-            raise ArgumentError(
-                "observations must be a table of two rows or more, a column for each "
-                f"quantity; got shape {sets.shape}"
-            )
-        count = sets.shape[0]
-        covariance = np.atleast_2d(np.cov(sets, rowvar=False)) / count
-        return cls(sets.mean(axis=0), covariance, count - 1.0)
 
     @property
     def standard(self) -> Array:

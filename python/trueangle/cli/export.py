@@ -68,7 +68,7 @@ def add_target_options(
 
 def _help(option: Option) -> str:
     words = f": {' or '.join(option.values)}" if isinstance(option.values, tuple) else ""
-    default = "" if option.default is None else f" (default: {option.default})"
+    default = "" if option.default in (None, "") else f" (default: {option.default})"
     return f"{option.help}{words}{default}"
 
 

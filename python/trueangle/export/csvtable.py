@@ -46,7 +46,7 @@ class CsvTable(Target):
         if not 4 <= entries <= _MOST:
             raise ArgumentError(f"entries must be from 4 to {_MOST}, got {entries}")
         pattern.check_one_turn(self.name)
-        pattern.check_orders(entries, self.name, pattern.least_entries(), _MOST)
+        pattern.check_orders(entries, self.name, range(4, _MOST + 1))
         values = np.round(linear_knots(pattern.correction, entries) * 360.0, 9)
         knots = np.concatenate([values, values[:1]])
         places = np.arange(entries + 1) * 360.0 / entries

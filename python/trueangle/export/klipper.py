@@ -65,7 +65,7 @@ class Klipper(Target):
         raw = read_whole(path, 8 << 20, "a printer.cfg")
         section, present = _list_of(raw.decode("utf-8", "replace"), path, options["section"])
         pattern.check_one_turn(self.name)
-        pattern.check_orders(KNOTS, self.name, None)
+        pattern.check_orders(KNOTS, self.name)
         steps = len(present)
         direction = -1 if is_backwards(present) else 1
         places = direction * np.arange(steps) / steps

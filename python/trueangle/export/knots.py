@@ -130,8 +130,8 @@ def one_turn_knots(
         Orders that the table cannot hold, or shafts of which it holds no whole turn.
     """
     pattern.check_one_turn(target)
-    least = pattern.least_entries()
-    pattern.check_orders(entries, target, 1 << (least - 1).bit_length() if binary else least, most)
+    some = (1 << k for k in range(2, most.bit_length())) if binary else range(4, most + 1)
+    pattern.check_orders(entries, target, some)
     return linear_knots(pattern.correction, entries)
 
 

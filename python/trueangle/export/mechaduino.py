@@ -42,7 +42,7 @@ class Mechaduino(Target):
 
     def make(self, pattern: TurnPattern, options: Mapping[str, Any]) -> Made:
         pattern.check_one_turn(self.name)
-        pattern.check_orders(ENTRIES, self.name, None)
+        pattern.check_orders(ENTRIES, self.name)
         counts = np.arange(ENTRIES) / ENTRIES
         exact = counts - pattern.correction(counts)
         zero, notes = 0.0, list[str]()

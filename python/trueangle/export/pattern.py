@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -129,10 +129,11 @@ class TurnPattern:
         """Entries to a turn with which a table holds all orders."""
         return 2 * math.ceil(max(self.lines, default=0.0)) + 1
 
-    def check_orders(self, entries: int, target: str, least: int | None, most: int = 0) -> None:
+    def check_orders(self, entries: int, target: str, allowed: Iterable[int] = ()) -> None:
         """Refuse orders at or above the Nyquist order of a table.
 
-        With ``least`` entries it would hold them, of which the target takes ``most``.
+        Of the numbers that the target takes one is advised that keeps the order: four to a wave
+        keep 98.5 % of it, two the half.
 
         Raises
         ------
@@ -142,14 +143,13 @@ class TurnPattern:
         limit = (entries - 1) // 2
         beyond = [order for order in self.lines if order > limit]
         if beyond:
+            least, most = self.least_entries(), 4.0 * max(beyond)
+            held = [n for n in allowed if n >= least]
+            kept = min((n for n in held if n >= most), default=max(held, default=0))
             raise ArgumentError(
                 f"{target}: {entries} entries hold orders up to {limit}, the model has "
-                f"{_orders(beyond)}: "
-                + (
-                    f"use `entries={least}` or more"
-                    if least and least <= most
-                    else 'use `target="c"`'
-                )
+                f"{_orders(beyond)}: use "
+                + (f"`entries={kept}` or more" if held else '`target="c"`')
             )
 
     def check_one_turn(self, target: str) -> None:

@@ -194,8 +194,7 @@ def _first_that_fits(
 
 def _check(shafts: Sequence[tuple[str, float, TurnPattern]], entries: int) -> None:
     for name, _, part in shafts:
-        needed = max(4, 1 << (part.least_entries() - 1).bit_length())
-        part.check_orders(entries, f"shaft {name}", needed, _SIZES[-1])
+        part.check_orders(entries, f"shaft {name}", _SIZES)
 
 
 def _smallest(

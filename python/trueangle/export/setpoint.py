@@ -113,7 +113,7 @@ class SetpointTravel:
             entries = max((n for n in allowed if n <= usual), default=max(allowed, default=usual))
         if not 4 <= entries <= _MOST:
             raise ArgumentError(f"entries must be from 4 to {_MOST} a turn, got {entries}")
-        pattern.check_orders(entries, target, min(allowed, default=None), largest)
+        pattern.check_orders(entries, target, allowed)
         count = math.ceil((stop - start) * entries / 360.0 - 1e-9) + 1
         if count > most:
             fits = f"`entries={max(allowed)}` or less" if allowed else '`target="c"`'

@@ -20,14 +20,14 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
     model = fit.model
     runs = len(fit.problem.runs)
     shown = fit_error_unit(fit, errors_in)
-    left = "none left: as many unknowns as readings"
+    left, freedom = "none left: as many unknowns as readings", fit.degrees_of_freedom
     if math.isfinite(fit.residual_variance):
         left = f"{_residual(fit, shown)} standard deviation"
     head = [
         ("readings", f"{fit.readings} in {runs} run{'s' if runs > 1 else ''}"),
         ("argument", f"{model.argument} angle"),
         ("zero", zero_text(model.constant, model.period) + _spread(fit, shown)),
-        ("residual", f"{left}, {fit.degrees_of_freedom:.6g} degrees of freedom"),
+        ("residual", f"{left}, {freedom:.6g} degree{'s' * (freedom != 1)} of freedom"),
         ("condition", f"number {fit.condition_number:.3g}; 1 where all orders are independent"),
     ]
     if model.covariance is not None:
@@ -37,6 +37,8 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
     before, after = _sizes(fit)
     sizes = f"{shown.number(before)} -> {shown.text(after)} rms in the readings fitted"
     lines = [f"{counted(model.orders, 'order')} fitted: error {sizes}."]
+    if not freedom:
+        lines.append("No reading tests it: as many unknowns as readings; read at more positions.")
     lines += [*(note for note in fit.notes if note.startswith("One sweep ")), ""]
     lines += [f"  {label:<10} {text}" for label, text in head]
     if model.channels is not None:

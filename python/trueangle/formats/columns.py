@@ -154,6 +154,8 @@ def _standard(role: str) -> Iterator[tuple[str, str | None]]:
 
 def listed_columns(header: Sequence[str]) -> str:
     """The columns there are, for a message."""
+    if not header:
+        return "it has no column of numbers or texts, one to a reading"
     shown = ", ".join(header[:20])
     return f"its columns are {shown}" + (f" and {len(header) - 20} more" if header[20:] else "")
 

@@ -52,7 +52,8 @@ FORMATS = (
     Format("mdf", {"MDF4": (".mf4", ".mdf")}, "mdf", magics=(b"MDF     ", b"UnFinMF ")),
     Format("wpilog", {"a data log of WPILib": (".wpilog",)}, magics=(b"WPILOG",)),
     Format("npy", {"numpy": (".npy",)}, magics=(b"\x93NUMPY",)),
-    Format("npz", {"numpy": (".npz",)}, magics=(b"PK\x03\x04",)),
+    # An archive whose first part is an array.
+    Format("npz", {"numpy": (".npz",)}, pattern=rb"\APK\x03\x04(?s:.{26})[^\0\n]{1,300}?\.npy"),
     # A process variable and a date, as camonitor begins a line.
     Format(
         "camonitor",

@@ -117,7 +117,11 @@ def open_text(path: Path) -> TextFile:
             if head.startswith(magic):
                 stream = _opener(kind)(stored, "rb")
                 return TextFile(_Unpacked(path, kind, stream), stored, size, unpack)
-        if head.startswith(b"PK\x03\x04") and head[_NAME:].startswith(_EXCEL):
+        if head.startswith(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"):
+            raise FileError(path, "is an Excel file of 1997 to 2003; save it as .xlsx or as CSV")
+        is_archive = head.startswith(b"PK\x03\x04")
+        named = path.suffix.lower() in (".xlsx", ".xlsm")
+        if is_archive and (named or head[_NAME:].startswith(_EXCEL)):
             from .excel import sheet_text
 
             stored.close()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 import xml.parsers.expat
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,7 +15,7 @@ from xml.etree import ElementTree
 
 from ..errors import ArgumentError, FileError
 from ..joint import FIXED_MEMBERS
-from ..support.decoding import Decoder, read_text, shown_value
+from ..support.decoding import Decoder, read_text, shown_value, toml_value
 from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
 from ..support.roles import role_kind
 from ..support.suggestions import did_you_mean
@@ -132,13 +131,7 @@ def load_description(path: str | PathLike[str]) -> RobotDescription:
 
 def description_of_text(path: str | PathLike[str], text: str) -> RobotDescription:
     """The robot that a text (TOML) describes; errors name ``path``."""
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as cause:
-        raise FileError(path, f"is not TOML: {cause}") from None
-    except (ValueError, RecursionError):  # whole numbers of thousands of digits, lists in lists
-        raise FileError(path, "holds a number, date or list that cannot be read") from None
-    return _DescriptionReader(Path(path)).robot(content)
+    return _DescriptionReader(Path(path)).robot(toml_value(path, text, "a robot file"))
 
 
 class _DescriptionReader(Decoder):
@@ -242,6 +235,7 @@ def robot_of_urdf(path: str | PathLike[str]) -> RobotDescription:
         joints than a robot file has.
     """
     root = _root(path)
+    names = [element.get("name") for element in root.findall("joint")]
     ratios: dict[str, float] = {}
     for transmission in root.iter("transmission"):
         driven = transmission.findall("joint")
@@ -251,7 +245,8 @@ def robot_of_urdf(path: str | PathLike[str]) -> RobotDescription:
             part = transmission if len(driven) == 1 else joint
             for reduction in part.iter("mechanicalReduction"):
                 ratio = _ratio(path, name, reduction.text or "")
-                if ratios.setdefault(name, ratio) != ratio:
+                # Of two joints of one name that is told.
+                if ratios.setdefault(name, ratio) != ratio and names.count(name) == 1:
                     raise FileError(
                         path,
                         f"joint {name!r} has two reductions, {ratios[name]:g} and {ratio:g}: keep "

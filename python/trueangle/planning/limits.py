@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from ..errors import ArgumentError, FileError
 from ..joint.signals import Signals, join_runs
 from ..runs.run import CalibrationRun
 from ..support.argumentkinds import told_kinds
-from ..support.decoding import finite_float, read_text, shown_value
+from ..support.decoding import finite_float, read_text, shown_value, toml_value
 from ..support.suggestions import did_you_mean
 
 #: Speeds of a further run where none are stated, deg/s.
@@ -181,12 +180,7 @@ def load_limits(path: str | Path) -> Limits:
     (-135.0, 135.0)
     """
     text = read_text(path, 100_000, FileError, "a file of limits")
-    try:
-        document = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as cause:
-        raise FileError(path, f"not a TOML file: {cause}") from None
-    except ValueError:  # whole numbers of thousands of digits
-        raise FileError(path, "holds a number or date that cannot be read") from None
+    document = toml_value(path, text, "a file of limits")
     for name in document:
         if name != "limits":
             raise FileError(

@@ -222,6 +222,8 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
         if channels is not None and excitation is not None:
             channels = channels.replace(excitation_deg=excitation)
     roles, path = table.roles, table.path
+    if not roles.keys() & {"reference", "indicated", "error"}:
+        _refuse_channels_in_rows(table)
     angles = find_run_angles(
         path,
         list(table.columns),
@@ -279,6 +281,20 @@ def _columns(table: FileReadings, given: Conversion) -> _RunColumns:
         channels,
         dropouts,
     )
+
+
+def _refuse_channels_in_rows(table: FileReadings) -> None:
+    """Refuse a log of readings in rows of their own, each with the name of its channel."""
+    for name, values in table.columns.items():
+        if values.dtype == object and name not in (c.name for c in table.roles.values()):
+            labels = list(dict.fromkeys(values.tolist()))
+            if len(labels) == 2:
+                files = ", ".join(f'"{label}.csv"' for label in labels)
+                raise table.error(
+                    f"each row is of one of two channels, {labels[0]} and {labels[1]}: write each "
+                    f'with its times to a file, and join them: `ta.join({files}, output="RUNS")`',
+                    name,
+                )
 
 
 def _entries(table: FileReadings, counts: float | None) -> _RunColumns:

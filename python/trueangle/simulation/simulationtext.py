@@ -11,8 +11,8 @@ from ..effects import KINDS, Effect
 from ..errors import ArgumentError, FileError
 from ..joint.joint import Bearing, DeclaredShaft, Head, Joint
 from ..joint.pattern import Harmonic
-from ..support.decoding import finite_float, read_text, shown_value
-from ..support.files import SIMULATION, SIMULATION_BYTES, refuse_own, written_atomically
+from ..support.decoding import finite_float, read_text, shown_value, toml_value
+from ..support.files import SIMULATION, SIMULATION_BYTES, written_atomically
 from ..support.suggestions import did_you_mean
 from .designs import MAX_SAMPLES, RunDesign
 
@@ -46,21 +46,7 @@ class StatedSimulation(NamedTuple):
 def decoded_simulation(path: str | Path) -> StatedSimulation:
     """The checked parts of a simulation file; see `load_simulation`."""
     text = read_text(path, SIMULATION_BYTES, FileError, "a simulation")
-    return _decoded(path, _document(path, text))
-
-
-def _document(path: str | Path, text: str) -> dict[str, Any]:
-    import tomllib  # with its parser some milliseconds, and most commands read no simulation
-
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as cause:
-        refuse_own(path, text.encode(), "a simulation")
-        raise FileError(path, f"not a TOML file: {cause}") from None
-    except RecursionError:
-        raise FileError(path, "not a simulation: nested too deeply") from None
-    except ValueError:  # whole numbers of thousands of digits, dates that are none
-        raise FileError(path, "holds a number or date that cannot be read") from None
+    return _decoded(path, toml_value(path, text, "a simulation"))
 
 
 def _decoded(path: str | Path, document: Mapping[str, Any]) -> StatedSimulation:

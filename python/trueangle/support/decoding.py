@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileError
-from .files import read_whole
+from .files import read_whole, refuse_own
 
 T = TypeVar("T")
 
@@ -70,6 +70,37 @@ def read_text(path: str | PathLike[str], most: int, kind: type[FileError], what:
         raise kind(path, f"is not {what}: not UTF-8 text", line=line) from None
 
 
+def toml_value(path: str | PathLike[str], text: str, what: str) -> dict[str, Any]:
+    """The tables of a TOML text.
+
+    Raises
+    ------
+    FileError
+        Names the line where the text ends being TOML.
+    """
+    import tomllib  # with its parser some milliseconds, and most commands read none
+
+    refuse_own(path, text[:4096].encode(), what)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as cause:
+        refuse_other(path, text, what, "[#")
+        raise FileError(path, f"not a TOML file: {cause}") from None
+    except (ValueError, RecursionError):  # whole numbers of thousands of digits, lists in lists
+        raise FileError(path, "holds a number, date or list that cannot be read") from None
+
+
+def refuse_other(
+    path: str | PathLike[str], text: str, what: str, first: str, kind: type[FileError] = FileError
+) -> None:
+    """Refuse text that is another file of this package, or that begins with none of ``first``."""
+    refuse_own(path, text[:4096].encode(), what)
+    begin = text.lstrip()[:1]
+    if begin and begin not in first:
+        problem = f"is not {what} (it begins with {begin!r})"
+        raise kind(path, f"{problem}; for readings: trueangle check {path}")
+
+
 def json_value(path: Path, text: str, kind: type[FileError], what: str) -> Any:
     """The value of a JSON text whose keys are unique and whose numbers are finite.
 
@@ -95,9 +126,7 @@ def json_value(path: Path, text: str, kind: type[FileError], what: str) -> Any:
     try:
         return json.loads(text, object_pairs_hook=pairs, parse_constant=constant)
     except json.JSONDecodeError as cause:
-        if (first := text.lstrip()[:1]) and first not in "{[":
-            problem = f"is not {what} (it begins with {first!r})"
-            raise kind(path, f"{problem}; for readings: trueangle check {path}") from None
+        refuse_other(path, text, what, "{[", kind)
         raise kind(
             path,
             f"is not complete JSON ({cause.msg}): truncated or not {what}; save it again",

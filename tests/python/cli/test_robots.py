@@ -240,7 +240,7 @@ def test_wrong_options_beside_a_robot_are_named(options, says, arm, capsys):
         ("gear_ratio = -51.0", "gear_ratio = 0.0", "key 'joint[1].gear_ratio': must not be 0"),
         ("reference = ", "refrence = ", "no column has the role 'refrence'"),
         ("fixed_member", "fixed_part", "'joint[0].fixed_part': is unknown"),
-        ('name = "arm"', "name = arm", "is not TOML"),
+        ('name = "arm"', "name = arm", "not a TOML file"),
     ],
 )
 def test_a_robot_file_that_is_wrong_says_where(old, new, says, arm, tmp_path, capsys):

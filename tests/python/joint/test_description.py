@@ -92,7 +92,7 @@ def test_defaults_and_the_simulation_beside_the_file(tmp_path: Path) -> None:
         ("[joint.signals]\nindicated = \"q\"", "signals = 1", r"signals': a table is needed"),
         ("worm = 144", '[[joint]]\nname = "base"', r"joint\[1\].name': two joints are called"),
         ("[robot]", "[robots]", "robots"),
-        ("[[joint]]", "[[joint]", "is not TOML"),
+        ("[[joint]]", "[[joint]", "not a TOML file"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, says: str | None) -> None:

@@ -65,7 +65,7 @@ def test_whole_numbers_of_thousands_of_digits_are_told(tmp_path):
     path = tmp_path / "limits.toml"
     path.write_text(f"[limits]\nsamples = {'9' * 5000}\n")
     with pytest.raises(
-        FileError, match=r"limits\.toml: holds a number or date that cannot be read$"
+        FileError, match=r"limits\.toml: holds a number, date or list that cannot be read$"
     ):
         load_limits(path)
 

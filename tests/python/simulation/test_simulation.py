@@ -302,7 +302,7 @@ def test_a_gear_is_a_strain_wave_gear_unless_said_otherwise(tmp_path):
 ODD_FILES = {
     "a huge number": ("[noise]\nsigma_arcsec = " + "9" * 400, "sigma_arcsec.*finite"),
     "thousands of digits": ("[noise]\nsigma_arcsec = " + "9" * 5000, "cannot be read"),
-    "deep nesting": ("x = " + "[" * 5000 + "]" * 5000, "nested too deeply"),
+    "deep nesting": ("x = " + "[" * 5000 + "]" * 5000, "list that cannot be read"),
     "a date": ("[noise]\nsigma_arcsec = 1979-05-27", "sigma_arcsec"),
     "a kind that is a list": ("[[effect]]\nkind = []", "kind must be one of"),
     "a huge parameter": (

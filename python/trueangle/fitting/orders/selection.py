@@ -344,7 +344,10 @@ class EvidenceSelection:
                 f"readings, a choice among orders {FEW}; {plan}"
             )
         best = max(rows, key=lambda row: row.probability)
-        beside = f"order {best.order:g}, the strongest of {len(self.orders)},"
+        count = len(self.orders)
+        beside = (
+            f"order {best.order:g}, the {f'strongest of {count}' if count > 1 else 'only one'},"
+        )
         if best.verdict == "reference":
             return "the only significant orders are the reference's own"
         if best.verdict not in ("noise", "alias"):

@@ -157,27 +157,37 @@ CERTIFICATE: Final = FileKind("a certificate (PDF)", (".pdf",))
 #: What `Report.save` writes, by the ending.
 REPORT: Final = FileKind("a report (HTML or PDF)", (*PAGE.endings, *PDF.endings))
 
-#: Files of this package, by the format that they state.
+#: Files of this package by the format that they state, or the name of their first table: what each
+#: is, and what uses it.
 _OWN: Final = {
-    b"model": "a correction model",
-    b"robot": "the correction models of a robot",
-    b"fleet": "a fleet",
+    "model": ("a correction model", 'ta.correct_logs("LOG", model="{}", output="OUT")'),
+    "robot": (
+        "the correction models of a robot",
+        'ta.correct_logs("LOG", model="{}", output="OUT")',
+    ),
+    "fleet": ("a fleet", 'ta.fit("RUNS", prior="{}")'),
+    "[limits": ("a file of limits", 'ta.plan(after="RUNS", limits="{}")'),
+    "[[joint": ("a robot file", 'ta.diagnose("RUNS", robot="{}")'),
+    "[robot": ("a robot file", 'ta.diagnose("RUNS", robot="{}")'),
 }
-_STATED: Final = rb'\A\s*\{\s*"format":\s*"trueangle-(model|robot|fleet)"'
+_SIMULATION: Final = ("a simulation", 'ta.diagnose("RUNS", simulation="{}")')
+#: A format, or the first table of TOML with a key.
+_STATED: Final = re.compile(
+    r'\A\s*\{\s*"format":\s*"trueangle-(model|robot|fleet)"'
+    r"|\A(?:\s*#.*\n)*\s*(?:(\[limits|\[\[joint|\[robot)"
+    r"|\[joint|\[\[(?:shaft|bearing|head|harmonic|effect|run)|\[noise)\].*\n(?:\s*[#[].*\n)*\s*\w+\s*="
+)
 
 
 def refuse_own(path: str | PathLike[str], head: bytes, wanted: str) -> None:
-    """Refuse a model or fleet in place of ``wanted``, by the first bytes of a file.
+    """Refuse another file of this package in place of ``wanted``, by the first bytes of a file.
 
     Raises
     ------
     FileError
     """
-    found = re.match(_STATED, head)
+    found = _STATED.match(head.decode("utf-8", "replace").replace("\r", ""))
     if found:
-        remedy = (
-            f'`ta.fit("RUNS", prior="{path}")`'
-            if found[1] == b"fleet"
-            else f'`ta.correct_logs("LOG", model="{path}", output="OUT")`'
-        )
-        raise FileError(path, f"is {_OWN[found[1]]}, not {wanted}; it is used by {remedy}")
+        what, use = _OWN.get(found[1] or found[2], _SIMULATION)
+        if what != wanted:
+            raise FileError(path, f"is {what}, not {wanted}; it is used by `{use.format(path)}`")
