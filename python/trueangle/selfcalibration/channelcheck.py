@@ -152,7 +152,7 @@ def channel_faults(
             "resting",
             f"{counted(found.rests, 'reading')} at rest {'has' if found.rests == 1 else 'have'} "
             "less weight",
-            "nothing: a place is known by the arc, not by the time",
+            "no action is needed: a place is known by the arc, not by the time",
         )
     if found.coverage < 355.0 and not found.recorded.clipped:
         add(

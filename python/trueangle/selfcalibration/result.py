@@ -289,4 +289,4 @@ def _table(orders: tuple[OrderEstimate, ...], unit: ErrorUnit) -> list[str]:
             f"{o.order:8g} {size:>17} {std:>7} {o.phase_deg:10.2f} {o.retained:9.3f} "
             f"{o.std_factor:7.2f}" + (f"  {o.of}" if names else "")
         )
-    return lines
+    return [*lines, "retained: share distinct from the motion; factor: std over one with reference"]

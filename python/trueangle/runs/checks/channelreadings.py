@@ -133,14 +133,14 @@ class ChannelReadings:
                 "no_centre",
                 f"the channels do not go round zero but about {y:.6g} (sine) and {x:.6g} (cosine): "
                 "their values are not centred on zero",
-                "nothing: the offsets are estimated and subtracted",
+                "no action is needed: the offsets are estimated and subtracted",
             )
         if falls:
             add(
                 "swapped_channels",
                 "the channels' phase falls as the recorded angle rises: sine and cosine are "
                 "swapped, or the sensor is reversed",
-                "nothing: the model keeps the direction; or rename them, "
+                "no action is needed: the model keeps the direction; or rename them, "
                 "`signals={'sine': 'NAME'}`",
             )
         return found
