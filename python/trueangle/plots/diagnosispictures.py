@@ -72,13 +72,10 @@ def gains(diagnosis: Diagnosis, ax: Axes | None = None) -> Axes:
     ax.set_yticks(place, [bar.cause for bar in bars])
     ax.invert_yaxis()
     ax.set_xlim(min(0.0, float((share - below).min())), max(105.0, float((share + above).max())))
-    ax.set_xlabel("share of the reducible error taken away on held-out runs / %")
+    ax.set_xlabel("share of the reducible error removed on held-out runs / %")
     told = ", ".join(f"{b.cause} {b.share:.0f} % ({b.low:.0f} to {b.high:.0f})" for b in bars)
-    return described(
-        ax,
-        f"Share of the reducible error that each cause takes away: {told}.",
-        "Gain of each cause",
-    )
+    told = f"Share of the reducible error that each cause removes: {told}."
+    return described(ax, told, "Gain of each cause")
 
 
 def error_left(diagnosis: Diagnosis, ax: Axes | None = None, errors_in: ErrorsIn = "auto") -> Axes:
@@ -179,16 +176,21 @@ def factors(diagnosis: Diagnosis, errors_in: ErrorsIn = "auto") -> Figure:
 def factor_title(factor: Factor) -> str:
     """The factor and its name, or that it has none."""
     what = factor.factor.replace("_place", " times the place").replace("reversal_time", "reversal")
+    what += "" if factor.shaft in (None, "output") else f" of the {factor.shaft}"
     what = what.replace("_", " ")
     if factor.orders:
         what += f" (order{'s' * (len(factor.orders) > 1)} {order_ranges(factor.orders)})"
-    return f"{what}: {', '.join(factor.named_by).replace('_', ' ') or 'no known cause'}"
+    return f"{what}: {', '.join(factor.named_by).replace('_', ' ') or 'cause not determined'}"
 
 
 def draw_factor(ax: Axes, factor: Factor, unit: ErrorUnit) -> None:
     """The function and its band; the two values of a sign as points."""
     curve, scale = factor.curve, unit.per_arcsec
     value, low, high = (scale * y for y in (curve.value, curve.low, curve.high))
+    if factor.factor == "place" and factor.shaft not in (None, "output"):
+        # An envelope: the places of the output are too far apart for the cycles of that shaft.
+        high = np.full(value.size, np.abs(value).max())
+        value, low = 0.0 * value, -high
     if curve.at.size > 2 and curve.unit != "run":
         ax.fill_between(curve.at, low, high, color=palette.AFTER, alpha=0.25, linewidth=0.0)
         ax.plot(curve.at, value, color=palette.AFTER, linewidth=1.4)
@@ -201,8 +203,6 @@ def draw_factor(ax: Axes, factor: Factor, unit: ErrorUnit) -> None:
     what = "amplitude" if factor.factor.endswith("_place") else "error"
     ax.set_ylabel(f"{what} / {unit.name}", fontsize="small")
     grid(ax)
-    described(
-        ax,
-        f"What follows the {factor_title(factor)}; {unit.text(factor.rms)} rms, from "
-        f"{unit.number(float(curve.value.min()))} to {unit.number(float(curve.value.max()))}.",
-    )
+    least, most = (unit.number(float(end(curve.value))) for end in (np.min, np.max))
+    told = f"What follows the {factor_title(factor)}; {unit.text(factor.rms)} rms"
+    described(ax, f"{told}, from {least} to {most}.")

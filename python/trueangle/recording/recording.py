@@ -358,13 +358,13 @@ class LiveRecording:
         if not share:
             return "motion: turn it slowly"
         if share < 1.0:
-            return f"turn on: {360.0 * share:.0f} of 360 deg are read"
+            return f"turn further: {360.0 * share:.0f} of 360 deg are read"
         if self.note:
             return self.note
         if min(forwards, backwards) < 1.0:
             return f"turn it {'backwards' if forwards > backwards else 'forwards'} as well"
         if not self.estimate.is_settled:
-            return "turn on: a further turn changes orders by more than their standard errors"
+            return "turn further: another turn changes orders by more than their standard errors"
         slow, fast = self.estimate.speeds
         # Ratio of two speeds that show a delay.
         return "turn it at another speed as well" if fast < 1.5 * slow else ""

@@ -219,7 +219,7 @@ def report(
         check_output(path, kind, hashes=[run.source.sha256 for run in found if run.source])
     if simulation is not None and (gear_ratio is not None or shafts):
         what = "shafts" if shafts else "gear_ratio"
-        raise ArgumentError(f"give {what} or a simulation (which states them), not both")
+        raise ArgumentError(f"give either `{what}=` or a simulation, which states it")
     joint = known_joint(simulation, gear_ratio, fixed_member, shafts)
     if certificate is not None:
         if title is not None:

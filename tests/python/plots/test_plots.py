@@ -10,13 +10,15 @@ import pytest
 
 import trueangle as ta
 from trueangle import plots, simulation
+from trueangle.diagnosis.factors.factor import Factor, FactorCurve
 from trueangle.errors import ArgumentError, MissingExtraError, RankError
 from trueangle.fitting.phases import run_phases
 from trueangle.planning import plan_mounts, plan_tilts
 from trueangle.plots import curves, palette
 from trueangle.plots.amplitudespectrum import OrderAxis
+from trueangle.plots.diagnosispictures import draw_factor, factor_title
 from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
-from trueangle.support.display_units import significant_digits
+from trueangle.support.display_units import error_unit, significant_digits
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
@@ -364,6 +366,15 @@ def test_diagnosis_pictures(diagnosed) -> None:
     assert before == pytest.approx(np.hypot(6.0, 2.0), rel=0.1)
     assert after == pytest.approx(2.0, rel=0.1)
     assert legend_texts(compared) == ["measured", "simulated", "difference, moved down"]
+    # Lines of another shaft are an envelope: the places of the output would make them an alias.
+    value = 33.0 * np.sin(np.radians(202.0 * np.linspace(0.0, 360.0, 73) + 20.0))
+    curve = FactorCurve(np.linspace(0.0, 360.0, 73), "deg", value, value - 1.0, value + 1.0)
+    factor = Factor("place", "motor", (2.0,), 23.0, 22.0, 24.0, 0.9, 40.0, ("a_b",), (), curve)
+    draw_factor(ax := matplotlib.figure.Figure().subplots(), factor, error_unit("arcsec"))
+    assert not ax.lines[0].get_ydata().any()
+    ends = ax.collections[0].get_datalim(ax.transData).intervaly
+    np.testing.assert_allclose(ends, [-np.abs(value).max(), np.abs(value).max()])
+    assert factor_title(factor) == "place of the motor (order 2): a b"
 
 
 def test_diagnosis_without_findings_has_no_gain_to_draw(diagnosed) -> None:

@@ -198,7 +198,7 @@ def test_shafts_are_declared_and_named(tmp_path, capsys) -> None:
     assert main([*arguments, "--orders", "stepper:1"]) == 0
     (row,) = json.loads(capsys.readouterr().out)["model"]["coefficients"]
     assert (row["line"], row["output_order"]) == ("stepper 1", 50.0)
-    with pytest.raises(ArgumentError, match="give shafts or a simulation"):
+    with pytest.raises(ArgumentError, match="give either `shafts=` or a simulation"):
         ta.report(ta.read_runs(file), simulation=ta.Simulation(), shafts={"worm": 3.0})
 
 

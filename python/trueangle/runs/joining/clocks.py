@@ -95,7 +95,7 @@ def estimated_clocks(
     if offset is None:
         notes.append(
             "the offset includes any constant delay between the two channels: no log can separate "
-            "them. a diagnosis finds delays that vary with speed"
+            "them. A diagnosis finds delays that vary with speed"
         )
     return replace(clocks, notes=tuple(notes))
 
