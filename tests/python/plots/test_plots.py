@@ -371,9 +371,8 @@ def test_diagnosis_pictures(diagnosed) -> None:
     curve = FactorCurve(np.linspace(0.0, 360.0, 73), "deg", value, value - 1.0, value + 1.0)
     factor = Factor("place", "motor", (2.0,), 23.0, 22.0, 24.0, 0.9, 40.0, ("a_b",), (), curve)
     draw_factor(ax := matplotlib.figure.Figure().subplots(), factor, error_unit("arcsec"))
-    assert not ax.lines[0].get_ydata().any()
-    ends = ax.collections[0].get_datalim(ax.transData).intervaly
-    np.testing.assert_allclose(ends, [-np.abs(value).max(), np.abs(value).max()])
+    ends = ax.collections[0].get_datalim(ax.transData).intervaly / np.abs(value).max()
+    np.testing.assert_allclose([*ax.lines[0].get_ydata(), *ends], [*np.zeros(73), -1.0, 1.0])
     assert factor_title(factor) == "place of the motor (order 2): a b"
 
 
