@@ -263,18 +263,18 @@ class Comparison(PlainResult):
         """Whether the models differ, by how much, and which of them to use."""
         size = f"{unit.text(self.rms_arcsec)} rms over the turn"
         if self.std_arcsec is not None:
-            size += f", uncertain by {unit.text(self.std_arcsec)}"
+            size += f", with a standard error of {unit.text(self.std_arcsec)}"
         if self.verdict is None or self.p is None:
             return [f"Difference {size}; not tested: that needs the covariance of both models."]
         a, b = (std or 0.0 for std in self.each_std_arcsec)
-        known = f"the uncertainty of A is {unit.text(a)} rms, that of B {unit.text(b)}"
+        known = f"the standard error of A is {unit.text(a)} rms, that of B {unit.text(b)}"
         if self.verdict == "same":
             lines = [f"No significant difference: {size}.", f"Use {'BA'[a <= b]}: {known}."]
         else:
-            lines = [f"Changed: the difference is significant, {size}.", f"Of them {known}."]
+            lines = [f"Changed: the models differ by {size}: {known}."]
             lines.append("Which is right now: trueangle watch READINGS --model A, then B.")
-        p = f"p {'< 1e-12' if self.p < 1e-12 else f'= {self.p:.2g}'} by noise alone"
-        return [*lines, f"{p}; below {self.false_alarms:g} is a change."]
+        p = "< 1e-12" if self.p < 1e-12 else f"= {self.p:.2g}"
+        return [*lines, f"By noise alone: p {p}; below {self.false_alarms:g} is a change."]
 
     def _arithmetic(self, unit: ErrorUnit) -> list[str]:
         if self.table_max_abs_arcsec is None or self.table_rms_arcsec is None:

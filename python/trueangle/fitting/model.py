@@ -52,9 +52,8 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         travel = span._replace(start=span.start * turn, stop=span.stop * turn)
         yield f"Fitted on {travel.describe(360.0)} only: outside it is extrapolated."
     if fit.missing:
-        rows = "row" if fit.missing == 1 else "rows"
         dropouts = "" if channels is None else "off the channels' curve or "
-        yield f"{fit.missing} {rows} {dropouts}with an empty cell omitted."
+        yield f"{counted(fit.missing, 'row')} {dropouts}with an empty cell omitted."
     if channels is not None and channels.second is not None:
         from ..estimation.tracks import Mismatch  # a fit without a second track does not need it
 
@@ -75,6 +74,8 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         rows = ", ".join(f"reading {row + 1} of run {label}" for label, row in sorted(fit.wild)[:3])
         rows += ", ..." * (weighted.wild > 3)
         yield f"{counted(weighted.wild, 'outlier')} rejected: {rows}."
+    if fit.amplitudes.size and (fit.amplitudes < 2.0 * fit.amplitude_std).all():
+        yield "No amplitude is twice its standard error: take more readings, or use it with care."
     if fit.uncertainty.note:
         yield _sentence(fit.uncertainty.note)
     fractional = [s.name for s in fit.problem.shafts if s.cycles_per_turn % 1.0]

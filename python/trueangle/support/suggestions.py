@@ -36,9 +36,9 @@ def did_you_mean(got: str, known: Iterable[str]) -> str:
     # Known words that are compared, at most.
     words = {word.lower(): word for word in reversed(list(islice(known, 2000)))}
     near = difflib.get_close_matches(got.lower(), words, n=3, cutoff=0.6)
-    # Words are begun right more often than ended right.
-    near.sort(key=lambda word: word[:2] != got.lower()[:2])
-    return f"; did you mean {words[near[0]]}?" if near else ""
+    # Words are begun right more often than ended right: who types arduino means no mechaduino.
+    begun = [w for size in (2, 1) for w in near if w[:size] == got.lower()[:size]]
+    return f"; did you mean {words[begun[0]]}?" if begun else ""
 
 
 def check_choice(name: str, got: object, known: Iterable[str]) -> str:

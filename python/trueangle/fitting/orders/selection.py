@@ -337,11 +337,10 @@ class EvidenceSelection:
         plan = f"run: `ta.plan_arc(0, 360, readings={FEW})`"
         if not rows:
             read = f"{counted(self.samples, 'reading')} at {counted(self.positions, 'position')}"
-            zeros = counted(self.units, "zero")
             what = "readings" if self.samples <= len(self.units) + 2 else "positions"
             return (
-                f"too few {what}: {read}; {zeros} and one order need {len(self.units) + 3} "
-                f"readings, a choice among orders {FEW}; {plan}"
+                f"too few {what}: {read}; {counted(self.units, 'zero')} and one order need "
+                f"{len(self.units) + 3} readings, a choice among orders {FEW}; {plan}"
             )
         best = max(rows, key=lambda row: row.probability)
         count = len(self.orders)
@@ -352,10 +351,10 @@ class EvidenceSelection:
             return "the only significant orders are the reference's own"
         if best.verdict not in ("noise", "alias"):
             return f"{beside} {verdict_reason(best.verdict)}"
-        chance = f"(probability {brief_number(100.0 * best.probability)} %)"
-        steps = [f"take {FEW} readings or more; {plan}"] if self.samples < FEW else []
-        why = [f"{beside} is not significant {chance}"]
-        return "; ".join([*why, *drift_of_a_sweep(self.runs, estimate.noise), *steps])
+        chance = f"is there with a probability of only {brief_number(100.0 * best.probability)} %"
+        why = [f"{beside} {chance}", *drift_of_a_sweep(self.runs, estimate.noise)]
+        few = [f"take {FEW} readings or more; {plan}"] * (self.samples < FEW)
+        return "; ".join([*why, *few])
 
     def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> tuple[Array, float]:
         """Reduction of the held-out mean square by each order; that of the chosen orders."""
