@@ -11,7 +11,7 @@
 //! without a group `k` that is in, `s_k = S_kk^-1 - I / tau` of itself, and of another
 //! `s_j + P_kj' S_kk^-1 P_kj`.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::sync::{Arc, Mutex};
@@ -21,6 +21,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::gram::{Gram, Sums};
 use super::model::Model;
 use super::posterior::Posterior;
+use crate::lstsq::invert_upper;
 
 /// `s` and `q` of a group without which the readings have covariance `V`.
 #[derive(Clone, Debug)]
@@ -93,30 +94,44 @@ impl Candidate {
 
     /// The variance of these that gains most, and what it gains.
     pub fn best(&self, sizes: &[f64]) -> (f64, f64) {
-        let best = best_above(sizes, f64::NEG_INFINITY, |tau| Some(self.parts(tau)));
+        let best = self.best_above(sizes, f64::NEG_INFINITY);
         best.unwrap_or((0.0, f64::NEG_INFINITY))
+    }
+
+    /// The same, where it is more than `least`.
+    fn best_above(&self, sizes: &[f64], least: f64) -> Option<(f64, f64)> {
+        best_above(sizes, least, self.q.len(), |tau| Some(self.parts(tau)))
     }
 }
 
-/// The variance of these that gains most, and what it gains, of what a group fits and what its volume
-/// costs; None where no variance gains more than `least`, mostly told by the greatest alone.
+/// The variance that gains most, and what it gains, of what a group fits and what its volume costs;
+/// None where none of these, from the least to the greatest, gains more than `least`.
+///
+/// A variance that is `e` times smaller fits less, and costs less by at most half of the columns.
 fn best_above(
     sizes: &[f64],
-    least: f64,
+    mut least: f64,
+    width: usize,
     parts: impl Fn(f64) -> Option<(f64, f64)>,
 ) -> Option<(f64, f64)> {
-    let greatest = sizes.iter().copied().fold(0.0, f64::max);
-    if parts(greatest)?.0 <= least {
-        return None;
+    let (mut best, mut greater) = (None, None);
+    for &tau in sizes.iter().rev() {
+        if let Some((at, fit, log_root)) = greater {
+            let cheaper = 0.5 * width as f64 * f64::ln(at / tau);
+            if fit - f64::max(log_root - cheaper, 0.0) < least {
+                continue;
+            }
+        }
+        let Some((fit, log_root)) = parts(tau) else {
+            continue;
+        };
+        if fit - log_root > least {
+            least = fit - log_root;
+            best = Some((tau, least));
+        }
+        greater = Some((tau, fit, log_root));
     }
-    // Of equal ones the first.
-    let gains = sizes.iter().rev().filter_map(|&tau| {
-        let (fit, log_root) = parts(tau)?;
-        Some((tau, fit - log_root))
-    });
-    gains
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .filter(|best| best.1 > least)
+    best
 }
 
 /// Product of the first `n` values of two columns.
@@ -129,7 +144,8 @@ fn dot(matrix: &DMatrix<f64>, n: usize, i: usize, k: usize) -> f64 {
 
 /// Columns above which a group is wide: one that is in is integrated over with the effects of runs, and
 /// one that is out has its principal axes as columns, so that the products of its own are diagonal.
-pub(super) const WIDE: usize = 16;
+/// Where more columns are in than it has, it is treated as a narrow one all the same.
+pub(super) const WIDE: usize = 32;
 
 /// Sums beside what is integrated over, by the bits of its variances.
 pub(super) type Met = Arc<Mutex<BTreeMap<Vec<u64>, Arc<Sums>>>>;
@@ -144,9 +160,21 @@ pub(super) type Met = Arc<Mutex<BTreeMap<Vec<u64>, Arc<Sums>>>>;
 #[derive(Debug)]
 struct Beside {
     parts: (f64, f64),
-    /// `L^-1`, whose square is the covariance.
-    root: DMatrix<f64>,
-    mean: DVector<f64>,
+    lower: DMatrix<f64>,
+    /// `z`.
+    known: DVector<f64>,
+    /// `L'^-1`, whose square is the covariance.
+    root: OnceCell<DMatrix<f64>>,
+}
+
+impl Beside {
+    fn root(&self) -> &DMatrix<f64> {
+        self.root.get_or_init(|| {
+            let mut root = self.lower.transpose();
+            invert_upper(root.as_view_mut());
+            root
+        })
+    }
 }
 
 /// Wide groups that were let in, by group and bits of the variance; None of those that cannot be.
@@ -165,14 +193,14 @@ pub struct Solved {
     /// `T^-2 + G` of the columns that are in, and the logarithm of its root.
     precision: DMatrix<f64>,
     log_root: f64,
-    /// Place of the columns of each group among those that are in, or among those of narrow groups
-    /// that are out.
+    /// Place of the columns of each group among those that are in, or among those that are out and
+    /// treated as narrow.
     places: Vec<usize>,
     /// Products of the columns that are in with all.
     cross: DMatrix<f64>,
-    /// `P` at the columns of narrow groups that are out.
+    /// `P` at the columns of the latter.
     reach: DMatrix<f64>,
-    /// `s` of each narrow group that is out.
+    /// `s` of each of their groups.
     outside: Vec<DMatrix<f64>>,
     /// Squares of all columns.
     squares: DVector<f64>,
@@ -223,27 +251,26 @@ impl Solved {
         let found = Posterior::of(&own, &sizes, active)?;
         let (covariance, mean) = (found.covariance(), found.mean.column(0).into_owned());
         let bounds = model.bounds();
+        let is_dense = |k: usize| model.tau[k] == 0.0 && model.widths[k] <= WIDE.max(mean.len());
         let (mut inside, mut out) = (0, Vec::new());
         let mut place = |k: usize| {
             let (from, to) = bounds[k];
-            match (is_narrow(k), model.tau[k] > 0.0) {
-                (false, _) => 0,
-                (true, true) => {
-                    inside += to - from;
-                    inside - (to - from)
-                }
-                (true, false) => {
-                    out.extend(from..to);
-                    out.len() - (to - from)
-                }
+            if is_narrow(k) && model.tau[k] > 0.0 {
+                inside += to - from;
+                return inside - (to - from);
             }
+            if is_dense(k) {
+                out.extend(from..to);
+                return out.len() - (to - from);
+            }
+            0
         };
         let places: Vec<usize> = (0..bounds.len()).map(&mut place).collect();
         let reach = &covariance * cross.select_columns(&out);
         // Products between groups are of no use.
         let outside = bounds.iter().enumerate().map(|(k, &(from, to))| {
             let width = to - from;
-            if model.tau[k] > 0.0 || !is_narrow(k) {
+            if !is_dense(k) {
                 return DMatrix::zeros(0, 0);
             }
             let own = sums.products.view((from, from), (width, width));
@@ -280,11 +307,12 @@ impl Solved {
 
     /// The variance with which a group that is out gains most, and what it gains, if more than `least`.
     pub fn best_above(&self, j: usize, sizes: &[f64], least: f64) -> Option<(f64, f64)> {
-        if self.model.widths[j] > WIDE {
-            return best_above(sizes, least, |tau| Some(self.with_wide(j, tau)?.parts));
+        let width = self.model.widths[j];
+        if width <= WIDE {
+            return self.outside(j).best_above(sizes, least);
         }
-        let own = self.outside(j);
-        best_above(sizes, least, |tau| Some(own.parts(tau)))
+        let parts = |tau| Some(self.with_wide(j, tau)?.parts);
+        best_above(sizes, least, width, parts)
     }
 
     /// A wide group that is out let in.
@@ -296,6 +324,14 @@ impl Solved {
 
     fn let_in(&self, j: usize, tau: f64) -> Option<Beside> {
         let (from, to) = self.bounds[j];
+        if !self.outside[j].is_empty() {
+            return Some(Beside {
+                parts: self.outside(j).parts(tau),
+                lower: DMatrix::zeros(0, 0),
+                known: DVector::zeros(0),
+                root: OnceCell::new(),
+            });
+        }
         let spread = self
             .squares
             .rows(from, to - from)
@@ -307,17 +343,15 @@ impl Solved {
         }
         let lower = Cholesky::new(&self.precision - &taken * taken.transpose())?.unpack();
         let weighted = moments.zip_map(&spread, |q, spread| q * (tau / spread).sqrt());
-        let mut root = DMatrix::identity(lower.nrows(), lower.nrows());
-        lower.solve_lower_triangular_unchecked_mut(&mut root);
-        let known = &root * (taken * &weighted);
+        let mut known = taken * &weighted;
+        lower.solve_lower_triangular_unchecked_mut(&mut known);
         let logs = 0.5 * spread.map(f64::ln).sum() + lower.diagonal().map(f64::ln).sum();
+        let fit = 0.5 * (weighted.norm_squared() + known.norm_squared());
         Some(Beside {
-            parts: (
-                0.5 * (weighted.norm_squared() + known.norm_squared()),
-                logs - self.log_root,
-            ),
-            mean: &self.mean - root.tr_mul(&known),
-            root,
+            parts: (fit, logs - self.log_root),
+            lower,
+            known,
+            root: OnceCell::new(),
         })
     }
 
@@ -379,19 +413,26 @@ impl Without<'_> {
     ///
     /// A wide one gains what it gains with this one, and what this one gains less beside it.
     pub fn best_above(&self, j: usize, sizes: &[f64], least: f64) -> Option<(f64, f64)> {
-        if self.solved.model.widths[j] <= WIDE {
-            let other = self.other(j);
-            return best_above(sizes, least, |tau| Some(other.parts(tau)));
+        let wide = self.solved.model.widths[j];
+        if wide <= WIDE {
+            return self.other(j).best_above(sizes, least);
         }
-        let (tau, width) = (self.solved.model.tau[self.k], self.precision.nrows());
-        best_above(sizes, least, |size| {
+        let tau = self.solved.model.tau[self.k];
+        let (place, width) = (self.solved.places[self.k], self.precision.nrows());
+        best_above(sizes, least, wide, |size| {
             let beside = self.solved.with_wide(j, size)?;
-            let place = self.solved.places[self.k];
-            let root = beside.root.columns(place, width);
-            let precision = Cholesky::new(root.tr_mul(&root))?.inverse();
-            let mean = &beside.mean.as_slice()[place..place + width];
-            let less = Candidate::of_posterior(&precision, mean, tau).parts(tau);
             let (fit, log_root) = beside.parts;
+            // The volume of this one is greater beside the other.
+            if fit + self.parts.0 - log_root <= least {
+                return Some((fit + self.parts.0, log_root));
+            }
+            if !self.solved.outside[j].is_empty() {
+                return Some(self.other(j).parts(size));
+            }
+            let root = beside.root().rows(place, width);
+            let precision = Cholesky::new(root * root.transpose())?.inverse();
+            let mean = self.solved.mean.rows(place, width) - root * &beside.known;
+            let less = Candidate::of_posterior(&precision, mean.as_slice(), tau).parts(tau);
             Some((
                 fit + self.parts.0 - less.0,
                 log_root + self.parts.1 - less.1,

@@ -103,7 +103,7 @@ def diagnose(
     within : float, optional
         Seconds that it may take. By itself work is counted and no clock looked at, so that the
         same readings give the same account on any machine, however busy; ordinary ones need a
-        third of what may be done. When either is up, the account so far is returned and marked
+        sixth of what may be done. When either is up, the account so far is returned and marked
         as incomplete (`Diagnosis.complete`, ``notes``): causes may be missing, and what was
         not held out is not confirmed. Seven tenths of the time are for the choice of causes.
     progress : {"none", "auto", "text", "json"}

@@ -20,8 +20,8 @@ from ..errors import ArgumentError
 from .suggestions import check_choice
 
 #: Most work where no time was given, in numbers of columns that are fitted or scored: in all, and
-#: for each item where that is more. Ordinary readings take a tenth to a third of that.
-LEAST, PER_ITEM = 1e8, 6e3
+#: for each item where that is more. Ordinary readings take a twentieth to a sixth of that.
+LEAST, PER_ITEM = 2e8, 1.2e4
 
 #: Ways of showing progress.
 STYLES: Final = ("auto", "text", "json", "none")

@@ -16,8 +16,8 @@ SAME = 1e-8
 
 WIDTHS = (1, 2, 3, 1)
 
-#: Groups that are narrow and wide.
-WIDE = (2, 20, 17, 1)
+#: Narrow and wide groups, the latter with more or fewer columns than those that are in.
+WIDE, DENSE = (2, 40, 35, 1), (30, 4, 33, 1)
 
 
 def made(seed, runs=3, n=60, widths=WIDTHS):
@@ -65,7 +65,7 @@ def test_evidence_and_mean_are_those_of_the_dense_covariance(seed):
         assert (np.linalg.eigvalsh(covariance) > -SAME).all()
 
 
-@pytest.mark.parametrize(("seed", "widths"), [*((k, WIDTHS) for k in range(6)), (6, WIDE)])
+@pytest.mark.parametrize(("seed", "widths"), enumerate([*6 * [WIDTHS], WIDE, DENSE]))
 def test_the_search_finds_the_best_of_all_models_beside_what_is_given(seed, widths):
     parts = made(seed, widths=widths)
     total = float(np.var(np.concatenate([p[1] for p in parts])))
@@ -102,7 +102,7 @@ def test_sums_less_a_function_are_those_of_errors_less_it():
         less.less(own[1:])
 
 
-@pytest.mark.parametrize("widths", [WIDTHS, WIDE])
+@pytest.mark.parametrize("widths", [WIDTHS, WIDE, DENSE])
 def test_changes_are_differences_of_the_evidence(widths):
     sums = Groups(made(1, widths=widths), widths).sums([0.8, 0.1, 0.1, 0.1, 0.1, 0.1], 4.0)
     sizes = 4.0 * 10.0 ** (-4.0 + 0.8 * np.arange(7))
