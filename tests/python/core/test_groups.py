@@ -65,7 +65,7 @@ def test_evidence_and_mean_are_those_of_the_dense_covariance(seed):
         assert (np.linalg.eigvalsh(covariance) > -SAME).all()
 
 
-@pytest.mark.parametrize(("seed", "widths"), enumerate([*6 * [WIDTHS], WIDE, DENSE]))
+@pytest.mark.parametrize(("seed", "widths"), [*enumerate([*6 * [WIDTHS], WIDE, DENSE])])
 def test_the_search_finds_the_best_of_all_models_beside_what_is_given(seed, widths):
     parts = made(seed, widths=widths)
     total = float(np.var(np.concatenate([p[1] for p in parts])))
