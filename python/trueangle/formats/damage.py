@@ -26,14 +26,12 @@ def damage_told(path: object, name: str, hint: str = "") -> Iterator[None]:
         raise FileError(
             path, "needs more memory than there is: it is damaged, or its parts are too large"
         ) from None
-    except OSError as cause:
-        _raise_if_of_machine(cause)
-        # An invalid argument is a place that a damaged file named.
-        if cause.errno is not None and cause.errno > 0 and cause.errno != errno.EINVAL:
-            raise
-        raise FileError(path, f"is damaged or not {name}: {_told(cause)}{hint}") from cause
     except Exception as cause:
         _raise_if_of_machine(cause)
+        # An invalid argument is a place that a damaged file named.
+        if isinstance(cause, OSError) and (cause.errno or 0) > 0 and cause.errno != errno.EINVAL:
+            cause.filename = cause.filename or str(path)
+            raise
         raise FileError(path, f"is damaged or not {name}: {_told(cause)}{hint}") from cause
 
 

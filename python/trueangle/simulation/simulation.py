@@ -189,7 +189,7 @@ def simulate(
     rng = random_numbers(seed)
     designs = sim.runs if runs is None else all_of_type("runs", runs, RunDesign, DESIGN)
     if not designs:
-        raise ArgumentError("the simulation designs no run: add a [[run]] table or pass `runs=`")
+        raise ArgumentError("the simulation designs no run: add a [[run]] table for each")
     around = sim.whole_surroundings
     ideal = [_measured(sim, design, j, rng) for j, design in enumerate(designs)]
     signals = join_runs(ideal)

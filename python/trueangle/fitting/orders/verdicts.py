@@ -37,7 +37,7 @@ _VERDICTS: Final = {
     "noise": "is not significant",
     "negligible": "is significant, but too small to change any reading",
     "too steep": "with it several true angles give one reading: it "
-    "can be corrected with argument='indicated' only",
+    "can be corrected with `argument='indicated'` only",
     "rounding": "may be made by the sensor's rounding to whole steps, which at evenly spaced "
     "positions is the same each time: read at other positions, too",
     "shared": "is collinear with others over this travel: needed for the curve, but perhaps not "
