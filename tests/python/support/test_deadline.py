@@ -146,7 +146,7 @@ def test_a_step_that_was_not_finished_names_nothing():
 
 def test_work_without_a_time_given_is_bounded_by_its_readings():
     """By what is done: no clock is looked at."""
-    for items, allowed in ((0, 100_000_000), (10_000, 100_000_000), (40_000, 240_000_000)):
+    for items, allowed in ((0, 200_000_000), (10_000, 200_000_000), (40_000, 480_000_000)):
         work = Deadline(clock=Ticks())
         with work.bounded(items):
             work.at("rounds", 0, 9)
