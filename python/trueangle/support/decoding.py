@@ -95,8 +95,7 @@ def refuse_other(
 ) -> None:
     """Refuse text that is another file of this package, or that begins with none of ``first``."""
     refuse_own(path, text[:4096].encode(), what)
-    begin = text.lstrip()[:1]
-    if begin and begin not in first:
+    if (begin := text.lstrip()[:1]) and begin not in first:
         problem = f"is not {what} (it begins with {begin!r})"
         raise kind(path, f"{problem}; for readings: trueangle check {path}")
 
@@ -126,7 +125,8 @@ def json_value(path: Path, text: str, kind: type[FileError], what: str) -> Any:
     try:
         return json.loads(text, object_pairs_hook=pairs, parse_constant=constant)
     except json.JSONDecodeError as cause:
-        refuse_other(path, text, what, "{[", kind)
+        if not text.lstrip().startswith("{"):  # else JSON that is cut off
+            refuse_other(path, text, what, "[", kind)
         raise kind(
             path,
             f"is not complete JSON ({cause.msg}): truncated or not {what}; save it again",
