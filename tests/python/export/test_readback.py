@@ -166,7 +166,7 @@ def test_the_tables_own_arithmetic_is_added(target, options, tmp_path, capsys):
         target == "tinymovr"
     )
     assert result.table_max_abs_arcsec > 3.0 * result.max_abs_arcsec
-    assert "the table's own arithmetic adds at most" in result.summary()
+    assert "Interpolation and whole numbers of the table add at most" in result.summary()
     back.save(tmp_path / "back.json")
     model.save(tmp_path / "model.json")
     paths = [str(tmp_path / name) for name in ("model.json", "back.json")]

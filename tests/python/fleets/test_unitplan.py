@@ -124,8 +124,8 @@ def test_an_order_that_the_fleet_does_not_know_is_free_and_one_that_never_varies
 
 
 WRONG = {
-    "neither": ({}, "give uncertainty="),
-    "both": ({"uncertainty": 2.0, "readings": 3}, "give uncertainty="),
+    "neither": ({}, "give either `uncertainty=`"),
+    "both": ({"uncertainty": 2.0, "readings": 3}, "give either `uncertainty=`"),
     "negative": ({"uncertainty": -2.0}, "uncertainty must be positive"),
     "none": ({"readings": 0}, "readings must be a whole number"),
     "noise": ({"readings": 3, "noise": 0.0}, "noise must be positive"),
