@@ -243,12 +243,7 @@ class Groups:
     def noise(
         self, tau: Sequence[float], scale: float, start: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]: ...
-    def sums(
-        self,
-        noise: Sequence[float] | NDArray[np.float64],
-        total: float,
-        scale: float | None = None,
-    ) -> GroupSums: ...
+    def sums(self, noise: Sequence[float] | NDArray[np.float64], total: float) -> GroupSums: ...
 
 @final
 class GroupSums:

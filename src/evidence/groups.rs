@@ -9,7 +9,7 @@ use super::gains::{Met, Solved, WIDE};
 use super::gram::Gram;
 use super::model::Model;
 use super::posterior::Posterior;
-use super::prior::{NoisePrior, Prior};
+use super::prior::Prior;
 use super::readings::Readings;
 use super::search::{Found, Search};
 use super::whitening::Noise;
@@ -37,12 +37,9 @@ pub struct Changes {
 
 impl Readings {
     /// Sums of all runs with one zero, under a noise; `total` is the variance of the errors.
-    /// Evidences are times a prior of the noise, where there is one.
-    pub fn group_sums(&self, noise: Noise, total: f64, prior: Option<NoisePrior>) -> GroupSums {
-        let mut gram = self.pooled(noise);
-        gram.sums.log_scale += prior.map_or(0.0, |prior| prior.log_density_of(noise));
+    pub fn group_sums(&self, noise: Noise, total: f64) -> GroupSums {
         GroupSums {
-            gram,
+            gram: self.pooled(noise),
             widths: self.widths(),
             total,
             met: Met::default(),

@@ -176,11 +176,6 @@ impl NoisePrior {
             .sum()
     }
 
-    /// The same of a noise, as the nearest within the bounds.
-    pub fn log_density_of(&self, noise: Noise) -> f64 {
-        self.log_density(&self.within(noise.variances().map(f64::ln)))
-    }
-
     /// Slopes of the logarithm of the density.
     pub fn slopes(&self, position: &[f64; VARIANCES]) -> [f64; VARIANCES] {
         let centre = self.centre();

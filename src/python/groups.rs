@@ -88,22 +88,14 @@ impl PyGroups {
     }
 
     /// Sums of all runs with one zero under a noise; `total` is the variance that sizes of groups
-    /// are relative to. Evidences are times the prior of the noise where its `scale` is given.
-    #[pyo3(signature = (noise, total, scale=None))]
-    fn sums(
-        &self,
-        py: Python<'_>,
-        noise: [f64; VARIANCES],
-        total: f64,
-        scale: Option<f64>,
-    ) -> PyResult<PyGroupSums> {
+    /// are relative to.
+    fn sums(&self, py: Python<'_>, noise: [f64; VARIANCES], total: f64) -> PyResult<PyGroupSums> {
         not_negative("noise", &noise)?;
         if !(noise[0] > 0.0 && total > 0.0 && total.is_finite()) {
             let problem = "noise[0], the white variance, and total must be above 0".into();
             return Err(argument_error(py, problem));
         }
-        let prior = scale.map(|scale| NoisePrior { scale, least: 0.0 });
-        let found = detached(py, || self.0.group_sums(Noise::of(noise), total, prior))?;
+        let found = detached(py, || self.0.group_sums(Noise::of(noise), total))?;
         Ok(PyGroupSums(found))
     }
 }

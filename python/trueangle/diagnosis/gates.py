@@ -1,7 +1,7 @@
 """Gates that a finding passes before it is confirmed, from its computed values.
 
-A law that does not carry over to other levels is not, nor a ratio that is one of several, nor two
-causes that are one column.
+A law that does not carry over to other levels is not, nor a size near zero, nor a ratio that is one
+of several, nor two causes that are one column.
 """
 
 from __future__ import annotations
@@ -58,6 +58,21 @@ def not_carried(finding: Finding) -> str:
     )
 
 
+def not_told_from_zero(finding: Finding) -> str:
+    """A size within two standard errors of zero."""
+    name = EFFECTS[finding.cause].size_name
+    if name not in finding.parameters:
+        name = next(iter(finding.parameters), "")
+    size = finding.parameters.get(name)
+    if size is None or size.std is None or isinstance(size.value, str):
+        return ""
+    values, stds = (np.abs(np.atleast_1d(np.asarray(x, float))) for x in (size.value, size.std))
+    if not values.size or values.size != stds.size or not (stds > 0.0).all():
+        return ""
+    z = float((values / stds).max())
+    return f"its {name} is {z:.1f} standard errors from zero" if z < 2.0 else ""
+
+
 def not_the_only_ratio(finding: Finding) -> str:
     """A ratio that is one of several with the same lines at these positions.
 
@@ -81,7 +96,7 @@ def gated_findings(
     """Findings as the gates leave them, the pairs that are not separated, and their terms."""
     found = []
     for finding in findings:
-        gates = (not_carried, not_the_only_ratio) if finding.confirmed else ()
+        gates = (not_carried, not_told_from_zero, not_the_only_ratio) if finding.confirmed else ()
         reason = next((said for gate in gates if (said := gate(finding))), "")
         found.append(replace(finding, status=NOT_CONFIRMED, reason=reason) if reason else finding)
     spots: list[Ambiguity] = []

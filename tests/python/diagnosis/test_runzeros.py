@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 import trueangle as ta
-from trueangle.diagnosis.selection import acts_on_runs
+from trueangle.diagnosis.confirmation import chance_between_runs, scatter_chance
+from trueangle.diagnosis.remainder import unexplained_remainder
+from trueangle.effects import EFFECTS
+from trueangle.estimation.regression import Regression
+from trueangle.joint.signals import Signals, join_runs
 from trueangle.simulation import (
     Backlash,
     CurrentCoupling,
@@ -15,9 +22,11 @@ from trueangle.simulation import (
     RunDesign,
     Simulation,
     TorsionalCompliance,
-    ZeroSlip,
     simulate,
 )
+
+#: Chance of a wrong alarm of the test of uniformity.
+ALARM = 1e-3
 
 
 def one_way(speeds: tuple[float, ...], samples: int = 60) -> Simulation:
@@ -28,13 +37,40 @@ def one_way(speeds: tuple[float, ...], samples: int = 60) -> Simulation:
     return Simulation(sigma_arcsec=1.0, runs=runs)
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_zeros_that_scatter_are_no_law_of_the_runs(seed: int) -> None:
-    """Six runs at a speed and in a direction each, whose zeros follow nothing."""
-    sim = one_way((5.0, -9.0, 20.0, -14.0, 28.0, -31.0))
-    found = ta.diagnose(simulate(sim.with_effects([ZeroSlip(20.0)]), 7_700 + seed), sim)
-    told = {f.cause for f in found.findings if f.confirmed}
-    assert not told & {*acts_on_runs()}, f"seed {7_700 + seed}"
+def fitted(signals: Signals, error: np.ndarray) -> Regression:
+    """Readings with a delay as their only cause."""
+    start = Regression.of(signals, error, Simulation().surroundings, rho=0.0)
+    return start.with_terms([EFFECTS["latency"].propose(start)])
+
+
+def test_the_chance_is_uniform_where_zeros_alone_scatter() -> None:
+    signals = join_runs(simulate(one_way((5.0, -9.0, 20.0, -14.0, 28.0, -31.0)), 3))
+    found = []
+    for seed in range(200):
+        rng = np.random.default_rng([77, seed])
+        error = 20.0 * rng.standard_normal(6)[signals.run] + rng.standard_normal(len(signals))
+        found.append(scatter_chance(fitted(signals, error), [0]))
+    assert kstest(found, "uniform").pvalue > ALARM, "seeds [77, 0] to [77, 199]"
+
+
+@pytest.mark.parametrize("size", [0.0, 0.7])
+def test_zeros_that_noise_explains_and_readings_within_runs_are_no_doubt(size: float) -> None:
+    """Runs that keep to one speed without a scatter of zeros, and runs there and back with one."""
+    if size:
+        turning = replace(one_way((6.0,)).runs[0], reversals=(0.5,), samples=200)
+        sim = Simulation(runs=(turning,) * 5)
+    else:
+        sim = one_way((5.0, -9.0, 20.0, -14.0))
+    signals = join_runs(simulate(sim, 3))
+    rng = np.random.default_rng(5)
+    slips = 20.0 * size * rng.standard_normal(signals.runs)
+    error = slips[signals.run] + rng.standard_normal(len(signals))
+    error = error + 3600.0 * 1e-3 * signals.velocity
+    regression = fitted(signals, error)
+    rest = unexplained_remainder(regression, None)
+    zeros = next(item for item in rest.evidence if item.test == "zeros of the runs")
+    assert (zeros.p < 0.01) == (size > 0.0)
+    assert chance_between_runs(regression, [0], rest) == 0.0
 
 
 def test_play_and_wind_up_of_four_runs_are_not_confirmed_as_a_delay() -> None:

@@ -190,32 +190,18 @@ def factor_account(signals: Signals, error: Array, groups: Sequence[Group]) -> F
         parts.append((columns[start:stop], y[start:stop], time))
     core = Groups(parts, widths)
     scale = _scale(y, cuts)
-    first = [AT_FIRST * total if _is_first(g) else 0.0 for g in groups]
-    score, found = _settled(core, groups, first, scale, total)
-    if found.inside:
-        # Beside slow functions no walk is left that could be one of them.
-        other = _settled(core, groups, [0.0] * len(groups), scale, total)
-        return other[1] if other[0] > score else found
-    return found
-
-
-def _settled(
-    core: Groups, groups: Sequence[Group], first: Sequence[float], scale: float, total: float
-) -> tuple[float, FactorAccount]:
-    """Log probability and account of a noise and a search in turns; the noise beside some first."""
-    none = [0.0] * len(groups)
-    noise = core.noise(list(first), scale)
-    sums = core.sums(_above_rounding(noise, total), total, scale)
-    score, tau = 0.0, none
+    noise = core.noise([AT_FIRST * total if _is_first(g) else 0.0 for g in groups], scale)
+    sums = core.sums(_above_rounding(noise, total), total)
+    tau = [0.0] * len(groups)
     for _ in range(ROUNDS):
-        score, found = _searched(sums, groups, none, _prior(groups), tau)
+        _, found = _searched(sums, groups, [0.0] * len(groups), _prior(groups), tau)
         is_same = [t > 0.0 for t in found] == [t > 0.0 for t in tau]
         tau = found
         if is_same:
             break
         noise = core.noise(tau, scale, noise)
-        sums = core.sums(_above_rounding(noise, total), total, scale)
-    return score, FactorAccount(groups, sums, tau, total)
+        sums = core.sums(_above_rounding(noise, total), total)
+    return FactorAccount(groups, sums, tau, total)
 
 
 def _above_rounding(noise: Array, total: float) -> Array:

@@ -11,14 +11,13 @@ from ...support.arrays import Array
 from ...support.display_units import ErrorUnit
 from ...support.layout import order_ranges
 from ...support.plainresult import PlainResult, plain_fields
-from .group import PAIRS
 
 #: Factors in words.
 WORDS = {
     "place": "the place",
     "direction": "the direction",
     "direction_place": "the direction times the place",
-    "reversal_time": "the time since the last reversal or stop",
+    "reversal_time": "the time since the last reversal",
     "run_time": "the time in the run",
     "run": "the run (its zero)",
     "run_place": "the run times the place",
@@ -34,9 +33,7 @@ WORDS = {
     "mount_place": "the place on the reference's mount",
     "step": "the step of the sensor",
     "frequency": "a line in time",
-    "travel": "the travel in the run",
 }
-WORDS |= {f"{one}_{other}": f"{WORDS[one]} times {WORDS[other]}" for one, other in PAIRS}
 
 #: Orders that are listed, and decimals of those that are not whole.
 LISTED, DECIMALS = 6, 2

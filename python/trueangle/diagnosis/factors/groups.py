@@ -13,7 +13,7 @@ from ...joint.pattern import line_columns
 from ...joint.signals import Signals
 from ...support.arrays import Array
 from .events import late_readings, step_events
-from .group import FEW, GRID, LOW, PAIRS, Basis, Group
+from .group import FEW, GRID, LOW, Basis, Group
 from .places import PeakSpectrum, place_groups, without_low
 
 #: Orders whose products with a factor are always tried.
@@ -91,9 +91,7 @@ def factor_groups(
     known = [m for m in dict.fromkeys(lines) if m > 0.0]
     spectrum = PeakSpectrum(theta, signals.places)
     groups = [*place_groups(signals, error, left, known, shafts, spectrum)]
-    axes = [*_axes(signals)]
-    groups += _of_pairs([*axes, _travel(signals)])
-    for axis in axes:
+    for axis in _axes(signals):
         groups.append(axis.alone())
         for product in axis.products:
             asked = [*ALWAYS, *known[:LOW], *drawn]
@@ -123,8 +121,8 @@ def _axes(signals: Signals) -> Iterator[Axis]:
     yield from _signed("speed", signals.velocity, 2.0 * SPEED_CHANGES, "deg/s")
     tau = signals.torque
     yield from _signed("load", tau, LOAD_CHANGES, "Nm")
-    if tau is not None and np.ptp(signs := _signs(tau)) > 0.0:
-        yield Axis("load_sign", signs, _column, np.array([-1.0, 1.0]), "sign")
+    if tau is not None and np.unique(np.sign(tau)).size > 1:
+        yield Axis("load_sign", np.sign(tau), _column, np.array([-1.0, 1.0]), "sign")
     kelvin = signals.temperature
     if kelvin is not None and np.ptp(kelvin) > TEMPERATURE_CHANGES:
         mean, half = float(kelvin.mean()), 0.5 * float(np.ptp(kelvin))
@@ -172,30 +170,17 @@ def _signed(factor: str, x: Array | None, changes: float, unit: str) -> Iterator
     yield Axis(factor, x, lambda x: np.hstack([part(x) for part in parts]), grid, unit)
 
 
-def _signs(x: Array) -> Array:
-    """Signs; at levels those of the levels: of one at nought noise has the sign."""
-    levels = _levels(x)
-    if not 2 <= levels.size <= KNOTS:
-        return np.asarray(np.sign(x))
-    near = levels[np.abs(x[:, None] - levels).argmin(axis=1)]
-    return np.asarray(np.sign(near) * (np.abs(near) > NEXT * np.ptp(x)))
-
-
 def knots_of(x: Array) -> Array:
     """Levels of what is set, and quantiles of what moves; none next to another."""
-    knots = _levels(x)
-    if not 2 <= knots.size <= KNOTS:
-        knots = np.quantile(x, np.linspace(0.0, 1.0, KNOTS))
-    knots = np.unique(knots)
-    return np.asarray(knots[np.diff(knots, prepend=-np.inf) > NEXT * np.ptp(x)])
-
-
-def _levels(x: Array) -> Array:
-    """Means of values that have no gap between them."""
     order = np.sort(x)
-    cuts = np.flatnonzero(np.diff(order) > 0.5 * LEVEL * float(np.ptp(x)))
+    step = 0.5 * LEVEL * float(order[-1] - order[0])
+    cuts = np.flatnonzero(np.diff(order) > step)
     edges = np.concatenate([[0], cuts + 1, [order.size]])
-    return np.array([order[a:b].mean() for a, b in itertools.pairwise(edges)])
+    knots = np.array([order[a:b].mean() for a, b in itertools.pairwise(edges)])
+    if not 2 <= knots.size <= KNOTS:
+        knots = np.quantile(order, np.linspace(0.0, 1.0, KNOTS))
+    knots = np.unique(knots)
+    return np.asarray(knots[np.diff(knots, prepend=-np.inf) > NEXT * np.ptp(order)])
 
 
 def grid_of(knots: Array) -> Array:
@@ -224,7 +209,7 @@ def _reversals(signals: Signals) -> Iterator[Axis]:
     """Transitions after a reversal, by travel and by time.
 
     They change sides with the direction, or not. Those from the start of a run, which may be at
-    rest or in the midst of a motion, are their own. So are those after a stop, while it lasts.
+    rest or in the midst of a motion, are their own.
     """
     since = _since(signals)
     sign = np.where(signals.direction < 0.0, -1.0, 1.0)
@@ -244,27 +229,6 @@ def _reversals(signals: Signals) -> Iterator[Axis]:
         x = np.maximum(x, 1e-9 * whole)
         for own in (sign * ~first, 1.0 * ~first, sign * first):
             yield Axis("reversal_time", x * own, decays, at, unit)
-    rest = _rest(signals)
-    whole = 2.0 * float(np.median(rest[rest > 0.0])) if rest.any() else 0.0
-
-    def settles(x: Array) -> Array:
-        decays = np.exp(-np.abs(x)[:, None] / (np.array(LENGTHS) * whole))
-        return np.asarray(np.sign(x)[:, None] * np.hstack([decays, np.ones((x.size, 1))]))
-
-    for way in (sign, np.abs(sign)) if whole > 0.0 else ():
-        at = np.linspace(1e-6, 1.0, GRID) * whole
-        yield Axis("reversal_time", rest * way, settles, at, "s")
-
-
-def _rest(signals: Signals) -> Array:
-    """Seconds since the joint stopped; 0 while it moves."""
-    v = signals.velocity
-    if v is None or signals.time is None:
-        return np.zeros(len(signals))
-    moves = np.abs(v) >= NEXT * float(np.abs(v).max(initial=0.0))
-    moves[[start for start, _ in signals.run_bounds()]] = True
-    since = np.maximum.accumulate(np.arange(v.size) * moves)
-    return np.asarray((signals.clock - signals.clock[since]) * ~moves)
 
 
 def _since(signals: Signals) -> Array | None:
@@ -296,27 +260,6 @@ def _clock(signals: Signals) -> Iterator[Axis]:
 
     unit = "s" if signals.time is not None else "reading"
     yield Axis("run_time", signals.clock, path, np.linspace(0.0, whole, GRID), unit)
-
-
-def _travel(signals: Signals) -> Axis:
-    """The way that the joint has gone in a run, about its mean: each run has its own zero."""
-    way = np.zeros(len(signals))
-    for start, stop in signals.run_bounds():
-        own = np.abs(np.diff(signals.degrees[start:stop], prepend=signals.degrees[start]))
-        way[start:stop] = np.cumsum(own) - np.cumsum(own).mean()
-    return Axis("travel", way, _column, np.zeros(1), "deg")
-
-
-def _of_pairs(axes: Sequence[Axis]) -> Iterator[Group]:
-    """Products of two factors: of each what is proportional, and of its size or its square."""
-    first = {axis.factor: axis for axis in reversed(axes)}
-    for pair in PAIRS:
-        if first.keys() >= {*pair}:
-            one, other = (first[factor].basis(first[factor].x)[:, :2] for factor in pair)
-            columns = np.hstack([one * column[:, None] for column in other.T])
-            if (scale := float(np.sqrt(np.sum(np.var(columns, axis=0))))) > 0.0:
-                at, unit = first[pair[1]].at, first[pair[1]].unit
-                yield Group("_".join(pair), columns / scale, (), at, None, unit)
 
 
 def _of_one_way(signals: Signals) -> Iterator[Group]:

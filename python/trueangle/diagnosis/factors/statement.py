@@ -33,7 +33,7 @@ from .names import (
 
 #: Steps whose surroundings are looked at, parts of a run in which its largest is looked for, and
 #: readings before and after by which its row is found.
-MOST_EVENTS: Final = 8
+MOST_EVENTS: Final = 4
 WINDOWS, NEAREST = 40, 3
 
 
@@ -153,14 +153,9 @@ def _events(regression: Regression) -> list[tuple[int, int]]:
 
 
 def _steps(signals: Signals, error: Array) -> list[tuple[int, int]]:
-    """Run and row of the steps that noise alone does not make, largest first.
-
-    Parts on both sides of a step are looked at for further ones.
-    """
+    """Run and row of the largest step of each run that noise alone does not make, largest first."""
     found = []
-    parts = [*signals.run_bounds()]
-    while parts:
-        start, stop = parts.pop()
+    for start, stop in signals.run_bounds():
         own = error[start:stop]
         width = own.size // WINDOWS
         if width < NEAREST:
@@ -171,7 +166,6 @@ def _steps(signals: Signals, error: Array) -> list[tuple[int, int]]:
             first = row - width
             at = start + first + _largest_step(own[first : row + width], NEAREST)[0]
             found.append((size, (int(signals.run[at]), int(signals.row[at]))))
-            parts += [(start, at), (at, stop)]
     return [place for _, place in sorted(found, reverse=True)]
 
 
