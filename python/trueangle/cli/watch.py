@@ -152,7 +152,7 @@ def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace)
     size = scale * largest.amplitude
     shown = error_unit(errors_in(args), size, model.period)
     text = (
-        f"window {window.window:5d}  largest deviation {shown.text(size)}, order "
-        f"{largest.order:g}; chart {window.statistic:.2f}, alarm at {window.limit:.2f}"
+        f"window {window.window:5d}  order {largest.order:g} is off by {shown.text(size)}; "
+        f"chart {window.statistic:.2f}, alarm at {window.limit:.2f}"
     )
     return f"{text}  ALARM {shown.spoken(window.because)}" if window.alarm else text

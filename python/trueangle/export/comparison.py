@@ -272,7 +272,7 @@ class Comparison(PlainResult):
             lines = [f"No significant difference: {size}.", f"Use {'BA'[a <= b]}: {known}."]
         else:
             lines = [f"Changed: the models differ by {size}: {known}."]
-            lines.append("Which is right now: trueangle watch READINGS --model A, then B.")
+            lines.append("Which is right now: trueangle watch READINGS -m A, then B.")
         p = "< 1e-12" if self.p < 1e-12 else f"= {self.p:.2g}"
         return [*lines, f"By noise alone: p {p}; below {self.false_alarms:g} is a change."]
 

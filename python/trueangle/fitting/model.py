@@ -74,8 +74,8 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         rows = ", ".join(f"reading {row + 1} of run {label}" for label, row in sorted(fit.wild)[:3])
         rows += ", ..." * (weighted.wild > 3)
         yield f"{counted(weighted.wild, 'outlier')} rejected: {rows}."
-    low = fit.degrees_of_freedom > 0 and fit.amplitudes < 2.0 * fit.amplitude_std
-    if np.any(low) and np.all(low):
+    errors = fit.standard_errors
+    if errors is not None and errors[0].size and (fit.amplitudes < 2.0 * errors[0]).all():
         yield "No amplitude is twice its standard error: take more readings, or use it with care."
     if fit.uncertainty.note:
         yield _sentence(fit.uncertainty.note)

@@ -144,7 +144,9 @@ def test_a_size_is_in_the_unit_asked_for(asked, readings):
     value, unit = SHOWN[asked]
     for alarm in (False, True):
         line = _line(window(turn, alarm), model, args)
-        found = re.match(r"window +7  order 3 is (\S+) (\w+) off  chart  9.00 of 8.50", line)
+        found = re.match(
+            r"window +7  order 3 is off by (\S+) (\w+); chart 9.00, alarm at 8.50", line
+        )
         assert float(found[1]) == pytest.approx(value, rel=1e-3)
         assert found[2] == unit
         assert ("ALARM" in line) == alarm
@@ -160,7 +162,7 @@ def test_by_itself_it_is_in_degrees_from_one_on(scale, unit, readings):
     turn = TURNS[readings]
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.0])], period=turn)
     args = argparse.Namespace(json=False, errors_in="auto", counts_per_turn=None)
-    assert f" {unit} off" in _line(window(turn, scale=scale), model, args)
+    assert f" {unit}; chart" in _line(window(turn, scale=scale), model, args)
     args.json = True
     plain = json.loads(_line(window(turn, scale=scale), model, args))
     sizes = [row["amplitude_arcsec"] for row in plain["orders"]]

@@ -123,7 +123,8 @@ def test_watch(period, desk, capsys):
     command = ("watch", "w.csv", "-m", "w.json")
     told = [json.loads(line) for line in printed(capsys, *command, "--json", status=3).splitlines()]
     lines = printed(capsys, *command, "--errors-in", "mrad", status=3).splitlines()
-    pattern = r"window +(\d+)  order (\S+) is (\S+) mrad off  chart +(\S+) of (\S+?)(  ALARM .*)?"
+    pattern = r"window +(\d+)  order (\S+) is off by (\S+) mrad; "
+    pattern += r"chart (\S+), alarm at (\S+?)(  ALARM .*)?"
     apart = 0
     for line, one in zip(lines, told, strict=True):
         window, order, size, chart, limit, alarm = re.fullmatch(pattern, line).groups()

@@ -50,7 +50,7 @@ def messages():
 #: Commands that are printed whole, to be typed.
 TYPED = [
     PACKAGE / "runs" / name
-    for name in ("checks/columns.py", "angles.py", "channelangle.py", "files.py")
+    for name in ("checks/columns.py", "checks/rows.py", "angles.py", "channelangle.py", "files.py")
 ]
 TYPED += [PACKAGE / "export" / "channelform.py"]
 
@@ -162,8 +162,8 @@ ASKED = {
     "too few entries": (
         lambda: ta.export_model(MODEL, "csv", entries=4),
         "export m.json --to csv --entries 4 -o x.csv",
-        "`entries=7` or more",
-        "--entries 7 or more",
+        "`entries=12` or more",
+        "--entries 12 or more",
     ),
     "counts": (
         lambda: ta.read_runs("c.csv"),

@@ -122,7 +122,7 @@ def test_a_changed_order_is_told_also_where_one_model_lacks_it(orders, added):
     )
     assert found.verdict == "changed"
     assert found.p < found.false_alarms
-    assert found.summary().startswith("Changed: difference")
+    assert found.summary().startswith("Changed: the models differ")
 
 
 def test_what_cannot_be_told_has_no_verdict():
@@ -145,7 +145,7 @@ def test_the_command_prints_the_verdict(tmp_path, capsys):
     for path, size in zip(paths, (0.0, 3.0), strict=True):
         calibrated(rng, added=(2, size)).save(path)
     assert main(["compare", *paths]) == 0
-    assert "below 0.01 it counts as changed" in capsys.readouterr().out.replace("\n", " ")
+    assert "below 0.01 is a change" in capsys.readouterr().out.replace("\n", " ")
     assert main(["compare", *paths, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["verdict"] == "changed"

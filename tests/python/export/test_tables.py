@@ -188,7 +188,7 @@ def test_what_cannot_be_kept_is_refused_and_nothing_written(model, tmp_path):
     with pytest.raises(ta.errors.ArgumentError, match=r"hold orders up to 7.*order 8.*32"):
         ta.export_model(model, "c", tmp_path / "a.h", entries=16)
     with pytest.raises(
-        ta.errors.ArgumentError, match=r"up to 7, the model has order 8.*17` or more"
+        ta.errors.ArgumentError, match=r"up to 7, the model has order 8.*32` or more"
     ):
         ta.export_model(model, "csv", tmp_path / "a.csv", entries=16)
     with pytest.raises(ta.errors.ArgumentError, match="power of two"):

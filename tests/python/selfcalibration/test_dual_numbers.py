@@ -423,7 +423,7 @@ def test_less_than_a_turn_of_the_motor_is_refused_with_what_to_record(turns, tmp
         assert not out.exists()
         advice = re.search(r"Record more: trueangle (.+) plans the travel$", told)
         assert main(advice[1].split()) == 0
-        assert re.search(r"turns +3\n", capsys.readouterr().out)
+        assert re.search(r"record 3 turns\n", capsys.readouterr().out)
 
 
 def test_one_turn_of_the_motor_is_enough_for_its_eccentricity():

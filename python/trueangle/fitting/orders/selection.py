@@ -14,7 +14,6 @@ from ...estimation.evidence import Alone, EvidenceEstimate, estimate_by_evidence
 from ...estimation.factor import orthonormal_basis
 from ...estimation.rounded import fit_rounded, is_rounding_visible
 from ...joint.gear import HIGHEST_LOW_ORDER
-from ...joint.pattern import lines_columns
 from ...model.validity import greatest_slope
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
@@ -58,6 +57,8 @@ def orders_beyond_rounding(
         coefficients, which without it is χ² with two degrees of freedom.
     """
     error = np.concatenate([unit.error for unit in units])
+    from ...joint.pattern import lines_columns  # few fits need it
+
     theta = 2.0 * np.pi * np.concatenate([unit.turns for unit in units])
     zeros = np.repeat(np.eye(len(units)), [unit.turns.size for unit in units], axis=0)
     lines = lines_columns(theta, np.asarray(orders, dtype=np.float64))

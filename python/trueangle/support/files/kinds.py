@@ -81,7 +81,7 @@ class FileKind(NamedTuple):
     >>> MODEL.check("joint.mdl")
     Traceback (most recent call last):
     ...
-    trueangle.errors.FileError: joint.mdl: the ending .mdl is none of a model (JSON) (.json); \
+    trueangle.errors.FileError: joint.mdl: the ending .mdl is not that of a model (JSON): .json; \
 name it joint.json
     >>> MODEL.check("joint.csv")
     Traceback (most recent call last):
