@@ -1,12 +1,11 @@
 """``python -m trueangle``, and where the command ``trueangle`` starts."""
 
-# Ctrl-C ends it without a traceback: nothing slow is imported before that is so, not even `signal`,
-# which takes half of the start of this package.
+# Ctrl-C ends it without a traceback: nothing slow is imported before that is so.
 try:
-    import _signal  # type: ignore[import-not-found]
+    import signal
 
-    if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
-        _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
 except KeyboardInterrupt:
     raise SystemExit(130) from None
 

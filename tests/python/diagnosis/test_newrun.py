@@ -37,6 +37,8 @@ def test_runs_of_unlike_joints_are_refused():
         assert ta.fit(runs, [2]).orders == (2,)
 
 
+# Units of one kind are joints of their own.
+@pytest.mark.filterwarnings("ignore::trueangle.errors.UnlikeRunsWarning")
 @pytest.mark.parametrize(
     ("name", "left"), [("stepper_encoder_units", 1.0005), ("rm44_repeat", 0.25)]
 )
