@@ -11,17 +11,11 @@
 //! without a group `k` that is in, `s_k = S_kk^-1 - I / tau` of itself, and of another
 //! `s_j + P_kj' S_kk^-1 P_kj`.
 
-use std::cell::{OnceCell, RefCell};
-use std::collections::BTreeMap;
-use std::rc::Rc;
-use std::sync::{Arc, Mutex};
-
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::gram::{Gram, Sums};
 use super::model::Model;
 use super::posterior::Posterior;
-use crate::lstsq::invert_upper;
 
 /// `s` and `q` of a group without which the readings have covariance `V`.
 #[derive(Clone, Debug)]
@@ -94,44 +88,20 @@ impl Candidate {
 
     /// The variance of these that gains most, and what it gains.
     pub fn best(&self, sizes: &[f64]) -> (f64, f64) {
-        let best = self.best_above(sizes, f64::NEG_INFINITY);
-        best.unwrap_or((0.0, f64::NEG_INFINITY))
+        let gains = sizes.iter().map(|&tau| (tau, self.gain(tau)));
+        gains.fold((0.0, f64::NEG_INFINITY), |best, own| {
+            if own.1 > best.1 { own } else { best }
+        })
     }
 
-    /// The same, where it is more than `least`.
-    fn best_above(&self, sizes: &[f64], least: f64) -> Option<(f64, f64)> {
-        best_above(sizes, least, self.q.len(), |tau| Some(self.parts(tau)))
-    }
-}
-
-/// The variance that gains most, and what it gains, of what a group fits and what its volume costs;
-/// None where none of these, from the least to the greatest, gains more than `least`.
-///
-/// A variance that is `e` times smaller fits less, and costs less by at most half of the columns.
-fn best_above(
-    sizes: &[f64],
-    mut least: f64,
-    width: usize,
-    parts: impl Fn(f64) -> Option<(f64, f64)>,
-) -> Option<(f64, f64)> {
-    let (mut best, mut greater) = (None, None);
-    for &tau in sizes.iter().rev() {
-        if let Some((at, fit, log_root)) = greater {
-            let cheaper = 0.5 * width as f64 * f64::ln(at / tau);
-            if fit - f64::max(log_root - cheaper, 0.0) < least {
-                continue;
-            }
+    /// The same; None where no variance gains more than `least`, mostly told by the greatest alone.
+    pub fn best_above(&self, sizes: &[f64], least: f64) -> Option<(f64, f64)> {
+        let greatest = sizes.iter().copied().fold(0.0, f64::max);
+        if self.parts(greatest).0 <= least {
+            return None;
         }
-        let Some((fit, log_root)) = parts(tau) else {
-            continue;
-        };
-        if fit - log_root > least {
-            least = fit - log_root;
-            best = Some((tau, least));
-        }
-        greater = Some((tau, fit, log_root));
+        Some(self.best(sizes)).filter(|best| best.1 > least)
     }
-    best
 }
 
 /// Product of the first `n` values of two columns.
@@ -142,43 +112,15 @@ fn dot(matrix: &DMatrix<f64>, n: usize, i: usize, k: usize) -> f64 {
         .dot(&matrix.column(k).rows(0, n))
 }
 
-/// Columns above which a group is wide: one that is in is integrated over with the effects of runs, and
-/// one that is out has its principal axes as columns, so that the products of its own are diagonal.
-/// Where more columns are in than it has, it is treated as a narrow one all the same.
-pub(super) const WIDE: usize = 32;
+/// Columns above which a group is wide.
+const WIDE: usize = 16;
 
-/// Sums beside what is integrated over, by the bits of its variances.
-pub(super) type Met = Arc<Mutex<BTreeMap<Vec<u64>, Arc<Sums>>>>;
-
-/// A model with a wide group that comes in: what this fits, what its volume costs, and the columns
-/// that were in beside it. With `U` and `d` its products with these and its own, and `r` its `q`:
-///
-/// ```text
-/// K = T^-2 + G - U h U' = L L',   h = tau / (1 + tau d),   z = L^-1 U h r
-/// 1/2 (r' h r + z' z),   1/2 sum log(1 + tau d) + log|L| - log|L without it|
-/// ```
-#[derive(Debug)]
-struct Beside {
-    parts: (f64, f64),
-    lower: DMatrix<f64>,
-    /// `z`.
-    known: DVector<f64>,
-    /// `L'^-1`, whose square is the covariance.
-    root: OnceCell<DMatrix<f64>>,
+/// `I + tau s` of a wide group that is out, factorised.
+#[derive(Clone, Debug)]
+pub struct Wide {
+    root: Cholesky<f64, Dyn>,
+    tau: f64,
 }
-
-impl Beside {
-    fn root(&self) -> &DMatrix<f64> {
-        self.root.get_or_init(|| {
-            let mut root = self.lower.transpose();
-            invert_upper(root.as_view_mut());
-            root
-        })
-    }
-}
-
-/// Wide groups that were let in, by group and bits of the variance; None of those that cannot be.
-type LetIn = BTreeMap<(usize, u64), Option<Rc<Beside>>>;
 
 /// A model under one noise with all that gains need.
 #[derive(Clone, Debug)]
@@ -190,51 +132,20 @@ pub struct Solved {
     bounds: Vec<(usize, usize)>,
     mean: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// `T^-2 + G` of the columns that are in, and the logarithm of its root.
-    precision: DMatrix<f64>,
-    log_root: f64,
-    /// Place of the columns of each group among those that are in, or among those that are out and
-    /// treated as narrow.
+    /// Place of the columns of each group that is in among those that are.
     places: Vec<usize>,
-    /// Products of the columns that are in with all.
-    cross: DMatrix<f64>,
-    /// `P` at the columns of the latter.
+    /// `P` at all columns.
     reach: DMatrix<f64>,
-    /// `s` of each of their groups.
+    /// `s` of each group; of use where it is out.
     outside: Vec<DMatrix<f64>>,
-    /// Squares of all columns.
-    squares: DVector<f64>,
     /// `q` at all columns; of use where groups are out.
     moments: DVector<f64>,
-    met: RefCell<LetIn>,
 }
 
 impl Solved {
-    /// From runs, and sums that were made of them before.
-    pub(super) fn beside(model: Model, grams: &[Gram], met: &Met) -> Option<Self> {
-        let groups = 0..model.tau.len();
-        let wide = |&k: &usize| model.widths[k] > WIDE;
-        let mut whole = model.clone();
-        for k in groups.clone().filter(wide) {
-            whole.omega[k] = model.tau[k];
-        }
-        let made = || {
-            let (mut sums, bounds) = (whole.sums(grams), model.bounds());
-            for k in groups.filter(wide).filter(|&k| model.tau[k] == 0.0) {
-                sums.turn(bounds[k]);
-            }
-            Arc::new(sums)
-        };
-        let key = whole.omega.iter().map(|omega| omega.to_bits()).collect();
-        let sums = Arc::clone(met.lock().ok()?.entry(key).or_insert_with(made));
-        Self::of(model, &sums)
-    }
-
-    /// From sums of all columns without the effects of runs and without wide groups that are in.
+    /// From sums of all columns without the effects of runs.
     pub fn of(model: Model, sums: &Sums) -> Option<Self> {
-        let is_narrow = |k: usize| model.widths[k] <= WIDE;
-        let tau = (0..model.tau.len()).map(|k| f64::from(is_narrow(k)) * model.tau[k]);
-        let tau = model.by_column(&tau.collect::<Vec<_>>());
+        let tau = model.by_column(&model.tau);
         let active: Vec<usize> = (0..tau.len()).filter(|&c| tau[c] > 0.0).collect();
         let cross = sums.products.select_rows(&active);
         let own = Sums {
@@ -244,59 +155,43 @@ impl Solved {
             log_scale: sums.log_scale,
         };
         let sizes: Vec<f64> = active.iter().map(|&c| tau[c]).collect();
-        let mut precision = own.products.clone();
-        for (i, size) in sizes.iter().enumerate() {
-            precision[(i, i)] += 1.0 / size;
-        }
         let found = Posterior::of(&own, &sizes, active)?;
         let (covariance, mean) = (found.covariance(), found.mean.column(0).into_owned());
+        let reach = &covariance * &cross;
         let bounds = model.bounds();
-        let is_dense = |k: usize| model.tau[k] == 0.0 && model.widths[k] <= WIDE.max(mean.len());
-        let (mut inside, mut out) = (0, Vec::new());
-        let mut place = |k: usize| {
-            let (from, to) = bounds[k];
-            if is_narrow(k) && model.tau[k] > 0.0 {
-                inside += to - from;
-                return inside - (to - from);
-            }
-            if is_dense(k) {
-                out.extend(from..to);
-                return out.len() - (to - from);
-            }
-            0
-        };
-        let places: Vec<usize> = (0..bounds.len()).map(&mut place).collect();
-        let reach = &covariance * cross.select_columns(&out);
+        let mut place = 0;
+        let places = (0..bounds.len()).map(|k| {
+            let own = place;
+            place += if model.tau[k] > 0.0 {
+                model.widths[k]
+            } else {
+                0
+            };
+            own
+        });
         // Products between groups are of no use.
-        let outside = bounds.iter().enumerate().map(|(k, &(from, to))| {
-            let width = to - from;
-            if !is_dense(k) {
-                return DMatrix::zeros(0, 0);
+        let outside = bounds.iter().map(|&(from, to)| {
+            let own = sums.products.view((from, from), (to - from, to - from));
+            let (beside, reached) = (cross.columns_range(from..to), reach.columns_range(from..to));
+            if to - from > WIDE {
+                return own - beside.transpose() * reached;
             }
-            let own = sums.products.view((from, from), (width, width));
-            own - cross
-                .columns(from, width)
-                .tr_mul(&reach.columns(places[k], width))
+            own - beside.tr_mul(&reached)
         });
         Some(Self {
             log_evidence: found.log_evidence,
-            log_root: -found.root.diagonal().map(f64::ln).sum(),
+            places: places.collect(),
             outside: outside.collect(),
-            squares: sums.products.diagonal(),
             moments: sums.moments.column(0) - cross.tr_mul(&mean),
-            met: RefCell::default(),
             bounds,
             mean,
             covariance,
-            precision,
-            places,
-            cross,
             reach,
             model,
         })
     }
 
-    /// Of a narrow group that is out.
+    /// Of a group that is out.
     pub fn outside(&self, j: usize) -> Candidate {
         let (from, to) = self.bounds[j];
         Candidate {
@@ -305,54 +200,14 @@ impl Solved {
         }
     }
 
-    /// The variance with which a group that is out gains most, and what it gains, if more than `least`.
-    pub fn best_above(&self, j: usize, sizes: &[f64], least: f64) -> Option<(f64, f64)> {
-        let width = self.model.widths[j];
-        if width <= WIDE {
-            return self.outside(j).best_above(sizes, least);
+    /// A group that is out with a variance, if it is so wide that its exchanges share a factor.
+    pub fn wide(&self, j: usize, tau: f64) -> Option<Wide> {
+        let own = &self.outside[j];
+        if own.nrows() <= WIDE {
+            return None;
         }
-        let parts = |tau| Some(self.with_wide(j, tau)?.parts);
-        best_above(sizes, least, width, parts)
-    }
-
-    /// A wide group that is out let in.
-    fn with_wide(&self, j: usize, tau: f64) -> Option<Rc<Beside>> {
-        let mut met = self.met.borrow_mut();
-        let made = || self.let_in(j, tau).map(Rc::new);
-        met.entry((j, tau.to_bits())).or_insert_with(made).clone()
-    }
-
-    fn let_in(&self, j: usize, tau: f64) -> Option<Beside> {
-        let (from, to) = self.bounds[j];
-        if !self.outside[j].is_empty() {
-            return Some(Beside {
-                parts: self.outside(j).parts(tau),
-                lower: DMatrix::zeros(0, 0),
-                known: DVector::zeros(0),
-                root: OnceCell::new(),
-            });
-        }
-        let spread = self
-            .squares
-            .rows(from, to - from)
-            .map(|d| 1.0 + tau * d.max(0.0));
-        let moments = self.moments.rows(from, to - from);
-        let mut taken = self.cross.columns(from, to - from).into_owned();
-        for (mut column, spread) in taken.column_iter_mut().zip(spread.iter()) {
-            column *= (tau / spread).sqrt();
-        }
-        let lower = Cholesky::new(&self.precision - &taken * taken.transpose())?.unpack();
-        let weighted = moments.zip_map(&spread, |q, spread| q * (tau / spread).sqrt());
-        let mut known = taken * &weighted;
-        lower.solve_lower_triangular_unchecked_mut(&mut known);
-        let logs = 0.5 * spread.map(f64::ln).sum() + lower.diagonal().map(f64::ln).sum();
-        let fit = 0.5 * (weighted.norm_squared() + known.norm_squared());
-        Some(Beside {
-            parts: (fit, logs - self.log_root),
-            lower,
-            known,
-            root: OnceCell::new(),
-        })
+        let root = Cholesky::new(DMatrix::identity(own.nrows(), own.nrows()) + own * tau)?;
+        Some(Wide { root, tau })
     }
 
     /// What differs of each group in each run from the shared coefficients.
@@ -377,79 +232,77 @@ impl Solved {
         found
     }
 
-    /// Without a narrow group that is in.
+    /// Without a group that is in.
     pub fn without(&self, k: usize) -> Option<Without<'_>> {
         let (place, width) = (self.places[k], self.model.widths[k]);
-        let own = self.covariance.view((place, place), (width, width));
-        let precision = Cholesky::new(own.into_owned())?.inverse();
+        let own = self
+            .covariance
+            .view((place, place), (width, width))
+            .into_owned();
+        let precision = Cholesky::new(own)?.inverse();
         let mean = &self.mean.as_slice()[place..place + width];
         let own = Candidate::of_posterior(&precision, mean, self.model.tau[k]);
-        let parts = own.parts(self.model.tau[k]);
+        let loss = own.gain(self.model.tau[k]);
         Some(Without {
             solved: self,
             k,
             precision,
             own,
-            parts,
-            loss: parts.0 - parts.1,
+            loss,
         })
     }
 }
 
 /// What a model would be without one of its groups; effects of runs stay as they are.
 pub struct Without<'a> {
-    pub(super) solved: &'a Solved,
+    solved: &'a Solved,
     k: usize,
     precision: DMatrix<f64>,
     /// The group itself, as if it were out.
     pub own: Candidate,
-    parts: (f64, f64),
     /// What its leaving takes from the log evidence.
     pub loss: f64,
 }
 
 impl Without<'_> {
-    /// The variance with which another group gains most, and what it gains, if more than `least`.
+    /// What another, wide group can gain at most: what it fits with its variance, by Woodbury.
     ///
-    /// A wide one gains what it gains with this one, and what this one gains less beside it.
-    pub fn best_above(&self, j: usize, sizes: &[f64], least: f64) -> Option<(f64, f64)> {
-        let wide = self.solved.model.widths[j];
-        if wide <= WIDE {
-            return self.other(j).best_above(sizes, least);
-        }
-        let tau = self.solved.model.tau[self.k];
-        let (place, width) = (self.solved.places[self.k], self.precision.nrows());
-        best_above(sizes, least, wide, |size| {
-            let beside = self.solved.with_wide(j, size)?;
-            let (fit, log_root) = beside.parts;
-            // The volume of this one is greater beside the other.
-            if fit + self.parts.0 - log_root <= least {
-                return Some((fit + self.parts.0, log_root));
-            }
-            if !self.solved.outside[j].is_empty() {
-                return Some(self.other(j).parts(size));
-            }
-            let root = beside.root().rows(place, width);
-            let precision = Cholesky::new(root * root.transpose())?.inverse();
-            let mean = self.solved.mean.rows(place, width) - root * &beside.known;
-            let less = Candidate::of_posterior(&precision, mean.as_slice(), tau).parts(tau);
-            Some((
-                fit + self.parts.0 - less.0,
-                log_root + self.parts.1 - less.1,
-            ))
-        })
+    /// ```text
+    /// 1/2 tau q' (A + tau U U')^-1 q,   A = I + tau s_j = L L',   U U' = P_kj' S_kk^-1 P_kj
+    /// ```
+    pub fn at_most(&self, j: usize, wide: &Wide) -> Option<f64> {
+        let (solved, tau) = (self.solved, wide.tau);
+        let ((from, to), place) = (solved.bounds[j], solved.places[self.k]);
+        let reach = solved
+            .reach
+            .view((place, from), (self.precision.nrows(), to - from));
+        let lower = wide.root.l_dirty();
+        let q = solved.moments.rows(from, to - from) + reach.tr_mul(&self.own.q);
+        let z = lower.solve_lower_triangular(&q)?;
+        let halves = reach.tr_mul(&Cholesky::new(self.precision.clone())?.l());
+        let w = lower.solve_lower_triangular(&halves)?;
+        let known = w.tr_mul(&z);
+        let inner = DMatrix::identity(known.len(), known.len()) + w.tr_mul(&w) * tau;
+        let less = tau * known.dot(&Cholesky::new(inner)?.solve(&known));
+        Some(0.5 * tau * (z.norm_squared() - less))
     }
 
-    /// Another narrow group that is out, in a model without this one.
+    /// Another group that is out, in a model without this one.
     pub fn other(&self, j: usize) -> Candidate {
-        let (solved, width) = (self.solved, self.precision.nrows());
+        let Self {
+            solved,
+            k,
+            precision,
+            own,
+            ..
+        } = self;
         let mut candidate = solved.outside(j);
-        let reach = solved.reach.view(
-            (solved.places[self.k], solved.places[j]),
-            (width, solved.model.widths[j]),
-        );
-        candidate.s += reach.tr_mul(&(&self.precision * reach));
-        candidate.q += reach.tr_mul(&self.own.q);
+        let ((from, to), place) = (solved.bounds[j], solved.places[*k]);
+        let reach = solved
+            .reach
+            .view((place, from), (precision.nrows(), to - from));
+        candidate.s += reach.tr_mul(&(precision * reach));
+        candidate.q += reach.tr_mul(&own.q);
         candidate
     }
 }

@@ -54,20 +54,6 @@ impl Sums {
         self.squares += &other.squares;
         self.log_scale += other.log_scale;
     }
-
-    /// Replaces columns by their principal axes: the products of these are diagonal.
-    pub(super) fn turn(&mut self, (from, to): (usize, usize)) {
-        let own = self.products.view((from, from), (to - from, to - from));
-        let axes = own.into_owned().symmetric_eigen().eigenvectors;
-        let rows = axes.tr_mul(&self.products.rows(from, to - from));
-        self.products.rows_mut(from, to - from).copy_from(&rows);
-        let columns = self.products.columns(from, to - from) * &axes;
-        self.products
-            .columns_mut(from, to - from)
-            .copy_from(&columns);
-        let moments = axes.tr_mul(&self.moments.rows(from, to - from));
-        self.moments.rows_mut(from, to - from).copy_from(&moments);
-    }
 }
 
 /// Sums of one run, and what its zero took of them.

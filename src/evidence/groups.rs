@@ -5,8 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::gains::{Met, Solved, WIDE};
-use super::gram::Gram;
+use super::gains::Solved;
+use super::gram::{Gram, Sums};
 use super::model::Model;
 use super::posterior::Posterior;
 use super::prior::Prior;
@@ -20,8 +20,6 @@ pub struct GroupSums {
     gram: Gram,
     widths: Vec<usize>,
     total: f64,
-    /// Beside wide groups.
-    met: Met,
 }
 
 /// What changes of a model do to its log evidence.
@@ -42,7 +40,6 @@ impl Readings {
             gram: self.pooled(noise),
             widths: self.widths(),
             total,
-            met: Met::default(),
         }
     }
 }
@@ -64,38 +61,29 @@ impl GroupSums {
     /// It goes from the other groups that have a variance in `start`. The score is the logarithm of
     /// the evidence times the prior, over that of the other groups all being out.
     pub fn search(&self, given: &[f64], probabilities: &[f64], start: &[f64]) -> Option<Found> {
-        let (has, sizes) = (|k: usize| given[k] > 0.0, self.sizes().len() as f64);
-        let free = (0..given.len()).filter(|&k| !has(k) && probabilities[k] > 0.0);
-        let free: Vec<usize> = free.collect();
-        let mut tau = given.to_vec();
-        for &k in &free {
-            tau[k] = start[k];
-        }
-        // With this one the sizes of a group have odds of 1.
-        let chance = |k: usize| {
-            if has(k) {
-                sizes / (1.0 + sizes)
-            } else {
-                probabilities[k]
-            }
-        };
-        let prior = Prior::of((0..given.len()).map(chance).collect(), self.total, 1);
-        let grams = std::slice::from_ref(&self.gram);
-        let mut search = Search::new(grams, &prior, 0.0).of(free, &self.met);
-        let found = search.from(self.model(&tau))?;
+        let is_free = |k: &usize| given[*k] == 0.0 && probabilities[*k] > 0.0;
+        let free: Vec<usize> = (0..given.len()).filter(is_free).collect();
+        let own: Vec<f64> = free.iter().map(|&k| probabilities[k]).collect();
+        let prior = Prior::of(own, self.total, 1);
+        let grams = [self.beside(given, &free)];
+        let widths = free.iter().map(|&k| self.widths[k]).collect();
+        let start = Model::of_groups(widths, free.iter().map(|&k| start[k]).collect());
+        let mut search = Search::new(&grams, &prior, 0.0);
+        let found = search.from(start)?;
         let none: f64 = prior.probabilities.iter().map(|p| (1.0 - p).ln()).sum();
+        let mut tau = given.to_vec();
+        for (&k, own) in free.iter().zip(&found.model.tau) {
+            tau[k] = *own;
+        }
         Some(Found {
             score: found.score - none,
-            ..found
+            model: Model::of_groups(self.widths.clone(), tau),
         })
     }
 
     /// Those of the errors less a function of the columns.
     pub fn less(&self, coefficients: &[f64]) -> Self {
-        let mut left = Self {
-            met: Met::default(),
-            ..self.clone()
-        };
+        let mut left = self.clone();
         let (own, sums) = (
             DVector::from_column_slice(coefficients),
             &mut left.gram.sums,
@@ -121,35 +109,22 @@ impl GroupSums {
 
     /// What leaving, coming in and exchange of groups do to a model.
     pub fn changes(&self, tau: &[f64]) -> Option<Changes> {
-        let solved = |tau: &[f64]| {
-            Solved::beside(self.model(tau), std::slice::from_ref(&self.gram), &self.met)
-        };
-        let (now, sizes, groups) = (solved(tau)?, self.sizes(), tau.len());
+        let solved = Solved::of(self.model(tau), &self.gram.sums)?;
+        let (sizes, groups) = (self.sizes(), tau.len());
         let mut found = Changes {
             losses: vec![0.0; groups],
             gains: vec![0.0; groups],
             instead: DMatrix::zeros(groups, groups),
         };
         let (inside, outside): (Vec<usize>, Vec<usize>) = (0..groups).partition(|&k| tau[k] > 0.0);
-        let any = f64::NEG_INFINITY;
         for &j in &outside {
-            found.gains[j] = now.best_above(j, &sizes, any)?.1;
+            found.gains[j] = solved.outside(j).best(&sizes).1;
         }
         for &k in &inside {
-            if self.widths[k] > WIDE {
-                let mut left = tau.to_vec();
-                left[k] = 0.0;
-                let rest = solved(&left)?;
-                found.losses[k] = now.log_evidence - rest.log_evidence;
-                for &j in &outside {
-                    found.instead[(k, j)] = rest.best_above(j, &sizes, any)?.1;
-                }
-                continue;
-            }
-            let without = now.without(k)?;
+            let without = solved.without(k)?;
             found.losses[k] = without.loss;
             for &j in &outside {
-                found.instead[(k, j)] = without.best_above(j, &sizes, any)?.1;
+                found.instead[(k, j)] = without.other(j).best(&sizes).1;
             }
         }
         Some(found)
@@ -157,5 +132,25 @@ impl GroupSums {
 
     fn model(&self, tau: &[f64]) -> Model {
         Model::of_groups(self.widths.clone(), tau.to_vec())
+    }
+
+    /// Some groups, those given being integrated over.
+    fn beside(&self, given: &[f64], free: &[usize]) -> Gram {
+        let model = self.model(given);
+        let bounds = model.bounds();
+        let columns: Vec<usize> = free
+            .iter()
+            .flat_map(|&k| bounds[k].0..bounds[k].1)
+            .collect();
+        let mut sums = Sums::zeros(columns.len(), 1);
+        let variances = model.by_column(given);
+        self.gram
+            .sums
+            .add_without_effects(&variances, &columns, &mut sums);
+        Gram {
+            sums,
+            means: self.gram.means.select_rows(&columns),
+            ..self.gram.clone()
+        }
     }
 }

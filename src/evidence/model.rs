@@ -134,7 +134,7 @@ impl Sums {
         };
         let x = effects.whitened(picked(&on));
         let y = effects.whitened(self.moments.select_rows(&on));
-        total.products -= x.transpose() * &x;
+        total.products -= x.tr_mul(&x);
         total.moments -= x.tr_mul(&y);
         total.squares -= y.tr_mul(&y);
         total.log_scale -= effects.log_root();

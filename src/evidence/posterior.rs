@@ -10,7 +10,6 @@
 use nalgebra::{Cholesky, DMatrix};
 
 use super::gram::Sums;
-use crate::lstsq::invert_upper;
 
 /// The posterior of the coefficients of the columns that are in.
 #[derive(Clone, Debug)]
@@ -24,7 +23,7 @@ pub struct Posterior {
     /// `s - g' S g`.
     pub residual: DMatrix<f64>,
     /// `L^-1 T`, whose square is the covariance.
-    pub(super) root: DMatrix<f64>,
+    root: DMatrix<f64>,
 }
 
 impl Posterior {
@@ -37,12 +36,11 @@ impl Posterior {
             unit + roots[i] * sums.products[(i, k)] * roots[k]
         });
         let lower = Cholesky::new(inner)?.unpack();
-        let mut root = lower.transpose();
-        invert_upper(root.as_view_mut());
-        let mut root = root.transpose();
-        for (mut column, own) in root.column_iter_mut().zip(&roots) {
-            column *= *own;
+        let mut root = DMatrix::zeros(m, m);
+        for (i, own) in roots.iter().enumerate() {
+            root[(i, i)] = *own;
         }
+        lower.solve_lower_triangular_unchecked_mut(&mut root);
         let q = &root * &sums.moments;
         let residual = &sums.squares - q.tr_mul(&q);
         let log_root: f64 = lower.diagonal().map(f64::ln).sum();
@@ -58,6 +56,6 @@ impl Posterior {
 
     /// Covariance of the coefficients.
     pub fn covariance(&self) -> DMatrix<f64> {
-        self.root.transpose() * &self.root
+        self.root.tr_mul(&self.root)
     }
 }

@@ -7,10 +7,9 @@
 //! within the window of the best is kept.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
-use super::gains::{Met, Solved, WIDE, Without};
-use super::gram::Gram;
+use super::gains::{Solved, Wide};
+use super::gram::{Gram, Sums};
 use super::model::Model;
 use super::prior::Prior;
 use crate::interrupt;
@@ -43,13 +42,11 @@ pub struct Search<'a> {
     grams: &'a [Gram],
     prior: &'a Prior,
     window: f64,
-    /// Groups that may come and leave.
-    free: Vec<usize>,
     best: f64,
     /// The best sizes of each set of groups with their effects of runs (bits of `omega`).
     met: BTreeMap<Vec<(usize, bool, u64)>, Found>,
-    /// Sums without the effects of runs and without wide groups.
-    sums: Met,
+    /// Sums without the effects of runs, for the variances used last.
+    sums: Option<(Vec<f64>, Sums)>,
 }
 
 impl<'a> Search<'a> {
@@ -59,17 +56,10 @@ impl<'a> Search<'a> {
             grams,
             prior,
             window,
-            free: (0..prior.probabilities.len()).collect(),
             best: f64::NEG_INFINITY,
             met: BTreeMap::new(),
-            sums: Met::default(),
+            sums: None,
         }
-    }
-
-    /// Of some groups alone, from sums that were made before.
-    pub(super) fn of(self, free: Vec<usize>, sums: &Met) -> Self {
-        let sums = Arc::clone(sums);
-        Self { free, sums, ..self }
     }
 
     /// The best model within reach of `start` by moves that gain; None where its evidence cannot be
@@ -137,8 +127,16 @@ impl<'a> Search<'a> {
         solved.log_evidence + self.prior.log_probability(&solved.model)
     }
 
-    fn solved(&self, model: Model) -> Option<Solved> {
-        Solved::beside(model, self.grams, &self.sums)
+    fn solved(&mut self, model: Model) -> Option<Solved> {
+        if self
+            .sums
+            .as_ref()
+            .is_none_or(|(omega, _)| *omega != model.omega)
+        {
+            self.sums = Some((model.omega.clone(), model.sums(self.grams)));
+        }
+        let (_, sums) = self.sums.as_ref()?;
+        Solved::of(model, sums)
     }
 
     fn meet(&mut self, model: &Model, score: f64) {
@@ -165,20 +163,21 @@ impl<'a> Search<'a> {
             model: now.model.clone(),
             score,
         });
-        let is_in = |&k: &usize| now.model.tau[k] > 0.0;
-        let (inside, outside): (Vec<usize>, Vec<usize>) = self.free.iter().partition(|k| is_in(k));
+        let groups = now.model.tau.len();
+        let (inside, outside): (Vec<usize>, Vec<usize>) =
+            (0..groups).partition(|&k| now.model.tau[k] > 0.0);
         for &j in &outside {
             self.enter(now, j, score, &mut best);
         }
+        let greatest = self.prior.sizes.iter().copied().fold(0.0, f64::max);
+        let others: Vec<_> = outside
+            .iter()
+            .map(|&j| (j, now.wide(j, greatest)))
+            .collect();
         for &k in &inside {
-            if now.model.widths[k] > WIDE {
-                self.leave_whole(now, k, &outside, &mut best)?;
-                continue;
-            }
-            let without = now.without(k)?;
-            self.resize(&without, k, score, &mut best);
+            self.resize(now, k, score, &mut best)?;
             if now.model.omega[k] == 0.0 {
-                self.leave(&without, k, &outside, score, &mut best);
+                self.leave(now, k, &others, score, &mut best)?;
             }
         }
         best
@@ -269,7 +268,7 @@ impl<'a> Search<'a> {
         // All sizes are equally probable.
         let coming = self.coming(&now.model, j, self.prior.sizes[0]);
         let least = self.least(best) - score - coming;
-        if let Some((tau, gain)) = now.best_above(j, &self.prior.sizes, least) {
+        if let Some((tau, gain)) = now.outside(j).best_above(&self.prior.sizes, least) {
             let model = || with(&now.model, &[(j, tau, now.model.omega[j])]);
             self.offer(model, score + gain + coming, best);
         }
@@ -286,52 +285,48 @@ impl<'a> Search<'a> {
         self.prior.change(now, j, tau, now.omega[j])
     }
 
-    /// Another size of a narrow group.
-    fn resize(&mut self, without: &Without, k: usize, score: f64, best: &mut Option<Found>) {
-        let now = &without.solved.model;
-        let (tau, gain) = without.own.best(&self.prior.sizes);
-        if tau != now.tau[k] {
-            let model = || with(now, &[(k, tau, now.omega[k])]);
-            self.offer(model, score + gain - without.loss, best);
-        }
-    }
-
-    /// A narrow group out, alone or for another one.
-    fn leave(
-        &mut self,
-        without: &Without,
-        k: usize,
-        outside: &[usize],
-        score: f64,
-        best: &mut Option<Found>,
-    ) {
-        let now = &without.solved.model;
-        let rest = with(now, &[(k, 0.0, 0.0)]);
-        let left = score - without.loss - self.coming(&rest, k, now.tau[k]);
-        self.offer(|| rest.clone(), left, best);
-        for &j in outside {
-            let coming = self.coming(&rest, j, self.prior.sizes[0]);
-            let least = self.least(best) - left - coming;
-            if let Some((tau, gain)) = without.best_above(j, &self.prior.sizes, least) {
-                let model = || with(&rest, &[(j, tau, rest.omega[j])]);
-                self.offer(model, left + gain + coming, best);
-            }
-        }
-    }
-
-    /// A wide group out, alone, in another size, or for another one: by factorising the rest.
-    fn leave_whole(
+    /// Another size of a group.
+    fn resize(
         &mut self,
         now: &Solved,
         k: usize,
-        outside: &[usize],
+        score: f64,
         best: &mut Option<Found>,
     ) -> Option<()> {
-        let rest = self.solved(with(&now.model, &[(k, 0.0, 0.0)]))?;
-        let left = self.score(&rest);
-        self.offer(|| rest.model.clone(), left, best);
-        for &j in outside.iter().chain([&k]) {
-            self.enter(&rest, j, left, best);
+        let without = now.without(k)?;
+        let (tau, gain) = without.own.best(&self.prior.sizes);
+        if tau != now.model.tau[k] {
+            let model = || with(&now.model, &[(k, tau, now.model.omega[k])]);
+            self.offer(model, score + gain - without.loss, best);
+        }
+        Some(())
+    }
+
+    /// A group out, alone or for another one.
+    fn leave(
+        &mut self,
+        now: &Solved,
+        k: usize,
+        others: &[(usize, Option<Wide>)],
+        score: f64,
+        best: &mut Option<Found>,
+    ) -> Option<()> {
+        let without = now.without(k)?;
+        let rest = with(&now.model, &[(k, 0.0, 0.0)]);
+        let left = score - without.loss - self.coming(&rest, k, now.model.tau[k]);
+        self.offer(|| rest.clone(), left, best);
+        for (j, wide) in others {
+            let j = *j;
+            let coming = self.coming(&rest, j, self.prior.sizes[0]);
+            let least = self.least(best) - left - coming;
+            let most = wide.as_ref().and_then(|wide| without.at_most(j, wide));
+            if most.is_some_and(|most| most <= least) {
+                continue;
+            }
+            if let Some((tau, gain)) = without.other(j).best_above(&self.prior.sizes, least) {
+                let model = || with(&rest, &[(j, tau, rest.omega[j])]);
+                self.offer(model, left + gain + coming, best);
+            }
         }
         Some(())
     }
@@ -346,7 +341,8 @@ impl<'a> Search<'a> {
         best: &mut Option<Found>,
     ) -> Option<()> {
         let model = with(&now.model, &[(k, 0.0, 0.0)]);
-        let without = self.solved(model)?;
+        let sums = model.sums(self.grams);
+        let without = Solved::of(model, &sums)?;
         let left = self.score(&without);
         self.offer(|| without.model.clone(), left, best);
         let mut other: Option<Found> = None;
