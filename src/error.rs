@@ -142,7 +142,7 @@ pub enum Error {
     Method,
 
     /// The readings cannot tell these unknowns apart.
-    #[error("rank {rank} of {unknowns} unknowns: {reason}")]
+    #[error("{reason}")]
     Rank {
         /// Numerical rank of the design.
         rank: usize,

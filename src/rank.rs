@@ -59,11 +59,16 @@ pub fn check<I: Iterator<Item = f64>>(
     let lost: Vec<_> = found.iter().map(|d| d.column).collect();
     let (orders, reason) = if (1..needed).contains(&distinct) {
         let orders = orders_of(design, &lost);
+        let fewer = match (distinct - 1) / 2 {
+            0 => String::new(),
+            1 => "fit 1 order, or ".into(),
+            most => format!("fit at most {most} orders, or "),
+        };
         let reason = format!(
-            "readings at {distinct} distinct angles cannot determine {}; \
-             fit at most {} orders, or measure at {needed} angles or more",
-            name(design, &orders),
-            distinct.saturating_sub(1) / 2
+            "readings at {distinct} distinct angle{} cannot determine {}; \
+             {fewer}measure at {needed} angles or more",
+            if distinct == 1 { "" } else { "s" },
+            name(design, &orders)
         );
         (orders, reason)
     } else if found.is_empty() || found.iter().any(|d| d.partners.len() > FEW_PARTNERS) {

@@ -116,7 +116,7 @@ def short_report(study: Study) -> str:
     add(study.planned, "of the gear, 2 mounts")
     lines.append(
         f"  `ta.plan_mounts(gear_ratio=100)`: mounts at 0 and {offset} deg, "
-        f"noise factor {plan.worst_noise_factor:.2f}"
+        f"standard errors {plan.worst_noise_factor:.2f} times the ideal"
     )
     return "\n".join(lines)
 

@@ -55,7 +55,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _in_memory(args: argparse.Namespace) -> OrderSelection:
     from ..fitting.orders.select import select_orders
-    from ..fitting.robust import without_spikes
     from .run_lists import read_selected_runs
 
     reference = (
@@ -64,7 +63,7 @@ def _in_memory(args: argparse.Namespace) -> OrderSelection:
         else parse_orders(args.reference_orders, "--reference-orders")
     )
     return select_orders(
-        [without_spikes(run) for run in read_selected_runs(args)],
+        read_selected_runs(args),
         None if args.orders is None else parse_orders(args.orders),
         args.gear_ratio,
         args.fixed_member,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from ..support.files import SIMULATION
 from .options import given, refuse_given
 from .parser import Input, Output, declare
 from .signal_options import add_signals
-from .values import angle, arc, names, parse_orders, seconds
+from .values import angle, arc, names, orders_by_shaft, parse_orders, seconds
 
 if TYPE_CHECKING:
     from ..fleets.unitplan import UnitPlan
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="circular_spline",
     )
     add("--positions N", int, "positions per mount (default: 36)")
-    add("--mounts J", int, "mounts of the artefact (default: 2)")
+    add("--mounts J", int, "times that the reference is clamped, turned each time (default: 2)")
     add(
         "--reference",
         ("polygon", "off-null", "encoder"),
@@ -59,8 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "encoder: a free reference encoder (default: polygon)",
     )
     add("--tilt-arcsec U", float, "off-null: largest tilt to both sides (default: 1200)")
-    add("--tilts T", int, "off-null: tilts per facet (default: 2)")
-    add("--orders 1-17,202", str, "orders wanted (default: 1-17 and the gear's own)")
+    add("--tilts T", int, "off-null: tilts per face of the polygon (default: 2)")
+    add("--orders 1-17,202", str, "or output:1-3;motor:1,2 (default: 1-17 and the gear's own)")
     add("--noise-arcsec S", float, "scatter of one reading")
     add("--std-arcsec U", float, "standard error wanted: gives the readings")
     of_arc = partial(declare, parser.add_argument_group("a joint that cannot turn once"))
@@ -113,7 +113,7 @@ def _add_self_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the plan."""
-    orders = None if args.orders is None else parse_orders(args.orders)
+    orders = None if args.orders is None else _output_orders(args)
     if args.after is not None:
         return _run_after(args)
     refuse_given(args, OF_AFTER, "is of plans after a diagnosis: add --after RUNS")
@@ -123,6 +123,17 @@ def run(args: argparse.Namespace) -> int:
     plan = _planned(args, orders)
     print(plan.to_json() if args.json else plan.summary())
     return 0
+
+
+def _output_orders(args: argparse.Namespace) -> tuple[float, ...]:
+    """Orders of ``--orders``, those of other shafts in cycles of the output."""
+    found = orders_by_shaft(args.orders)
+    if not isinstance(found, Mapping):
+        return parse_orders(args.orders)
+    from ..joint.shafts import resolve_orders
+
+    shafts = resolve_orders(found, args.gear_ratio, args.fixed_member)
+    return tuple(sorted({k * shaft.cycles_per_turn for shaft in shafts for k in shaft.orders}))
 
 
 def _planned(

@@ -283,8 +283,11 @@ def _used(runs: list[CalibrationRun]) -> int:
 
 def _incomplete(at: Deadline, gain: bool) -> str:
     """That the account was ended, while what, and what that means."""
-    means = "; causes may be missing or wrong" + ", few were tested on held-out data" * gain
-    return f"INCOMPLETE: {at.why} while {at.cut}{means}"
+    means = ", few were tested on held-out data" * gain
+    return (
+        f"INCOMPLETE: {at.why} while {at.cut}. Below is what was found by then{means}: with more "
+        "time names and sizes may change"
+    )
 
 
 def _ratio_finding(ratio: GearedLinesRatio) -> Finding:

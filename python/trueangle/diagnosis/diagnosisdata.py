@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -68,6 +69,16 @@ class DiagnosisData(Correctable):
             and not (self.unexplained is not None and self.unexplained.found)
             and not self.wrong
         )
+
+    @property
+    def detectable(self) -> float:
+        """Amplitude from which an order shows in these readings, arcsec.
+
+        Its deviance n A²/(2 σ²) is then 4 ln n: the price of two coefficients (Schwarz), and of
+        the choice among n/2 orders. Of correlated readings n is the number of independent ones.
+        """
+        n = max(self.readings_used * (1.0 - self.correlation) / (1.0 + self.correlation), 2.0)
+        return self.noise * math.sqrt(8.0 * math.log(n) / n)
 
     @property
     def wrong(self) -> list[Belief]:
@@ -171,7 +182,8 @@ class DiagnosisData(Correctable):
             steps.append("write the extended simulation (`diagnosis.simulation()`)")
         lasting = {f.cause: EFFECTS[f.cause].not_at_run_time for f in sure}
         steps += [f"{cause} cannot be corrected ({why})" for cause, why in lasting.items() if why]
-        steps += ["measure the next runs (`diagnosis.plan()`)"] if self.planned else []
+        if self.planned:
+            steps.append("separate the causes that look alike (`diagnosis.plan()`)")
         still = [spot for spot in self.in_question if spot.causes not in self.planned]
         told = {spot.measure: ", ".join(spot.causes) for spot in reversed(still)}
         steps += [f"to distinguish {causes}: {measure}" for measure, causes in told.items()]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..effects import EFFECTS, Effect
+from ..effects.effect import title_of
 from ..estimation.quantity import Parameters, Quantity
 from ..support.display_units import ErrorUnit, error_unit, sine_of_rms
 from ..support.layout import wrapped_lines
@@ -45,7 +46,7 @@ _SIZED: dict[str, tuple[float, str]] = {
 _PLACES = {
     "order": "order {}",
     "carrier": "of order {}",
-    "frequency_hz": "{} Hz",
+    "frequency_hz": "of {} Hz",
     "place_deg": "at {} deg",
     "cosine": "over the turn",
     "per_deg_s": "with the speed",
@@ -130,7 +131,8 @@ def finding_lines(
 ) -> list[str]:
     """A finding as readable text behind its number, without what those ``before`` have stated."""
     n = unit.number
-    lines = [number + finding.cause]
+    title = title_of(finding.cause)
+    lines = [number + finding.cause + f": {title}" * (title != finding.cause)]
     if not finding.confirmed:
         lines[0] += f" (NOT CONFIRMED: {unit.spoken(finding.reason)})"
         lines = wrapped_lines(lines[0], 3)
@@ -203,6 +205,9 @@ def named_quantity(name: str, entry: Quantity, unit: ErrorUnit) -> tuple[str, st
     """Name and value of a parameter, an error in ``unit``."""
     shown, of = parameter_unit(name, unit)
     value, std = entry.value, entry.std
+    if name == "half_width_arcsec" and isinstance(value, float):
+        full = of.number(2.0 * abs(value), None if std is None else 2.0 * std)
+        return shown, f"{_number(abs(value), std, of)} (full width {full})"
     if isinstance(value, list):
         stds = std if isinstance(std, list) else [None] * len(value)
         text = ", ".join(_number(*item, of) for item in zip(value[:12], stds, strict=False))
@@ -224,7 +229,8 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
     """A finding by its cause, its line, and its size with its standard error."""
     known = {name: quantity.value for name, quantity in finding.parameters.items()}
     shaft = known.get("shaft")
-    name = f"{finding.cause} {shaft.replace('_', ' ')}" if shaft else finding.cause
+    name = title_of(finding.cause)
+    name += f" of the {shaft.replace('_', ' ')}," if shaft else ""
     for parameter, words in _PLACES.items():
         if isinstance(known.get(parameter), int | float):
             std = finding.parameters[parameter].std
@@ -238,6 +244,10 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
             continue
         std = finding.parameters[parameter].std
         stds = std if isinstance(std, list) else [std] * len(sizes)
+        if parameter == "half_width_arcsec":  # its sign is that of the direction
+            size = abs(sizes[0])
+            full = unit.number(2.0 * size, 2.0 * std if std else None)
+            return f"{name} (half width {unit.text(size, std)}, full {full})"
         shown = [*map((ErrorUnit(word, factor) if word else unit).text, sizes[:3], stds)]
         if parameter == "delay_s":
             shown.append(f"the {'joint' if sizes[0] > 0.0 else 'reference'} is late")

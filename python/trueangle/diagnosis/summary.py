@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from ..effects.ambiguity import Ambiguity
 from ..effects.missing_order import MissingOrder
-from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, sine_of_rms
+from ..support.display_units import ErrorsIn, ErrorUnit, brief_number, error_unit, sine_of_rms
 from ..support.layout import counted, laid_out
 from ..support.layout import wrapped_lines as _wrapped
 from .beliefs import Belief
@@ -104,7 +104,11 @@ def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
     elif not entries:
         entries.append(("Nothing beyond the simulation: no test is significant.", 0, 0))
     entries.append((_noise(diagnosis, unit), 2, 0))
-    if steps := "; ".join(diagnosis.next_steps):
+    steps = "; ".join(diagnosis.next_steps)
+    if diagnosis.is_enough and not steps:
+        least = brief_number(diagnosis.detectable * unit.per_arcsec)
+        steps = f"nothing to correct: an order above about {least} {unit.name} would be found"
+    if steps:
         entries.append((f"What to do: {steps}.", 2, 0))
     return [*(line for entry in entries for line in _wrapped(*entry)), ""]
 
@@ -125,7 +129,8 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
         text = f"NOT UNDERSTOOD: at least {unit.text(rest.rms)} rms ({share}) is not noise"
         yield f"{text} and has no known cause.", 2, 0
         yield from _items(rest.firing[:3], unit)
-    for title, status in (("Confirmed", True), ("Not confirmed", False)):
+    sure = "Confirmed" if diagnosis.complete else "Confirmed so far"
+    for title, status in ((sure, True), ("Not confirmed", False)):
         named = [brief_finding(f, unit) for f in diagnosis.findings if f.confirmed is status]
         if named:
             most = len(named) if status else LISTED
@@ -134,10 +139,10 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     lacking = () if diagnosis.torque is None else diagnosis.torque.findings
     torque = "; ".join(f.summary() for f in lacking if f.confirmed)
     if torque:
-        yield f"Confirmed in the drive's torque: {torque}.", 2, 0
-    sure = {factor.factor for factor in diagnosis.factors if factor.named_by}
+        yield f"{sure} in the drive's torque: {torque}.", 2, 0
+    named_factors = {factor.factor for factor in diagnosis.factors if factor.named_by}
     for factor in diagnosis.factors:
-        beyond = not factor.named_by and factor.factor in sure
+        beyond = not factor.named_by and factor.factor in named_factors
         yield f"{'Beyond that, follows' if beyond else 'Follows'} {factor.sentence(unit)}.", 2, 0
     wrong = "; ".join(f"{b.what} {b.verdict.replace('_', ' ')}" for b in diagnosis.wrong[:4])
     if wrong:

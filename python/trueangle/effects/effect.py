@@ -37,6 +37,11 @@ Reported: TypeAlias = "tuple[Parameters, list[Effect]]"
 Spots: TypeAlias = Sequence[Ambiguity]
 
 
+def title_of(kind: str) -> str:
+    """What a first line calls a cause."""
+    return (EFFECTS[kind].title if kind in EFFECTS else "") or kind
+
+
 class Effect(TabledParameters):
     """Base of the effects; each is a frozen dataclass whose fields are its parameters.
 
@@ -48,6 +53,8 @@ class Effect(TabledParameters):
     ----------------
     kind : str
         Its name in the vocabulary of causes.
+    title : str
+        What a first line calls it where its name in the vocabulary is not plain.
     sentence : str
         The physics in one sentence.
     needs : tuple of str
@@ -105,6 +112,7 @@ class Effect(TabledParameters):
     """
 
     noun: ClassVar[str] = "the effect of a simulation"
+    title: ClassVar[str] = ""
     sentence: ClassVar[str]
     needs: ClassVar[tuple[str, ...]] = ()
     factor: ClassVar[str] = "angle"

@@ -58,6 +58,7 @@ class MissingOrder(Effect):
     phase_deg: float = 0.0
 
     kind: ClassVar[str] = "missing_order"
+    title: ClassVar[str] = "periodic error"
     size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = "A periodic error of one shaft that the simulation does not have."
     form_of: ClassVar[tuple[str, ...]] = ("place",)

@@ -64,6 +64,7 @@ class TimePeriodic(Effect):
     amplitude_arcsec: float
 
     kind: ClassVar[str] = "time_periodic"
+    title: ClassVar[str] = "line in time"
     size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
         "Mains, a converter's clock, vibration, or an alias of one of them: a "

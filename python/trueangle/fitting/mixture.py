@@ -95,7 +95,7 @@ def check_new_run(estimate: EvidenceEstimate, travel: Array, orders: Sequence[fl
         raise NoModelError(
             f"no correction can be given: order {listed} differs so much between the runs that a "
             "correction may make a new run worse. The runs may be of different joints: fit each "
-            "separately, or declare the `orders=`"
+            "separately, or give the orders that you know: `orders=[1, 2]`"
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from .._core import __version__
 from ..errors import ArgumentError
+from ..estimation.reference import design_matrix
 from ..joint.shafts import Shaft
 from ..model.model import HarmonicModel
 from ..model.records import FitRecord, Provenance
@@ -18,12 +19,14 @@ from ..runs.channelangle import common_channels
 from ..runs.checks.check import channel_faults
 from ..runs.checks.record import records_of
 from ..runs.checks.rows import duplicate_rows, duplicate_runs, missed_counts
-from ..support.angles import wrap
+from ..support.angles import arcsec, wrap
 from ..support.arrays import Array
+from ..support.display_units import error_unit, sine_of_rms
 from ..support.distributions import student_quantile
 from ..support.layout import counted
 from .decoded import track_readings
 from .fitdata import FitData
+from .orders.table import UNDETERMINED
 from .rounding import COUNTED
 
 if TYPE_CHECKING:
@@ -76,7 +79,7 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         yield f"{counted(weighted.wild, 'outlier')} rejected: {rows}."
     errors = fit.standard_errors
     if errors is not None and errors[0].size and (fit.amplitudes < 2.0 * errors[0]).all():
-        yield "No amplitude is twice its standard error: take more readings, or use it with care."
+        yield _undetermined(fit)
     if fit.uncertainty.note:
         yield _sentence(fit.uncertainty.note)
     fractional = [s.name for s in fit.problem.shafts if s.cycles_per_turn % 1.0]
@@ -89,6 +92,25 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         yield from map(_sentence, fit.evidence.notes)
     elif (verified := _verified(fit)) is not None:
         yield _sentence(verified[1])
+
+
+def _undetermined(fit: FittedCoefficients) -> str:
+    """What a curve is good for of which no amplitude is twice its standard error."""
+    size, error = (arcsec(x, fit.problem.period) for x in fit.curve_and_error)
+    before = arcsec(fit.rms_before, fit.problem.period)
+    unit = error_unit("auto", sine_of_rms(before), fit.problem.period)
+    curve = f"{' +- '.join(unit.pair(size, error))} {unit.name}"
+    if size >= 2.0 * error:
+        return (
+            f"No single amplitude is twice its standard error; the curve, of {curve}, is "
+            "determined where it was read."
+        )
+    needed = math.ceil(len(fit.problem.runs) * (2.0 * error / max(size, 1e-300)) ** 2)
+    chosen = '; or let `orders="auto"` choose' * (fit.evidence is None)
+    return (
+        f"{UNDETERMINED}the fitted error, {curve}, is below twice its standard error. Do not rely "
+        f"on it: about {needed:.3g} runs like these in all would determine it{chosen}."
+    )
 
 
 def _sentence(note: str) -> str:
@@ -242,6 +264,29 @@ class FittedCoefficients(FitData):
         both = self.freedom[1:].reshape(-1, 2).min(axis=1)
         found = self._around(self.amplitudes, self.amplitude_std, both, level)
         return np.asarray(np.maximum(found, 0.0))
+
+    @property
+    def curve_and_error(self) -> tuple[float, float]:
+        """Amplitude of the fitted curve, and its standard error, in the unit of the runs.
+
+        ::
+
+            2 mean_i g_iᵀ b bᵀ g_i, mean_i g_iᵀ V g_i
+
+        are their squares, over the places read, with rows ``g_i`` of the series less their mean,
+        coefficients b and their covariance V.
+        """
+        places = np.concatenate(self.problem.angles)
+        # Readings at whose places the two are compared.
+        places = places[:: 1 + places.size // 512]
+        shafts = [(shaft.cycles_per_turn, shaft.orders) for shaft in self.bare_model.shafts]
+        rows = design_matrix(places, shafts, self.problem.period)
+        rows = (rows - rows.mean(axis=0))[:, 1:]
+        shown = [(s.cosine, s.sine) for s in self.bare_model.shafts]
+        pairs = np.concatenate([np.column_stack(pair) for pair in shown])
+        error = np.einsum("ij,jk,ik->i", rows, self.covariance[1:, 1:], rows)
+        curve = math.sqrt(2.0) * np.std(rows @ pairs.ravel())
+        return float(curve), math.sqrt(float(np.mean(error)))
 
     @property
     def freedom(self) -> Array:

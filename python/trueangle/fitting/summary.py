@@ -13,6 +13,7 @@ from ..support.distributions import student_quantile
 from ..support.layout import counted, laid_out
 from ..support.plainresult import finite_or_none
 from .model import FittedCoefficients
+from .orders.table import UNDETERMINED
 
 
 def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
@@ -36,7 +37,8 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
         head.append(("indicated", "minus what the sensor reads"))
     before, after = _sizes(fit)
     sizes = f"{shown.number(before)} -> {shown.text(after)} rms in the readings fitted"
-    lines = [f"{counted(model.orders, 'order')} fitted: error {sizes}."]
+    lines = [note for note in fit.notes if note.startswith(UNDETERMINED)]
+    lines.append(f"{counted(model.orders, 'order')} fitted: error {sizes}.")
     if not freedom:
         lines.append("No reading tests it: as many unknowns as readings; read at more positions.")
     lines += [*(note for note in fit.notes if note.startswith("One sweep ")), ""]
@@ -57,10 +59,9 @@ def fit_error_unit(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> Err
 
 
 def _sizes(fit: FittedCoefficients) -> tuple[float, float]:
-    """Rms of pattern and residual together, and of the residual, arcsec."""
+    """Rms of the errors about the zeros of their runs, and of the residual, arcsec."""
     left = fit.residual_std if math.isfinite(fit.residual_std) else 0.0
-    both = math.hypot(*math.sqrt(0.5) * fit.model.amplitudes, left)
-    return arcsec(both, fit.model.period), arcsec(left, fit.model.period)
+    return arcsec(fit.rms_before, fit.model.period), arcsec(left, fit.model.period)
 
 
 def _residual(fit: FittedCoefficients, shown: ErrorUnit) -> str:

@@ -61,7 +61,7 @@ class OrthonormalColumns:
         _, values, turned = np.linalg.svd(raw, full_matrices=False)
         if values[-1] < _SINGULAR * values[0]:
             raise ArgumentError(
-                f"orders {', '.join(f'{k:g}' for k in orders)} are collinear over "
+                f"orders {', '.join(f'{k:g}' for k in orders)} look the same over "
                 f"{(stop - start) * 360.0:g} deg: use fewer orders (`orders=`), or a longer arc"
             )
         self._turned = turned.T * (math.sqrt(self.grid.size) / values)

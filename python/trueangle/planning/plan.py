@@ -136,8 +136,8 @@ def plan_mounts(
         crowded = _crowded_class(positions, seen)
         raise NoModelError(
             f"{mounts} mount{'s' if mounts > 1 else ''} of {positions} positions cannot separate "
-            f"orders {', '.join(f'{m:g}' for m in crowded)}, which are collinear there: "
-            f"use at least {need} mounts, or a free reference encoder"
+            f"orders {', '.join(f'{m:g}' for m in crowded)}: there they look the same; "
+            f"use at least {need} mounts (`mounts={need}`), or a free reference encoder"
         )
     offsets = search_offsets(positions, mounts, seen)
     factors = dict(zip(seen, mount_noise_factors(positions, offsets, seen).tolist(), strict=True))
@@ -147,10 +147,10 @@ def plan_mounts(
     if hidden:
         notes.append(
             f"orders {', '.join(f'{m:g}' for m in hidden)} are the same at every position and "
-            "vanish in each mount's zero: only another number of facets shows them"
+            "vanish in each mount's zero: only another number of positions shows them"
         )
     if mounts == 2:
-        notes.append("2 mounts determine the artefact's own errors poorly; use 3")
+        notes.append("2 mounts determine the reference's own errors poorly; use 3 (`mounts=3`)")
     worst = max(factors.values())
     return CalibrationPlan(
         kind="mounts",
@@ -222,7 +222,7 @@ def plan_tilts(
         notes=(
             "fit the autocollimator's scale as one more column: an error of 0.1 % is "
             f"{0.001 * tilt_arcsec:.2g} arcsec here",
-            "the artefact stays where it is, so its own errors stay in the result",
+            "the reference is not turned, so its own errors stay in the result",
         ),
     )
 

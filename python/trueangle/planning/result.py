@@ -83,12 +83,12 @@ class ArcPlan(PlainResult):
             *place_table(self.places_deg, self.counts),
             f"  D-efficiency           {self.d_efficiency:.3f} of the best possible",
             f"  of even spacing        {self.efficiency_of_even_spacing:.3f}",
-            f"  noise factor per order {_FACTOR}",
-            "  order  noise factor  with even spacing",
+            _FACTOR,
+            "  order  these places  even spacing",
         ]
         for order, factor in self.noise_factors.items():
             even = self.even_noise_factors[order]
-            lines.append(f"  {order:5g}  {_factor(factor):>12}  {_factor(even):>17}")
+            lines.append(f"  {order:5g}  {_factor(factor):>12}  {_factor(even):>12}")
         lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)
 
@@ -100,7 +100,12 @@ class ArcPlan(PlainResult):
 
 
 #: What a noise factor compares with.
-_FACTOR = "(1: as from as many readings over whole turns)"
+_FACTOR = "  standard error of each order (1: of as many readings over whole turns)"
+
+
+def _worst(factor: float) -> str:
+    """The largest noise factor."""
+    return f"  worst order            standard error {factor:.2f} times the ideal"
 
 
 def _factor(factor: float) -> str:
@@ -186,16 +191,14 @@ class CalibrationPlan(PlainResult):
         if self.kind == "mounts":
             shifts = ", ".join(str(s) for s in self.facet_shifts)
             facet = self.facet_noise_factor
-            factor = f"{facet:.2f}" if math.isfinite(facet) else "impossible with one mount"
+            factor = "impossible with one mount"
+            if math.isfinite(facet):
+                factor = f"standard errors {facet:.2f} times those of one mount"
             lines += [
-                f"  turn the artefact by   {shifts} facets, one for each mount",
-                f"  artefact fitted too    factor {factor}",
+                f"  turn the reference by  {shifts} of {self.positions} faces, mount by mount",
+                f"  its errors fitted too  {factor}",
             ]
-        lines += [
-            f"  worst noise factor     {self.worst_noise_factor:.2f}",
-            f"  noise factor per order {_FACTOR}",
-            *factor_table(self.noise_factors),
-        ]
+        lines += [_worst(self.worst_noise_factor), _FACTOR, *factor_table(self.noise_factors)]
         lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)
 
@@ -295,7 +298,7 @@ class SelfPlan(PlainResult):
                 f"  factor by ratio        {table}",
                 f"  knots per turn         at most {self.knots_per_turn:g}, in the slowest part",
             ]
-        lines.append(f"  worst noise factor     {self.worst_noise_factor:.2f}")
+        lines.append(_worst(self.worst_noise_factor))
         if self.given:
             given: Any = self.given
             names = ", ".join(f"{k:g}" for k in given["blind_orders"])
@@ -306,7 +309,7 @@ class SelfPlan(PlainResult):
                 if names
                 else f"  the given angles       factor {factor}, {worse}"
             )
-        lines += [f"  noise factor per order {_FACTOR}", *factor_table(self.noise_factors)]
+        lines += [_FACTOR, *factor_table(self.noise_factors)]
         lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)
 

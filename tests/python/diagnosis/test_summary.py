@@ -138,18 +138,18 @@ BRIEFLY = {
     "filter_lag": ({"cutoff_hz": 22.5}, "filter_lag (22.5 Hz)"),
     "outliers": ({"fraction": 0.025}, "outliers (2.5 % of the readings)"),
     "torsional_compliance": ({"arcsec_per_Nm": 1.5}, "torsional_compliance (1.5 arcsec per Nm)"),
-    "backlash": ({"half_width_arcsec": 7.2}, "backlash (0.002000 deg)"),
+    "backlash": ({"half_width_arcsec": 7.2}, "backlash (half width 0.002000 deg, full 0.004000)"),
     "sidebands": (
         {"carrier": 102.0, "amplitudes": [3.6, 7.2]},
         "sidebands of order 102 (0.001000 deg, 0.002000 deg)",
     ),
     "missing_order": (
         {"shaft": "wave_generator", "order": 2, "amplitude_arcsec": 36.0},
-        "missing_order wave generator order 2 (0.01000 deg)",
+        "periodic error of the wave generator, order 2 (0.01000 deg)",
     ),
     "time_periodic": (
         {"frequency_hz": 49.96, "amplitude_arcsec": 3.6},
-        "time_periodic 49.96 Hz (0.001000 deg)",
+        "line in time of 49.96 Hz (0.001000 deg)",
     ),
     "local_defect": (
         {"place_deg": 211.5, "height_arcsec": 3.6},

@@ -47,7 +47,7 @@ def test_a_drift_on_a_short_travel_is_no_order(seed):
     t = x / 9.0 - 0.5
     drift = 0.01 * (rng.normal() * t + rng.normal() * t**2 + rng.normal() * t**3)
     run = run_of(x, 0.0025 * np.sin(np.radians(144 * x)) + drift, noise=5e-4, seed=seed)
-    with pytest.raises(NoModelError, match="declare the orders"):
+    with pytest.raises(NoModelError, match="fit the orders that you know"):
         ta.fit(run)
     assert ta.fit(run, [144]).orders == (144,)
 

@@ -17,6 +17,8 @@ from trueangle.simulation import RunDesign, Simulation
 #: Printed to three digits; factors of mounts and heads to two decimals.
 THREE, CENTS = 6e-3, 0.0051
 
+WORST = "worst order            standard error"
+
 
 def rows(text, columns):
     """Lines of nothing but so many numbers."""
@@ -54,13 +56,15 @@ def test_of_mounts():
     text = plan.summary()
     offsets = re.search(r"offset by (.*) deg", text)[1].split(", ")
     assert [float(x) for x in offsets] == pytest.approx(plan.mount_offsets_deg, rel=THREE)
-    assert told(text, "worst noise factor") == pytest.approx(plan.worst_noise_factor, abs=CENTS)
-    assert told(text, "artefact fitted too    factor") == pytest.approx(
+    assert told(text, "worst order            standard error") == pytest.approx(
+        plan.worst_noise_factor, abs=CENTS
+    )
+    assert told(text, "its errors fitted too  standard errors") == pytest.approx(
         plan.facet_noise_factor, abs=CENTS
     )
     assert f"{plan.readings} readings in all, {plan.readings // 108}" in " ".join(text.split())
-    assert f"{', '.join(map(str, plan.facet_shifts))} facets" in text
-    pairs = dict(re.findall(r"(\d+) +(\d+\.\d\d)\b", text.partition("per order")[2]))
+    assert f"{', '.join(map(str, plan.facet_shifts))} of 36 faces" in text
+    pairs = dict(re.findall(r"(\d+) +(\d+\.\d\d)\b", text.partition("each order")[2]))
     for order, factor in plan.noise_factors.items():
         assert float(pairs[f"{order:g}"]) == pytest.approx(factor, abs=CENTS)
 
@@ -71,7 +75,9 @@ def test_of_heads_and_of_a_coast():
     given = re.search(r"the given angles +factor (\S+), (\S+) times the best", text).groups()
     wanted = [plan.given["worst_noise_factor"], plan.given["worse_by"]]
     assert [float(x) for x in given] == pytest.approx(wanted, abs=CENTS)
-    assert told(text, "worst noise factor") == pytest.approx(plan.worst_noise_factor, abs=CENTS)
+    assert told(text, "worst order            standard error") == pytest.approx(
+        plan.worst_noise_factor, abs=CENTS
+    )
     coast = plan_self(
         "spin-down", [1, 2], start_speed=4.0, rate=500.0, noise=9.0, standard_error=0.3
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...effects.curve import Curve
+from ...effects.effect import title_of
 from ...support.arrays import Array
 from ...support.display_units import ErrorUnit
 from ...support.layout import order_ranges
@@ -144,7 +145,8 @@ class Factor(PlainResult):
         range_ = f"{n(self.low)} to" if self.low else "at most"
         text += f", {n(self.rms)} {unit.name} rms ({range_} {n(self.high)})"
         held = "; the extended simulation contains its curve" if self.effects else ""
-        return f"{text}: {', '.join(self.named_by) or f'cause not determined{held}'}"
+        names = ", ".join(map(title_of, self.named_by))
+        return f"{text}: {names or f'cause not determined{held}'}"
 
     def _brief(self) -> str:
         return f"{self.factor}, {self.rms:.3g} arcsec rms, {', '.join(self.named_by) or 'no name'}"

@@ -53,7 +53,7 @@ SHARED_BLOCKS = 2
 #: Widths of bands, in resolution cells.
 WIDTHS = (1, 3, 9)
 
-#: Departure of the steps from equal ones up to which a record counts as evenly sampled.
+#: Departure of the steps from those of one clock up to which a record counts as evenly sampled.
 EVEN = 0.02
 
 #: Readings below which a run has no periodogram.
@@ -292,19 +292,22 @@ def order_test(left: Leftover, top: float, correlation: float = 0.0) -> Evidence
 
 
 def _sampling(axis: Array, bounds: list[tuple[int, int]]) -> tuple[bool, float, list[float]]:
-    """Whether all steps are equal, readings per unit, and the rate of each even run (or 0)."""
+    """Whether all steps are of one clock, readings per unit, each run's rate (0: uneven)."""
     steps = [np.abs(np.diff(axis[a:b])) for a, b in bounds]
-    joined = np.concatenate(steps)
-    middle = float(np.median(joined))
-    even = _are_alike(joined, middle)
-    own = [float(np.median(s)) for s in steps]
-    rates = [1.0 / m if _are_alike(s, m) else 0.0 for s, m in zip(steps, own, strict=True)]
+    tick = _tick(np.concatenate(steps))
+    ticks = [_tick(own) for own in steps]
+    rates = [1.0 / own if own else 0.0 for own in ticks]
     mean = [(b - a - 1) / float(np.ptp(axis[a:b])) for a, b in bounds]
-    return even, 1.0 / middle if even else float(np.max(mean)), rates
+    return tick > 0.0, 1.0 / tick if tick else float(np.max(mean)), rates
 
 
-def _are_alike(steps: Array, middle: float) -> bool:
-    return middle > 0.0 and float(np.mean(np.abs(steps - middle) < EVEN * middle)) > 0.95
+def _tick(steps: Array) -> float:
+    """The step of a clock of which all steps are whole multiples, some readings left out, or 0."""
+    for tick in (float(np.median(steps)), float(steps.min())):
+        away = np.abs(steps - np.maximum(np.rint(steps / tick), 1.0) * tick) if tick else steps
+        if float(np.mean(away < EVEN * tick)) > 0.95:
+            return tick
+    return 0.0
 
 
 def _blocks(size: int, over: float) -> tuple[NDArray[np.int64], Array]:

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Unpack
 
-from ...errors import TrueAngleError, UnlikeRunsWarning
+from ...errors import NoModelError, TrueAngleError, UnlikeRunsWarning
 from ...joint.shafts import limited_orders
 from ...runs.files import runs_of
 from ...runs.run import CalibrationRun
@@ -17,8 +17,10 @@ from ..decoded import decoded
 from ..fit import fitted_to
 from ..robust import without_spikes
 from ..uncertainty import CovarianceKind, check_covariance
+from ..worth import of_worth
 from .choice import Method, selected_orders
 from .result import OrderSelection as OrderSelection
+from .table import UNDETERMINED
 
 
 @told_kinds
@@ -134,15 +136,21 @@ def _as_fitted(
         with warnings.catch_warnings():
             # `trueangle.fit` reports what the fit would warn about.
             warnings.simplefilter("ignore", UnlikeRunsWarning)
-            fit = fitted_to(
-                runs,
-                None,
-                argument=selection.argument,
-                loss="auto",
-                evidence=selection,
-                candidates=candidates,
-                **joint,
+            fit = of_worth(
+                fitted_to(
+                    runs,
+                    None,
+                    argument=selection.argument,
+                    loss="auto",
+                    evidence=selection,
+                    candidates=candidates,
+                    **joint,
+                )
             )
+    except NoModelError as error:
+        return selection.with_notes((f"{UNDETERMINED}{error}", *selection.notes))
     except TrueAngleError:
         return selection
-    return selection if fit.selection is None else fit.selection
+    found = selection if fit.selection is None else fit.selection
+    doubts = (note.rstrip(".") for note in fit.notes if note.startswith(UNDETERMINED))
+    return found.with_notes((*doubts, *found.notes))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, Final
 
 from ...estimation.evidence import CORRELATION_TIMES
@@ -11,7 +10,7 @@ from ...support.angles import arcsec
 from ...support.display_units import ErrorsIn, ErrorUnit, error_unit, rounded_phase, sine_of_rms
 from ...support.layout import counted, laid_out, order_ranges, wrapped_lines
 from ...support.plainresult import finite_or_none, plain_fields
-from .table import OrderRow, OrderTable
+from .table import IN_MODEL, UNDETERMINED, OrderRow, OrderTable
 
 
 def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> str:
@@ -21,18 +20,19 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
     before, after = (arcsec(v, period) for v in selection.holdout_rms)
     unit = selection_error_unit(selection, errors_in)
     noise_std = noise / math.sqrt(2.0 * max(1.0, selection.noise.degrees_of_freedom))
-    retained = [row for row in selection.table if row.retained]
+    retained = [row for row in selection.table if row.verdict in IN_MODEL]
     head = f"NO ORDER RETAINED: {selection.reason}."
     if retained:
         sizes = f"{unit.number(before)} -> {unit.text(after)}"
         head = f"{counted(retained, 'order')} retained: held-out error {sizes} rms "
         head += f"({selection.holdout})."
     read = f"{counted(selection.samples, 'reading')} in {counted(selection.runs, 'run')}"
-    lines = [head, f"  {read}, {selection.positions.describe()}"]
+    notes = [note for note in selection.notes if note.startswith(UNDETERMINED)]
+    lines = [*(f"{note}." for note in notes), head, f"  {read}, {selection.positions.describe()}"]
     if selection.table:
         size = f"{unit.number(noise, noise_std)} {unit.name}"
         lines.append(f"  noise of one reading  {size}{_source(selection, unit)}")
-    others = [row for row in selection.table if not row.retained and row.verdict != "alias"]
+    others = [row for row in selection.table if row not in retained and row.verdict != "alias"]
     others.sort(key=lambda row: row.log10_false_alarm)
     # Rejected orders listed in addition to the retained ones, the strongest first.
     shown = sorted([*retained, *others[:8]], key=lambda row: row.order)
@@ -43,12 +43,16 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
         lines.append(f"  ... and {counted(hidden, 'weaker order')}, not retained")
     if shown:
         lines += wrapped_lines(_LEGEND, 2, 2)
-    lines += ["", *_explanations(retained, selection)]
+        reasons = {row.verdict: row.reason for row in shown if row.verdict not in _PLAIN}
+        for verdict, reason in reasons.items():
+            if reason not in selection.reason:
+                lines += wrapped_lines(f"{verdict}: {reason}", 2, 2)
+    lines += ["", *_explanations(selection)]
     for row in selection.table:
         if row.doubtful or row.verdict == "reference":
             text = row.reason if row.doubtful else f"{row.order:g}: {row.reason}"
             lines += wrapped_lines(f"! {text}", 2)
-    for note in selection.notes:
+    for note in selection.notes[len(notes) :]:
         lines += wrapped_lines(f"note: {note}", 2)
     return laid_out(lines).rstrip()
 
@@ -58,6 +62,9 @@ def selection_error_unit(selection: OrderTable, errors_in: ErrorsIn = "auto") ->
     before = arcsec(selection.holdout_rms[0], selection.period)
     return error_unit(errors_in, sine_of_rms(before), selection.period)
 
+
+#: Verdicts whose name is the reason, and that of which each row has a line.
+_PLAIN: Final = ("retained", "noise", "negligible", "reference")
 
 _COLUMNS: Final = "  {:>5} {:>9} {:>7} {:>7} {:>5} {:>6} {:>11} {:>8}  {}"
 _HEADER: Final = _COLUMNS.format(
@@ -86,11 +93,12 @@ def _line(row: OrderRow, period: float, unit: ErrorUnit) -> str:
     return _COLUMNS.format(order, size, std, phase, phase_std, spread, chance, gain, row.verdict)
 
 
-def _explanations(rows: Sequence[OrderRow], selection: OrderTable) -> list[str]:
+def _explanations(selection: OrderTable) -> list[str]:
     """Possible causes of each retained order; its aliases are reported separately."""
     known = {
         row.order: [e.name for e in row.explanations if e.order == row.order and not e.assumed]
-        for row in rows
+        for row in selection.table
+        if row.retained
     }
     told = [f"{order:g}: {'; or '.join(names)}" for order, names in known.items() if names]
     if unknown := [order for order, names in known.items() if not names]:

@@ -21,6 +21,9 @@ IN_MODEL: Final = ("retained", "shared")
 #: Verdicts of orders that are in the error and that no model shall have.
 LEFT_OUT: Final = ("reference", "too long", "negligible", "too steep", "rounding", "in time")
 
+#: How a note begins that no model of these orders is worth using: the answer, so the first line.
+UNDETERMINED: Final = "NOT DETERMINED: "
+
 
 @dataclass(frozen=True)
 class OrderRow:

@@ -40,14 +40,15 @@ _VERDICTS: Final = {
     "can be corrected with `argument='indicated'` only",
     "rounding": "may be made by the sensor's rounding to whole steps, which at evenly spaced "
     "positions is the same each time: read at other positions, too",
-    "shared": "is collinear with others over this travel: needed for the curve, but perhaps not "
-    "real",
+    "shared": "is in the model, but over this travel it looks like other orders: only their sum is "
+    "known; a whole turn separates them",
     "in time": "follows the time better, as a line of a fixed frequency: a vibration or an "
     "electrical line, and no error of a place",
     "small": "has no prominent amplitude",
     "phase varies": "varies in phase from run to run",
     "too long": "cannot be distinguished from drift in time over so short a travel, passed once "
-    "(fitted jointly, not kept): run it there and back, or declare the orders",
+    "(fitted jointly, not kept): run it there and back, or fit the orders that you know: "
+    "`ta.fit(runs, orders=[1, 2])`",
     "alias": "cannot be distinguished from retained orders at these positions",
 }
 
