@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 from ..errors import ArgumentError, NoOrderError, UnlikeRunsWarning
 from ..joint.shafts import limited_orders, resolve_orders
 from ..model.model import Argument
 from ..model.validity import check_invertible
+from ..runs.checks.rows import parted
 from ..runs.files import runs_of
 from ..runs.follows import check_usable
 from ..runs.run import CalibrationRun
@@ -153,12 +155,17 @@ def fit(
     >>> result.model.shafts[0].sine[0].__round__(9)
     0.5
     """
+    found, lost = decoded(runs_of(runs, reading)), list[str]()
+    check_usable(found)
+    if orders is None or isinstance(orders, str):
+        # What stays from one reading on is of no order; of orders that are given it is noted.
+        found, lost = parted(found)
     if prior is not None:
         from .prior import fitted_with_prior
 
         asked = {"nuisance": nuisance, "covariance": covariance, "ridge": ridge, "method": method}
         problem, weighted, posterior = fitted_with_prior(
-            decoded(runs_of(runs, reading)),
+            found,
             prior,
             None
             if orders is None or isinstance(orders, str)
@@ -176,11 +183,11 @@ def fit(
             travelled_span(problem.travel, problem.period, problem.is_periodic),
             None,
             (gear_ratio, fixed_member),
-            (posterior.note(),),
+            (*lost, posterior.note()),
             posterior=posterior,
         )
     result = fitted_to(
-        decoded(runs_of(runs, reading)),
+        found,
         orders,
         gear_ratio=gear_ratio,
         fixed_member=fixed_member,
@@ -194,6 +201,7 @@ def fit(
         method=method,
         threads=threads,
     )
+    result = replace(result, remarks=(*lost, *result.remarks)) if lost else result
     return result if result.evidence is None else of_worth(result)
 
 
@@ -222,7 +230,6 @@ def fitted_to(
     """
     check_choice("argument", argument, ARGUMENTS)
     check_covariance(covariance, len(found))
-    check_usable(found)
     selection = evidence
     sought: dict[str, Any] = {
         "candidates": candidates,

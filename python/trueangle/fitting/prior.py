@@ -29,7 +29,6 @@ from ..estimation.linear import NormalEquations, total
 from ..joint.shafts import ShaftOrders
 from ..model.model import Argument
 from ..model.validity import check_invertible
-from ..runs.follows import check_usable
 from ..runs.outliers import WILD
 from ..runs.run import CalibrationRun
 from ..support.angles import circular_mean, unit_name, wrap
@@ -286,7 +285,6 @@ def fitted_with_prior(
         if not (value is None or value == _USUAL[name]):
             raise ArgumentError(f"{name} does not go with `prior=`; leave one of them out")
     check_choice("argument", argument, ARGUMENTS)
-    check_usable(runs)
     known = fleet_prior(prior, runs[0].period)
     angle: Argument = "reference" if argument == "auto" else argument
     problem = Problem(runs, list(known.shafts) if shafts is None else shafts, angle)

@@ -353,6 +353,7 @@ def _runs_of_readings(table: FileReadings, given: Conversion) -> list[Calibratio
                 source=found.source,
                 indicated_sign=found.indicated_sign,
                 channels=found.channels,
+                roles=table.named,
             )
         )
     return runs

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -14,7 +15,7 @@ import trueangle._core as _core
 from ..errors import ArgumentError, UnitWarning
 from ..support.angles import wrap
 from ..support.arrays import quantile
-from ..support.roles import role_code
+from ..support.roles import role_code, turned_code
 from .checks.angles import (
     BLOCKS,
     COARSE,
@@ -25,6 +26,7 @@ from .checks.angles import (
     UNUSABLE_ANGLES,
     angle_ratio,
     bending,
+    mixed_units,
     ratio_suggestion,
 )
 from .checks.fault import DataFault
@@ -96,7 +98,7 @@ def _unrelated(run: CalibrationRun, which: str) -> Iterator[tuple[str, str]]:
     # than half a turn hide it, by what would make the differences agree.
     found = (
         text
-        for text, factor in _remedies(run.period).items()
+        for text, factor in _remedies(run).items()
         if (
             abs(factor * ratio - 1.0) < _NEAR
             if ratio is not None
@@ -126,12 +128,20 @@ def check_usable(runs: Sequence[CalibrationRun]) -> None:
     strides = [1 + (run.reference.size - 1) // LOOKED_AT for run in runs]
     if _are_plain(runs, strides):
         return
+    records = [
+        replace(record, rows=np.arange(len(record)) * stride + 1)
+        for record, stride in zip(records_of(map(_some_of, runs, strides)), strides, strict=True)
+    ]
+    _refuse(mixed_units(records))
     for run in runs:
         check_follows(run)
-    records = records_of(map(_some_of, runs, strides))
     for test in UNUSABLE_ANGLES:
-        for fault in test(records):
-            raise ArgumentError(f"the data must not be used as they are: {fault}")
+        _refuse(test(records))
+
+
+def _refuse(faults: Iterator[DataFault]) -> None:
+    for fault in faults:
+        raise ArgumentError(f"the data must not be used as they are: {fault}")
 
 
 def _are_plain(runs: Sequence[CalibrationRun], strides: Sequence[int]) -> bool:
@@ -144,7 +154,7 @@ def _are_plain(runs: Sequence[CalibrationRun], strides: Sequence[int]) -> bool:
     """
     sizes = []
     for run, stride in zip(runs, strides, strict=True):
-        step, long_steps, slip, spread, travel, half, size, least = _core.following(
+        step, long_steps, slip, spread, travel, half, size, _ = _core.following(
             run.indicated, run.reference, run.period, stride, COARSE / 360.0, BLOCKS
         )
         # Errors within a third of a turn have a resultant of at least `_FOLLOWS`.
@@ -155,7 +165,7 @@ def _are_plain(runs: Sequence[CalibrationRun], strides: Sequence[int]) -> bool:
         # Where as many steps are coarse, the test of the ratio knows no travel.
         if not bent and long_steps < steps - int(0.9 * (steps - 1)):
             return False
-        if least <= size * OTHER_UNIT and steps >= 4 * BLOCKS - 1:
+        if step > LEAST_JUMP / 360.0 and steps >= 4 * BLOCKS - 1:
             return False
         # Turns up to which a place within one is known to far more than is looked at.
         if size > (_MANY_TURNS if run.period == _TURNS["radians"] else 2.0**30):
@@ -166,10 +176,7 @@ def _are_plain(runs: Sequence[CalibrationRun], strides: Sequence[int]) -> bool:
 
 def _some_of(run: CalibrationRun, stride: int | None = None) -> CalibrationRun:
     """Every ``stride``-th reading; about `_SAMPLE` of them by default."""
-    stride = stride or max(len(run) // _SAMPLE, 1)
-    return CalibrationRun(
-        run.reference[::stride], run.indicated[::stride], run.period, label=run.label
-    )
+    return run.part(slice(None, None, stride or max(len(run) // _SAMPLE, 1)))
 
 
 def _of(run: CalibrationRun) -> str:
@@ -195,19 +202,19 @@ def _warn_of_degrees(run: CalibrationRun) -> None:
             f"the reference{_of(run)} goes to {float(reference.max()):.6g}, and its error repeats "
             "with 360: if these are degrees, give `period=360` (the default is 2*pi, radians)",
             UnitWarning,
-            stacklevel=7,
+            stacklevel=6,
         )
 
 
-def _remedies(period: float) -> dict[str, float]:
+def _remedies(run: CalibrationRun) -> dict[str, float]:
     """What the indicated angle may be instead, with the factor that puts it right."""
-    code = role_code("indicated", "-NAME", None)
-    found = {f"it runs backwards: change its sign with {code}": -1.0}
+    period, (name, _) = run.period, run.roles.get("indicated", ("NAME", None))
+    found = {f"it runs backwards: change its sign with {turned_code(run.roles)}": -1.0}
     # A column is converted when it is read: its unit need not be that of the run, which
     # is only the likeliest.
     columns = sorted(_TURNS, key=lambda unit: not math.isclose(_TURNS[unit], period))
     for column, unit in permutations(columns, 2):
-        code = role_code("indicated", "NAME", "turn" if unit == "turns" else unit[:3])
+        code = role_code("indicated", name, "turn" if unit == "turns" else unit[:3])
         factor = _TURNS[column] / _TURNS[unit]
         found[f"it looks like {unit} in a column of {column}: give {code}"] = factor
     return found

@@ -75,6 +75,14 @@ class FileReadings(NamedTuple):
     columns: dict[str, NDArray[Any]]
     source: InputFile
 
+    @property
+    def named(self) -> dict[str, tuple[str, str | None]]:
+        """Name and unit of the column of each role, a reversed sensor's with a minus."""
+        return {
+            role: ("-" * column.is_reversed + column.name, column.unit)
+            for role, column in self.roles.items()
+        }
+
     def error(self, problem: str, column: str | None = None, row: int | None = None) -> FileError:
         """The error that reports ``problem`` of a column, at the line of a row."""
         line = 1 if row is None else self.format.line_of(self.path, row)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -66,6 +66,8 @@ class CalibrationRun:
         the run keep it, for `trueangle.correct` and `trueangle.export_model`.
     channels : Channels, optional
         By which ``indicated`` was made of the signals ``sine`` and ``cosine``.
+    roles : mapping of str to (str, str or None), optional
+        Column and unit in the file by role, for messages; a reversed sensor's with a minus.
 
     Raises
     ------
@@ -98,6 +100,7 @@ class CalibrationRun:
     source: InputFile | None = field(default=None, kw_only=True)
     indicated_sign: int = field(default=1, kw_only=True)
     channels: Channels | None = field(default=None, kw_only=True)
+    roles: Mapping[str, tuple[str, str | None]] = field(default_factory=dict, kw_only=True)
 
     if TYPE_CHECKING:  # what is taken is more than what is kept
 
@@ -122,6 +125,7 @@ class CalibrationRun:
             source: InputFile | None = None,
             indicated_sign: int = 1,
             channels: Channels | None = None,
+            roles: Mapping[str, tuple[str, str | None]] = ...,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -165,6 +169,15 @@ class CalibrationRun:
 
     def _named(self) -> str:
         return f" ({self.label})" if self.label else ""
+
+    def part(self, rows: Any, **changes: Any) -> CalibrationRun:
+        """Some of its readings, by any index of numpy, as a run of their own."""
+        names = ("reference", "indicated", "weights", *FIELDS)
+        each = {name: values for name in names if (values := getattr(self, name)) is not None}
+        others = {name: np.asarray(values)[rows] for name, values in self.columns.items()}
+        signals = {name: values[rows] for name, values in self.signals.items()}
+        taken = {name: values[rows] for name, values in each.items()}
+        return replace(self, **{**taken, "signals": signals, "columns": others, **changes})
 
     def signal(self, name: str) -> Array | None:
         """Values of the signal ``name``, a field or one of ``signals``; None without.

@@ -126,6 +126,12 @@ def role_code(role: str, name: str = "NAME", unit: str | None = "UNIT") -> str:
     return f"`signals={{{role!r}: {column!r}}}`"
 
 
+def turned_code(columns: Mapping[str, tuple[str, str | None]]) -> str:
+    """How the indicated angle of these columns is named with the other sign, as `role_code`."""
+    name, unit = columns.get("indicated", ("NAME", None))
+    return role_code("indicated", name[1:] if name.startswith("-") else f"-{name}", unit)
+
+
 def role_kind(role: str) -> str:
     """What a role holds: "angle", "velocity", "time", "plain" or "label".
 

@@ -222,6 +222,7 @@ def test_what_bounds_call_plain_no_test_refuses() -> None:
         assert not (are_plain and faults), faults
         taken += not faults
         plain += are_plain
-    assert 0.1 * taken < plain < taken
+    # Of steps beyond 20 deg rows in another unit are looked for.
+    assert 0.08 * taken < plain < taken
     for size in (5, 36, 37, 4095, 4096, 8191):
         assert _are_plain([run(360.0, 1.0, size)], [1 + (size - 1) // 4096])

@@ -97,18 +97,7 @@ def _without_zero_weights(run: CalibrationRun) -> CalibrationRun | None:
     if run.weights is None or (run.weights > 0.0).all():
         return run
     keep = run.weights > 0.0
-    if not keep.any():
-        return None
-    mount = None if run.mount is None else run.mount[keep]
-    return CalibrationRun(
-        run.reference[keep],
-        run.indicated[keep],
-        period=run.period,
-        mount=mount,
-        label=run.label,
-        weights=run.weights[keep],
-        time=None if run.time is None else run.time[keep],
-    )
+    return run.part(keep) if keep.any() else None
 
 
 def _travelled(

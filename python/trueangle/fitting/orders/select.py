@@ -8,7 +8,9 @@ from typing import Any, Unpack
 
 from ...errors import NoModelError, TrueAngleError, UnlikeRunsWarning
 from ...joint.shafts import limited_orders
+from ...runs.checks.rows import parted
 from ...runs.files import runs_of
+from ...runs.follows import check_usable
 from ...runs.run import CalibrationRun
 from ...runs.source import ReadingOptions
 from ...support.argumentkinds import told_kinds
@@ -110,6 +112,8 @@ def select_orders(
     (3,)
     """
     found = decoded(runs_of(runs, reading))
+    check_usable(found)
+    found, _ = parted(found)
     check_covariance(covariance, len(found))
     joint: dict[str, Any] = {"gear_ratio": gear_ratio, "fixed_member": fixed_member}
     joint |= {"shafts": shafts, "nuisance": nuisance}

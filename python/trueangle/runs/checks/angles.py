@@ -9,10 +9,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ...support.angles import wrap
 from ...support.arrays import Array, median, quantile
-from ...support.roles import role_code
+from ...support.roles import turned_code
 from .fault import DataFault
 from .record import Record
+from .rows import ROUNDING, USUAL
 
 #: Travel (degrees) from which on a ratio of the channels means anything, and how far from 1
 #: it may be: errors of several degrees over a short travel are still errors. A periodic error
@@ -32,8 +34,11 @@ UNITS = {
 #: Denominators of gear ratios that are offered, round ones first, and how near one must be.
 DENOMINATORS = (1, 2, 3, 4, 5, 10, 6, 7, 8, 9, 11, 12, 13)
 
-#: Share by which a part's values and steps are those of another unit.
+#: Units that angles may be in among degrees, and share by which the travel of a run may differ.
+OTHER_UNITS = {"radians": 180.0 / math.pi, "turns": 360.0}
 UNIT_SPREAD = 0.35
+#: Logarithm of the odds that rows in another unit are none.
+_BY_CHANCE = math.log(1e3)
 #: Part of the greatest angle up to which others may be in radians among degrees.
 OTHER_UNIT = math.pi / 180.0 * (1.0 + UNIT_SPREAD)
 
@@ -116,9 +121,7 @@ def ratio_suggestion(ratio: float | None, agrees: float = AGREES) -> str:
 def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
     """A sign, unit or gear ratio that is not the output's."""
     turned: dict[str, list[tuple[str, float]]] = {}
-    named = (r.columns["indicated"] for r in records if "indicated" in r.columns)
-    name, unit = next(named, ("NAME", None))
-    code = role_code("indicated", name[1:] if name.startswith("-") else f"-{name}", unit)
+    code = turned_code(next((r.columns for r in records if "indicated" in r.columns), {}))
     for record in records:
         slope = _straight(record)
         if slope is None or abs(slope - 1.0) < bending(_turns(record)):
@@ -140,56 +143,103 @@ def wrong_ratio(records: list[Record]) -> Iterator[DataFault]:
 
 
 def mixed_units(records: list[Record]) -> Iterator[DataFault]:
-    """Runs, or parts of one, whose angles are in another unit than the others."""
+    """Runs, or readings of one, whose angles are in another unit than the others."""
     sizes = np.array([float(np.abs(record.reference).max(initial=0.0)) for record in records])
     travel = np.array([float(np.ptp(record.reference)) for record in records])
     whole, largest = float(travel.max(initial=0.0)), float(sizes.max(initial=0.0))
-    small = [
-        k
-        for k in range(len(records))
-        if whole > 30.0
-        and sizes[k] <= largest * OTHER_UNIT
-        and len(records[k]) >= BLOCKS
-        and abs(travel[k] * 180.0 / np.pi / whole - 1.0) < UNIT_SPREAD
-    ]
-    if small:
-        labels = [records[k].label for k in small]
-        yield DataFault.of(
-            "mixed_units",
-            labels,
-            (),
-            f"run {', '.join(labels[:4])} looks like radians among degrees: its angles "
-            f"cover {float(median(travel[small])):.3g} where other runs cover {whole:.4g}",
-            "multiply its angles by 180/pi",
-        )
+    found = set[int]()
+    for unit, factor in OTHER_UNITS.items():
+        small = [
+            k
+            for k in np.flatnonzero(sizes * factor <= largest * (1.0 + UNIT_SPREAD)).tolist()
+            if whole > 30.0
+            and len(records[k]) >= BLOCKS
+            and abs(travel[k] * factor / whole - 1.0) < UNIT_SPREAD
+            and not _scatters_as(records, k, factor)
+        ]
+        found.update(small)
+        if small:
+            labels = [records[k].label for k in small]
+            yield DataFault.of(
+                "mixed_units",
+                labels,
+                (),
+                f"run {', '.join(labels[:4])} looks like {unit} among degrees: its angles cover "
+                f"{float(median(travel[small])):.3g} where other runs cover {whole:.4g}",
+                "multiply its angles by " + ("360" if unit == "turns" else "180/pi"),
+            )
     for k, record in enumerate(records):
-        if k not in small:
-            yield from _parts_in_other_units(record)
+        for role in ("reference", "indicated") if k not in found else ():
+            yield from _rows_in_other_units(record, role)
 
 
-def _parts_in_other_units(record: Record) -> Iterator[DataFault]:
-    if len(record) < 4 * BLOCKS:
+def _scatters_as(records: list[Record], k: int, factor: float) -> bool:
+    """Whether a run of less travel is one: its two angles go together, with the others' noise."""
+    travel, moved = np.ptp(records[k].reference), np.ptp(records[k].indicated)
+    noise = [_roughness(record.run.centred_error, record.time) for record in records]
+    usual = float(median([x for i, x in enumerate(noise) if i != k] or [0.0]))
+    alike = abs(moved - travel) <= AGREES * travel
+    return bool(alike and noise[k] * math.sqrt(factor) > max(usual, ROUNDING))
+
+
+def _rows_in_other_units(record: Record, role: str) -> Iterator[DataFault]:
+    """Rows of a column that go on from the others in another unit, and not in its own."""
+    angle = getattr(record, role)
+    steps = np.abs(wrap(np.diff(angle), 360.0))
+    if len(record) < 4 * BLOCKS or not steps.min() <= LEAST_JUMP < steps.max():
         return
-    steps = np.abs(np.diff(record.reference))
-    edges = np.linspace(0, len(record), BLOCKS + 1).astype(int)
-    typical = np.array([median(steps[a : max(b - 1, a + 1)]) for a, b in itertools.pairwise(edges)])
-    top = np.array([np.abs(record.reference[a:b]).max() for a, b in itertools.pairwise(edges)])
-    large = float(median(typical[typical > 0.3 * typical.max()])) if typical.max() > 0 else 0.0
-    if large == 0.0 or top.max() < 30.0:
-        return
-    other = (top <= top.max() * OTHER_UNIT) & (
-        np.abs(typical * 180.0 / np.pi / large - 1.0) < UNIT_SPREAD
-    )
-    if other.any() and not other.all():
-        first = int(np.flatnonzero(other)[0])
-        rows = np.concatenate([record.rows[edges[j] : edges[j + 1]] for j in np.flatnonzero(other)])
-        yield record.fault(
-            "mixed_units",
-            rows.tolist(),
-            f"a part of run {record.label} (from about row {record.rows[edges[first]]}) looks "
-            "like radians among degrees",
-            "convert it, or give it another file",
-        )
+    # Steps of the rows in the larger unit: in the other they are nothing beside them.
+    limit = USUAL * float(quantile(steps[steps <= LEAST_JUMP], 0.9))
+    if limit == 0.0 or np.count_nonzero(steps > limit) > 0.5 * steps.size:
+        return  # angles in no order
+    for unit, factor in OTHER_UNITS.items():
+        other = _in_unit(angle, factor, limit)
+        if _are_others(other, np.where(other, factor, 1.0) * angle, limit):
+            rows = record.rows[other]
+            yield record.fault(
+                "mixed_units",
+                rows.tolist(),
+                f"the {role} angle of run {record.label} looks like {unit} among degrees in "
+                f"{rows.size} rows (first: row {rows[0]})",
+                "convert them, or give them another file",
+            )
+            return
+
+
+def _are_others(other: NDArray[np.bool_], angle: Array, limit: float) -> bool:
+    """Whether rows that are converted go on from the others, and move, by no chance.
+
+    Of angles at random ``2 limit / 360`` do so; against that stands that any parts were looked at.
+    """
+    parts = int(np.count_nonzero(np.diff(other)))
+    steps = np.abs(wrap(np.diff(angle), 360.0))[other[1:] | other[:-1]]
+    moves = np.count_nonzero((steps <= limit) & (steps >= limit / USUAL**2))
+    told = (moves - np.count_nonzero(steps > limit)) * math.log(180.0 / limit)
+    return bool(parts and told > parts * (math.log(other.size / parts) + 1.0) + _BY_CHANCE)
+
+
+def _in_unit(angle: Array, factor: float, limit: float) -> NDArray[np.bool_]:
+    """Which parts between jumps are taken for another unit, so that least is left of jumps.
+
+    A change of the unit, and a jump that is left, count 1 and 2; the least of all ways is found.
+    """
+    both = np.stack([angle, angle * factor])
+    apart = np.abs(wrap(both[None, :, 1:] - both[:, None, :-1], 360.0)) > limit
+    jumps = np.flatnonzero(apart[0, 0])
+    starts = np.concatenate([[0], jumps + 1])
+    cost = 2 * apart + (1 - np.eye(2, dtype=int))[:, :, None]
+    within = np.append(np.where(apart[0, 0], 0, cost[1, 1]), 0)
+    inside = np.add.reduceat(within, starts).tolist()
+    (least, other), ways = (0, inside[0]), []
+    for ((aa, ab), (ba, bb)), more in zip(
+        np.moveaxis(cost[:, :, jumps], -1, 0).tolist(), inside[1:], strict=True
+    ):
+        ways.append((other + ba < least + aa, other + bb < least + ab))
+        least, other = min(least + aa, other + ba), min(least + ab, other + bb) + more
+    states = [other < least]
+    for way in reversed(ways):
+        states.append(way[states[-1]])
+    return np.repeat(states[::-1], np.diff([*starts, angle.size]))
 
 
 def wrapped_reference(records: list[Record]) -> Iterator[DataFault]:

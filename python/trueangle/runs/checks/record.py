@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...support.angles import unwrapped, wrap
 from ...support.arrays import Array
 from ...support.roles import offsets_of, unit_in_name
+from ...support.signals import FIELDS
 from ..files import read_columns
 from ..readings import FileReadings
 from ..run import CalibrationRun
@@ -92,34 +93,42 @@ class Record:
     @cached_property
     def run(self) -> CalibrationRun:
         """Its angles as a run."""
-        return CalibrationRun(self.reference, self.indicated, 360.0)
+        return CalibrationRun(self.reference, self.indicated, 360.0, roles=self.columns)
 
 
 def records_of(runs: Iterable[CalibrationRun]) -> list[Record]:
     """Records of runs that were read already, angles in degrees."""
     found = []
     for k, run in enumerate(runs):
-        scale = 360.0 / run.period
         channels = None
         if run.channels is not None:
             sine, cosine = run.signals["sine"], run.signals["cosine"]
             rows = np.arange(1, len(run) + 1)
             channels = RecordedChannels(sine, cosine, rows, run.channels.direction < 0)
+        label, signals = run.label or str(k + 1), {name: getattr(run, name) for name in FIELDS}
         found.append(
-            Record(
-                run.label or str(k + 1),
-                run.reference * scale,
-                run.indicated * scale,
-                np.arange(1, len(run) + 1),
-                run.time,
-                None if run.velocity is None else run.velocity * scale,
-                run.temperature,
-                run.torque,
-                None if run.mount is None else run.mount * scale,
-                channels=channels,
-            )
+            _record(label, run, slice(None), signals, columns=run.roles, channels=channels)
         )
     return found
+
+
+def _record(
+    label: str, of: Any, rows: Any, signals: Mapping[str, Array | None], **known: Any
+) -> Record:
+    """Some rows of a run or a table, its angles and signals in degrees."""
+    scale = 360.0 / of.period
+    return Record(
+        label,
+        of.reference[rows] * scale,
+        of.indicated[rows] * scale,
+        np.arange(1, of.reference.size + 1)[rows],
+        **{
+            name: values[rows] * (scale if name in ("velocity", "mount") else 1.0)
+            for name, values in signals.items()
+            if name in FIELDS and values is not None
+        },
+        **known,
+    )
 
 
 def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
@@ -132,11 +141,6 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
     """
     found: list[Record] = []
     for table in read_columns(data, checked_reading_options(reading)):
-        scale = 360.0 / table.period
-        columns = {
-            role: (f"-{c.name}" if c.is_reversed else c.name, c.unit)
-            for role, c in table.table.roles.items()
-        }
         channels = None
         if table.channels is not None:
             sine, cosine = table.signals["sine"], table.signals["cosine"]
@@ -144,23 +148,16 @@ def read_records(data: Any, reading: Mapping[str, Any]) -> list[Record]:
             falls = table.channels.direction < 0
             channels = RecordedChannels(sine[known], cosine[known], known + 1, falls)
         for i, (labels, rows) in enumerate(table.groups):
-            signals = {name: values[rows] for name, values in table.signals.items()}
-            velocity, mount = signals.get("velocity"), signals.get("mount")
             found.append(
-                Record(
+                _record(
                     labels.run or str(len(found) + 1),
-                    table.reference[rows] * scale,
-                    table.indicated[rows] * scale,
-                    rows + 1,
-                    signals.get("time"),
-                    None if velocity is None else velocity * scale,
-                    signals.get("temperature"),
-                    signals.get("torque"),
-                    None if mount is None else mount * scale,
-                    columns,
-                    _deviations(table.table),
-                    _clocks(table.table),
-                    channels if i == 0 else None,
+                    table,
+                    rows,
+                    table.signals,
+                    columns=table.table.named,
+                    deviations=_deviations(table.table),
+                    clocks=_clocks(table.table),
+                    channels=channels if i == 0 else None,
                 )
             )
     return found

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -13,8 +14,9 @@ from ...support.angles import wrap
 from ...support.arrays import Array, distinct, median, quantile
 from ...support.display_units import brief_number
 from ..outliers import WILD, robust_scale, spikes
+from ..run import CalibrationRun
 from .fault import REPEATS, DataFault
-from .record import LEAST_READINGS, Record
+from .record import LEAST_READINGS, Record, records_of
 
 #: Readings on either side of a step that show whether it stays.
 _BESIDE: Final = 7
@@ -23,10 +25,10 @@ _BESIDE: Final = 7
 _FEW: Final = 4
 
 #: Steps of the reference, in usual ones, up to which a change of the error is no gap.
-_USUAL: Final = 3.0
+USUAL: Final = 3.0
 
 #: Jumps up to this are rounding of angles, degrees.
-_ROUNDING: Final = 1e-9
+ROUNDING: Final = 1e-9
 
 #: Of more readings every second, third ... is looked at.
 _LOOKED_AT: Final = 8192
@@ -70,6 +72,24 @@ def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
             )
 
 
+def parted(runs: Sequence[CalibrationRun]) -> tuple[list[CalibrationRun], list[str]]:
+    """Runs in parts before and after every loss of counts, and each loss in a sentence.
+
+    From there on all is off by one more unknown, as from one run to the next.
+    """
+    parts, told = [], []
+    for run, record in zip(runs, records_of(runs), strict=True):
+        faults = list(missed_counts([record]))
+        told += [f"{f.says}; the readings from there have a zero of their own" for f in faults]
+        starts = [fault.rows[0] - 1 for fault in faults]
+        parts.append(run.part(slice(starts[0])) if faults else run)
+        for a, b in pairwise([*starts, len(run)]):
+            parts.append(
+                run.part(slice(a, b), label=f"{record.label} from row {a + 1}", left_out=0)
+            )
+    return parts, told
+
+
 def _largest(error: Array, size: float) -> int:
     """First reading after the largest change of an error in the sense of ``size``."""
     return 1 + int(np.argmax(wrap(np.diff(error), 360.0) * np.sign(size)))
@@ -88,7 +108,7 @@ def _jumps(reference: Array, indicated: Array, error: Array) -> Iterator[tuple[i
     usual = median(np.lib.stride_tricks.sliding_window_view(around, _BESIDE), axis=1)
     off = changes - usual
     size = np.abs(off)
-    limit = max(WILD * max(robust_scale(off), float(quantile(size, 0.8))), _ROUNDING)
+    limit = max(WILD * max(robust_scale(off), float(quantile(size, 0.8))), ROUNDING)
     # What rounds jumps from count to count: a few jumps are larger than all others.
     limit = max(limit, 2.0 * float(np.partition(size, -_FEW - 1)[-_FEW - 1]))
     far = np.flatnonzero(size > limit)
@@ -96,10 +116,10 @@ def _jumps(reference: Array, indicated: Array, error: Array) -> Iterator[tuple[i
     for k in far[(far >= _BESIDE) & (far < size.size - _BESIDE)].tolist():
         before, after = slice(k - _BESIDE, k), slice(k + 1, k + 1 + _BESIDE)
         way = steps[before.start : after.stop] * np.sign(steps[before].sum())
-        onward = way.min() >= 0.0 and way[-_BESIDE:].any() and way[_BESIDE] <= _USUAL * pace
+        onward = way.min() >= 0.0 and way[-_BESIDE:].any() and way[_BESIDE] <= USUAL * pace
         ends = np.stack([reference[k : k + 2], indicated[k : k + 2]])
         over = np.ptp(np.floor(ends / 360.0), axis=1) > 0.0
-        at_turn = np.abs(wrap(ends, 360.0)).min(axis=1) <= max(_USUAL * way[_BESIDE], limit)
+        at_turn = np.abs(wrap(ends, 360.0)).min(axis=1) <= max(USUAL * way[_BESIDE], limit)
         alone = max(size[before].max(), size[after].max()) <= 0.5 * size[k]
         rise = float(median(error[after]) - median(error[k - _BESIDE + 1 : k + 1]))
         stays = 0.5 < wrap(rise - _BESIDE * usual[k], 360.0) / off[k] < 1.5
@@ -130,7 +150,7 @@ def _lost(
     size, travel = jumps[row]
     then = ends[nearest]
     gone = lost[new] - lost[then]
-    near = np.abs(ring[nearest] - place[new]) <= _USUAL * _pace(np.diff(reference))
+    near = np.abs(ring[nearest] - place[new]) <= USUAL * _pace(np.diff(reference))
     # Jumps that are reversed at the same place do not count.
     again = near & (np.abs(gone) > 0.5 * abs(size))
     if again.sum() < _BESIDE and abs(size) <= travel:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,6 @@ from ...support.angles import ARCSEC_PER_TURN
 from ...support.arrays import Array
 from ...support.layout import counted, wrapped_lines
 from ...support.plainresult import ShownResult, plain_fields
-from ...support.signals import FIELDS
 from ..files import runs_of
 from ..run import CalibrationRun
 from .clocks import estimated_clocks
@@ -311,19 +310,7 @@ def _lowered(run: CalibrationRun, expected: _Expected) -> CalibrationRun:
     """The run's readings that the log covers, less the error there."""
     rows = expected.known
     lowered = run.indicated[rows] - expected.error[rows] * (run.period / 360.0)
-    fields = {
-        name: values[rows]
-        for name in (*FIELDS, "weights")
-        if (values := getattr(run, name)) is not None
-    }
-    return replace(
-        run,
-        reference=run.reference[rows],
-        indicated=lowered,
-        signals={name: values[rows] for name, values in run.signals.items()},
-        columns={name: np.asarray(values)[rows] for name, values in run.columns.items()},
-        **fields,
-    )
+    return run.part(rows, indicated=lowered)
 
 
 def _expected(run: CalibrationRun, log: CalibrationRun, by: str | None, source: str) -> _Expected:

@@ -90,21 +90,33 @@ def test_signs_and_ratios_that_are_wrong(slope: float, kind: str | None) -> None
         assert f"{slope:.6g} times" in found[0].says
 
 
-def test_radians_among_degrees() -> None:
-    other = record(np.radians(SWEEP), label="r")
+@pytest.mark.parametrize(("unit", "size"), [("radians", np.pi / 180.0), ("turns", 1.0 / 360.0)])
+def test_runs_and_rows_in_another_unit(unit: str, size: float) -> None:
+    other = record(size * SWEEP, label="r")
     (found,) = mixed_units([record(SWEEP), other, record(SWEEP, label="3")])
     assert (found.fault, found.runs, found.rows) == ("mixed_units", ("r",), ())
+    assert f"looks like {unit} among degrees" in found.says
     for factor, told in ((1.3, True), (1.4, False), (0.7, True), (0.6, False)):
-        scaled = record(np.radians(SWEEP) * factor, label="r")
+        scaled = record(size * SWEEP * factor, label="r")
         assert bool(list(mixed_units([record(SWEEP), scaled]))) == told
     short = SWEEP[:30] * 0.1
-    assert not list(mixed_units([record(short), record(np.radians(short), label="r")]))
-    part = SWEEP.copy()
-    part[80:120] = np.radians(part[80:120])
-    (found,) = mixed_units([record(part)])
-    assert found.rows == tuple(range(11 + 80, 11 + 120))
-    assert "from about row 91" in found.says
-    assert not list(mixed_units([record(part[:31])]))
+    assert not list(mixed_units([record(short), record(size * short, label="r")]))
+    rng = np.random.default_rng(71_300)
+    noise = [rng.normal(0.0, 0.01, SWEEP.size) for _ in range(2)]
+    # What moves little, with the noise of the others, is no other unit.
+    little = record(size * SWEEP, size * SWEEP + noise[0], "little")
+    assert not list(mixed_units([record(SWEEP, SWEEP + noise[1]), little]))
+    for rows in (np.arange(80, 120), np.arange(40, 160), rng.choice(np.arange(4, 160), 12, False)):
+        for column in ("reference", "indicated"):
+            part = {"reference": SWEEP, "indicated": SWEEP + noise[0]}
+            part[column] = part[column].copy()
+            part[column][rows] *= size
+            (found,) = mixed_units([record(**part)])
+            assert found.rows == tuple(11 + np.sort(rows))
+            assert f"the {column} angle of run 1 looks like {unit} among degrees in" in found.says
+            with pytest.raises(ArgumentError, match=f"{column} angle of run 1 looks like {unit}"):
+                ta.fit(ta.CalibrationRun(**part, period=360.0))
+    assert not list(mixed_units([record(**{k: v[100:131] for k, v in part.items()})]))
     assert not list(mixed_units([record(np.zeros(64))]))
 
 

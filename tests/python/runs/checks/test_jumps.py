@@ -47,20 +47,17 @@ def test_what_takes_several_readings_is_told_within_them():
     assert found >= 12
 
 
-def test_a_fit_and_a_check_tell_it_and_parts_apart_fit_well():
-    at, run = stepper(np.random.default_rng([SEED, 2]), 2.0)
-    says = f"jumps by -7.2 deg at row {at + 1} and stays there: steps or counts were lost"
+@pytest.mark.parametrize(("turns", "step", "lost"), [(2.0, 1.8, 7.2), (1.0, 0.9, -3.6)])
+def test_a_check_tells_it_and_a_fit_gives_the_readings_from_there_a_zero(turns, step, lost):
+    at, run = stepper(np.random.default_rng([SEED, 2]), turns, step, lost)
+    says = f" deg at row {at + 1} and stays there: steps or counts were lost"
     assert says in ta.check(run).data_faults[0].says
     (note,) = [note for note in ta.fit(run, orders=[1, 2]).notes if "jumps" in note]
-    assert says in note
-    assert note.endswith("; give the rows from there another run label, or measure again.")
-    parts = [
-        ta.CalibrationRun(run.reference[rows], run.indicated[rows], 360.0, label=label)
-        for label, rows in (("before", slice(at)), ("after", slice(at, None)))
-    ]
-    fit = ta.fit(parts, orders=[1, 50])
+    assert note.endswith(f"{says}; give the rows from there another run label, or measure again.")
+    fit = ta.fit(run)
+    assert fit.notes[0].endswith(f"{says}; the readings from there have a zero of their own.")
+    assert fit.orders == ta.select_orders(run).orders == (1, 50)
     assert fit.amplitudes == pytest.approx([0.4, 0.1], abs=0.02)
-    assert not [note for note in fit.notes if "jumps" in note]
 
 
 def sound(rng):
