@@ -131,7 +131,7 @@ def silence_output() -> None:
 
 #: What is emphasised in a text: bold, red, yellow, green. Colours add nothing to the words.
 _RULES: Final = (
-    (r"\berror:|\bNOT UNDERSTOOD\b|\bNO ORDER RETAINED\b|\bDISAGREE\b", "1;31"),
+    (r"\berror:|\bNOT UNDERSTOOD\b|\bNO ORDER RETAINED\b|\bNOT DETERMINED\b|\bDISAGREE\b", "1;31"),
     (r"\bwarning:|^ *! |\bNOT CONFIRMED\b|^Not confirmed:", "33"),
     (r"^Confirmed:|\bretained$|^Nothing beyond the simulation:|^No fault found", "32"),
     (r"^\d+\. .*|^[A-Z][^\n]*:$|did you mean [^\n?]+\?", "1"),

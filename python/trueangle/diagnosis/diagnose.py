@@ -283,10 +283,10 @@ def _used(runs: list[CalibrationRun]) -> int:
 
 def _incomplete(at: Deadline, gain: bool) -> str:
     """That the account was ended, while what, and what that means."""
-    means = ", few were tested on held-out data" * gain
+    means = ", few of it tested on held-out data" * gain
     return (
-        f"INCOMPLETE: {at.why} while {at.cut}. Below is what was found by then{means}: with more "
-        "time names and sizes may change"
+        f"INCOMPLETE: {at.why} while {at.cut}. Below is what was found by then{means}; names and "
+        "sizes may change"
     )
 
 

@@ -44,13 +44,13 @@ _SIZED: dict[str, tuple[float, str]] = {
 
 #: Place or object of a finding, by its parameters.
 _PLACES = {
-    "order": "order {}",
-    "carrier": "of order {}",
-    "frequency_hz": "of {} Hz",
-    "place_deg": "at {} deg",
-    "cosine": "over the turn",
-    "per_deg_s": "with the speed",
-    "per_Nm": "with the load",
+    "order": ", order {}",
+    "carrier": " of order {}",
+    "frequency_hz": " of {} Hz",
+    "place_deg": " at {} deg",
+    "cosine": " over the turn",
+    "per_deg_s": " with the speed",
+    "per_Nm": " with the load",
 }
 
 
@@ -230,12 +230,12 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
     known = {name: quantity.value for name, quantity in finding.parameters.items()}
     shaft = known.get("shaft")
     name = title_of(finding.cause)
-    name += f" of the {shaft.replace('_', ' ')}," if shaft else ""
+    name += f" of the {shaft.replace('_', ' ')}" if shaft else ""
     for parameter, words in _PLACES.items():
         if isinstance(known.get(parameter), int | float):
             std = finding.parameters[parameter].std
             at = _number(known[parameter], std, _PLAIN) if std else f"{known[parameter]:.5g}"
-            name += f" {words.format(at)}"
+            name += words.format(at)
     for parameter, (factor, word) in _SIZED.items():
         found = known.get(parameter)
         numbers = found if isinstance(found, list) else [found]
@@ -244,13 +244,15 @@ def brief_finding(finding: Finding, unit: ErrorUnit) -> str:
             continue
         std = finding.parameters[parameter].std
         stds = std if isinstance(std, list) else [std] * len(sizes)
-        if parameter == "half_width_arcsec":  # its sign is that of the direction
-            size = abs(sizes[0])
-            full = unit.number(2.0 * size, 2.0 * std if std else None)
-            return f"{name} (half width {unit.text(size, std)}, full {full})"
+        late = "joint" if sizes[0] > 0.0 else "reference"
+        if parameter in ("half_width_arcsec", "delay_s"):  # whose sign is a direction
+            sizes = [abs(size) for size in sizes]
         shown = [*map((ErrorUnit(word, factor) if word else unit).text, sizes[:3], stds)]
+        if parameter == "half_width_arcsec":
+            full = unit.number(2.0 * sizes[0], 2.0 * std if std else None)
+            shown = [f"half width {shown[0]}", f"full {full}"]
         if parameter == "delay_s":
-            shown.append(f"the {'joint' if sizes[0] > 0.0 else 'reference'} is late")
+            shown.append(f"the {late} is late")
         return f"{name} ({', '.join(shown)}{' ...' * (len(sizes) > 3)})"
     if finding.gain is None:
         return name

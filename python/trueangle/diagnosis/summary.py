@@ -143,13 +143,15 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     named_factors = {factor.factor for factor in diagnosis.factors if factor.named_by}
     for factor in diagnosis.factors:
         beyond = not factor.named_by and factor.factor in named_factors
-        yield f"{'Beyond that, follows' if beyond else 'Follows'} {factor.sentence(unit)}.", 2, 0
+        also = "Beyond that, it" if beyond else "The error"
+        yield f"{also} follows {factor.sentence(unit)}.", 2, 0
     wrong = "; ".join(f"{b.what} {b.verdict.replace('_', ' ')}" for b in diagnosis.wrong[:4])
     if wrong:
         yield f"Wrong in the simulation: {wrong}.", 2, 0
-    for spot in diagnosis.in_question:
+    for spot in {_seen(spot, unit): spot for spot in reversed(diagnosis.in_question)}.values():
         detected = "not distinguished" if len(spot.causes) > 1 else "not confirmed"
-        yield f"Detected, {detected}: {_seen(spot, unit)}.", 2, 0
+        why = re.split(r"; |\. | \(", spot.because)[0]
+        yield f"Detected, {detected}: {_seen(spot, unit)}; {why}.", 2, 0
 
 
 def _by_cause(named: Iterable[str]) -> str:
@@ -213,8 +215,8 @@ def _ambiguity_entries(diagnosis: DiagnosisData, verbose: bool, unit: ErrorUnit)
     rest = dict.fromkeys(cause for spot in spots if spot not in shown for cause in spot.causes)
     names = ", ".join(cause for cause in rest if cause not in named)
     if names:
-        again = " either" if shown else ""
-        yield f"Not detectable in these runs{again}: {names} (why: `verbose=True`).", 2, 0
+        also = " also" if shown else ""
+        yield f"These runs{also} cannot show, or not name: {names} (why: `verbose=True`).", 2, 0
 
 
 def _head(spot: Ambiguity) -> str:

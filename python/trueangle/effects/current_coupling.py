@@ -105,7 +105,7 @@ class CurrentCoupling(FactorEffect):
         if share_left(regression, current, torque) < OWN_OF_VELOCITY:
             yield cls.blind(
                 "the current follows the torque: the field of one and the twist of the other "
-                "are the same regressor",
+                "give the same readings",
                 TorsionalCompliance,
             )
 

@@ -143,7 +143,7 @@ def _hidden_by(regression: Regression, joint: str) -> _Hidden | None:
     if share_left(regression, own[:, None], motion) < OWN_POWER:
         return (
             f"joint {joint} moves in proportion to this joint: a share of its angle and a ramp in "
-            "this one's own are the same regressor",
+            "this one's own give the same readings",
             ScaleError,
         )
     others = {j: _about_means(signals, a) for j, a in signals.coupled.items() if j != joint}

@@ -95,7 +95,7 @@ class Latency(Effect):
             and share_left(regression, velocity, signals.direction[:, None]) < OWN_OF_VELOCITY
         ):
             yield cls.blind(
-                "one speed: the sign of velocity and velocity itself are the same regressor",
+                "one speed: a delay and play give the same readings",
                 Backlash,
                 first=False,
             )

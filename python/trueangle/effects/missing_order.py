@@ -171,13 +171,14 @@ class MissingOrder(Effect):
         for spot in spots:
             # The lowest order is meant, but where one that the gear has looks the same.
             if spot.factor == "grid" and grid is not None:
-                alike = any(m != order and grid.folded(m) == grid.folded(order) for m in gear)
+                alike = [m for m in gear if m != order and grid.folded(m) == grid.folded(order)]
                 if order == grid.folded(order) and not alike:
                     continue
-                aliases = ", ".join(f"{m:g}" for m in grid.aliases(order, 3))
+                both = [*dict.fromkeys([*alike, *grid.aliases(order, 3)])]
+                aliases = ", ".join(f"{m:g}" for m in both[:3])
                 because = (
-                    f"order {order:g} and {aliases} are the same numbers at these "
-                    f"{grid.positions} positions; {spot.because}"
+                    f"order {order:g} looks like {aliases} at these {grid.positions} positions; "
+                    f"{spot.because}"
                 )
                 return replace(spot, because=because)
         if order == 1.0 and len(regression.belief.joint.shafts) > 1:

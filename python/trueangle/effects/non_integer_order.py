@@ -73,6 +73,7 @@ class NonIntegerOrder(Effect):
     amplitude_arcsec: float
 
     kind: ClassVar[str] = "non_integer_order"
+    title: ClassVar[str] = "line of no shaft"
     size_name: ClassVar[str] = "amplitude_arcsec"
     sentence: ClassVar[str] = (
         "A bearing's cage or balls roll with slip: a line at an order that is not whole, with "

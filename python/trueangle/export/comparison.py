@@ -271,10 +271,18 @@ class Comparison(PlainResult):
         if self.verdict == "same":
             lines = [f"No significant difference: {size}.", f"Use {'BA'[a <= b]}: {known}."]
         else:
-            lines = [f"Changed: the models differ by {size}: {known}."]
+            lines = [f"Changed{self._moved(unit)}: the models differ by {size}: {known}."]
             lines.append("Which is right now: trueangle watch READINGS -m A, then B.")
         p = "< 1e-12" if self.p < 1e-12 else f"= {self.p:.2g}"
         return [*lines, f"By noise alone: p {p}; below {self.false_alarms:g} is a change."]
+
+    def _moved(self, unit: ErrorUnit) -> str:
+        """The orders that differ by more than three standard errors, the clearest first."""
+        sizes = {row["order"]: (row["amplitude_arcsec"], row["std_arcsec"]) for row in self.orders}
+        clear = {k: size / std for k, (size, std) in sizes.items() if size and std}
+        first = sorted((k for k, times in clear.items() if times > 3.0), key=lambda k: -clear[k])
+        each = ", ".join(f"order {k:g} by {unit.text(*sizes[k])}" for k in first[:3])
+        return f" ({each})" * bool(each)
 
     def _arithmetic(self, unit: ErrorUnit) -> list[str]:
         if self.table_max_abs_arcsec is None or self.table_rms_arcsec is None:

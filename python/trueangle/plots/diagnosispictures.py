@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..effects.effect import title_of
 from ..errors import ArgumentError
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit
 from ..support.layout import order_ranges
@@ -180,7 +181,8 @@ def factor_title(factor: Factor) -> str:
     what = what.replace("_", " ")
     if factor.orders:
         what += f" (order{'s' * (len(factor.orders) > 1)} {order_ranges(factor.orders)})"
-    return f"{what}: {', '.join(factor.named_by).replace('_', ' ') or 'cause not determined'}"
+    names = ", ".join(map(title_of, factor.named_by)).replace("_", " ")
+    return f"{what}: {names or 'cause not determined'}"
 
 
 def draw_factor(ax: Axes, factor: Factor, unit: ErrorUnit) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ..fitting.orders.result import OrderSelection
-from ..fitting.orders.table import OrderRow
+from ..fitting.orders.table import IN_MODEL, OrderRow
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.display_units import ErrorUnit, significant_digits
 from .curves import CONFIDENCE
@@ -57,7 +57,7 @@ def order_lines(result: OrderSelection | FitResult) -> list[OrderLine]:
                 float(row.order),
                 factor * row.amplitude,
                 limit=float(limit),
-                kept=row.retained,
+                kept=row.verdict in IN_MODEL,
                 row=row,
             )
             for row, limit in zip(selection.table, limits, strict=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from ..effects.effect import title_of
 from ..runs.run import CalibrationRun
 from ..support.angles import ARCSEC_PER_TURN, circular_mean, wrap
 from ..support.display_units import ErrorUnit
@@ -113,7 +114,7 @@ def finding_names(diagnosis: Diagnosis) -> list[str]:
     >>> believed = replace(demo_simulation(), harmonics=())
     >>> runs = ta.simulate(demo_simulation(), seed=0)
     >>> finding_names(ta.diagnose(runs, believed))[:2]
-    ['missing order: wave generator 2', 'missing order: motor 2']
+    ['periodic error: wave generator 2', 'periodic error: motor 2']
     """
     names = [_name(finding) for finding in diagnosis.findings]
     seen: Counter[str] = Counter()
@@ -125,7 +126,7 @@ def finding_names(diagnosis: Diagnosis) -> list[str]:
 
 
 def _name(finding: Finding) -> str:
-    cause = finding.cause.replace("_", " ")
+    cause = title_of(finding.cause).replace("_", " ")
     values = {name: quantity.value for name, quantity in finding.parameters.items()}
     shaft, order = values.get("shaft"), values.get("order")
     if isinstance(shaft, str):

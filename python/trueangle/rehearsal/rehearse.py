@@ -221,9 +221,8 @@ def _notes(searches: Collection[SizeSearch], at: Deadline) -> list[str]:
     notes = []
     left = [search.cause for search in searches if not search.done]
     if left:
-        why = "it was interrupted" if at.stopped else f"the {at.within:g} s given were up"
         none = [search.cause for search in searches if not search.done and not search.answers]
-        text = f"INCOMPLETE: {why} before all trials of {counted(left, 'cause')} were made"
+        text = f"INCOMPLETE: {at.why} before all trials of {counted(left, 'cause')} were made"
         notes.append(text + (f"; not tried at all: {', '.join(none)}" if none else ""))
     failed = [o for search in searches for _, o in search.answers if o.verdict == FAILED]
     if failed:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from ..effects.effect import title_of
 from ..plots.orderlines import likely_aliases
 from ..plots.simulatedcurves import finding_names
 from ..runs.run import CalibrationRun
@@ -76,7 +77,7 @@ def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
         # The size of each uncertain cause, as findings are listed.
         spot["options"] = [
             {
-                "name": cause.replace("_", " "),
+                "name": title_of(cause).replace("_", " "),
                 "parameters": [
                     _parameter(i, parameter, entry, named=False)
                     for i, (parameter, entry) in enumerate(
@@ -94,6 +95,7 @@ def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _parameter(index: int, name: str, entry: dict[str, Any], named: bool) -> dict[str, Any]:
     value, std = entry["value"], entry["std"]
+    value = abs(value) if name == "half_width_arcsec" else value  # its sign is a direction
     number = isinstance(value, int | float) and not isinstance(value, bool)
     unit = next((u for u in _UNITS if name.endswith(f"_{u}")), "")
     # The amplitudes of several lines, whose name states no unit.
@@ -141,7 +143,7 @@ def unknown_content(
         return _folded(selection) + _conditions(runs) + _held(runs)
     found = [
         _entry(
-            " or ".join(cause.replace("_", " ") for cause in entry["causes"])
+            " or ".join(title_of(cause).replace("_", " ") for cause in entry["causes"])
             + (" (something is detected)" if entry["supported"] else ""),
             "; ".join([entry["because"], *_estimates(entry)]),
             entry["measure"],
@@ -154,7 +156,7 @@ def unknown_content(
 def _estimates(entry: dict[str, Any]) -> list[str]:
     """The size of each uncertain cause, where something is found."""
     return [
-        f"if {cause.replace('_', ' ')}: "
+        f"if {title_of(cause).replace('_', ' ')}: "
         + ", ".join(
             _estimate(name, q["value"], q["std"])
             for name, q in parameters.items()
@@ -168,7 +170,7 @@ def _estimate(name: str, value: float, std: float) -> str:
     """Sizes with their unit behind each number, as `ErrorUnit.spoken` finds them."""
     stem = name.removesuffix("_arcsec")
     unit = "" if stem == name and name != "amplitudes" else " arcsec"
-    shown, spread = ErrorUnit("", 1.0).pair(value, std)
+    shown, spread = ErrorUnit("", 1.0).pair(abs(value) if stem == "half_width" else value, std)
     return f"{stem.replace('_', ' ')} {shown}{unit} +- {spread}{unit}"
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import NoModelError, TrueAngleError
 from ..fitting.heldout import HeldOut, hold_out
+from ..fitting.orders.table import IN_MODEL
 from ..joint.joint import DeclaredShaft, Joint
 from ..model.model import HarmonicModel
 from ..plots.curves import fitted_degrees
@@ -111,7 +112,7 @@ def order_content(selection: OrderSelection, name: LineNames) -> dict[str, Any]:
             {
                 "line": name(float(row.order)),
                 "order": float(row.order),
-                "retained": row.retained,
+                "retained": row.verdict in IN_MODEL,
                 "verdict": row.verdict,
                 "amplitude_arcsec": finite_or_none(factor * row.amplitude),
                 "std_arcsec": finite_or_none(factor * row.standard_error),

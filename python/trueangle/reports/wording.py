@@ -75,7 +75,7 @@ def as_sentence(text: str) -> str:
     >>> as_sentence("verified at 36 positions")
     'Verified at 36 positions.'
     """
-    text = text.strip()
+    text = text.strip().replace("+-", "±")
     return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"
 
 

@@ -90,10 +90,15 @@ class HeldOutPattern:
     p: float
     """Probability of so great a difference between the two patterns by noise alone."""
 
+    @property
+    def agrees(self) -> bool:
+        """Whether noise alone makes this difference in one case of a thousand."""
+        return self.p > 0.001
+
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         rms = "rms_before_arcsec=rms_before rms_after_arcsec=rms_after"
-        return plain_fields(self, f"fitted_on judged_on {rms} p") | {"agrees": self.p > 0.001}
+        return plain_fields(self, f"fitted_on judged_on {rms} p agrees")
 
 
 @dataclass(frozen=True)
@@ -235,7 +240,9 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
     rms = math.sqrt(0.5) * math.hypot(*(o.amplitude for o in result.orders))
     answer = "" if result.channels else "NO CORRECTION: no order is the encoder's alone; "
     answer = f"Encoder error {unit.text(rms)} rms; " if result.orders else answer
+    failed = [test for test in result.held_out.values() if not test.agrees]
     lines = [
+        *(f"NOT CONFIRMED: {t.judged_on} disagrees with {t.fitted_on}." for t in failed[:1]),
         f"{answer}calibrated without a reference ({result.method}): {result.readings} readings, "
         f"{result.turns:.1f} turns, noise {unit.text(result.noise_arcsec)}",
     ]
@@ -255,7 +262,7 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
         lines += ["", "held out"]
         for test in result.held_out.values():
             verb = "predict" if test.fitted_on.endswith("s") else "predicts"
-            agree = "agree" if test.p > 0.001 else "DISAGREE"
+            agree = "agree" if test.agrees else "DISAGREE"
             lines.append(
                 f"  {test.fitted_on} {verb} {test.judged_on}: {unit.number(test.rms_before)} -> "
                 f"{unit.number(test.rms_after)} {unit.name} rms, they {agree} (p = {test.p:.2g})"
@@ -289,4 +296,5 @@ def _table(orders: tuple[OrderEstimate, ...], unit: ErrorUnit) -> list[str]:
             f"{o.order:8g} {size:>17} {std:>7} {o.phase_deg:10.2f} {o.retained:9.3f} "
             f"{o.std_factor:7.2f}" + (f"  {o.of}" if names else "")
         )
-    return [*lines, "retained: share distinct from the motion; factor: std over one with reference"]
+    lines.append("retained: share that the motion does not hide; factor: standard error over that")
+    return [*lines, "of readings with a reference"]

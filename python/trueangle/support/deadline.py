@@ -157,7 +157,7 @@ class Deadline:
         if self.stopped:
             return "it was interrupted"
         if self.within is not None:
-            return f"the {self.within:g} s given were up"
+            return f"the time given, {self.within:g} s, was over"
         return "the usual limit of work was reached"
 
     @contextlib.contextmanager

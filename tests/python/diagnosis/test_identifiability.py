@@ -286,6 +286,6 @@ def test_a_line_is_one_whatever_made_it():
 def test_a_line_behind_which_the_gear_may_stand_is_doubted():
     grid = regression(runs(samples=36, spacing="uniform", turns=1.0, reversals=(), start_deg=0.0))
     doubt = ambiguity_of_cause(line(grid, 8.0), grid, blind_spots(grid))
-    assert "order 8 and 28, 44, 64" in doubt.because
+    assert "order 8 looks like 100, 28, 44 at" in doubt.because
     # None of the gear's orders looks like order 3 at these positions.
     assert origins(grid, 3.0) == []

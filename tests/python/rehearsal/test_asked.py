@@ -206,8 +206,8 @@ def test_a_rehearsal_is_whole_where_all_of_its_causes_are(
     assert (found["latency"].trials, found["backlash"].trials) == (3, 0)
     assert not found.complete
     assert found.notes == [
-        "INCOMPLETE: the 70 s given were up before all trials of 1 cause were made; not tried at "
-        "all: backlash",
+        "INCOMPLETE: the time given, 70 s, was over before all trials of 1 cause were made; "
+        "not tried at all: backlash",
         FORMS,
     ]
 

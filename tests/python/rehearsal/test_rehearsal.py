@@ -192,7 +192,7 @@ def test_a_time_that_is_up_gives_the_account_so_far():
     result = rehearse(SIM, causes=["backlash", "latency"], seeds=500, within=3.0, workers=1)
     assert time.monotonic() - before < 3.0 + SOON
     assert not result.complete
-    assert result.notes[0].startswith("INCOMPLETE: the 3 s given were up")
+    assert result.notes[0].startswith("INCOMPLETE: the time given, 3 s, was over")
     assert result.summary().startswith("INCOMPLETE")
     # Rounds are whole: as many trials as were counted.
     for cause in result.causes:

@@ -99,10 +99,10 @@ def test_one_of_each_is_told_in_the_singular() -> None:
     assert "hidden 1 time, up to" in text
     assert found._brief() == "0 of 1 cause named, 1 trial"
     failed = [(0, TrialOutcome(FAILED, failure="KeyError: x"))]
-    at: Any = SimpleNamespace(stopped=False, within=2.0)
+    at: Any = SimpleNamespace(why="the time given, 2 s, was over")
     search = SizeSearch("a", None, None, 2, answers=failed)
     assert _notes([search], at) == [
-        "INCOMPLETE: the 2 s given were up before all trials of 1 cause were made",
+        "INCOMPLETE: the time given, 2 s, was over before all trials of 1 cause were made",
         "1 diagnosis failed (KeyError: x) and counts as not named: this is a defect of trueangle",
     ]
 
@@ -356,7 +356,8 @@ def test_further_runs_are_for_causes_of_which_one_was_not_named() -> None:
 @pytest.mark.parametrize("stopped", [False, True])
 def test_what_is_incomplete_is_what_has_trials_left(stopped) -> None:
     """Of causes that are done, of some trials, of none, and of none to make; and of failures."""
-    at = SimpleNamespace(stopped=stopped, within=7.5)
+    why = "it was interrupted" if stopped else "the time given, 7.5 s, was over"
+    at = SimpleNamespace(why=why)
     kinds = {"done": (True, 3), "some": (False, 2), "none": (False, 0), "blind": (True, 0)}
     for count in range(5):
         for chosen in itertools.combinations(kinds, count):
@@ -369,7 +370,6 @@ def test_what_is_incomplete_is_what_has_trials_left(stopped) -> None:
             left = [name for name in chosen if name in ("some", "none")]
             assert len(notes) == bool(left)
             if left:
-                why = "it was interrupted" if stopped else "the 7.5 s given were up"
                 wanted = (
                     f"INCOMPLETE: {why} before all trials of {in_words(left, 'cause')} were made"
                 )

@@ -103,7 +103,7 @@ def test_findings_of_one_cause_have_names_of_their_own(large) -> None:
     names = [finding["name"] for finding in findings]
     assert sum(finding["cause"] == "missing_order" for finding in findings) > 1
     assert len(set(names)) == len(names)
-    assert "missing order: stepper 1" in names
+    assert "periodic error: stepper 1" in names
     (chart,) = large.figures["error-left"]["charts"]
     named = [text for _, text in chart["y"]["ticks"]]
     assert len(set(named)) == len(named) > 2

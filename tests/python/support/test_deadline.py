@@ -126,7 +126,8 @@ def test_wherever_it_is_ended_the_account_says_so_and_confirms_nothing_unmeasure
             assert told["notes"] == []
             continue
         assert told["notes"][0].startswith("INCOMPLETE: ")
-        assert result.summary().startswith(f"INCOMPLETE: the {within} s given were up while ")
+        over = f"the time given, {within} s, was over"
+        assert result.summary().startswith(f"INCOMPLETE: {over} while ")
         assert not result.is_enough
         for finding in result.findings:
             named.add((finding.cause, finding.status))
@@ -316,7 +317,7 @@ def test_within_of_the_command_line(files, capsys, monkeypatch):
     monkeypatch.chdir(files)
     assert main(["diagnose", "r.csv", "--simulation", "believed.toml", "--within", "200ms"]) == 0
     shown = capsys.readouterr()
-    assert shown.out.startswith("INCOMPLETE: the 0.2 s given were up")
+    assert shown.out.startswith("INCOMPLETE: the time given, 0.2 s, was over")
     assert shown.err == ""
 
 

@@ -142,7 +142,7 @@ class Factor(PlainResult):
         if self.events:
             shown = " and ".join(f"run {run + 1} at row {row + 1}" for run, row in self.events)
             text += f" ({'events' if len(self.events) > 1 else 'an event'} in {shown})"
-        range_ = f"{n(self.low)} to" if self.low else "at most"
+        range_ = f"95 %: {n(self.low)} to" if self.low else "at most"
         text += f", {n(self.rms)} {unit.name} rms ({range_} {n(self.high)})"
         held = "; the extended simulation contains its curve" if self.effects else ""
         names = ", ".join(map(title_of, self.named_by))

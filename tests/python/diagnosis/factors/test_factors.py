@@ -63,7 +63,7 @@ def test_a_zero_that_follows_the_speed_is_no_new_zero_of_each_run(rng):
     truth = np.std([v / 11.0 for v in SPEEDS])
     assert speed.low < truth < speed.high
     assert speed.named_by == ()
-    assert "Follows the speed" in found.summary()
+    assert "The error follows the speed" in found.summary()
 
 
 def test_interpolation_that_follows_the_temperature_is_stated_with_its_order(rng):
