@@ -118,6 +118,12 @@ def test_phases_of_runs_and_their_mean(fit, errors_in, per):
         np.testing.assert_allclose(drawn, per * own, atol=1e-9)
         end = mean.get_ydata()[1] * np.exp(1j * mean.get_xdata()[1])
         np.testing.assert_allclose(end, per * own.mean(), atol=1e-9)
+    # Runs keep their numbers where one of two readings is left out.
+    theta = np.arange(0.0, 360.0, 5.0)
+    error = 0.1 * np.sin(np.radians(theta))
+    runs = [ta.CalibrationRun(x, x + e, 360.0) for x, e in
+            ((theta, error), (theta[:2], error[:2]), (theta, error))]  # fmt: skip
+    assert run_phases(ta.fit(runs, [1]))[0].labels == ("1", "3")
 
 
 def test_gains_end_at_both_ends_of_their_intervals():
