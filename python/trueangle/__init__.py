@@ -1,10 +1,6 @@
 """trueangle: measure, explain and correct the angle error of rotary encoders and robot joints."""
 
-from __future__ import annotations
-
-import importlib
-
-TYPE_CHECKING = False  # without typing, and without the core: Ctrl-C in here has a traceback
+TYPE_CHECKING = False  # nothing is imported, and no core: Ctrl-C in here has a traceback
 if TYPE_CHECKING:
     from typing import Any
 
@@ -112,7 +108,9 @@ _MODULES = {"errors": "errors", "plots": "plots", "terms": "model.terms"}
 __all__ = sorted([*_PUBLIC, *_MODULES])
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
+    import importlib
+
     if name in _MODULES:
         return importlib.import_module(f".{_MODULES[name]}", __name__)
     module = _PUBLIC.get(name)
