@@ -11,6 +11,8 @@ from ..errors import ArgumentError, NoOrderError, UnlikeRunsWarning
 from ..joint.shafts import limited_orders, resolve_orders
 from ..model.model import Argument
 from ..model.validity import check_invertible
+from ..runs.checks.angles import angle_ratio
+from ..runs.checks.record import records_of
 from ..runs.checks.rows import parted
 from ..runs.files import runs_of
 from ..runs.follows import check_usable
@@ -157,6 +159,7 @@ def fit(
     """
     found, lost = decoded(runs_of(runs, reading)), list[str]()
     check_usable(found)
+    _check_sign(found, gear_ratio)
     if orders is None or isinstance(orders, str):
         # What stays from one reading on is of no order; of orders that are given it is noted.
         found, lost = parted(found)
@@ -203,6 +206,19 @@ def fit(
     )
     result = replace(result, remarks=(*lost, *result.remarks)) if lost else result
     return result if result.evidence is None else of_worth(result)
+
+
+def _check_sign(runs: Sequence[CalibrationRun], gear_ratio: float | None) -> None:
+    """Raise where the motor of the readings turns as often as stated, the other way."""
+    for run in runs if gear_ratio else ():
+        motor = run.signals.get("motor")
+        turns = None if motor is None else angle_ratio(records_of([replace(run, indicated=motor)]))
+        # As near as a ratio that is stated in three digits.
+        if gear_ratio and turns and abs(turns / gear_ratio + 1.0) < 0.01:
+            raise ArgumentError(
+                f"gear_ratio is {gear_ratio:g}, and the motor of the readings turns {turns:.4g} "
+                f"times per turn of the reference: give `gear_ratio={-gear_ratio:g}`"
+            )
 
 
 def fitted_to(

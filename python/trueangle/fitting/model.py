@@ -82,6 +82,11 @@ def _fit_notes(fit: FittedCoefficients) -> Iterable[str]:
         yield _undetermined(fit)
     if fit.uncertainty.note:
         yield _sentence(fit.uncertainty.note)
+    if (fit.joint[0] or 0.0) < 0.0 and not any("motor" in run.signals for run in fit.problem.runs):
+        yield (
+            "The sign of the gear ratio does not show: only orders of the wave generator depend on "
+            "it; record a column motor_deg to have it checked."
+        )
     fractional = [s.name for s in fit.problem.shafts if s.cycles_per_turn % 1.0]
     if fractional:
         yield (

@@ -239,6 +239,21 @@ def test_bad_options_are_named(options, message):
         fitted(theta, theta + error, **options)
 
 
+def test_the_sign_of_a_gear_is_that_of_the_motor_that_was_read() -> None:
+    theta = np.arange(0.0, 720.0, 0.9)
+    error = 0.1 * np.sin(np.radians(theta)) + 0.02 * np.sin(np.radians(80.0 * theta))
+    for turns, asked in ((80.0, -80.0), (-80.0, 80.0)):
+        motor = ta.CalibrationRun(
+            theta, theta + error, 360.0, signals={"motor": (turns * theta + 7.0) % 360.0}
+        )
+        with pytest.raises(ta.errors.ArgumentError, match=f"give `gear_ratio={turns:g}`"):
+            ta.fit(motor, [1], gear_ratio=asked)
+        assert not any("sign" in note for note in ta.fit(motor, [1], gear_ratio=turns).notes)
+    bare = ta.CalibrationRun(theta, theta + error, 360.0)
+    (note,) = [n for n in ta.fit(bare, [1], gear_ratio=-80.0).notes if "sign of the gear" in n]
+    assert "record a column motor_deg" in note
+
+
 def test_the_summary_tells_amplitudes_uncertainties_and_zeros():
     theta, error = readings(1, noise=0.01)
     runs = [ta.CalibrationRun(theta, theta + error + z, 360.0) for z in (0.0, 0.01)]

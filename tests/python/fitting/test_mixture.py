@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 
 import numpy as np
 import pytest
@@ -156,6 +157,13 @@ def test_one_sweep_states_what_it_took_as_drift() -> None:
     found, both = ta.fit(one), ta.fit([one, back])
     (note,) = [note for note in found.notes if note.startswith("One sweep cannot distinguish")]
     assert note.startswith(found.summary().splitlines()[1])
+    (size,) = re.findall(r": (\S+) arcsec rms was taken", note)
+    assert 0.5 < float(size) / (3600.0 * found.residual_std) < 1.0
+    # Without noise, and with printed digits alone, nothing was taken.
+    for digits in (12, 4, 3):
+        error = 0.9 * np.sin(np.radians(3.0 * theta))
+        bare = ta.CalibrationRun(theta, np.round(theta + error, digits), 360.0)
+        assert not any("One sweep" in note for note in ta.fit(bare).notes), digits
     assert not any("One sweep" in note for note in both.notes)
     with pytest.raises(ta.errors.NoOrderError, match="one sweep cannot distinguish"):
         ta.fit(rough)

@@ -353,7 +353,7 @@ class EvidenceSelection:
         if best.verdict not in ("noise", "alias"):
             return f"{beside} {verdict_reason(best.verdict)}"
         chance = f"is there with a probability of only {brief_number(100.0 * best.probability)} %"
-        why = [f"{beside} {chance}", *drift_of_a_sweep(self.runs, estimate.noise)]
+        why = [f"{beside} {chance}", *drift_of_a_sweep(self.runs, estimate)]
         few = [f"take {FEW} readings or more; {plan}"] * (self.samples < FEW)
         return "; ".join([*why, *few])
 

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from ...estimation.evidence import EvidenceEstimate
 from ...joint.gear import (
     HIGHEST_LOW_ORDER,
     explain_as_harmonic,
@@ -27,7 +28,6 @@ from ...runs.aliasing import (
 from ...runs.run import CalibrationRun, as_runs
 from ...runs.travel import is_swept_once
 from ...support.angles import arcsec
-from ...support.arrays import Array
 from ...support.display_units import brief_number, error_unit, sine_of_rms
 from .candidates import Candidates, choose_candidates
 from .result import OrderSelection
@@ -136,11 +136,20 @@ def _separating_offset(divisions: int, ratio: float | None, member: str) -> floa
     return plan.mount_offsets_deg[1]
 
 
-def drift_of_a_sweep(runs: Sequence[CalibrationRun], noise: Array) -> list[str]:
-    """What a single sweep took as drift, where it is most of the variances of the noise."""
-    drift = math.sqrt(noise[1:].sum())
-    if len(runs) > 1 or drift**2 <= noise[0] or not is_swept_once(runs[0]):
+def drift_of_a_sweep(runs: Sequence[CalibrationRun], estimate: EvidenceEstimate) -> list[str]:
+    """What a single sweep took as drift, where it is most of what the orders leave.
+
+    A millionth of the error is rounding, of which an estimate knows no more.
+    """
+    if len(runs) > 1 or not is_swept_once(runs[0]):
         return []
+    # Noise of a reading is white, or correlated over the next ones.
+    noise, error = float(estimate.noise[:2].sum()), estimate.runs[0].error
+    left = [read.error - estimate.curve(read.theta)[0] for read in estimate.runs]
+    taken = float(np.var(np.concatenate([part - part.mean() for part in left]))) - noise
+    if taken <= max(noise, 1e-12 * float(np.var(error))):
+        return []
+    drift = math.sqrt(taken)
     period = runs[0].period
     size = arcsec(drift, period)
     text = error_unit("auto", sine_of_rms(size), period).text(size)
@@ -165,7 +174,7 @@ def selection_notes(
             f"{worst:.3g} arcsec at most"
         )
     if selection.estimate is not None:
-        notes += drift_of_a_sweep(runs, selection.estimate.noise)
+        notes += drift_of_a_sweep(runs, selection.estimate)
     retained = [row for row in selection.table if row.retained]
     aliased = [row for row in retained if row.aliases]
     grid = positions.divisions is not None and len(positions.offsets) == 1
