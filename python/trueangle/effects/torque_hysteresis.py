@@ -168,7 +168,7 @@ class TorqueHysteresis(Effect):
         torque = torque_of(signals)[:, None]
         loop = cls.loop(signals, 0.2 * float(np.abs(torque).max()))[:, None]
         if not loop.any():
-            yield cls.blind("the torque turns round in no run: a loop in it is never closed")
+            yield cls.blind("no run loads and unloads the joint: no loop shows")
             return
         low = np.hstack([line_columns(signals.theta, k) for k in (1, 2, 3, 5)])
         if share_left(regression, loop, torque, signals.direction[:, None], low) < OWN_POWER:

@@ -321,5 +321,5 @@ def _rounds(
     if noise is None and standard_error is None:
         return None
     if noise is None or standard_error is None:
-        raise ArgumentError("the number of readings needs both noise and standard_error")
+        raise ArgumentError("the number of readings needs both `noise=` and `standard_error=`")
     return math.ceil(readings_needed(noise, standard_error, factor) / per_round) * per_round

@@ -305,9 +305,9 @@ class SelfPlan(PlainResult):
             factor = f"{given['worst_noise_factor']:.2f}"
             worse = f"{given['worse_by']:.2f} times the best"
             lines.append(
-                f"  the given angles       cannot see {names}; factor {factor} of the others"
+                f"  the given angles       do not show {names}; standard errors {factor}"
                 if names
-                else f"  the given angles       factor {factor}, {worse}"
+                else f"  the given angles       standard error {factor}, {worse}"
             )
         lines += [_FACTOR, *factor_table(self.noise_factors)]
         lines += [f"  note: {note}" for note in self.notes]

@@ -148,7 +148,7 @@ RULES = {
         [replace(run, gravity_Nm=0.0, torque_Nm=5.0 * (k % 3 - 1)) for k, run in enumerate(RICH)],
         {},
         ("torque_hysteresis",),
-        "turns round in no run",
+        "loads and unloads",
     ),
     "load and temperature together": (
         [

@@ -72,7 +72,8 @@ def test_of_mounts():
 def test_of_heads_and_of_a_coast():
     plan = plan_self("heads", range(1, 9), angles=[0.0, 40.0, 95.0], noise=5.0, standard_error=0.5)
     text = plan.summary()
-    given = re.search(r"the given angles +factor (\S+), (\S+) times the best", text).groups()
+    worse = r"the given angles +standard error (\S+), (\S+) times the best"
+    given = re.search(worse, text).groups()
     wanted = [plan.given["worst_noise_factor"], plan.given["worse_by"]]
     assert [float(x) for x in given] == pytest.approx(wanted, abs=CENTS)
     assert told(text, "worst order            standard error") == pytest.approx(

@@ -17,20 +17,20 @@ from ...support.plainresult import PlainResult, plain_fields
 WORDS = {
     "place": "the place",
     "direction": "the direction",
-    "direction_place": "the direction times the place",
+    "direction_place": "the place, changing with the direction",
     "reversal_time": "the time since the last reversal",
     "run_time": "the time in the run",
     "run": "the run (its zero)",
-    "run_place": "the run times the place",
+    "run_place": "the place, changing with the run",
     "speed": "the speed",
-    "speed_place": "the speed times the place",
+    "speed_place": "the place, changing with the speed",
     "load": "the load",
     "load_sign": "the sign of the load",
-    "load_place": "the load times the place",
+    "load_place": "the place, changing with the load",
     "temperature": "the temperature",
-    "temperature_place": "the temperature times the place",
+    "temperature_place": "the place, changing with the temperature",
     "current": "the current",
-    "current_place": "the current times the place",
+    "current_place": "the place, changing with the current",
     "mount_place": "the place on the reference's mount",
     "step": "the step of the sensor",
     "frequency": "a line in time",
@@ -124,10 +124,10 @@ class Factor(PlainResult):
     def sentence(self, unit: ErrorUnit) -> str:
         """The factor in words: what is followed, how much, and whether it has a name."""
         also = [WORDS[other] for other in self.not_distinguished_from]
-        times = " times the place"
-        products = [word.removesuffix(times) for word in also if word.endswith(times)]
-        text = " or ".join([WORDS[self.factor], *(w for w in also if not w.endswith(times))])
-        text += f" or the place times {', '.join(products)}" if products else ""
+        times = "the place, changing with "
+        products = [word.removeprefix(times) for word in also if word.startswith(times)]
+        text = " or ".join([WORDS[self.factor], *(w for w in also if not w.startswith(times))])
+        text += f" or {times}{', '.join(products)}" if products else ""
         if (self.factor, self.curve.unit) == ("reversal_time", "deg"):
             text = text.replace(WORDS["reversal_time"], "the travel since the last reversal")
         if self.orders:
