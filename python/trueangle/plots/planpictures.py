@@ -98,14 +98,14 @@ def plan_factors(plan: CalibrationPlan, ax: Axes | None = None) -> Axes:
     ax.axhline(1.0, color=palette.ink(ax), linewidth=1.0, linestyle="--")
     ax.set_xticks(place, [f"{m:g}" for m in orders], rotation=90 if len(orders) > 20 else 0)
     ax.set_xlabel("order / cycles per output turn")
-    ax.set_ylabel("noise factor (1 = ideal)")
+    ax.set_ylabel("standard error (1 = ideal)")
     grid(ax, "y")
     blind = [f"{orders[i]:g}" for i in place[~seen]]
     told = f"worst {float(factors[seen].max(initial=0.0)):.3g}" + (
         f"; undetermined: {', '.join(blind)}" if blind else ""
     )
-    text = f"Noise factor of {len(orders)} wanted orders: {told}."
-    return described(ax, text, "Noise factor of every wanted order")
+    text = f"Standard error of {len(orders)} wanted orders, 1 is ideal: {told}."
+    return described(ax, text, "Standard error of every wanted order")
 
 
 def detection(rehearsal: Rehearsal) -> Figure:

@@ -200,7 +200,7 @@ def test_what_an_arc_does_not_tell_is_said_before():
     assert "orders up to 1" in usual.notes[0]
     asked = ta.plan_arc(0.0, 60.0, [1, 2])
     assert "more than 1000 times" in asked.notes[0]
-    with pytest.raises(ArgumentError, match="are collinear over 10 deg"):
+    with pytest.raises(ArgumentError, match="look the same over 10 deg"):
         ta.plan_arc(0.0, 10.0, range(1, 9))
 
 

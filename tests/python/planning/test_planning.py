@@ -173,7 +173,7 @@ def test_command_prints_the_contracts_json(capsys):
 
 def test_command_prints_text_and_refuses_too_few_mounts(capsys):
     assert main(["plan", "--gear-ratio", "100"]) == 0
-    assert "worst noise factor     1.28" in capsys.readouterr().out
+    assert "worst order            standard error 1.28" in capsys.readouterr().out
     assert main(["plan", "--gear-ratio", "50", "--mounts", "2"]) == 1
     assert "at least 3 mounts" in capsys.readouterr().err
     assert main(["plan", "--gear-ratio", "100", "--reference", "off-null", "--json"]) == 0

@@ -25,7 +25,7 @@ matplotlib.use("Agg")
 
 #: Labels of axes must end with "/ unit" or name a pure number or category.
 UNITS = ("/ deg", "/ arcsec", "/ s", "/ (deg/s)", "/ °C", "/ Nm", "/ cycles per output turn")
-UNITLESS = ("direction of travel", "noise factor (1 = ideal)")
+UNITLESS = ("direction of travel", "standard error (1 = ideal)")
 
 
 @pytest.fixture(scope="module")
