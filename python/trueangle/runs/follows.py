@@ -28,6 +28,7 @@ from .checks.angles import (
     bending,
     mixed_units,
     ratio_suggestion,
+    usual_step,
 )
 from .checks.fault import DataFault
 from .checks.record import Record, records_of
@@ -165,7 +166,9 @@ def _are_plain(runs: Sequence[CalibrationRun], strides: Sequence[int]) -> bool:
         # Where as many steps are coarse, the test of the ratio knows no travel.
         if not bent and long_steps < steps - int(0.9 * (steps - 1)):
             return False
-        if step > LEAST_JUMP / 360.0 and steps >= 4 * BLOCKS - 1:
+        angles = (run.reference[::stride], run.indicated[::stride])
+        scale = 360.0 / run.period
+        if step > LEAST_JUMP / 360.0 and any(usual_step(scale * angle) for angle in angles):
             return False
         # Turns up to which a place within one is known to far more than is looked at.
         if size > (_MANY_TURNS if run.period == _TURNS["radians"] else 2.0**30):

@@ -182,16 +182,31 @@ def _scatters_as(records: list[Record], k: int, factor: float) -> bool:
     return bool(alike and noise[k] * math.sqrt(factor) > max(usual, ROUNDING))
 
 
+def usual_step(angle: Array) -> float:
+    """Steps up to which readings go on from each other, degrees.
+
+    0 where no rows are in another unit: there are no jumps, no order, or too few rows whose angles
+    are, converted, within those of the others.
+    """
+    steps = np.abs(wrap(np.diff(angle), 360.0))
+    if angle.size < 4 * BLOCKS or not steps.min() <= LEAST_JUMP < steps.max():
+        return 0.0
+    # Steps of the rows in the larger unit: in the other they are nothing beside them.
+    limit = USUAL * float(quantile(steps[steps <= LEAST_JUMP], 0.9))
+    size = np.abs(angle)
+    most = 2 * np.count_nonzero(size <= size.max() * OTHER_UNIT)
+    is_told = (
+        limit > 0.0 and most * math.log(180.0 / limit) > math.log(angle.size) + 1.0 + _BY_CHANCE
+    )
+    return limit if is_told and np.count_nonzero(steps > limit) <= 0.5 * steps.size else 0.0
+
+
 def _rows_in_other_units(record: Record, role: str) -> Iterator[DataFault]:
     """Rows of a column that go on from the others in another unit, and not in its own."""
     angle = getattr(record, role)
-    steps = np.abs(wrap(np.diff(angle), 360.0))
-    if len(record) < 4 * BLOCKS or not steps.min() <= LEAST_JUMP < steps.max():
+    limit = usual_step(angle)
+    if limit == 0.0:
         return
-    # Steps of the rows in the larger unit: in the other they are nothing beside them.
-    limit = USUAL * float(quantile(steps[steps <= LEAST_JUMP], 0.9))
-    if limit == 0.0 or np.count_nonzero(steps > limit) > 0.5 * steps.size:
-        return  # angles in no order
     for unit, factor in OTHER_UNITS.items():
         other = _in_unit(angle, factor, limit)
         if _are_others(other, np.where(other, factor, 1.0) * angle, limit):
