@@ -19,7 +19,6 @@ from ..runs.travel import over_turns
 from ..support.angles import circular_mean, common_sign
 from ..support.arrays import Array
 from ..support.suggestions import check_choice
-from .orders.harmonicsums import HarmonicSums
 from .summed import SummedReadings
 
 if TYPE_CHECKING:
@@ -324,8 +323,15 @@ class SummedProblem(Problem):
         cosine, sine = np.arange(steps.size) * 2 + 1, np.arange(steps.size) * 2 + 2
         found = np.empty((2 * steps.size + 2, 2 * steps.size + 2))
         weight, error = spectrum.weight, spectrum.error
-        turned = np.concatenate([cosine, sine])
-        found[np.ix_(turned, turned)] = HarmonicSums.whole(weight, *2 * [steps.astype(np.float64)])
+        # cos a cos b = (cos(a - b) + cos(a + b)) / 2, and so on.
+        both = np.concatenate([weight[:0:-1].conj(), weight])
+        middle = weight.size - 1
+        plus = 0.5 * both[middle + np.add.outer(steps, steps)]
+        minus = 0.5 * both[middle + np.subtract.outer(steps, steps)]
+        found[np.ix_(cosine, cosine)] = (plus + minus).real
+        found[np.ix_(sine, sine)] = (minus - plus).real
+        found[np.ix_(cosine, sine)] = (plus - minus).imag
+        found[np.ix_(sine, cosine)] = (plus + minus).imag
         found[0, 0], found[-1, -1] = weight[0].real, spectrum.squares
         found[0, cosine], found[0, sine] = weight[steps].real, weight[steps].imag
         found[-1, cosine], found[-1, sine] = error[steps].real, error[steps].imag

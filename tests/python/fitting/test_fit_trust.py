@@ -7,9 +7,6 @@ import pytest
 
 import trueangle as ta
 from trueangle.errors import OutsideSpanWarning, RankError, UnlikeRunsWarning
-from trueangle.fitting.orders import unitgroups
-from trueangle.fitting.orders.harmonicsums import harmonic_sums
-from trueangle.fitting.orders.zerogroups import ZeroGroupReadings
 
 ARCSEC = 1.0 / 3600.0
 
@@ -210,28 +207,6 @@ def test_units_of_one_kind_are_not_one_joint(data_dir):
 
 
 # -- many runs -----------------------------------------------------------------------
-
-
-def test_many_runs_are_taken_together_with_the_same_sums():
-    random = np.random.default_rng(6)
-    units = []
-    for number in range(unitgroups.MOST_UNITS + 5):
-        turns = random.uniform(-2.0, 3.0, random.integers(2, 9))
-        error = number + random.normal(0.0, 0.1, turns.size)
-        units.append(ZeroGroupReadings(turns, error, random.uniform(0.5, 2.0, turns.size), ""))
-    orders = (1, 2, 5, 40)
-    sums = harmonic_sums(units, orders)
-    assert sums.units == unitgroups.GROUPS
-    parts = [harmonic_sums([unit], orders) for unit in units]
-    every = range(len(orders))
-    gram, rhs, squares = sums.total()
-    np.testing.assert_allclose(gram, sum(p.gram(0, every) for p in parts), atol=1e-9)
-    np.testing.assert_allclose(rhs, sum(p.rhs(0, every) for p in parts), atol=1e-9)
-    assert squares == pytest.approx(sum(p.squares[0] for p in parts))
-    members = unitgroups.units_in_groups(units)[3]
-    np.testing.assert_allclose(
-        sums.gram(3, every), sum(parts[i].gram(0, every) for i in members), atol=1e-9
-    )
 
 
 def test_a_thousand_short_runs_find_their_order():

@@ -1,93 +1,105 @@
-"""Chosen orders fitted to normal equations, and their gain in held-out units."""
+"""What each order does for readings that are held out, and without it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from ...estimation.linear import pseudo_inverse
 from ...support.arrays import Array
-from .harmonicsums import HarmonicSums
 
 #: A candidate is an alias of the chosen orders if less than this share of its columns' energy
 #: is independent of them.
 COLLINEAR: Final = 1e-8
 
 
-def fit_chosen_orders(sums: HarmonicSums, chosen: Sequence[int]) -> tuple[Array, Array, float]:
-    """Coefficients of the chosen orders, inverse normal matrix, residual sum of squares."""
-    gram, rhs, squares = sums.total()
-    columns = sums.columns(chosen)
-    if columns.size == 0:
-        return np.zeros(0), np.zeros((0, 0)), squares
-    inverse = pseudo_inverse(gram[columns[:, None], columns])
-    coefficients = inverse @ rhs[columns]
-    return coefficients, inverse, max(0.0, squares - float(rhs[columns] @ coefficients))
+class Products(NamedTuple):
+    """Products of the columns of a unit, as far as a fit of chosen orders needs them.
+
+    Attributes
+    ----------
+    mine : ndarray, shape (2 chosen, 2 orders + 1)
+        Of the chosen orders' columns with all, the error at last.
+    blocks : ndarray, shape (orders, 2, 2)
+        Of the two columns of each order.
+    scores : ndarray, shape (2 orders,)
+        Of the columns with the error.
+    """
+
+    mine: Array
+    blocks: Array
+    scores: Array
 
 
-def held_out_gains(
-    sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
-) -> tuple[Array, Array, float]:
+def products(unit: Array, chosen: Sequence[int]) -> Products:
+    """Those of a unit, as `zerogroups.unit_columns` gives it."""
+    columns = unit[:, :-1]
+    cosine, sine = columns[:, ::2], columns[:, 1::2]
+    both = [np.einsum("nk,nk->k", a, b) for a in (cosine, sine) for b in (cosine, sine)]
+    mine = unit[:, np.ravel([(2 * k, 2 * k + 1) for k in chosen]).astype(np.intp)]
+    return Products(mine.T @ unit, np.stack(both, axis=1).reshape(-1, 2, 2), unit[:, -1] @ columns)
+
+
+def held_out_gains(units: Sequence[Array], chosen: Sequence[int]) -> tuple[Array, Array, float]:
     """Held-out sum of squares with and without each order, one unit held out at a time.
 
     The held-out unit keeps its own zero, the chosen orders come from the other units.
 
+    Parameters
+    ----------
+    units : sequence of ndarray
+        As `zerogroups.unit_columns` gives them.
+    chosen : sequence of int
+        Places of the chosen orders.
+
     Returns
     -------
-    without, with_ : ndarray, shape (len(orders),)
+    without, with_ : ndarray, shape (orders,)
         For an order among the chosen ones ``with_`` is the model itself; for another one
         ``without`` is. Entry by entry their difference is the gain of that order.
     model : float
         Held-out sum of squares of the chosen orders.
     """
-    position = {k: i for i, k in enumerate(chosen)}
-    outside = [k for k in orders if k not in position]
-    both = np.asarray([*chosen, *outside], dtype=np.intp)
-    size, every = len(chosen), both.size
-    base = np.concatenate([np.arange(size), np.arange(size) + every])
-    other = np.stack([np.arange(size, every), np.arange(size, every) + every], axis=1)
-    grams = [sums.gram(u, chosen, both) for u in range(sums.units)]
-    blocks = [sums.blocks(u, both[size:]) for u in range(sums.units)]
-    rhs = [sums.rhs(u, both) for u in range(sums.units)]
-    total, whole, every_block = (np.sum(part, axis=0) for part in (grams, rhs, blocks))
+    pairs = np.arange(units[0].shape[1] - 1).reshape(-1, 2)
+    outside = [k for k in range(len(pairs)) if k not in chosen]
+    mine, others = pairs[list(chosen)].ravel(), pairs[outside]
+    of_mine = np.arange(mine.size).reshape(-1, 2)
+    every = [products(unit, chosen) for unit in units]
+    total = Products(*(np.sum(each, axis=0) for each in zip(*every, strict=True)))
     model = 0.0
-    dropped, added = np.zeros(size), np.zeros(len(outside))
-    for gram, block, mine, squares in zip(grams, blocks, rhs, sums.squares, strict=True):
-        train, score = total - gram, whole - mine
-        inverse = pseudo_inverse(train[:, base])
-        fitted = inverse @ score[base]
-        here = gram[:, base]
-        left = mine - fitted @ gram
-        error = float(squares - fitted @ (mine[base] + left[base]))
+    dropped, added = np.zeros(len(chosen)), np.zeros(len(outside))
+    for unit, own in zip(units, every, strict=True):
+        train = Products(*(a - b for a, b in zip(total, own, strict=True)))
+        inverse = pseudo_inverse(train.mine[:, mine])
+        fitted = inverse @ train.mine[:, -1]
+        left = unit[:, -1] - unit[:, mine] @ fitted
+        error = float(left @ left)
         model += error
         # Dropping order j moves all coefficients by -inverse_j inverse_jj^-1 fitted_j.
-        pairs = np.stack([np.arange(size), np.arange(size) + size], axis=1)
-        own = np.linalg.pinv(inverse[pairs[:, :, None], pairs[:, None, :]], hermitian=True)
-        back = np.einsum("bki,kij,kj->bk", inverse[:, pairs], own, fitted[pairs])
-        dropped += error + 2.0 * left[base] @ back + np.einsum("bk,bk->k", back, here @ back)
+        alone = np.linalg.pinv(inverse[of_mine[:, :, None], of_mine[:, None, :]], hermitian=True)
+        back = np.einsum("bki,kij,kj->bk", inverse[:, of_mine], alone, fitted[of_mine])
+        dropped += ((left[:, None] + unit[:, mine] @ back) ** 2).sum(axis=0)
         # Adding an order moves the others by -slope times its own coefficients.
-        flat = train[:, other]
-        slope = (inverse @ train[:, other.ravel()]).reshape(flat.shape)
-        alone = every_block - block - np.einsum("bki,bkj->kij", flat, slope)
+        both = train.mine[:, others]
+        slope = np.tensordot(inverse, both, 1)
         step = np.einsum(
             "kij,kj->ki",
-            np.linalg.pinv(alone, rcond=COLLINEAR, hermitian=True),
-            score[other] - np.einsum("bki,b->ki", flat, fitted),
+            np.linalg.pinv(
+                train.blocks[outside] - np.einsum("bki,bkj->kij", both, slope),
+                rcond=COLLINEAR,
+                hermitian=True,
+            ),
+            train.scores[others] - np.einsum("bki,b->ki", both, fitted),
         )
         move = np.einsum("bki,ki->bk", slope, step)
-        linear = np.einsum("ki,ki->k", step, left[other]) - left[base] @ move
-        square = (
-            np.einsum("ki,kij,kj->k", step, block, step)
-            - 2.0 * np.einsum("bk,bki,ki->k", move, gram[:, other], step)
-            + np.einsum("bk,bk->k", move, here @ move)
-        )
-        added += square - 2.0 * linear
-    without, with_ = np.full(len(orders), model), np.full(len(orders), model)
-    for i, k in enumerate(orders):
-        if k in position:
-            without[i] = dropped[position[k]]
-        else:
-            with_[i] += added[outside.index(k)]
+        linear = np.einsum("ki,ki->k", step, (left @ unit[:, :-1])[others])
+        linear -= (left @ unit[:, mine]) @ move
+        square = np.einsum("ki,kij,kj->k", step, own.blocks[outside], step)
+        square -= 2.0 * np.einsum("bk,bki,ki->k", move, own.mine[:, others], step)
+        square += np.einsum("bk,bk->k", move, own.mine[:, mine] @ move)
+        added += error - 2.0 * linear + square
+    without, with_ = np.full(len(pairs), model), np.full(len(pairs), model)
+    without[list(chosen)], with_[outside] = dropped, added
     return without, with_, model

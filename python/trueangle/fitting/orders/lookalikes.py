@@ -12,10 +12,9 @@ from typing import Final
 
 import numpy as np
 
+from ...estimation.linear import pseudo_inverse
 from ...runs.aliasing import Positions, position_coherence
-from .chosen import fit_chosen_orders
-from .harmonicsums import harmonic_sums
-from .zerogroups import ZeroGroupReadings
+from .zerogroups import ZeroGroupReadings, unit_columns
 
 #: Two orders are separated when one explains better by this many noise variances: a
 #: likelihood ratio of e^5, about 150 to 1.
@@ -58,10 +57,15 @@ def _substitution_losses(
 ) -> list[float]:
     """Increase of the sum of squares when each of ``others`` takes the place of ``order``."""
     rest = [k for k in orders if k != order]
-    together = [*rest, order, *others]
-    sums = harmonic_sums(units, together)
-    kept = list(range(len(rest)))
-    best = fit_chosen_orders(sums, [*kept, len(rest)])[2]
-    return [
-        fit_chosen_orders(sums, [*kept, len(rest) + 1 + j])[2] - best for j in range(len(others))
-    ]
+    columns = np.concatenate(unit_columns(units, [*rest, order, *others]))
+    products = columns.T @ columns
+    kept = np.arange(2 * len(rest))
+    first = kept.size
+
+    def left(start: int) -> float:
+        own = np.append(kept, [start, start + 1])
+        score = products[own, -1]
+        return float(products[-1, -1] - score @ pseudo_inverse(products[np.ix_(own, own)]) @ score)
+
+    best = left(first)
+    return [left(first + 2 * j) - best for j in range(1, len(others) + 1)]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...estimation.linear import pseudo_inverse
 from ...support.arrays import Array
-from .harmonicsums import HarmonicSums
+from .chosen import products
 
 
 def circular_range_deg(phases: ArrayLike) -> Array:
@@ -32,31 +32,23 @@ def circular_range_deg(phases: ArrayLike) -> Array:
     return np.where(seen < 2, math.nan, np.degrees(2.0 * math.pi - gaps.max(axis=0)))
 
 
-def _unit_coefficients(
-    sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]
-) -> tuple[Array, Array]:
-    """A and B of each order in each unit, the other chosen orders held at the common fit.
+def unit_phases(units: Sequence[Array], chosen: Sequence[int]) -> Array:
+    """Phase ``atan2(A, B)`` of each order in each unit, shape (units, orders), radians.
 
-    Both of shape (units, orders), NaN where the unit does not see the order.
+    The other chosen orders are held at the common fit; NaN where a unit does not see the order.
+    ``units`` are as `zerogroups.unit_columns` gives them.
     """
-    index, units = np.asarray(orders, dtype=np.intp), range(sums.units)
-    gram = np.sum([sums.gram(unit, chosen) for unit in units], axis=0)
-    coefficients = pseudo_inverse(gram) @ np.sum([sums.rhs(u, chosen) for u in units], axis=0)
-    common = np.zeros((index.size, 2))
-    for place, k in enumerate(chosen):
-        common[index == k] = coefficients[[place, place + len(chosen)]]
-    result = np.full((sums.units, index.size, 2), math.nan)
-    for unit in units:
-        left = sums.rhs(unit, index) - sums.gram(unit, index, chosen) @ coefficients
-        blocks, score = sums.blocks(unit, index), left.reshape(2, -1).T
-        trace = np.trace(blocks, axis1=1, axis2=2)
-        seen = np.linalg.eigvalsh(blocks)[:, 0] > 1e-9 * trace
-        step = np.linalg.solve(blocks[seen], score[seen][..., None])[..., 0]
-        result[unit, seen] = common[seen] + step
-    return result[..., 0], result[..., 1]
-
-
-def unit_phases(sums: HarmonicSums, chosen: Sequence[int], orders: Sequence[int]) -> Array:
-    """Phase ``atan2(A, B)`` of each order in each unit, shape (units, orders), radians."""
-    cosine, sine = _unit_coefficients(sums, chosen, orders)
-    return np.asarray(np.arctan2(cosine, sine))
+    every = [products(unit, chosen) for unit in units]
+    pairs = np.arange(units[0].shape[1] - 1).reshape(-1, 2)
+    mine = pairs[list(chosen)].ravel()
+    total = np.sum([own.mine for own in every], axis=0)
+    fitted = pseudo_inverse(total[:, mine]) @ total[:, -1]
+    common = np.zeros(pairs.size)
+    common[mine] = fitted
+    found = np.full((len(units), *pairs.shape), math.nan)
+    for unit, own in zip(found, every, strict=True):
+        scores = (own.scores - fitted @ own.mine[:, :-1])[pairs]
+        seen = np.linalg.eigvalsh(own.blocks)[:, 0] > 1e-9 * np.trace(own.blocks, 0, 1, 2)
+        step = np.linalg.solve(own.blocks[seen], scores[seen][..., None])[..., 0]
+        unit[seen] = common[pairs][seen] + step
+    return np.asarray(np.arctan2(found[..., 0], found[..., 1]))

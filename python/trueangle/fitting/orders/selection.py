@@ -23,14 +23,22 @@ from ...support.layout import counted
 from ..rounding import rounding_step
 from .candidates import LIKELY, Candidates
 from .chosen import held_out_gains
-from .harmonicsums import HarmonicSums, harmonic_sums
 from .lookalikes import find_lookalikes
 from .noise import ReadingVariance
 from .phases import circular_range_deg, unit_phases
 from .result import OrderSelection
 from .table import IN_MODEL, OrderRow
 from .verdicts import drift_of_a_sweep, row_with_verdict, selection_notes, verdict_reason
-from .zerogroups import ZeroGroupReadings, folds_of_run, some_angles, some_readings, zero_groups
+from .zerogroups import (
+    GROUPS,
+    MOST_UNITS,
+    ZeroGroupReadings,
+    folds_of_run,
+    some_angles,
+    some_readings,
+    unit_columns,
+    zero_groups,
+)
 
 if TYPE_CHECKING:
     from ..summed import SummedReadings
@@ -168,16 +176,15 @@ class EvidenceSelection:
         self.orders = list(candidates.orders)
         reference = set(candidates.reference)
         self.forced = [i for i, k in enumerate(self.orders) if k in reference]
-        self.sums = harmonic_sums(self.units, self.orders)
-        self.folds: HarmonicSums | None = self.sums
+        self.folds = self.units
         if len(self.units) > 1:
             what = "mount" if len(self.units) > len(runs) else "run"
-            if self.sums.units < len(self.units):
-                what = f"of {self.sums.units} groups of runs"
+            if len(self.units) > MOST_UNITS:
+                what = f"of {GROUPS} groups of runs"
         else:
             what = "block of neighbouring positions"
             parts = folds_of_run(units[0], self.positions) if len(units) == 1 else []
-            self.folds = harmonic_sums(parts, self.orders) if parts else None
+            self.folds = some_readings(parts)
         self.holdout = f"each {what} predicted by a fit to the others"
 
     def result(self) -> OrderSelection:
@@ -274,8 +281,13 @@ class EvidenceSelection:
         dropped: Mapping[int, str],
     ) -> OrderSelection:
         shown = sorted({*chosen, *dropped, *self.candidates.main_indices})
-        gains, model = self._gains(chosen, shown)
-        spread = circular_range_deg(unit_phases(self.sums, chosen, shown))
+        orders = [self.orders[i] for i in shown]
+        mine = [shown.index(i) for i in chosen]
+        units = unit_columns(self.units, orders)
+        spread = circular_range_deg(unit_phases(units, mine))
+        if self.folds is not self.units:
+            units = unit_columns(self.folds, orders) if self.folds else []
+        gains, rms = self._held_out(units, mine)
         lookalikes = find_lookalikes(
             self.units,
             self.positions,
@@ -304,7 +316,7 @@ class EvidenceSelection:
                     standard_error=std,
                     statistic=own.statistic,
                     log10_false_alarm=self._false_alarm(own.statistic),
-                    holdout_gain=float(gains[n]),
+                    holdout_gain=float(gains[n]) if gains.size else math.nan,
                     phase_spread_deg=float(spread[n]),
                     aliases=tuple(aliases.get(i, ())),
                     needed=std * needed[i] if math.isfinite(std) else math.nan,
@@ -315,11 +327,10 @@ class EvidenceSelection:
         if not retained and self.samples <= len(self.units) + 2:  # no reading for the noise
             rows = []
         rows = [row_with_verdict(row, self.candidates, self.positions, retained) for row in rows]
-        orders = tuple(retained)
         selection = OrderSelection(
-            orders=orders,
+            orders=tuple(retained),
             table=tuple(rows),
-            reason="" if orders else self._refusal(rows, estimate),
+            reason="" if retained else self._refusal(rows, estimate),
             method="evidence",
             period=self.period,
             positions=self.positions,
@@ -327,7 +338,7 @@ class EvidenceSelection:
             runs=len(self.runs),
             noise=noise,
             holdout=self.holdout,
-            holdout_rms=self._held_out_rms(model),
+            holdout_rms=rms,
             gear_ratio=self.candidates.gear_ratio,
             estimate=estimate,
         )
@@ -357,20 +368,17 @@ class EvidenceSelection:
         few = [f"take {FEW} readings or more; {plan}"] * (self.samples < FEW)
         return "; ".join([*why, *few])
 
-    def _gains(self, chosen: Sequence[int], orders: Sequence[int]) -> tuple[Array, float]:
-        """Reduction of the held-out mean square by each order; that of the chosen orders."""
-        if self.folds is None:
-            return np.full(len(orders), math.nan), math.nan
-        without, with_, model = held_out_gains(self.folds, chosen, orders)
-        return np.asarray((without - with_) / np.maximum(np.abs(without), 1e-300)), model
-
-    def _held_out_rms(self, model: float) -> tuple[float, float]:
-        """Held-out rms with no order at all and with the chosen ones."""
-        if self.folds is None:
-            return math.nan, math.nan
-        weight = float(self.folds.weight.sum())
-        none = float(self.folds.squares.sum())
-        return math.sqrt(none / weight), math.sqrt(max(0.0, model) / weight)
+    def _held_out(
+        self, parts: Sequence[Array], chosen: Sequence[int]
+    ) -> tuple[Array, tuple[float, float]]:
+        """Reduction of the held-out mean square by each order; rms without and with the chosen."""
+        if not parts:
+            return np.empty(0), (math.nan, math.nan)
+        without, with_, model = held_out_gains(parts, chosen)
+        gains = (without - with_) / np.maximum(np.abs(without), 1e-300)
+        weight = sum(float(unit.weights.sum()) for unit in self.folds)
+        none = sum(float(part[:, -1] @ part[:, -1]) for part in parts)
+        return gains, (math.sqrt(none / weight), math.sqrt(model / weight))
 
     def _needed(self) -> NDArray[np.float64]:
         """Amplitudes, in standard errors, from which orders are more likely there than not.

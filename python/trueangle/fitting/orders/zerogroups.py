@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._core import line_columns
 from ...estimation.evidence import RunReadings
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
@@ -19,6 +20,10 @@ from ...support.arrays import Array
 #: Readings in a row that are kept together of many, and the turn by which they are chosen evenly.
 _TOGETHER: Final = 256
 _GOLDEN: Final = 0.5 * (math.sqrt(5.0) - 1.0)
+
+#: Of more units, what is held out in turn are groups of them, dealt in turn.
+MOST_UNITS: Final = 96
+GROUPS: Final = 32
 
 #: Readings from which orders are chosen; of more, some blocks are taken.
 MOST_READINGS: Final = 8000
@@ -114,6 +119,27 @@ def some_readings(
             time = np.arange(size, dtype=float) if unit.time is None else unit.time
             found.append(unit._replace(time=time).part(mask, unit.label))
     return found
+
+
+def unit_columns(units: Sequence[ZeroGroupReadings], orders: Sequence[float]) -> list[Array]:
+    """Cosine and sine of each order in turn, then the error: a row a reading, a part a unit.
+
+    Less their weighted means in the unit, and times the roots of the weights, so that the products
+    of the rows are normal equations with each unit's zero taken out. Of many units some are
+    taken together in one part.
+    """
+    places = np.asarray(orders, dtype=np.float64)
+    parts = []
+    for unit in units:
+        rows = np.empty((unit.turns.size, 2 * places.size + 1))
+        rows[:, :-1] = line_columns(2.0 * math.pi * unit.turns, places)
+        rows[:, -1] = unit.error
+        rows -= unit.weights @ rows / unit.weights.sum()
+        rows *= np.sqrt(unit.weights)[:, None]
+        parts.append(rows)
+    if len(parts) <= MOST_UNITS:
+        return parts
+    return [np.concatenate(parts[k::GROUPS]) for k in range(GROUPS)]
 
 
 def _centred(runs: Sequence[CalibrationRun]) -> Iterator[NDArray[np.float64]]:
