@@ -16,10 +16,10 @@ from ..estimation.linear import (
     NormalEquations,
     cluster_covariance,
     least_squares,
-    linear_residual,
     moderated_covariance,
     pseudo_inverse,
     total,
+    without_columns,
 )
 from ..support.arrays import Array, median
 from ..support.suggestions import check_choice
@@ -292,7 +292,7 @@ def _correlated(
         x, own, weight = problem.columns(i), problem.private(i), weights[i]
         root = np.ones(len(x)) if weight is None else np.sqrt(weight)
         counted = root > 0.0
-        columns.append((root[:, None] * linear_residual(own, x, weight))[counted])
+        columns.append((root[:, None] * without_columns(own, x, weight))[counted])
         left.append((root * rests[i])[counted])
     noise = CorrelatedNoise.of(columns, left, fitted.solution.residual_variance)
     if kind == "auto" and noise.odds < _CORRELATED:

@@ -12,6 +12,7 @@ from trueangle.estimation.linear import (
     linear_residual,
     pseudo_inverse,
     total,
+    without_columns,
 )
 
 #: Relative, of well-conditioned systems of some dozen unknowns.
@@ -66,6 +67,8 @@ def test_rows_agree_with_numpy_and_leave_nothing_along_the_columns(n, m, k):
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING * size)
     left = linear_residual(design, target, weights)
     assert np.abs(design.T @ (weights[:, None] * left)).max() < ROUNDING * n * size
+    apart = without_columns(design * 10.0 ** np.arange(m), target, weights)
+    np.testing.assert_allclose(apart, left, rtol=0, atol=ROUNDING * n * size)
     model = _core.LinearModel.of_rows(design, target, weights)
     np.testing.assert_allclose(
         model.squares, (weights[:, None] * left**2).sum(axis=0), rtol=0, atol=ROUNDING * n * size
