@@ -15,7 +15,7 @@ from ...joint.signals import Signals
 from ...support.arrays import Array
 from .extension import curves_of
 from .factor import Factor, FactorCurve
-from .group import FACTORS, FEW, Group, lines_of
+from .group import FACTORS, FEW, TOGETHER, Group, lines_of
 
 #: Readings used at most; of more, every n-th.
 MOST_READINGS: Final = 2500
@@ -339,14 +339,15 @@ def _alike(
     """Factors that explain as much in the place of one, or are nearly the same columns.
 
     The evidence may distinguish the latter, but only by errors of the signals. Products come with
-    the lines of the place that are their means.
+    the lines of the place that are their means. Two factors that act together are more than one.
     """
     groups = account.groups
     rest = account.without(members)
     own, _ = account.best_beside(rest, members)
     kinds: dict[str, list[int]] = {}
+    no_other = (groups[members[0]].factor, NAME, *TOGETHER)
     for k, group in enumerate(groups):
-        if account.tau[k] == 0.0 and group.factor not in (groups[members[0]].factor, NAME):
+        if account.tau[k] == 0.0 and group.factor not in no_other:
             kinds.setdefault(group.factor, []).append(k)
     losses, _, instead = account.sums.changes(account.tau)
     orders = {m for k in members for m in groups[k].orders}

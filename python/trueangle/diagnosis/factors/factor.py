@@ -12,13 +12,14 @@ from ...support.arrays import Array
 from ...support.display_units import ErrorUnit
 from ...support.layout import order_ranges
 from ...support.plainresult import PlainResult, plain_fields
+from .group import PAIRS
 
 #: Factors in words.
 WORDS = {
     "place": "the place",
     "direction": "the direction",
     "direction_place": "the place, changing with the direction",
-    "reversal_time": "the time since the last reversal",
+    "reversal_time": "the time since the last reversal or stop",
     "run_time": "the time in the run",
     "run": "the run (its zero)",
     "run_place": "the place, changing with the run",
@@ -34,7 +35,9 @@ WORDS = {
     "mount_place": "the place on the reference's mount",
     "step": "the step of the sensor",
     "frequency": "a line in time",
+    "travel": "the travel in the run",
 }
+WORDS |= {f"{one}_{other}": f"{WORDS[one]}, changing with {WORDS[other]}" for one, other in PAIRS}
 
 #: Orders that are listed, and decimals of those that are not whole.
 LISTED, DECIMALS = 6, 2
@@ -50,7 +53,8 @@ class FactorCurve:
         Values of the factor, in ``unit``.
     unit : str
     value, low, high : ndarray, shape (g,)
-        Of a product with the place: of the amplitude of its orders.
+        Of a product with the place: of the amplitude of its orders; of a product of two factors: at
+        the largest value of the first.
     """
 
     at: Array
@@ -71,8 +75,8 @@ class Factor(PlainResult):
     Attributes
     ----------
     factor : str
-        One of ``place``, ``direction``, ``speed`` ..., or one of them with ``_place``: times a
-        pattern of the angle.
+        One of ``place``, ``direction``, ``speed`` ..., one of them with ``_place``: times a pattern
+        of the angle, or two that act together, as ``direction_load``.
     shaft : str or None
         Whose place.
     orders : tuple of float or None

@@ -13,6 +13,19 @@ from numpy.typing import NDArray
 from ...joint.pattern import line_columns
 from ...support.arrays import Array
 
+#: Factors that act together: play under load, a delay in the cold, creep under load, a scale that
+#: expands.
+PAIRS: Final = (
+    ("direction", "load"),
+    ("direction", "temperature"),
+    ("speed", "load"),
+    ("speed", "temperature"),
+    ("load", "temperature"),
+    ("load", "travel"),
+    ("temperature", "travel"),
+)
+TOGETHER: Final = tuple(map("_".join, PAIRS))
+
 #: The factors, in the order in which equally strong ones are stated.
 FACTORS: Final = (
     "place",
@@ -33,6 +46,7 @@ FACTORS: Final = (
     "run_place",
     "run_time",
     "frequency",
+    *TOGETHER,
 )
 
 #: Columns of a narrow group.

@@ -9,11 +9,13 @@ from typing import Final
 
 import numpy as np
 
+from ...estimation.factor import orthonormal_basis
 from ...joint.pattern import line_columns
 from ...joint.signals import Signals
 from ...support.arrays import Array
-from .events import late_readings, step_events
-from .group import FEW, GRID, LOW, Basis, Group
+from .account import SAME_COLUMNS
+from .events import step_events
+from .group import FEW, GRID, LOW, PAIRS, Basis, Group
 from .places import PeakSpectrum, place_groups, without_low
 
 #: Orders whose products with a factor are always tried.
@@ -91,7 +93,9 @@ def factor_groups(
     known = [m for m in dict.fromkeys(lines) if m > 0.0]
     spectrum = PeakSpectrum(theta, signals.places)
     groups = [*place_groups(signals, error, left, known, shafts, spectrum)]
-    for axis in _axes(signals):
+    axes = [*_axes(signals)]
+    groups += _of_pairs([*axes, _travel(signals)])
+    for axis in axes:
         groups.append(axis.alone())
         for product in axis.products:
             asked = [*ALWAYS, *known[:LOW], *drawn]
@@ -102,7 +106,6 @@ def factor_groups(
     groups += _of_runs(signals, [*ALWAYS, *known[:2], *drawn])
     groups += _of_frequencies(signals, frequencies)
     groups += step_events(signals, events)
-    groups += late_readings(signals, error)
     given = {*ALWAYS, *known, *drawn}
     low = {float(k) for k in range(1, LOW + 1)}
     for k, group in enumerate(groups):
@@ -122,7 +125,9 @@ def _axes(signals: Signals) -> Iterator[Axis]:
     tau = signals.torque
     yield from _signed("load", tau, LOAD_CHANGES, "Nm")
     if tau is not None and np.unique(np.sign(tau)).size > 1:
-        yield Axis("load_sign", np.sign(tau), _column, np.array([-1.0, 1.0]), "sign")
+        # At a level of nought noise has the sign.
+        signs = np.sign(tau) * (np.abs(tau) > NEXT * np.ptp(tau))
+        yield Axis("load_sign", signs, _column, np.array([-1.0, 1.0]), "sign")
     kelvin = signals.temperature
     if kelvin is not None and np.ptp(kelvin) > TEMPERATURE_CHANGES:
         mean, half = float(kelvin.mean()), 0.5 * float(np.ptp(kelvin))
@@ -206,15 +211,15 @@ def _column(x: Array) -> Array:
 
 
 def _reversals(signals: Signals) -> Iterator[Axis]:
-    """Transitions after a reversal, by travel and by time.
+    """Transitions after a reversal, by travel and by time, and what grows while the joint stands.
 
     They change sides with the direction, or not. Those from the start of a run, which may be at
     rest or in the midst of a motion, are their own.
     """
-    since = _since(signals)
     sign = np.where(signals.direction < 0.0, -1.0, 1.0)
     first = signals.segment_first[signals.segment]
-    for x, unit in ((signals.travel, "deg"), (since, "s")):
+    ways = ((signals.travel, "deg", 0.0), (_since(signals), "s", 0.0), (_rest(signals), "s", 1.0))
+    for x, unit, end in ways:
         if x is None:
             continue
         whole = float(np.median(_longest(signals, x)))
@@ -222,13 +227,25 @@ def _reversals(signals: Signals) -> Iterator[Axis]:
             continue
         lengths = np.array(LENGTHS) * whole
 
-        def decays(x: Array, lengths: Array = lengths) -> Array:
-            return np.exp(-np.minimum(np.abs(x)[:, None] / lengths, 700.0)) * np.sign(x)[:, None]
+        def settles(x: Array, lengths: Array = lengths, end: float = end) -> Array:
+            decays = np.exp(-np.minimum(np.abs(x)[:, None] / lengths, 700.0))
+            return np.abs(decays - end) * np.sign(x)[:, None]
 
         at = np.linspace(1e-6, 0.5, GRID) * whole
         x = np.maximum(x, 1e-9 * whole)
         for own in (sign * ~first, 1.0 * ~first, sign * first):
-            yield Axis("reversal_time", x * own, decays, at, unit)
+            yield Axis("reversal_time", x * own, settles, at, unit)
+
+
+def _rest(signals: Signals) -> Array | None:
+    """Seconds since the joint stopped; 0 while it moves."""
+    v = signals.velocity
+    if v is None or signals.time is None:
+        return None
+    moves = np.abs(v) >= NEXT * float(np.abs(v).max(initial=0.0))
+    moves[[start for start, _ in signals.run_bounds()]] = True
+    since = np.maximum.accumulate(np.arange(v.size) * moves)
+    return np.asarray(signals.clock - signals.clock[since])
 
 
 def _since(signals: Signals) -> Array | None:
@@ -260,6 +277,40 @@ def _clock(signals: Signals) -> Iterator[Axis]:
 
     unit = "s" if signals.time is not None else "reading"
     yield Axis("run_time", signals.clock, path, np.linspace(0.0, whole, GRID), unit)
+
+
+def _travel(signals: Signals) -> Axis:
+    """The way that the joint has gone in a run, about its mean: each run has its own zero."""
+    way = np.zeros(len(signals))
+    for start, stop in signals.run_bounds():
+        own = np.abs(np.diff(signals.degrees[start:stop], prepend=signals.degrees[start]))
+        way[start:stop] = np.cumsum(own) - np.cumsum(own).mean()
+    return Axis("travel", way, _column, np.linspace(way.min(), way.max(), GRID), "deg")
+
+
+def _of_pairs(axes: Sequence[Axis]) -> Iterator[Group]:
+    """Products of two factors that are no sums of functions of each: the runs cross them.
+
+    Of each what is proportional, and of its size or its square.
+    """
+    first = {axis.factor: axis for axis in reversed(axes)}
+    for one, other in ((first[a], first[b]) for a, b in PAIRS if {a, b} <= first.keys()):
+        sides = [axis.basis(axis.x)[:, :2] for axis in (one, other)]
+        columns = _products(*sides)
+        basis = orthonormal_basis(np.hstack([np.ones((len(columns), 1)), *sides]))
+        left, total = columns - basis @ (basis.T @ columns), np.sum(np.var(columns, axis=0))
+        if np.sum(np.var(left, axis=0)) > SAME_COLUMNS * total:
+            most, scale = sides[0][[np.argmax(one.x)]], float(np.sqrt(total))
+
+            def at_most(x: Array, basis=other.basis, most=most, scale=scale) -> Array:  # type: ignore[no-untyped-def]
+                return np.asarray(_products(most, basis(x)[:, :2]) / scale)
+
+            factor = f"{one.factor}_{other.factor}"
+            yield Group(factor, columns / scale, (), other.at, at_most, other.unit)
+
+
+def _products(one: Array, other: Array) -> Array:
+    return np.hstack([one * column[:, None] for column in other.T])
 
 
 def _of_one_way(signals: Signals) -> Iterator[Group]:

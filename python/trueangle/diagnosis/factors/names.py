@@ -215,7 +215,7 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
             worst = (freed - score, asked, free)
     if worst is not None:
         better, group, other = worst
-        what = _followed(names, other, tau) or "a free function"
+        what = _followed(names, other, tau)
         reason = f"{what} explains the readings better (log Bayes factor {better:.0f})"
         return dict.fromkeys(group, reason)
     for k in sure:
@@ -224,7 +224,7 @@ def _worst(names: NamedForms, found: Sequence[Finding], sure: Sequence[int]) -> 
         freed, free = names.beside([j for j in sure if j != k], tau, follows)
         if follows and freed > score - ALIKE:
             what = _followed(names, free, tau)
-            return {k: f"{what or 'noise alone'} explains the readings as well"}
+            return {k: f"{what} explains the readings as well"}
     for k in sure:
         # Lines of the place that are not its own are no part of an order.
         is_line = found[k].cause == MissingOrder.kind
@@ -248,11 +248,12 @@ def _related(found: Sequence[Finding], sure: Sequence[int]) -> list[list[int]]:
 
 
 def _followed(names: NamedForms, other: Sequence[float], tau: Sequence[float]) -> str:
-    """Factors that a model has and another one has not, in words."""
-    new = [k for k in names.free if other[k] > 0.0 and tau[k] == 0.0]
+    """Factors that a model has and another one has not, or else all that it has, in words."""
+    own = [k for k in names.free if other[k] > 0.0]
+    new = [k for k in own if tau[k] == 0.0] or own
     factors = dict.fromkeys(names.account.groups[k].factor for k in new)
     words = " and ".join(WORDS[factor] for factor in factors)
-    return f"a free function of {words}" if words else ""
+    return f"a free function of {words}" if words else "noise alone"
 
 
 def confirmed_names(names: NamedForms, findings: Sequence[Finding]) -> list[int]:

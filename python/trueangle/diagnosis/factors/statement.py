@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects import EFFECTS
-from ...effects.missed_counts import MissedCounts
 from ...effects.missing_order import MissingOrder
 from ...estimation.regression import Regression
 from ...estimation.segments import short_segments
@@ -33,7 +32,7 @@ from .names import (
 
 #: Steps whose surroundings are looked at, parts of a run in which its largest is looked for, and
 #: readings before and after by which its row is found.
-MOST_EVENTS: Final = 4
+MOST_EVENTS: Final = 8
 WINDOWS, NEAREST = 40, 3
 
 
@@ -67,7 +66,7 @@ def stated_factors(
         _lines(chosen),
         _resolved(chosen, _orders(chosen, drawn=True)),
         _frequencies(chosen),
-        [*_events(chosen), *_steps(signals, error)][:MOST_EVENTS],
+        _steps(signals, error)[:MOST_EVENTS],
         [cycles for cycles in chosen.belief.joint.shafts.values() if abs(cycles) > 1.0],
     )
     count = len(findings)
@@ -146,16 +145,15 @@ def _frequencies(regression: Regression) -> list[float]:
     return [float(np.mean(hertz)) for hertz in found if hertz is not None]
 
 
-def _events(regression: Regression) -> list[tuple[int, int]]:
-    """Run and row of the steps among the terms."""
-    steps = [term.shape for term in regression.terms if term.cause == MissedCounts.kind]
-    return [(step["run"], step["row"]) for step in steps]
-
-
 def _steps(signals: Signals, error: Array) -> list[tuple[int, int]]:
-    """Run and row of the largest step of each run that noise alone does not make, largest first."""
+    """Run and row of the steps that noise alone does not make, largest first.
+
+    Parts on both sides of a step are looked at for further ones.
+    """
     found = []
-    for start, stop in signals.run_bounds():
+    parts = [*signals.run_bounds()]
+    while parts:
+        start, stop = parts.pop()
         own = error[start:stop]
         width = own.size // WINDOWS
         if width < NEAREST:
@@ -166,6 +164,7 @@ def _steps(signals: Signals, error: Array) -> list[tuple[int, int]]:
             first = row - width
             at = start + first + _largest_step(own[first : row + width], NEAREST)[0]
             found.append((size, (int(signals.run[at]), int(signals.row[at]))))
+            parts += [(start, at), (at, stop)]
     return [place for _, place in sorted(found, reverse=True)]
 
 

@@ -1,4 +1,4 @@
-"""What follows the time since an event: since the last reversal, or since the start of the run.
+"""Events: what follows the time since a reversal or the start of the run, and steps.
 
 With ``s`` seconds since the event and ``d`` the direction, the residual is compared with
 
@@ -8,6 +8,19 @@ With ``s`` seconds since the event and ``d`` the direction, the residual is comp
 
 about their means between two events, for a few ``τ``. The sums over runs (or pieces of few
 runs) are compared with their own scatter by Student's t, for any noise within them.
+
+Steps between levels are what changes rarely and by much, not a little all the time. Medians of
+blocks of readings in a row (which single readings and tails hardly move) have increments that are
+normal for any noise and for a random walk. Something that sits at levels and changes over between
+them has few large ones: their kurtosis
+
+::
+
+    b₂ = mean(d⁴) / (mean(d²)²)
+
+is above three, which is tested as Anscombe and Glynn (1983) do, with the number of independent
+increments. Every run is taken in units of its own scatter, which lowers the kurtosis of m
+increments by ``m/(m + 2)``.
 """
 
 from __future__ import annotations
@@ -18,19 +31,36 @@ from dataclasses import replace
 import numpy as np
 
 from ...support.arrays import Array
+from ...support.display_units import brief_number
+from ...support.distributions import normal_tail
 from .evidence import Evidence, drawn_signs, largest_of, made_even
 from .leftover import Leftover
 from .place import ModulatedSums, unit_sums
+from .scatter import normal_kurtosis
 
 #: Form that the tests report.
 AFTER_REVERSALS = "relaxes after reversals"
 AFTER_START = "relaxes after the start of a run"
+STEPS = "steps between levels"
 
 #: Time constants, in shares of the time between two events.
 CONSTANTS = (0.05, 0.2, 0.6)
 
 #: Readings between two events that show how something relaxes.
 LEAST_READINGS = 12
+
+#: Readings of a block, and blocks that a run must have.
+BLOCK, LEAST_BLOCKS = 9, 8
+
+#: Increments needed together, and those that neighbours which share a block are worth.
+LEAST_INCREMENTS, SHARED = 40, 1.125
+
+#: Kurtosis that medians of readings which share much of their noise may have beyond three:
+#: 0.15 was the most in noise of which neighbours share 0 to 0.99.
+ALLOWED = 0.2
+
+#: Standard deviations of increments from which on one is reported as a step.
+STEP = 4.0
 
 
 def reversal_test(left: Leftover) -> Evidence | None:
@@ -88,4 +118,38 @@ def _relaxing(
         f"the residual relaxes in time {when}, within about {constant:.2g} {unit}",
         rms=abs(size) * rms,
         looks_like=looks_like,
+    )
+
+
+def steps_test(left: Leftover) -> Evidence | None:
+    """Kurtosis of the increments of blocks; None where there are too few."""
+    parts, large, fourth = [], [], 0.0
+    for start, stop in left.bounds:
+        blocks = (stop - start) // BLOCK
+        if blocks < LEAST_BLOCKS:
+            continue
+        rows = left.residual[start : start + blocks * BLOCK].reshape(blocks, BLOCK)
+        d = np.diff(np.median(rows, axis=1))
+        spread = float(np.sqrt(np.mean(d**2)))
+        if spread > 0.0:
+            parts.append(d / spread)
+            # Reported as steps: those beyond the noise of their own run.
+            large.append(d[np.abs(d) > STEP * 1.4826 * float(np.median(np.abs(d)))])
+            shared = float(np.mean(d[1:] * d[:-1])) / spread**2
+            known = d.size / (1.0 + 2.0 * shared**2)
+            fourth += float(np.sum((d / spread) ** 4)) * (known + 2.0) / known
+    if not parts or sum(map(len, parts)) < LEAST_INCREMENTS:
+        return None
+    d = np.concatenate(parts)
+    kurtosis = fourth / d.size
+    steps = np.concatenate(large)
+    size = float(np.sqrt(np.mean(steps**2))) if steps.size else 0.0
+    return Evidence(
+        "steps in time",
+        kurtosis,
+        normal_tail(normal_kurtosis(kurtosis - ALLOWED, d.size / SHARED)),
+        f"the residual changes in steps between levels: {steps.size} of about "
+        f"{brief_number(size)} arcsec",
+        rms=0.5 * size,
+        looks_like=STEPS,
     )

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 
 from ...support.plainresult import ShownResult, plain_fields
-from .events import reversal_test, start_test
+from .events import reversal_test, start_test, steps_test
 from .evidence import Evidence
 from .leftover import Leftover
 from .noise import Noise, estimate_noise
 from .periodogram import order_test, time_test
 from .place import LEAST_ORDERS, place_tests
 from .scatter import scatter_tests
-from .steps import steps_test
 from .zeros import run_test
 
 

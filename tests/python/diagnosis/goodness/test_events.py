@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from trueangle.diagnosis.goodness import Evidence, Leftover
-from trueangle.diagnosis.goodness.events import reversal_test, start_test
-from trueangle.diagnosis.goodness.steps import steps_test
+from trueangle.diagnosis.goodness.events import reversal_test, start_test, steps_test
 
 from .readings import Array
 

@@ -10,11 +10,10 @@ import pytest
 from scipy.stats import ttest_1samp
 
 from trueangle.diagnosis.goodness import goodness_of_fit
-from trueangle.diagnosis.goodness.events import CONSTANTS, reversal_test, start_test
+from trueangle.diagnosis.goodness.events import CONSTANTS, reversal_test, start_test, steps_test
 from trueangle.diagnosis.goodness.noise import estimate_noise
 from trueangle.diagnosis.goodness.periodogram import order_test, time_test
 from trueangle.diagnosis.goodness.place import ModulatedSums, place_tests
-from trueangle.diagnosis.goodness.steps import steps_test
 from trueangle.diagnosis.goodness.zeros import run_test
 
 from .readings import leftover
