@@ -169,6 +169,17 @@ def test_a_virtual_data_set_that_is_not_asked_for_does_no_harm(tmp_path):
     assert "other" not in run.columns
 
 
+def test_a_file_of_compounds_or_dangling_links_is_told_to_have_no_column(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    fields = [("reference_deg", "f8"), ("indicated_deg", "f8")]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["runs"] = np.zeros(50, dtype=fields)
+        file["reference_deg"] = h5py.SoftLink("/nowhere")
+        file["indicated_deg"] = h5py.ExternalLink("gone.h5", "/indicated_deg")
+    with pytest.raises(ta.errors.FileError, match=r"it has no column of numbers or texts, one to"):
+        ta.check(tmp_path / "a.h5")
+
+
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_an_array_is_written_and_not_mapped(order, tmp_path):
     given = np.random.default_rng(8).uniform(0.0, 360.0, (3000, 2))
