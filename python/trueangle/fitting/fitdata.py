@@ -69,7 +69,7 @@ class FitData(PlainResult):
 
     @property
     def runs(self) -> tuple[CalibrationRun, ...]:
-        """The runs fitted, as given but for `nuisance`.
+        """The runs fitted, as given but for `nuisance`, in parts where counts were lost.
 
         Raises
         ------

@@ -142,8 +142,8 @@ def figures_of_runs(
     # At one place no order can be looked for.
     if fit is not None or (selection is not None and order_lines(selection)):
         made["spectrum"] = spectrum_figure(fit, selection, name, scale)
-    if held is not None:
-        made["before-after"] = _before_after(held, runs, scale)
+    if fit is not None and held is not None:
+        made["before-after"] = _before_after(held, fit.runs, scale)
     if fit is not None:
         multiples = phase_figure(fit, name, scale)
         if multiples is not None:

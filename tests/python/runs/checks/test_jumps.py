@@ -58,6 +58,7 @@ def test_a_check_tells_it_and_a_fit_gives_the_readings_from_there_a_zero(turns, 
     assert fit.notes[0].endswith(f"{says}; the readings from there have a zero of their own.")
     assert fit.orders == ta.select_orders(run).orders == (1, 50)
     assert fit.amplitudes == pytest.approx([0.4, 0.1], abs=0.02)
+    assert ta.report(run).content["gain"] is not None
 
 
 def sound(rng):
