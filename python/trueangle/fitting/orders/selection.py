@@ -17,8 +17,9 @@ from ...joint.gear import HIGHEST_LOW_ORDER
 from ...model.validity import greatest_slope
 from ...runs.aliasing import Positions
 from ...runs.run import CalibrationRun
+from ...support.angles import arcsec
 from ...support.arrays import Array
-from ...support.display_units import brief_number
+from ...support.display_units import brief_number, error_unit, sine_of_rms
 from ...support.layout import counted
 from ..rounding import rounding_step
 from .candidates import LIKELY, Candidates
@@ -365,8 +366,14 @@ class EvidenceSelection:
             return f"{beside} {verdict_reason(best.verdict)}"
         chance = f"is there with a probability of only {brief_number(100.0 * best.probability)} %"
         why = [f"{beside} {chance}", *drift_of_a_sweep(self.runs, estimate)]
-        few = [f"take {FEW} readings or more; {plan}"] * (self.samples < FEW)
-        return "; ".join([*why, *few])
+        if self.samples < FEW:
+            why.append(f"take {FEW} readings or more; {plan}")
+        elif len(why) == 1 and (known := [r.needed for r in rows if math.isfinite(r.needed)]):
+            least = arcsec(max(known), self.period)
+            unit = error_unit("auto", sine_of_rms(least), self.period)
+            size = f"{brief_number(least * unit.per_arcsec)} {unit.name}"
+            why.append(f"nothing to correct: an order above about {size} would be retained")
+        return "; ".join(why)
 
     def _held_out(
         self, parts: Sequence[Array], chosen: Sequence[int]
