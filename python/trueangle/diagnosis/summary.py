@@ -123,12 +123,15 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     """Faults of the data, what is not understood, what is found or wrong."""
     yield from ((f"{note}.", 2, 0) for note in diagnosis.notes)
     yield from ((f"Fault of the data, {fault}.", 2, 0) for fault in diagnosis.data_faults)
-    rest = diagnosis.unexplained
+    rest, unknown = diagnosis.unexplained, list[Entry]()
     if rest is not None and rest.found:
-        share = f"{100.0 * rest.share:.0f} % of the residual variance"
-        text = f"NOT UNDERSTOOD: at least {unit.text(rest.rms)} rms ({share}) is not noise"
-        yield f"{text} and has no known cause.", 2, 0
-        yield from _items(rest.firing[:3], unit)
+        share = f"{100.0 * rest.share:.0f} %"
+        text = f"at least {unit.text(rest.rms)} rms ({share} of the residual variance) is not noise"
+        unknown = [(f"NOT UNDERSTOOD: {text} and has no known cause.", 2, 0)]
+        unknown += _items(rest.firing[:3], unit)
+        if share != "0 %":  # what is next to nothing comes last
+            yield from unknown
+            unknown = []
     sure = "Confirmed" if diagnosis.complete else "Confirmed so far"
     for title, status in ((sure, True), ("Not confirmed", False)):
         named = [brief_finding(f, unit) for f in diagnosis.findings if f.confirmed is status]
@@ -152,6 +155,7 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
         detected = "not distinguished" if len(spot.causes) > 1 else "not confirmed"
         why = re.split(r"; |\. | \(", spot.because)[0]
         yield f"Detected, {detected}: {_seen(spot, unit)}; {why}.", 2, 0
+    yield from unknown
 
 
 def _by_cause(named: Iterable[str]) -> str:

@@ -195,7 +195,7 @@ def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
     if fit.known is None:
         return _refit(fit, train, dict.fromkeys(lines, (1,)), lines)
     if len(train) > 1:
-        check_new_run(others, travel, chosen)
+        check_new_run(others, travel)
     mean, _ = others.among(chosen, travel, beside)
     pairs = zip(lines.items(), mean.reshape(-1, 2).tolist(), strict=True)
     found = tuple(Shaft(name, k, (1,), (a,), (b,)) for (name, k), (a, b) in pairs)

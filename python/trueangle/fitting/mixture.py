@@ -67,7 +67,7 @@ def fit_mixture(
         travel = some_angles(problem.angles, problem.period)
         assert selection.estimate is not None
         if len(runs) > 1:
-            check_new_run(selection.estimate, travel, selection.orders)
+            check_new_run(selection.estimate, travel)
         fitted, uncertainty = _fitted(problem, selection, weights, travel)
         if not robust:
             return MixtureFit(selection, problem, RobustFit(fitted, None, 0), uncertainty)
@@ -86,16 +86,17 @@ def fit_mixture(
     return MixtureFit(selection, problem, weighted, uncertainty)
 
 
-def check_new_run(estimate: EvidenceEstimate, travel: Array, orders: Sequence[float]) -> None:
+def check_new_run(estimate: EvidenceEstimate, travel: Array) -> None:
     """Raise where runs differ so much that a gain in a further one is uncertain."""
     gain, spread = estimate.gain_of_a_run(travel)
     # Standard deviations between runs by which the gain of a further one must exceed nothing.
     if gain <= 2.0 * spread:
-        listed = ", ".join(f"{order:g}" for order in orders[:6])
+        differs = np.sum([m.weight * (m.omega > 0.0) for m in estimate.models], axis=0) > 0.5
+        orders = [f"{k:g}" for k, own in zip(estimate.told, differs, strict=True) if own]
         raise NoModelError(
-            f"no correction can be given: order {listed} differs so much between the runs that a "
-            "correction may make a new run worse. The runs may be of different joints: fit each "
-            "separately, or give the orders that you know: `orders=[1, 2]`"
+            f"no correction can be given: order {', '.join(orders[:6])} is not the same in all "
+            "runs, and a correction may make a new run worse. Where the runs are of different "
+            "joints, fit each separately; of one joint, give the orders: `orders=[1, 2]`"
         )
 
 

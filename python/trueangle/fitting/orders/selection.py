@@ -324,9 +324,9 @@ class EvidenceSelection:
                     probability=float(chance[i]),
                 )
             )
-        retained = {row.order: row.amplitude for row in rows if row.verdict in IN_MODEL}
-        if not retained and self.samples <= len(self.units) + 2:  # no reading for the noise
+        if self.samples <= len(self.units) + 2:  # no reading for the noise
             rows = []
+        retained = {row.order: row.amplitude for row in rows if row.verdict in IN_MODEL}
         rows = [row_with_verdict(row, self.candidates, self.positions, retained) for row in rows]
         selection = OrderSelection(
             orders=tuple(retained),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.errors import NoOrderError
 
 SEED = 71_400
 
@@ -150,3 +151,16 @@ def test_each_run_of_the_magnetic_encoder_corrects_the_others(data_dir):
             if other is not runs[3 * k]
         ]
         assert np.std([part - part.mean() for part in left]) < 0.09
+
+
+@pytest.mark.parametrize("sizes", [(2, 1), (3,), (2, 2), (1, 1, 2)])
+def test_as_many_unknowns_as_readings_choose_no_order(sizes):
+    """Two readings had fitted order 1 as 44.13 +- 0.05 where it was 60 arcsec."""
+    rng = np.random.default_rng(sum(sizes))
+    runs = []
+    for size in sizes:
+        angle = rng.uniform(0.0, 360.0, size)
+        error = (60.0 * np.cos(np.radians(angle - 30.0)) + rng.uniform(-9.0, 9.0)) / 3600.0
+        runs.append(ta.CalibrationRun(angle, angle + error, period=360.0))
+    with pytest.raises(NoOrderError, match=rf"one order need {len(sizes) + 3} readings.*plan"):
+        ta.fit(runs)
