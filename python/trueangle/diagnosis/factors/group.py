@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -16,13 +17,8 @@ from ...support.arrays import Array
 #: Factors that act together: play under load, a delay in the cold, creep under load, a scale that
 #: expands.
 PAIRS: Final = (
-    ("direction", "load"),
-    ("direction", "temperature"),
-    ("speed", "load"),
-    ("speed", "temperature"),
+    *product(("direction", "speed", "travel"), ("load", "temperature")),
     ("load", "temperature"),
-    ("load", "travel"),
-    ("temperature", "travel"),
 )
 TOGETHER: Final = tuple(map("_".join, PAIRS))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -68,7 +68,7 @@ def factor_groups(
     drawn: Sequence[float] = (),
     frequencies: Sequence[float] = (),
     events: Sequence[tuple[int, int]] = (),
-    shafts: Iterable[float] = (),
+    shafts: Sequence[float] = (),
 ) -> list[Group]:
     """Groups of columns at these readings.
 
@@ -85,7 +85,7 @@ def factor_groups(
         Lines in Hz that are new in every run.
     events : sequence of (int, int)
         Run and row at which something happened once.
-    shafts : iterable of float
+    shafts : sequence of float
         Cycles of the other shafts in an output turn.
     """
     theta = signals.theta
@@ -110,9 +110,16 @@ def factor_groups(
     low = {float(k) for k in range(1, LOW + 1)}
     for k, group in enumerate(groups):
         sought = {*group.orders} - given - (low if group.factor == "place" else set())
-        if len(group.orders) == 1 and sought:
-            groups[k] = replace(group, alternatives=float(spectrum.count))
+        if len(group.orders) == 1 and (sought or group.factor == "place"):
+            number = float(spectrum.count) if sought else _number(group.orders[0], shafts)
+            groups[k] = replace(group, alternatives=number)
     return groups
+
+
+def _number(order: float, shafts: Sequence[float]) -> float:
+    """The lowest number that a line has on any shaft: k is as likely as 1/k of the first."""
+    on = [order / abs(c) for c in (1.0, *shafts)]
+    return min((n for n in on if n > 0.5 and abs(n - round(n)) < 1e-6), default=max(order, 1.0))
 
 
 def _axes(signals: Signals) -> Iterator[Axis]:
@@ -285,7 +292,7 @@ def _travel(signals: Signals) -> Axis:
     for start, stop in signals.run_bounds():
         own = np.abs(np.diff(signals.degrees[start:stop], prepend=signals.degrees[start]))
         way[start:stop] = np.cumsum(own) - np.cumsum(own).mean()
-    return Axis("travel", way, _column, np.linspace(way.min(), way.max(), GRID), "deg")
+    return Axis("travel", way, _column, np.zeros(1), "deg")
 
 
 def _of_pairs(axes: Sequence[Axis]) -> Iterator[Group]:

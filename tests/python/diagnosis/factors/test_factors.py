@@ -405,7 +405,7 @@ FORMS = {
         pattern(lambda x, d, v, t, r: 0.2 * load(t, r) ** 2 * np.sin(6.0 * np.pi * x + 1.0)),
     ),
     "play under load": ("direction_load", one_way(lambda x, d, torque: 0.4 * d * np.abs(torque))),
-    "creep under load": ("load_travel", one_way(lambda x, d, torque: 0.003 * torque * d * x)),
+    "creep under load": ("travel_load", one_way(lambda x, d, torque: 0.003 * torque * d * x)),
     "flanks at levels of the load": ("load_sign", flank),
     "creep at rest": ("reversal_time", creep_at_rest),
     "slips": ("run_time", slips),
@@ -422,3 +422,14 @@ def test_a_form_without_a_name_is_stated_by_its_factor_and_gets_none(rng, form):
     assert found.factors[0].factor == factor
     if form == "slips":
         assert len(found.factors[0].events) == 4
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_of_shafts_whose_lines_are_one_column_the_lower_number_is_stated(seed):
+    """Order 1 of the motor and order 11 of the output, at places of a polygon: rounding chose."""
+    rng = np.random.default_rng([7, seed])
+    theta = np.tile(np.arange(36) * 10.0, 4)
+    e = 9.0 * np.sin(np.radians(25.0 * theta + 40.0 * seed)) + NOISE * rng.standard_normal(144)
+    runs = [ta.CalibrationRun(theta, theta + e / 3600.0, period=360.0)]
+    found = ta.diagnose(runs, Simulation(Joint(25.0, "none"), sigma_arcsec=NOISE))
+    assert [(f.shaft, f.orders) for f in found.factors] == [("motor", (1.0,))]
