@@ -20,9 +20,8 @@ pub const TERMS: usize = 5;
 /// Variances of the noise: its white part and its terms.
 pub const VARIANCES: usize = TERMS + 1;
 
-/// Correlation times of the terms in median steps of time, each about 8 times the one before, so that
-/// neighbours together are near any time between; the last is a walk for most runs.
-pub const CORRELATION_TIMES: [f64; TERMS] = [1.0, 8.0, 63.0, 500.0, 4000.0];
+/// Correlation times of the terms in median steps of time; the last is a walk for any run.
+pub const CORRELATION_TIMES: [f64; TERMS] = [3.0, 15.0, 80.0, 400.0, 4000.0];
 
 /// Share of the total variance below which an innovation is rounding.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;

@@ -208,7 +208,8 @@ def _print(log: LogReport, asked: ErrorsIn) -> None:
         if joint["missing"]:
             text += f", {joint['missing']} missing kept"
         if joint["outside_span"]:
-            text += f", {joint['outside_span']} outside the calibrated span"
+            text += f", {joint['outside_span']} outside the calibrated span, "
+            text += "where no reading verifies it"
         print(text, flush=True)
 
 

@@ -153,6 +153,6 @@ def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace)
     shown = error_unit(errors_in(args), size, model.period)
     text = (
         f"window {window.window:5d}  order {largest.order:g} is off by {shown.text(size)}; "
-        f"chart {window.statistic:.2f}, alarm at {window.limit:.2f}"
+        f"score {window.statistic:.2f}, alarm from {window.limit:.2f}"
     )
-    return f"{text}  ALARM {shown.spoken(window.because)}" if window.alarm else text
+    return f"{text}  ALARM {shown.spoken(window.because)}" if window.alarm else f"{text}: no alarm"

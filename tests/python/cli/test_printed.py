@@ -77,7 +77,7 @@ def test_correct_tells_readings_outside_the_span_beside_those_missing(desk, caps
     (desk / "d.csv").write_text("indicated_deg,x\n0,1\n29,2\n,3\n100,4\n210,5\n")
     text = printed(capsys, "correct", "d.csv", "-m", "arc.json", "-o", "d_out.csv")
     assert "d.csv: 5 readings corrected" in text
-    assert ", 1 missing kept, 3 outside the calibrated span\n" in text
+    assert ", 1 missing kept, 3 outside the calibrated span, where no reading verifies it\n" in text
 
 
 @pytest.mark.parametrize("period", [360.0, 2.0 * np.pi, 1.0])
@@ -124,7 +124,7 @@ def test_watch(period, desk, capsys):
     told = [json.loads(line) for line in printed(capsys, *command, "--json", status=3).splitlines()]
     lines = printed(capsys, *command, "--errors-in", "mrad", status=3).splitlines()
     pattern = r"window +(\d+)  order (\S+) is off by (\S+) mrad; "
-    pattern += r"chart (\S+), alarm at (\S+?)(  ALARM .*)?"
+    pattern += r"score (\S+), alarm from (\S+?)(?:: no alarm|(  ALARM .*))"
     apart = 0
     for line, one in zip(lines, told, strict=True):
         window, order, size, chart, limit, alarm = re.fullmatch(pattern, line).groups()
