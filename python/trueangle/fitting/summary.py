@@ -87,7 +87,7 @@ def _intervals(fit: FittedCoefficients) -> str:
     near, far = (student_quantile(0.975, v) for v in (most, least))
     times = f"{far:.3g}" if far < near + 0.05 else f"{near:.3g} to {far:.3g}"
     held = ", with the bias of the ridge" if fit.ridge > 0.0 else ""
-    return f"95 % within {times} standard errors, {_KINDS[found.kind]}{held}"
+    return f"95 % are {times} times the +- shown, {_KINDS[found.kind]}{held}"
 
 
 _KINDS = {

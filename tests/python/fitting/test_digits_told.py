@@ -55,7 +55,7 @@ def test_a_residual_has_the_digits_that_its_degrees_of_freedom_leave(count, nois
 def test_the_factor_that_is_told_is_that_of_the_intervals(count, unit):
     """Two-sided, of the degrees of freedom: in words, in JSON and by scipy."""
     fit = ta.fit(run_of(unit, 50.0, 1.0, count), orders=[1], loss="linear", covariance="white")
-    said = re.search(r"95 % within (\S+) standard errors", fit.summary())[1]
+    said = re.search(r"95 % are (\S+) times the", fit.summary())[1]
     (row,) = fit.to_dict()["orders"]
     low, high = row["interval_arcsec"]
     times = stats.t.ppf(0.975, count - 3.0)

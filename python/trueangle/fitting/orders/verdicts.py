@@ -291,4 +291,4 @@ def _sentence(positions: Positions, candidates: Candidates) -> str:
     where = f"verified at {positions.describe()}"
     if _between(positions, candidates):
         return f"{where}, and in between for the orders that these distinguish"
-    return f"{where}; in between it is not: higher orders look like those retained"
+    return f"{where} only; between them higher orders look like those retained"

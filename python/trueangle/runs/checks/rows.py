@@ -37,8 +37,8 @@ _LOOKED_AT: Final = 8192
 def missed_counts(records: Iterable[Record]) -> Iterator[DataFault]:
     """Jumps of the error that stay, and are of no place of the joint.
 
-    Of places read before and after, the error is off by all jumps between. Where they are few, an
-    error of the place is no steeper than the angle itself, but at a sensor's own wrap.
+    Of places read before and after, the error is off by all jumps between. Where these are too few,
+    an error of the place is no steeper than the angle itself, but at a sensor's own wrap.
     """
     for record in records:
         apart = 1 + len(record) // _LOOKED_AT
@@ -153,7 +153,8 @@ def _lost(
     near = np.abs(ring[nearest] - place[new]) <= USUAL * _pace(np.diff(reference))
     # Jumps that are reversed at the same place do not count.
     again = near & (np.abs(gone) > 0.5 * abs(size))
-    if again.sum() < _BESIDE and abs(size) <= travel:
+    # A motion over one turn comes back to a few places only.
+    if again.sum() < (_BESIDE if np.isinf(travel) else USUAL) and abs(size) <= travel:
         return None
     if not again.any():
         return size
