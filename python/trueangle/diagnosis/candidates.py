@@ -99,7 +99,8 @@ class CandidateScores:
     """Scores of candidates of one step, and the best one of them."""
 
     def __init__(self) -> None:
-        self.told: dict[int, float] = {}
+        #: By identity, each with its extension: one that is gone leaves its identity to others.
+        self.told: dict[int, tuple[Extension, float]] = {}
         self.seen = 0
         self.leading = 0.0
 
@@ -122,8 +123,8 @@ class CandidateScores:
         extension, start, _ = candidate
         if id(extension) not in self.told:
             less = extension.deviance - told_from_form_errors(start, extension).deviance
-            self.told[id(extension)] = less
-        return self.score(candidate) - self.told[id(extension)]
+            self.told[id(extension)] = extension, less
+        return self.score(candidate) - self.told[id(extension)][1]
 
     def best(self, candidates: Sequence[Candidate]) -> tuple[float, Candidate] | None:
         """The best candidate with its score, where one is above zero.
