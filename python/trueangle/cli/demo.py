@@ -115,8 +115,8 @@ def short_report(study: Study) -> str:
     lines.append("  The 36 readings of both are the same: only other positions separate them.")
     add(study.planned, "of the gear, 2 mounts")
     lines.append(
-        f"  `ta.plan_mounts(gear_ratio=100)`: mounts at 0 and {offset} deg, "
-        f"standard errors {plan.worst_noise_factor:.2f} times the ideal"
+        f"  `ta.plan_mounts(gear_ratio=100)`: mounts at 0 and {offset} deg,\n"
+        f"  standard errors {plan.worst_noise_factor:.2f} times the ideal"
     )
     return "\n".join(lines)
 

@@ -155,4 +155,4 @@ def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace)
         f"window {window.window:5d}  order {largest.order:g} is off by {shown.text(size)}; "
         f"score {window.statistic:.2f}, alarm from {window.limit:.2f}"
     )
-    return f"{text}  ALARM {shown.spoken(window.because)}" if window.alarm else f"{text}: no alarm"
+    return f"{text}  ALARM {shown.spoken(window.because)}" if window.alarm else text

@@ -13,6 +13,7 @@ from ..estimation.regression import Regression
 from ..support.arrays import Array
 from ..support.deadline import current_deadline
 from .factors.factor import Factor
+from .factors.group import TOGETHER
 from .factors.statement import account_rows, stated_factors
 from .finding import Finding
 from .findings import findings_of, reconsidered_findings
@@ -58,8 +59,12 @@ class NamedCauses:
         return [c for factor in self.factors if not factor.named_by for c in factor.effects]
 
     def less_factors(self, sigma: float | None) -> Unexplained:
-        """What they leave beyond the factors without a name: what these explain is explained."""
-        explained = [f.fitted for f in self.factors if not f.named_by and f.fitted is not None]
+        """What they leave beyond the factors without a name: what these explain is explained.
+
+        Two that act together are not: no curve of a simulation holds them.
+        """
+        alone = [f for f in self.factors if not f.named_by and f.factor not in TOGETHER]
+        explained = [f.fitted for f in alone if f.fitted is not None]
         if not explained:
             return self.rest
         chosen, rows = self.chosen, np.zeros(self.chosen.n, dtype=bool)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from trueangle.effects.curve import Curve
 from trueangle.simulation import Simulation
 
 from .sweeps import measured
@@ -69,7 +70,8 @@ def test_play_is_told_from_either_side(first, seed):
     assert abs(width.value - wanted) < WITHIN * width.std + SHARE * abs(wanted)
     assert result.gain["rms_after_arcsec"] < 1.2 * 3600.0 * sigma
     # What is written back says the same of these readings.
-    (effect,) = result.extended.effects
+    effect, *curves = result.extended.effects
+    assert all(isinstance(curve, Curve) for curve in curves)  # of what follows something besides
     assert (effect.turns_first, effect.half_width_arcsec) == (first, width.value)
     beyond = np.concatenate([3600.0 * np.degrees(run.error) for run in runs])
     beyond = beyond - result.extended.predict(runs)

@@ -151,7 +151,7 @@ def test_readings_for_a_standard_error():
     plan = plan_mounts(100, 36, 3, noise=5.0, standard_error=0.5)
     # Three mounts of 36, each twice: what the table calls 6 rounds.
     assert plan.readings == 216
-    with pytest.raises(ArgumentError, match="both noise and standard_error"):
+    with pytest.raises(ArgumentError, match="both `noise=` and `standard_error=`"):
         plan_mounts(100, noise=5.0)
 
 

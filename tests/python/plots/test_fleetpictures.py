@@ -281,7 +281,7 @@ def test_noise_factors(orders) -> None:
     heights = [bar.get_height() for bar in ax.patches]
     assert np.ptp(heights) > 0.01
     count, worst, unseen = words(
-        ax, r"of (\d+) wanted orders: worst (\S+?)(?:; undetermined: (.*))?\.$"
+        ax, r"of (\d+) wanted orders, 1 is ideal: worst (\S+?)(?:; undetermined: (.*))?\.$"
     )
     assert float(worst) == pytest.approx(max(heights), rel=THREE)
     named = [text.get_text() for text in ax.get_xticklabels()]

@@ -14,6 +14,7 @@ import pytest
 import trueangle as ta
 from plots.strokes import strokes
 from trueangle.cli import main
+from trueangle.effects.effect import title_of
 from trueangle.errors import ArgumentError, MissingExtraError
 from trueangle.fitting.heldout import hold_out
 from trueangle.joint.shafts import shaft_cycles
@@ -295,7 +296,7 @@ def test_not_identifiable_causes_are_unknowns(demo) -> None:
     spots = demo.content["diagnosis"]["not_identifiable"]
     assert len(spots) > 0
     for spot in spots:
-        what = " or ".join(cause.replace("_", " ") for cause in spot["causes"])
+        what = " or ".join(title_of(cause).replace("_", " ") for cause in spot["causes"])
         assert any(key.startswith(what) for key in entries)
 
 
