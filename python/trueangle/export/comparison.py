@@ -278,7 +278,8 @@ class Comparison(PlainResult):
 
     def _moved(self, unit: ErrorUnit) -> str:
         """The orders that differ by more than three standard errors, the clearest first."""
-        sizes = {row["order"]: (row["amplitude_arcsec"], row["std_arcsec"]) for row in self.orders}
+        pairs = ((row["order"], row["amplitude_arcsec"], row["std_arcsec"]) for row in self.orders)
+        sizes = {k: (size or 0.0, std or 0.0) for k, size, std in pairs}
         clear = {k: size / std for k, (size, std) in sizes.items() if size and std}
         first = sorted((k for k, times in clear.items() if times > 3.0), key=lambda k: -clear[k])
         each = ", ".join(f"order {k:g} by {unit.text(*sizes[k])}" for k in first[:3])
