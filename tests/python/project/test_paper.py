@@ -94,7 +94,7 @@ def test_the_papers_method_retains_its_orders():
         assert study.gear[name].at_positions < -75.0
         assert study.gear[name].in_between > 30.0
         assert study.planned[name].in_between < -94.0
-    assert len(short_report(study).splitlines()) == 10
+    assert len(short_report(study).splitlines()) == 11
 
 
 def test_phases_across_the_turn_are_averaged_on_the_circle():
