@@ -50,22 +50,18 @@ pub struct Following {
     pub half: f64,
     /// The greatest reference, its sign left away.
     pub largest: f64,
-    /// The least of the greatest references of the blocks.
-    pub least_block: f64,
 }
 
 /// Bins of the travel in which its densest half is sought.
 const TRAVEL_BINS: usize = 64;
 
-/// Compares every `stride`-th reading of two angles, steps with the length `long` (in turns), and
-/// the references of so many `blocks` of readings.
+/// Compares every `stride`-th reading of two angles, and steps with the length `long` (in turns).
 pub fn following(
     indicated: &[f64],
     reference: &[f64],
     period: f64,
     stride: usize,
     long: f64,
-    blocks: usize,
 ) -> Following {
     let mut found = Following::default();
     let per_turn = 1.0 / period;
@@ -87,21 +83,16 @@ pub fn following(
         })
     };
     let (mut low, mut high, mut least, mut most) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
-    let mut tops = vec![0.0f64; blocks];
-    for (i, (y, step, slip, place, apart)) in readings().enumerate() {
+    for (y, step, slip, place, apart) in readings() {
         found.step = found.step.max(step);
         found.long_steps += usize::from(step > long);
         found.slip = found.slip.max(slip);
         (low, high) = (low.min(place), high.max(place));
         (least, most) = (least.min(apart), most.max(apart));
-        // Blocks begin at i * count / blocks, rounded down.
-        let top = &mut tops[((i + 1) * blocks - 1) / count];
-        *top = top.max(y.abs() * per_turn);
+        found.largest = found.largest.max(y.abs() * per_turn);
     }
     found.spread = most - least;
     found.travel = high - low;
-    found.largest = tops.iter().copied().fold(0.0, f64::max);
-    found.least_block = tops.iter().copied().fold(f64::INFINITY, f64::min);
     let mut bins = [0; TRAVEL_BINS];
     let width = found.travel / TRAVEL_BINS as f64;
     for (.., place, _) in readings() {
@@ -250,7 +241,7 @@ mod tests {
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         for case in 0..200 {
-            let (stride, blocks) = (1 + case % 3, 8);
+            let stride = 1 + case % 3;
             let pace = 0.3 * draw();
             let (mut place, mut all, mut off) = (5.0 * draw(), Vec::new(), Vec::new());
             for _ in 0..60 + case {
@@ -269,7 +260,7 @@ mod tests {
             for (i, e) in e.iter().enumerate() {
                 indicated[i * stride] += 360.0 * (e + f64::from(i as u32 % 3));
             }
-            let found = following(&indicated, &reference, 360.0, stride, 0.1, blocks);
+            let found = following(&indicated, &reference, 360.0, stride, 0.1);
             let steps: Vec<f64> = y.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
             let slips = e.windows(2).map(|w| (w[1] - w[0]).abs());
             let range = |v: &[f64]| {
@@ -284,11 +275,8 @@ mod tests {
             near(found.spread, range(&e));
             near(found.travel, range(&y));
             assert_eq!(found.long_steps, steps.iter().filter(|&&s| s > 0.1).count());
-            let top = |v: &[f64]| v.iter().fold(0.0f64, |a, x| a.max(x.abs()));
-            near(found.largest, top(&y));
+            near(found.largest, y.iter().fold(0.0f64, |a, x| a.max(x.abs())));
             let n = y.len();
-            let tops = (0..blocks).map(|b| top(&y[b * n / blocks..(b + 1) * n / blocks]));
-            near(found.least_block, tops.fold(f64::INFINITY, f64::min));
             let mut sorted = y.clone();
             sorted.sort_by(f64::total_cmp);
             let held = n / 2;

@@ -549,8 +549,7 @@ def following(
     period: float,
     stride: int,
     long: float,
-    blocks: int,
-) -> tuple[float, int, float, float, float, float, float, float]: ...
+) -> tuple[float, int, float, float, float, float, float]: ...
 def triangle(
     run: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None],
     period: float,

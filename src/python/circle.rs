@@ -22,7 +22,7 @@ pub fn resultant(
 }
 
 /// The fields of `circle::Following`, in order.
-type Followed = (f64, usize, f64, f64, f64, f64, f64, f64);
+type Followed = (f64, usize, f64, f64, f64, f64, f64);
 
 /// How two angles go together.
 #[pyfunction]
@@ -33,12 +33,11 @@ pub fn following(
     period: f64,
     stride: usize,
     long: f64,
-    blocks: usize,
 ) -> PyResult<Followed> {
     let (indicated, reference) = (slice(indicated)?, slice(reference)?);
     same_length("reference", reference.len(), "indicated", indicated.len())?;
     let found = look(py, reference.len() / stride.max(1), || {
-        circle::following(indicated, reference, period, stride, long, blocks)
+        circle::following(indicated, reference, period, stride, long)
     })?;
     Ok((
         found.step,
@@ -48,7 +47,6 @@ pub fn following(
         found.travel,
         found.half,
         found.largest,
-        found.least_block,
     ))
 }
 

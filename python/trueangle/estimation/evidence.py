@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._core import Evidence, Groups
 from ..support.arrays import Array
@@ -109,7 +110,16 @@ class EvidenceEstimate:
     @property
     def present(self) -> tuple[float, ...]:
         """Orders that runs more probably share or differ by than not."""
-        some = np.sum([m.weight * ((m.tau > 0.0) | (m.omega > 0.0)) for m in self.models], axis=0)
+        return self._probable([((m.tau > 0.0) | (m.omega > 0.0)) for m in self.models])
+
+    @property
+    def differing(self) -> tuple[float, ...]:
+        """Orders that runs more probably differ by than not."""
+        return self._probable([m.omega > 0.0 for m in self.models])
+
+    def _probable(self, has: Sequence[NDArray[np.bool_]]) -> tuple[float, ...]:
+        """Orders that models have, more probably than not."""
+        some = np.array([model.weight for model in self.models]) @ has
         return tuple(k for k, p in zip(self.told, some, strict=True) if p > 0.5)
 
     def without(self, left_out: Collection[int]) -> EvidenceEstimate:

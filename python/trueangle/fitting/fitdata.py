@@ -12,7 +12,6 @@ import numpy as np
 from ..errors import ArgumentError
 from ..runs.run import CalibrationRun
 from ..runs.travel import Span
-from ..support.angles import circular_mean, wrap
 from ..support.arrays import Array
 from ..support.plainresult import PlainResult
 from .problem import Problem, SolvedProblem
@@ -107,12 +106,10 @@ class FitData(PlainResult):
     @property
     def rms_before(self) -> float:
         """Rms of the errors about the zeros of their runs, before any correction."""
-        errors, period = [], self.problem.period
+        errors = []
         for run, w in zip(self.problem.runs, self.weights or self.problem.base, strict=True):
-            error = run.indicated - run.reference
-            error = error if w is None else error[w > 0.0]
+            error = run.centred_error if w is None else run.centred_error[w > 0.0]
             if error.size:
-                error = wrap(error - circular_mean(error, period), period)
                 errors.append(error - error.mean())
         return float(np.std(np.concatenate(errors)))
 

@@ -81,8 +81,7 @@ def fit_mixture(
         if not selection.orders:
             raise NoOrderError(f"no order is supported by the data: {selection.reason}")
     wild = rejected(weights, given)
-    unsettled = 0 if same else _ROUNDS
-    weighted = RobustFit(fitted, weights if wild else None, wild, far, unsettled)
+    weighted = RobustFit(fitted, weights if wild else None, wild, far, 0 if same else _ROUNDS)
     return MixtureFit(selection, problem, weighted, uncertainty)
 
 
@@ -91,10 +90,9 @@ def check_new_run(estimate: EvidenceEstimate, travel: Array) -> None:
     gain, spread = estimate.gain_of_a_run(travel)
     # Standard deviations between runs by which the gain of a further one must exceed nothing.
     if gain <= 2.0 * spread:
-        differs = np.sum([m.weight * (m.omega > 0.0) for m in estimate.models], axis=0) > 0.5
-        orders = [f"{k:g}" for k, own in zip(estimate.told, differs, strict=True) if own]
+        orders = ", ".join(f"{order:g}" for order in estimate.differing[:6])
         raise NoModelError(
-            f"no correction can be given: order {', '.join(orders[:6])} is not the same in all "
+            f"no correction can be given: order {orders} is not the same in all "
             "runs, and a correction may make a new run worse. Where the runs are of different "
             "joints, fit each separately; of one joint, give the orders: `orders=[1, 2]`"
         )

@@ -17,7 +17,6 @@ from ..support.angles import wrap
 from ..support.arrays import quantile
 from ..support.roles import role_code, turned_code
 from .checks.angles import (
-    BLOCKS,
     COARSE,
     LEAST_JUMP,
     LOOKED_AT,
@@ -155,8 +154,8 @@ def _are_plain(runs: Sequence[CalibrationRun], strides: Sequence[int]) -> bool:
     """
     sizes = []
     for run, stride in zip(runs, strides, strict=True):
-        step, long_steps, slip, spread, travel, half, size, _ = _core.following(
-            run.indicated, run.reference, run.period, stride, COARSE / 360.0, BLOCKS
+        step, long_steps, slip, spread, travel, half, size = _core.following(
+            run.indicated, run.reference, run.period, stride, COARSE / 360.0
         )
         # Errors within a third of a turn have a resultant of at least `_FOLLOWS`.
         if slip > LEAST_JUMP / 360.0 or spread > 1.0 / 3.0:

@@ -217,7 +217,7 @@ def test_equal_runs_have_one_degree_of_freedom_less_than_runs():
     low, high = found.interval(0.99).T
     np.testing.assert_allclose(high - low, 2.0 * student_quantile(0.995, 7.0) * std, rtol=1e-6)
     assert "by the scatter between runs" in found.summary()
-    assert "2.36 standard errors" in found.summary()
+    assert "2.36 times the +- shown" in found.summary()
 
 
 def test_amplitude_intervals_hold_the_amplitudes():

@@ -65,9 +65,9 @@ def orders_beyond_rounding(
         Log of the p-value below which an order is accepted: by the likelihood ratio for both of its
         coefficients, which without it is χ² with two degrees of freedom.
     """
-    error = np.concatenate([unit.error for unit in units])
     from ...joint.pattern import lines_columns  # few fits need it
 
+    error = np.concatenate([unit.error for unit in units])
     theta = 2.0 * np.pi * np.concatenate([unit.turns for unit in units])
     zeros = np.repeat(np.eye(len(units)), [unit.turns.size for unit in units], axis=0)
     lines = lines_columns(theta, np.asarray(orders, dtype=np.float64))
@@ -287,7 +287,7 @@ class EvidenceSelection:
         units = unit_columns(self.units, orders)
         spread = circular_range_deg(unit_phases(units, mine))
         if self.folds is not self.units:
-            units = unit_columns(self.folds, orders) if self.folds else []
+            units = unit_columns(self.folds, orders)
         gains, rms = self._held_out(units, mine)
         lookalikes = find_lookalikes(
             self.units,

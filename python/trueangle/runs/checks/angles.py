@@ -195,10 +195,10 @@ def usual_step(angle: Array) -> float:
     limit = USUAL * float(quantile(steps[steps <= LEAST_JUMP], 0.9))
     size = np.abs(angle)
     most = 2 * np.count_nonzero(size <= size.max() * OTHER_UNIT)
-    is_told = (
+    is_enough = (
         limit > 0.0 and most * math.log(180.0 / limit) > math.log(angle.size) + 1.0 + _BY_CHANCE
     )
-    return limit if is_told and np.count_nonzero(steps > limit) <= 0.5 * steps.size else 0.0
+    return limit if is_enough and np.count_nonzero(steps > limit) <= 0.5 * steps.size else 0.0
 
 
 def _rows_in_other_units(record: Record, role: str) -> Iterator[DataFault]:
