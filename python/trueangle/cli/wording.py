@@ -77,7 +77,7 @@ _OWN = frozenset(
 )
 
 #: What a diagnosis may do where no order is supported: there may be no model at all.
-_PERHAPS = "; a diagnosis names other causes, and --corrected-model FILE writes the corrected model"
+_PERHAPS = "; to look for causes other than an order (--corrected-model FILE writes their model)"
 
 
 class Wording:

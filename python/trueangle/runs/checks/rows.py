@@ -210,7 +210,7 @@ def duplicate_runs(records: list[Record]) -> Iterator[DataFault]:
             says = f"runs {', '.join(labels[:-1])} and {labels[-1]} hold the same readings, to the "
             says += "last digit: noise and repeatability would come out too good"
             others = " ".join(f"--run '!{label}'" for label in labels[1:])
-            mend = f"keep the first (option {others})"
+            mend = f"read only the first of them: add {others}"
             yield DataFault.of("duplicate_runs", labels, (), says, mend)
 
 

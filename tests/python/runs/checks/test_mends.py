@@ -177,7 +177,7 @@ def test_of_runs_that_are_there_twice_one_is_kept():
     records = sound()
     records.append(replace(records[1], label="run 1 again"))
     (found,) = data_faults(records)
-    assert found.mend == "keep the first (option --run '!run 1 again')"
+    assert found.mend == "read only the first of them: add --run '!run 1 again'"
     for label in found.runs:
         assert told([r for r in records if r.label == label or r.label not in found.runs]) == []
 
