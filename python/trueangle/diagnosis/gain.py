@@ -183,12 +183,8 @@ def measure_delay_gain(without: Regression, delayed: Regression) -> Gain:
         for values, regression in ((before, without), (after, delayed)):
             values[test] = held_out_residuals(regression, (), test, own_zero, search=False)[0]
     clean = ~delayed.outlying
-    before, after = before[clean], after[clean]
-    share, interval = reducible_share(before, after, unit[clean], delayed.variance, rng)
     holdout = f"{what} ({parts} parts)"
-    return Gain(
-        holdout, error_numbers(before), error_numbers(after), share, interval, None, _note(share)
-    )
+    return _gain(holdout, before[clean], after[clean], unit[clean], delayed.variance, rng)
 
 
 def measure_belief_gains(
@@ -228,22 +224,25 @@ def measure_belief_gains(
             before[k, test] += (new - old - (new - old).mean())[test]
             after[k, test] -= fitted.gain(own[~test, None])[1][0] * own[test]
     clean = ~regression.outlying
-    gains = []
-    for was, is_now in zip(before[:, clean], after[:, clean], strict=True):
-        share, interval = reducible_share(was, is_now, unit[clean], regression.variance, rng)
-        holdout = f"{what} ({int(folds.max()) + 1} parts)"
-        gains.append(
-            Gain(
-                holdout,
-                error_numbers(was),
-                error_numbers(is_now),
-                share,
-                interval,
-                None,
-                _note(share),
-            )
-        )
-    return gains
+    holdout = f"{what} ({int(folds.max()) + 1} parts)"
+    return [
+        _gain(holdout, was, is_now, unit[clean], regression.variance, rng)
+        for was, is_now in zip(before[:, clean], after[:, clean], strict=True)
+    ]
+
+
+def _gain(
+    holdout: str,
+    before: Array,
+    after: Array,
+    unit: NDArray[np.int64],
+    variance: float,
+    rng: np.random.Generator,
+) -> Gain:
+    """Gain by errors of held-out readings, without a control."""
+    share, interval = reducible_share(before, after, unit, variance, rng)
+    numbers = error_numbers(before), error_numbers(after)
+    return Gain(holdout, *numbers, share, interval, None, _note(share))
 
 
 def _note(share: float | None) -> str:
