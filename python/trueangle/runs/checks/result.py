@@ -11,6 +11,7 @@ import numpy as np
 from ...support.arrays import Array, median, quantile
 from ...support.layout import counted, laid_out, wrapped_lines
 from ...support.plainresult import PlainResult, plain_fields
+from ..outliers import FEWEST
 from .angles import BLOCKS
 from .fault import DataFault
 from .record import LEAST_READINGS, Record
@@ -99,6 +100,9 @@ def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
     def no(what: str, because: str, measure: str) -> None:
         cannot.append({"what": what, "because": because, "measure": measure})
 
+    if extent.readings < FEWEST * extent.runs:
+        few, more = counted(extent.readings, "reading"), f"{FEWEST} or more in a run"
+        no("outliers, and orders apart from noise", few, more)
     if extent.span_deg >= 350.0:
         can.append("integer orders of a whole turn")
     else:

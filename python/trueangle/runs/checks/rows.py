@@ -184,11 +184,11 @@ def outliers(records: Iterable[Record], faults: Iterable[DataFault]) -> Iterator
 
 def _isolated(record: Record) -> tuple[NDArray[np.bool_], Array]:
     """Which readings are isolated outliers, and how far each is off its neighbours, deg."""
-    far, distance = spikes(record.run.centred_error, record.reference, 360.0)
+    far, distance = spikes(error := record.run.centred_error, record.reference, 360.0)
     if far.any():
-        # A sensor that rounds differs from its neighbours by its counts.
+        # A sensor that rounds differs from its neighbours by its counts, which its errors span.
         steps = np.diff(np.unique(record.indicated[~far]))
-        far &= distance > 2.0 * steps.min(initial=360.0, where=steps > 0.0)
+        far &= distance > 2.0 * steps.min(initial=np.ptp(error[~far]), where=steps > 0.0)
         # What several readings in a row show is an effect, not an outlier.
         far &= np.convolve(far, np.ones(7), "same") < 1.5
     return far, distance

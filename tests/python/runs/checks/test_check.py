@@ -175,6 +175,25 @@ def test_measured_data(data_dir: Path) -> None:
     assert [(f.fault, f.rows) for f in found.data_faults] == [("outliers", (743,))]
 
 
+@pytest.mark.parametrize(
+    ("places", "counts"), [(200, None), (200, 4096), (3000, None), (3000, 4096), (3000, 512)]
+)
+def test_an_outlier_is_found_between_places_far_apart_and_counts(
+    places: int, counts: int | None
+) -> None:
+    """Places 1.8 deg apart are no counts of 1.8 deg, and counts are no outliers."""
+    rng = np.random.default_rng(places)
+    theta = np.arange(places) * 360.0 / places
+    sound = theta + 0.2 * np.cos(np.radians(theta)) + rng.normal(0.0, 0.01, places)
+    for off in (0.0, 3.0):
+        indicated = sound + off * (np.arange(places) == 77)
+        if counts is not None:
+            indicated = np.round(indicated * counts / 360.0) * 360.0 / counts
+        run = ta.CalibrationRun(theta, indicated, period=360.0)
+        found = [(fault.fault, fault.rows) for fault in ta.check(run).data_faults]
+        assert found == ([("outliers", (78,))] if off else [])
+
+
 @pytest.mark.parametrize("mounts", [(0.0, 105.0), (-30.0, 17.5, 80.0)])
 def test_levels_within_one_run_are_reported(mounts: tuple[float, ...]) -> None:
     """A mean of two levels is no level; noise is one, and a drift has both of its ends."""
