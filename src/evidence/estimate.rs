@@ -372,7 +372,7 @@ impl Readings {
         let mut probabilities: Vec<f64> = (0..self.orders().len()).map(outside).collect();
         for (k, &place) in places.iter().enumerate() {
             let own = models.iter().filter(|(_, model)| model.tau[k] > 0.0);
-            probabilities[place] = own.map(|(weight, _)| weight).sum();
+            probabilities[place] = own.map(|(weight, _)| weight).sum::<f64>().min(1.0);
         }
         models.sort_by(|a, b| b.0.total_cmp(&a.0));
         Some(Estimate {

@@ -137,7 +137,7 @@ class EvidenceEstimate:
         )
         models = tuple(WeightedModel(w, np.array(tau), np.array(own)) for w, tau, own in found)
         probability = np.zeros_like(self.probability)
-        probability[places] = np.sum([m.weight * (m.tau > 0.0) for m in models], axis=0)
+        probability[places] = np.sum([m.weight * (m.tau > 0.0) for m in models], axis=0).clip(max=1)
         zeros = tuple(zero for r, zero in enumerate(self.zeros) if r not in left_out)
         return replace(
             self,

@@ -320,6 +320,20 @@ def test_one_even_run_has_no_orders_that_are_noise(correlation: float) -> None:
         assert estimate_by_evidence([run], range(1, 31)).included == (1, 2)
 
 
+def test_a_probability_is_no_more_than_one() -> None:
+    """The weights of many models add up to 1 but for their rounding."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        theta = np.sort(rng.uniform(0.0, 2.0 * np.pi, 120))
+        error = 40.0 * np.cos(theta) + 20.0 * np.sin(5.0 * theta)
+        path = 0.3 * np.cumsum(rng.normal(size=(2, 120)), axis=1) + rng.normal(size=(2, 120))
+        estimate = estimate_by_evidence(
+            [RunReadings(theta, error + own) for own in path], range(1, 13)
+        )
+        for found in (estimate, estimate.without([0])):
+            assert ((found.probability >= 0.0) & (found.probability <= 1.0)).all()
+
+
 def test_orders_that_the_places_cannot_distinguish_share_their_probability() -> None:
     """At 16 places orders 3 and 13 are the same columns."""
     theta = np.tile(2.0 * np.pi * np.arange(16) / 16, 8)
