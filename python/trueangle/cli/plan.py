@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ArgumentError
 from ..selfcalibration import PLANNED
 from ..support.files import SIMULATION
-from .options import given, refuse_given
+from .options import add_shared, given, refuse_given
 from .parser import Input, Output, declare
 from .signal_options import add_signals
-from .values import angle, arc, names, orders_by_shaft, parse_orders, seconds
+from .values import angle, arc, declared_shafts, names, orders_by_shaft, parse_orders, seconds
 
 if TYPE_CHECKING:
     from ..fleets.unitplan import UnitPlan
@@ -35,21 +35,15 @@ OF_AFTER = (
     *("counts_per_turn_reference", "topic", "facets", "unit_from", "periods_per_turn"),
 )
 _OF_OTHERS = (
-    *("gear_ratio", *OF_TURNS, "orders", "noise_arcsec", "std_arcsec", "arc", *OF_ARC),
+    *("gear_ratio", "shaft", *OF_TURNS, "orders", "noise_arcsec", "std_arcsec", "arc", *OF_ARC),
     *("uncertainty", "prior", "self_method", *OF_SELF),
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
+    add_shared(parser, "gear-ratio", "fixed-member", "shaft")
     add = partial(declare, parser)
-    add("--gear-ratio R", float, "motor turns per output turn")
-    add(
-        "--fixed-member",
-        ("circular_spline", "flexspline", "none"),
-        "the fixed member of the gear (default: %(default)s)",
-        default="circular_spline",
-    )
     add("--positions N", int, "positions per mount (default: 36)")
     add("--mounts J", int, "times that the reference is clamped, turned each time (default: 2)")
     add(
@@ -113,9 +107,11 @@ def _add_self_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the plan."""
-    orders = None if args.orders is None else _output_orders(args)
     if args.after is not None:
         return _run_after(args)
+    if args.orders is None:
+        refuse_given(args, ("shaft",), "is of orders of that shaft: add --orders NAME:1,2")
+    orders = None if args.orders is None else _output_orders(args)
     refuse_given(args, OF_AFTER, "is of plans after a diagnosis: add --after RUNS")
     if args.self_method is None:
         of_self = (*OF_SELF, "simulation")
@@ -127,12 +123,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _output_orders(args: argparse.Namespace) -> tuple[float, ...]:
     """Orders of ``--orders``, those of other shafts in cycles of the output."""
-    found = orders_by_shaft(args.orders)
+    further = declared_shafts(args.shaft)
+    found = orders_by_shaft(args.orders, further)
     if not isinstance(found, Mapping):
         return parse_orders(args.orders)
     from ..joint.shafts import resolve_orders
 
-    shafts = resolve_orders(found, args.gear_ratio, args.fixed_member)
+    shafts = resolve_orders(found, args.gear_ratio, args.fixed_member, further)
     return tuple(sorted({k * shaft.cycles_per_turn for shaft in shafts for k in shaft.orders}))
 
 

@@ -165,7 +165,8 @@ def orders_by_shaft(
         if shaft not in known:
             raise ArgumentError(
                 f"--orders: there is no shaft {shaft!r}; the shafts are "
-                f"{', '.join(known)}{did_you_mean(shaft, known)}"
+                f"{', '.join(known)}"
+                + (did_you_mean(shaft, known) or f"; add --shaft {shaft}=CYCLES")
             )
         if shaft in by_shaft:
             raise ArgumentError(f"--orders names shaft {shaft!r} twice: {text!r}")

@@ -65,6 +65,17 @@ def rms_arcsec(model: ta.HarmonicModel, runs: list[ta.CalibrationRun]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
 
 
+def test_the_shaft_that_a_plan_asks_for_is_taken(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["plan", "--positions", "36", "--orders", "worm:1,2"]
+    assert main(words) == 1
+    assert "add --shaft worm=CYCLES" in capsys.readouterr().err
+    assert main([*words, "--shaft", "worm=40", "--json"]) == 0
+    assert {*json.loads(capsys.readouterr().out)["noise_factors"]} == {"40", "80"}
+    assert main(["plan", "--orders", "motor:1"]) == 1
+    assert "--shaft motor=CYCLES" in capsys.readouterr().err
+    assert main(["plan", "--orders", "motor:1", "--shaft", "motor=57"]) == 0
+
+
 # -- a correction without a model to begin with --------------------------------------
 
 

@@ -329,12 +329,6 @@ def test_a_mistyped_shaft_is_answered_with_the_one_meant(command, tmp_path, caps
     assert "shafts=" not in text
 
 
-def test_a_shaft_of_unknown_speed_asks_for_the_ratio(tmp_path, capsys):
-    runs = write(tmp_path / "r.csv", [])
-    text = told(["fit", runs, "-o", tmp_path / "x", "--orders", "motor:1"], capsys)
-    assert "--gear-ratio" in text
-
-
 #: Columns of runs whose indicated angle moves otherwise than the reference: unit of both,
 #: the indicated angle by the true one in degrees, and what is said of it.
 MOVES = {
