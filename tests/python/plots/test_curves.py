@@ -56,14 +56,6 @@ def fit():
     return fitted()
 
 
-@pytest.fixture(autouse=True)
-def _closed():
-    yield
-    from matplotlib import pyplot
-
-    pyplot.close("all")
-
-
 @pytest.mark.parametrize("period", PERIODS)
 def test_residuals_stand_at_the_signal_of_their_own_run(period):
     found = fitted(period)

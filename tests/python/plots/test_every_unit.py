@@ -131,14 +131,6 @@ def test_the_numbers_of_a_page_are_alike(unit):
 matplotlib.use("Agg")
 
 
-@pytest.fixture(autouse=True)
-def _closed():
-    yield
-    from matplotlib import pyplot
-
-    pyplot.close("all")
-
-
 @pytest.fixture(scope="module")
 def wide() -> list[ta.CalibrationRun]:
     """Two degrees of error."""

@@ -44,14 +44,6 @@ def fleet():
     )
 
 
-@pytest.fixture(autouse=True)
-def _closed():
-    yield
-    from matplotlib import pyplot
-
-    pyplot.close("all")
-
-
 def lines(ax):
     """Data of lines by their labels."""
     return {line.get_label(): np.array(line.get_data(), dtype=object) for line in ax.lines}

@@ -44,14 +44,6 @@ def fit(runs: list[ta.CalibrationRun]) -> ta.FitResult:
     return ta.fit(runs[:3], {"output": [1, 2], "motor": [1]}, gear_ratio=100)
 
 
-@pytest.fixture(autouse=True)
-def _closed():
-    yield
-    from matplotlib import pyplot
-
-    pyplot.close("all")
-
-
 def check_labels(ax) -> None:
     labels = [ax.get_xlabel(), ax.get_ylabel()]
     if ax.name == "polar":

@@ -131,7 +131,3 @@ def test_counts_and_the_ratchet(checkout):
     assert "rooms.fitting: 8, the limit is 7" in done.stdout
     weigh(checkout, "--lower")
     assert (checkout / ".ci" / "weight.toml").read_text(encoding="utf-8") == limits
-
-
-def test_lint_weighs_the_package():
-    assert "$(PYTHON) .ci/weight\n" in (ROOT / "Makefile").read_text("utf-8")

@@ -10,6 +10,7 @@ import trueangle as ta
 from trueangle.effects import Backlash
 from trueangle.joint.joint import DeclaredShaft
 from trueangle.reports.demo import demo_simulation
+from trueangle.reports.page import find_browser
 from trueangle.simulation import Harmonic, Joint, RunDesign
 
 ORDERS = {"output": [1], "motor": [1, 2], "wave_generator": [2]}
@@ -37,6 +38,14 @@ def large():
     )
     runs = ta.simulate(replace(believed, harmonics=lines), seed=7)
     return ta.report(runs, simulation=believed, title="Degrees")
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with pytest.importorskip("playwright.sync_api").sync_playwright() as driver:
+        started = driver.chromium.launch(executable_path=find_browser(), args=["--no-sandbox"])
+        yield started
+        started.close()
 
 
 @pytest.fixture(scope="session")

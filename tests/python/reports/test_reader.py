@@ -15,7 +15,7 @@ from trueangle.reports.diagnosed import _parameter
 from trueangle.reports.figures import panel_figure
 from trueangle.reports.page import find_browser
 
-playwright = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("playwright.sync_api")
 pytest.importorskip("jinja2")
 pytest.importorskip("matplotlib")
 BROWSER = find_browser()
@@ -37,14 +37,6 @@ QUESTIONS = {
     "valid where": ("model", "It holds from"),
     "made from what": ("provenance", "sha256"),
 }
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as driver:
-        started = driver.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        yield started
-        started.close()
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,11 @@
+"""Figures are closed after each test."""
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    yield
+    from matplotlib import pyplot
+
+    pyplot.close("all")
