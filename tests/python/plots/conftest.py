@@ -1,5 +1,3 @@
-"""Figures are closed after each test."""
-
 import pytest
 
 
