@@ -109,9 +109,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the plan."""
     if args.after is not None:
         return _run_after(args)
-    if args.orders is None:
-        refuse_given(args, ("shaft",), "is of orders of that shaft: add --orders NAME:1,2")
-    orders = None if args.orders is None else _output_orders(args)
+    orders = _output_orders(args)
     refuse_given(args, OF_AFTER, "is of plans after a diagnosis: add --after RUNS")
     if args.self_method is None:
         of_self = (*OF_SELF, "simulation")
@@ -121,8 +119,11 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _output_orders(args: argparse.Namespace) -> tuple[float, ...]:
+def _output_orders(args: argparse.Namespace) -> tuple[float, ...] | None:
     """Orders of ``--orders``, those of other shafts in cycles of the output."""
+    if args.orders is None:
+        refuse_given(args, ("shaft",), "is of orders of that shaft: add --orders NAME:1,2")
+        return None
     further = declared_shafts(args.shaft)
     found = orders_by_shaft(args.orders, further)
     if not isinstance(found, Mapping):

@@ -110,7 +110,7 @@ class EvidenceEstimate:
     @property
     def present(self) -> tuple[float, ...]:
         """Orders that runs more probably share or differ by than not."""
-        return self._probable([((m.tau > 0.0) | (m.omega > 0.0)) for m in self.models])
+        return self._probable([(m.tau > 0.0) | (m.omega > 0.0) for m in self.models])
 
     @property
     def differing(self) -> tuple[float, ...]:

@@ -72,7 +72,8 @@ def test_the_shaft_that_a_plan_asks_for_is_taken(capsys: pytest.CaptureFixture[s
     assert main([*words, "--shaft", "worm=40", "--json"]) == 0
     assert {*json.loads(capsys.readouterr().out)["noise_factors"]} == {"40", "80"}
     assert main(["plan", "--orders", "motor:1"]) == 1
-    assert "--shaft motor=CYCLES" in capsys.readouterr().err
+    assert "give --gear-ratio, or " in (said := capsys.readouterr().err)
+    assert "--shaft motor=CYCLES" in said
     assert main(["plan", "--orders", "motor:1", "--shaft", "motor=57"]) == 0
 
 

@@ -46,6 +46,11 @@ def test_all_arrows_point_one_way():
     assert done.returncode == 0, done.stdout
 
 
+def test_make_lint_runs_it_and_weighs():
+    text = (ROOT / "Makefile").read_text("utf-8")
+    assert "$(PYTHON) .ci/arrows\n\t$(PYTHON) .ci/weight\n" in text
+
+
 @pytest.mark.parametrize(
     "planted",
     [
@@ -67,6 +72,11 @@ FORBIDDEN = {
     "face, by its name": ("fitting/orders/verdicts.py", "import trueangle", "face"),
     "drawing": ("model/corrector.py", "from ..plots import curves", "plots stands above model"),
     "drawing, by the full name": ("model/model.py", "import trueangle.plots.palette", "above"),
+    "reports": ("diagnosis/levels.py", "from ..reports import page", "reports stands above"),
+    "a fit by a picture": ("plots/planpictures.py", "from ..fitting import fit", "do not fit"),
+    "a format and a model": ("formats/__init__.py", "from ..model import model", "above formats"),
+    "an effect and a diagnosis": ("effects/backlash.py", "from .. import diagnosis", "above"),
+    "a fit and a diagnosis": ("fitting/fit.py", "from ..diagnosis import gain", "above fitting"),
     "the ground": ("support/files/outputs.py", "from ...model import model", "above support"),
 }
 

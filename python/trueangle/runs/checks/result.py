@@ -101,8 +101,7 @@ def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
         cannot.append({"what": what, "because": because, "measure": measure})
 
     if extent.readings < FEWEST * extent.runs:
-        few, more = counted(extent.readings, "reading"), f"{FEWEST} or more in a run"
-        no("outliers, and orders apart from noise", few, more)
+        no("single outliers", counted(extent.readings, "reading"), f"{FEWEST} or more in a run")
     if extent.span_deg >= 350.0:
         can.append("integer orders of a whole turn")
     else:

@@ -184,7 +184,8 @@ def outliers(records: Iterable[Record], faults: Iterable[DataFault]) -> Iterator
 
 def _isolated(record: Record) -> tuple[NDArray[np.bool_], Array]:
     """Which readings are isolated outliers, and how far each is off its neighbours, deg."""
-    far, distance = spikes(error := record.run.centred_error, record.reference, 360.0)
+    error = record.run.centred_error
+    far, distance = spikes(error, record.reference, 360.0)
     if far.any():
         # A sensor that rounds differs from its neighbours by its counts, which its errors span.
         steps = np.diff(np.unique(record.indicated[~far]))
