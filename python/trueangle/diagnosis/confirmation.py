@@ -175,9 +175,7 @@ def confirmation_status(
     if regression is not None and group and set(group) <= {*free_paths(regression)}:
         return NOT_CONFIRMED, (f"it is {FREE_PATH}, which fits anything: it describes the noise")
     if unexplained.found and takes_up and not _is_seen_without_a_name(regression, group):
-        return NOT_CONFIRMED, (
-            "part of the error is unexplained, and this flexible cause would fit it"
-        )
+        return NOT_CONFIRMED, ("it fits nearly any residual, and part of the error is unexplained")
     if regression is not None and group and takes_up and cause != DriftWithinRun.kind:
         drift = _drift(regression)
         is_seen = drift > 0.0 and _is_seen_without_a_name(regression, group)

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 #: What to do where nothing else is known.
 MEASURE_MORE = "measure more runs, in both directions and at two speeds, then diagnose again"
 
+#: The same where the runs are planned.
+PLANNED = "measure the planned runs (`diagnosis.plan()`)"
+
 
 class Correctable(PlainResult):
     """A diagnosis that a model can be made of."""

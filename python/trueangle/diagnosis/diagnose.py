@@ -283,11 +283,8 @@ def _used(runs: list[CalibrationRun]) -> int:
 
 def _incomplete(at: Deadline, gain: bool) -> str:
     """That the account was ended, while what, and what that means."""
-    means = ", few of it tested on held-out data" * gain
-    return (
-        f"INCOMPLETE: {at.why} while {at.cut}. Below is what was found by then{means}; names and "
-        "sizes may change"
-    )
+    means = ", as few are tested on held-out data" * gain
+    return f"INCOMPLETE: {at.why} while {at.cut}; names and sizes found by then may change{means}"
 
 
 def _ratio_finding(ratio: GearedLinesRatio) -> Finding:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
+from ..effects.effect import title_of
 from ..estimation.regression import ROUNDING
 from ..joint.signals import join_runs
 from ..runs.checks.fault import DataFault
@@ -18,7 +19,7 @@ from ..simulation.simulation import Simulation
 from ..support.layout import counted
 from ..support.plainresult import json_text, plain_fields
 from .beliefs import Belief
-from .correctable import MEASURE_MORE, Correctable
+from .correctable import MEASURE_MORE, PLANNED, Correctable
 from .discrepancy import Discrepancy
 from .factors.factor import Factor
 from .finding import Finding
@@ -180,15 +181,19 @@ class DiagnosisData(Correctable):
             steps.append("write the correction model (`diagnosis.correction()`)")
         elif added or self.wrong:
             steps.append("write the extended simulation (`diagnosis.simulation()`)")
-        lasting = {f.cause: EFFECTS[f.cause].not_at_run_time for f in sure}
+        lasting = {title_of(f.cause): EFFECTS[f.cause].not_at_run_time for f in sure}
         steps += [f"{cause} cannot be corrected ({why})" for cause, why in lasting.items() if why]
-        if self.planned:
-            steps.append("separate the causes that look alike (`diagnosis.plan()`)")
-        still = [spot for spot in self.in_question if spot.causes not in self.planned]
-        told = {spot.measure: ", ".join(spot.causes) for spot in reversed(still)}
-        steps += [f"to distinguish {causes}: {measure}" for measure, causes in told.items()]
+        asked: dict[str, dict[str, None]] = {}
+        for spot in self.not_identifiable:
+            is_planned = spot.supported and spot.causes in self.planned
+            if is_planned or spot in self.in_question:
+                asked.setdefault(PLANNED if is_planned else spot.measure, {})[
+                    _question(spot.causes)
+                ] = None
+        steps += [f"{', '.join(questions)}: {measure}" for measure, questions in asked.items()]
         unexplained = self.unexplained is not None and self.unexplained.found
-        if not self.planned and (unexplained or len(sure) < len(self.findings)):
+        doubtful = unexplained or len(sure) < len(self.findings)
+        if doubtful and not self.planned and MEASURE_MORE not in asked:
             steps.append(MEASURE_MORE)
         return steps
 
@@ -255,3 +260,9 @@ class DiagnosisData(Correctable):
             parts.append("more is unexplained")
         parts.append(f"noise {self.noise:.3g} arcsec of {self.readings} readings")
         return ", ".join(parts) + (f": {', '.join(sure)}" if sure else "")
+
+
+def _question(causes: Sequence[str]) -> str:
+    """What a measurement is for: which of the causes it is, or whether it is this one."""
+    *others, last = map(title_of, causes)
+    return f"to distinguish {', '.join(others)} and {last}" if others else f"to confirm {last}"

@@ -132,7 +132,7 @@ def finding_lines(
     """A finding as readable text behind its number, without what those ``before`` have stated."""
     n = unit.number
     title = title_of(finding.cause)
-    lines = [number + finding.cause + f": {title}" * (title != finding.cause)]
+    lines = [number + finding.cause + f": {title}" * (title != finding.cause.replace("_", " "))]
     if not finding.confirmed:
         lines[0] += f" (NOT CONFIRMED: {unit.spoken(finding.reason)})"
         lines = wrapped_lines(lines[0], 3)

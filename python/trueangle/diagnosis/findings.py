@@ -15,6 +15,7 @@ from ..estimation.regression import Regression
 from ..runs.checks.fault import DataFault
 from ..support.deadline import current_deadline
 from .confirmation import CONFIRMED, NOT_CONFIRMED, confirmation_status
+from .correctable import MEASURE_MORE
 from .finding import Finding
 from .formerrors import with_form_errors, with_unseen_orders
 from .gain import Gain, measure_gain
@@ -200,12 +201,8 @@ def equal_scatter(item: ScatterFinding) -> Ambiguity | None:
 
 def scatter_doubt(item: ScatterFinding, fault: DataFault | None = None) -> Ambiguity:
     """Ambiguity of scatter about an uncertain mean, or of readings that a fault made unusable."""
-    because, measure = (
-        "the error that the readings show has no certain cause yet, so what scatters about it "
-        "has none either",
-        "measure more runs, in both directions and at two speeds, then diagnose again",
-    )
+    because = "the error itself has no certain cause yet, so its scatter has none either"
     if fault is not None:
         because = f"{fault.fault}: the faulty readings cause the scatter"
-        measure = f"{fault.mend}; then diagnose again"
+    measure = MEASURE_MORE if fault is None else f"{fault.mend}; then diagnose again"
     return Ambiguity((item.cause,), because, measure, True, item.bic_gain)

@@ -33,38 +33,20 @@ def diagnosis_summary(
 
     ``verbose`` also reports in full the causes not in question that these readings cannot show.
     """
-    d = diagnosis.discrepancy
-    unit = error_unit(errors_in, sine_of_rms(d.rms))
-    n = unit.number
+    unit = error_unit(errors_in, sine_of_rms(diagnosis.discrepancy.rms))
     lines = [
         *_headline(diagnosis, unit),
         *_wrapped(diagnosis.simulated.summary() if diagnosis.simulated else "", 0),
-        f"Measured minus simulated: rms {unit.text(d.rms)}, peak-to-peak "
-        f"{n(d.peak_to_peak)}, max abs {n(d.max_abs)} ({diagnosis.readings} readings).",
+        *(line for entry in _sizes(diagnosis, unit) for line in _wrapped(*entry)),
     ]
-    if diagnosis.readings_used < diagnosis.readings:
-        used = f"{diagnosis.readings_used} of {diagnosis.readings} readings were used"
-        lines += _wrapped(f"{used}: evenly spaced, without turning points.", 0)
     sure = sum(finding.confirmed for finding in diagnosis.findings)
     shown = diagnosis.findings if verbose else diagnosis.findings[: sure + LISTED]
     for k, finding in enumerate(shown):
         lines += ["", *finding_lines(f"{k + 1}. ", finding, unit, shown[:k])]
-    if more := len(diagnosis.findings) - len(shown):
-        lines += ["", f"{counted(more, 'further finding')} not confirmed (`verbose=True`)."]
     if diagnosis.wrong:
         lines += ["", "Wrong in the simulation:"]
         for belief in diagnosis.wrong:
             lines += _wrapped(f"- {_belief(belief, unit)}", 2)
-    g = diagnosis.gain
-    rms, peak, most = (
-        f"{n(g[f'{size}_before_arcsec'])} -> {n(g[f'{size}_after_arcsec'])}"
-        for size in ("rms", "peak_to_peak", "max_abs")
-    )
-    together = f"Extended simulation, in the readings that were fitted: rms {rms} {unit.name}, "
-    together += f"peak-to-peak {peak}, max abs {most}."
-    if sure < len(diagnosis.findings):
-        together += " Causes that are not confirmed are not in it."
-    lines += ["", *_wrapped(together, 2)]
     if diagnosis.torque is not None:
         lines += ["", *(part for text in diagnosis.torque.lines() for part in _wrapped(text, 2))]
     open_still = [*_ambiguity_entries(diagnosis, verbose, unit)]
@@ -83,27 +65,39 @@ def _if_it_is(spot: Ambiguity, unit: ErrorUnit) -> Iterator[str]:
         yield f"If {cause}: {shown}."
 
 
-def _noise(diagnosis: DiagnosisData, unit: ErrorUnit) -> str:
-    """The noise of one reading, next to that of the simulation."""
+def _sizes(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
+    """The error without and with what was found, and the noise of one reading."""
+    used = counted(diagnosis.readings, "reading")
+    if diagnosis.readings_used < diagnosis.readings:
+        used = f"{diagnosis.readings_used} of {used}, evenly spaced, without turning points"
+    without, extended = (
+        f"rms {unit.text(diagnosis.gain[f'rms_{when}_arcsec'])}, "
+        f"peak-to-peak {unit.number(diagnosis.gain[f'peak_to_peak_{when}_arcsec'])}, "
+        f"max abs {unit.number(diagnosis.gain[f'max_abs_{when}_arcsec'])}"
+        for when in ("before", "after")
+    )
+    yield f"Measured minus simulated: {without} ({used}).", 2, 0
+    if extended.split(",")[0] != without.split(",")[0]:
+        yield f"With what is confirmed added: {extended}.", 2, 0
     text = f"Noise of one reading: {unit.text(diagnosis.noise)}"
     if diagnosis.extended.sigma_arcsec:
         text += f" ({unit.number(diagnosis.extended.sigma_arcsec)} in the simulation)"
     if diagnosis.correlation:
         text += f", correlation between neighbours {diagnosis.correlation:.2f}"
-    return f"{text}."
+    yield f"{text}.", 2, 0
 
 
 def _headline(diagnosis: DiagnosisData, unit: ErrorUnit) -> list[str]:
     """What a reader must know first: what is found, how large it is, and what to do."""
     entries = [*_found(diagnosis, unit)]
     rest = diagnosis.unexplained
-    noise = [] if rest is None else [item for item in rest.noise_firing if _is_material(item)]
-    if noise and not entries:
-        entries.append(("No pattern beyond the simulation, but the noise differs.", 0, 0))
-        entries += _items((item for item in noise if item.test != AGAINST_STATED), unit)
+    noise = () if rest is None or entries else rest.noise_firing
+    others = [item for item in noise if item.test != AGAINST_STATED]
+    if others or any(abs(item.statistic - 1.0) > MATERIAL for item in noise):
+        entries = [("No pattern beyond the simulation, but the noise differs.", 0, 0)]
+        entries += _items(others, unit)
     elif not entries:
         entries.append(("Nothing beyond the simulation: no test is significant.", 0, 0))
-    entries.append((_noise(diagnosis, unit), 2, 0))
     steps = "; ".join(diagnosis.next_steps)
     if diagnosis.is_enough and not steps:
         least = brief_number(diagnosis.detectable * unit.per_arcsec)
@@ -121,7 +115,9 @@ def _items(evidence: Iterable[Evidence], unit: ErrorUnit) -> Iterator[Entry]:
 
 def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     """Faults of the data, what is not understood, what is found or wrong."""
-    yield from ((f"{note}.", 2, 0) for note in diagnosis.notes)
+    notes = [(f"{note}.", 2, 0) for note in diagnosis.notes]
+    if notes and not diagnosis.complete:  # all that follows depends on it
+        yield notes.pop(0)
     yield from ((f"Fault of the data, {fault}.", 2, 0) for fault in diagnosis.data_faults)
     rest, unknown = diagnosis.unexplained, list[Entry]()
     if rest is not None and rest.found:
@@ -133,21 +129,26 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
             yield from unknown
             unknown = []
     sure = "Confirmed" if diagnosis.complete else "Confirmed so far"
-    for title, status in ((sure, True), ("Not confirmed", False)):
-        named = [brief_finding(f, unit) for f in diagnosis.findings if f.confirmed is status]
-        if named:
-            most = len(named) if status else LISTED
-            more = f", and {len(named) - most} more" if len(named) > most else ""
-            yield f"{title}: {_by_cause(named[:most])}{more}.", 2, 0
+    named = [brief_finding(f, unit) for f in diagnosis.findings if f.confirmed]
+    if named:
+        yield f"{sure}: {_by_cause(named)}.", 2, 0
     lacking = () if diagnosis.torque is None else diagnosis.torque.findings
     torque = "; ".join(f.summary() for f in lacking if f.confirmed)
     if torque:
         yield f"{sure} in the drive's torque: {torque}.", 2, 0
-    named_factors = {factor.factor for factor in diagnosis.factors if factor.named_by}
-    for factor in diagnosis.factors:
-        beyond = not factor.named_by and factor.factor in named_factors
-        also = "Beyond that, it" if beyond else "The error"
-        yield f"{also} follows {factor.sentence(unit)}.", 2, 0
+    nameless: dict[tuple[str, str], list[str]] = {}
+    for factor in (factor for factor in diagnosis.factors if not factor.named_by):
+        nameless.setdefault((factor.followed, factor.status), []).append(factor.size(unit))
+    for (what, status), each in nameless.items():
+        yield f"The error follows {what}: {'; '.join(each)}. {status}.", 2, 0
+    doubted: dict[str, list[str]] = {}
+    doubtful = [finding for finding in diagnosis.findings if not finding.confirmed]
+    for finding in doubtful[:LISTED]:
+        doubted.setdefault(unit.spoken(finding.reason), []).append(brief_finding(finding, unit))
+    for reason, each in doubted.items():
+        yield f"Not confirmed: {_by_cause(each)}{f': {reason}' if reason else ''}.", 2, 0
+    if len(doubtful) > LISTED:
+        yield f"Not confirmed: {len(doubtful) - LISTED} more (`verbose=True`).", 2, 0
     wrong = "; ".join(f"{b.what} {b.verdict.replace('_', ' ')}" for b in diagnosis.wrong[:4])
     if wrong:
         yield f"Wrong in the simulation: {wrong}.", 2, 0
@@ -156,6 +157,7 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
         why = re.split(r"; |\. | \(", spot.because)[0]
         yield f"Detected, {detected}: {_seen(spot, unit)}; {why}.", 2, 0
     yield from unknown
+    yield from notes
 
 
 def _by_cause(named: Iterable[str]) -> str:
@@ -165,11 +167,6 @@ def _by_cause(named: Iterable[str]) -> str:
         what, *size = re.split(r" (?=[-\d(])", text, maxsplit=1)
         sizes.setdefault(what, []).extend(size)
     return "; ".join(f"{what} {', '.join(each)}".strip() for what, each in sizes.items())
-
-
-def _is_material(item: Evidence) -> bool:
-    """Whether the noise differs by more than a few percent from the stated one."""
-    return item.test != AGAINST_STATED or abs(item.statistic - 1.0) > MATERIAL
 
 
 def _seen(spot: Ambiguity, unit: ErrorUnit) -> str:

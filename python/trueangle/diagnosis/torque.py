@@ -115,10 +115,8 @@ class TorqueAccount(ShownResult):
         )
         for finding in self.findings:
             yield f"- {finding.summary()}"
-        if not self.findings:
-            yield "- nothing is in it beyond the simulator's" + (
-                "" if not self.unexplained else " that has a name"
-            )
+        if not self.findings and not self.unexplained:
+            yield "- nothing is in it beyond the simulator's"
         if self.unexplained:
             yield "- NOT UNDERSTOOD: there is more in it than noise"
         if self.advice:

@@ -39,7 +39,7 @@ Spots: TypeAlias = Sequence[Ambiguity]
 
 def title_of(kind: str) -> str:
     """What a first line calls a cause."""
-    return (EFFECTS[kind].title if kind in EFFECTS else "") or kind
+    return (EFFECTS[kind].title if kind in EFFECTS else "") or kind.replace("_", " ")
 
 
 class Effect(TabledParameters):

@@ -132,15 +132,15 @@ class MissedCounts(Effect):
 
     @classmethod
     def report(cls, regression: Regression, terms: Sequence[Fitted]) -> Reported:
-        rows = [(float(c[0]), float(np.sqrt(v[0, 0])), t.shape) for t, c, v in terms]
-        labels = regression.signals.labels
+        rows = sorted((t.shape["run"], t.shape["row"], c[0], v[0, 0] ** 0.5) for t, c, v in terms)
 
-        def one(values: list[Any]) -> Any:
-            return values[0] if len(values) == 1 else values
+        def one(values: Any) -> Any:
+            return values[0] if len(values) == 1 else [*values]
 
+        runs, places, steps, errors = zip(*rows, strict=True)
         parameters = {
-            "step_arcsec": quantity(one([row[0] for row in rows]), one([row[1] for row in rows])),
-            "run": quantity(one([labels[row[2]["run"]] for row in rows])),
-            "row": quantity(one([row[2]["row"] for row in rows])),
+            "step_arcsec": quantity(one(steps), one(errors)),
+            "run": quantity(one([regression.signals.labels[run] for run in runs])),
+            "row": quantity(one(places)),
         }
-        return parameters, [MissedCounts(row[0], row[2]["run"], row[2]["row"]) for row in rows]
+        return parameters, [MissedCounts(step, run, row) for run, row, step, _ in rows]

@@ -172,9 +172,10 @@ class Comparison(PlainResult):
     Attributes
     ----------
     orders : list of dict
-        ``{"order", "amplitude_arcsec", "phase_deg", "std_arcsec"}`` of the difference of the
-        errors, ``C sin(order * angle + phase)``; ``std_arcsec`` is of the amplitude in any
-        one phase, None where neither model states a covariance.
+        ``{"order", "amplitude_arcsec", "phase_deg", "std_arcsec", "model"}`` of the difference
+        of the errors, ``C sin(order * angle + phase)``; ``std_arcsec`` is of the amplitude in any
+        one phase, None where neither model states a covariance; ``model`` is "A" or "B" where only
+        the first or the second has the order, else "both".
     rms_arcsec, max_abs_arcsec : float
         Of the difference over a turn, its zero taken out.
     std_arcsec : float or None
@@ -203,7 +204,7 @@ class Comparison(PlainResult):
         changed.
     """
 
-    orders: list[dict[str, float | None]]
+    orders: list[dict[str, Any]]
     rms_arcsec: float
     max_abs_arcsec: float
     std_arcsec: float | None
@@ -262,28 +263,31 @@ class Comparison(PlainResult):
     def _verdict(self, unit: ErrorUnit) -> list[str]:
         """Whether the models differ, by how much, and which of them to use."""
         size = f"{unit.text(self.rms_arcsec)} rms over the turn"
-        if self.std_arcsec is not None:
-            size += f", with a standard error of {unit.text(self.std_arcsec)}"
         if self.verdict is None or self.p is None:
             return [f"Difference {size}; not tested: that needs the covariance of both models."]
         a, b = (std or 0.0 for std in self.each_std_arcsec)
-        known = f"the standard error of A is {unit.text(a)} rms, that of B {unit.text(b)}"
-        if self.verdict == "same":
-            lines = [f"No significant difference: {size}.", f"Use {'BA'[a <= b]}: {known}."]
-        else:
-            lines = [f"Changed{self._moved(unit)}: the models differ by {size}: {known}."]
-            lines.append("Which is right now: trueangle watch READINGS -m A, then B.")
+        first = f"No significant difference: {size}."
+        use = f"Use {'BA'[a <= b]}, the more certain one."
+        if self.verdict == "changed":
+            first = f"Changed: {'; '.join([*self._moved(unit), size])}."
+            # Where the difference is less than what either is uncertain by, that one is no judge.
+            if max(a, b) < self.rms_arcsec:
+                use = "Which is right now: trueangle watch READINGS -m A, then B."
+        known = f"Standard error over the turn: {unit.text(a)} rms of A, {unit.text(b)} of B."
         p = "< 1e-12" if self.p < 1e-12 else f"= {self.p:.2g}"
-        return [*lines, f"By noise alone: p {p}; below {self.false_alarms:g} is a change."]
+        p = f"By noise alone: p {p}; below {self.false_alarms:g} is a change."
+        return [first, f"{use} {known}", p]
 
-    def _moved(self, unit: ErrorUnit) -> str:
+    def _moved(self, unit: ErrorUnit) -> list[str]:
         """The orders that differ by more than three standard errors, the clearest first."""
-        pairs = ((row["order"], row["amplitude_arcsec"], row["std_arcsec"]) for row in self.orders)
-        sizes = {k: (size or 0.0, std or 0.0) for k, size, std in pairs}
-        clear = {k: size / std for k, (size, std) in sizes.items() if size and std}
-        first = sorted((k for k, times in clear.items() if times > 3.0), key=lambda k: -clear[k])
-        each = ", ".join(f"order {k:g} by {unit.text(*sizes[k])}" for k in first[:3])
-        return f" ({each})" * bool(each)
+        rows = (row for row in self.orders if row["std_arcsec"] and row["amplitude_arcsec"])
+        clearest = sorted(rows, key=lambda row: row["std_arcsec"] / row["amplitude_arcsec"])[:3]
+        return [
+            f"order {row['order']:g} by {unit.text(row['amplitude_arcsec'], row['std_arcsec'])}"
+            + f" (in {row['model']} only)" * (row["model"] != "both")
+            for row in clearest
+            if row["amplitude_arcsec"] > 3.0 * row["std_arcsec"]
+        ]
 
     def _arithmetic(self, unit: ErrorUnit) -> list[str]:
         if self.table_max_abs_arcsec is None or self.table_rms_arcsec is None:
@@ -364,7 +368,7 @@ def compare(
     zero = float(np.mean(difference)) if turns == 1 or at_readings else 0.0
     difference = difference - zero
     spectrum = np.fft.rfft(difference) * (2.0 / points)
-    rows: list[dict[str, float | None]] = []
+    rows: list[dict[str, Any]] = []
     for order in orders:
         if same:
             z = _line(second, order) - _line(first, order)
@@ -374,7 +378,9 @@ def compare(
             z = complex(2.0 * np.mean(difference * np.exp(2j * np.pi * order * x)))
         size = {"order": order, "amplitude_arcsec": abs(z) * ARCSEC_PER_TURN}
         phase = math.degrees(math.atan2(z.real, z.imag)) % 360.0
-        rows.append({**size, "phase_deg": phase, "std_arcsec": _std(first, second, order)})
+        of = "both" if order in one.lines and order in two.lines else "BA"[order in one.lines]
+        std = _std(first, second, order)
+        rows.append({**size, "phase_deg": phase, "std_arcsec": std, "model": of})
     tables = [
         (m.fit.table, ARCSEC_PER_TURN / m.period) for m in (first, second) if m.fit and m.fit.table
     ]
@@ -430,19 +436,13 @@ def _line(model: HarmonicModel, order: float) -> complex:
 
 def _std(first: HarmonicModel, second: HarmonicModel, order: float) -> float | None:
     """Of one coefficient of the difference, in arcsec."""
-    total, known = 0.0, False
+    variances = []
     for model in (first, second):
-        if model.covariance is None:
-            continue
-        at = 1
-        for shaft in model.shafts:
-            for k in shaft.orders:
-                if k * shaft.cycles_per_turn == order:
-                    known = True
-                    variance = (model.covariance[at, at] + model.covariance[at + 1, at + 1]) / 2.0
-                    total += float(variance) / model.period**2
-                at += 2
-    return math.sqrt(total) * ARCSEC_PER_TURN if known else None
+        known = _coefficients(model).get(order)
+        if known is not None and model.covariance is not None:
+            spread = np.diag(model.covariance)[list(known[0])]
+            variances.append(float(spread.mean()) / model.period**2)
+    return math.sqrt(sum(variances)) * ARCSEC_PER_TURN if variances else None
 
 
 def _terms(model: HarmonicModel, kind: str) -> list[Any]:

@@ -11,7 +11,7 @@ from ..support.angles import arcsec, zero_text
 from ..support.display_units import ErrorsIn, ErrorUnit, error_unit, rounded_phase, sine_of_rms
 from ..support.distributions import student_quantile
 from ..support.layout import counted, laid_out
-from ..support.plainresult import finite_or_none
+from ..support.plainresult import finite_or_none, plain_fields
 from .model import FittedCoefficients
 from .orders.table import UNDETERMINED
 
@@ -167,13 +167,11 @@ def _evidence(found: FittedCoefficients) -> list[dict[str, Any]]:
     return [
         {
             "shaft": "output",
-            "order": row.order,
-            "retained": row.retained,
+            **plain_fields(row, "order retained probability"),
             "amplitude_arcsec": finite_or_none(scale * row.amplitude),
             "std_arcsec": finite_or_none(scale * row.standard_error),
             "phase_deg": finite_or_none(row.phase_deg % 360.0),
-            "holdout_gain": finite_or_none(row.holdout_gain),
-            "reason": row.reason,
+            **plain_fields(row, "holdout_gain reason"),
         }
         for row in (() if found.selection is None else found.selection.table)
     ]

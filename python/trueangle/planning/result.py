@@ -76,6 +76,7 @@ class ArcPlan(PlainResult):
         way = ", half from either side" if self.both_directions else ""
         arc = f"{self.start_deg:g} to {self.stop_deg:g} deg"
         lines = [f"{self.readings} readings over {arc}{each}{way}"]
+        lines += [f"  note: {note}" for note in self.notes]
         if self.uncertainty_arcsec is not None:
             size = f"{self.uncertainty_arcsec:.3g} arcsec"
             lines.append(f"  uncertainty (k = 2)    {size} at the worst place")
@@ -89,7 +90,6 @@ class ArcPlan(PlainResult):
         for order, factor in self.noise_factors.items():
             even = self.even_noise_factors[order]
             lines.append(f"  {order:5g}  {_factor(factor):>12}  {_factor(even):>12}")
-        lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)
 
     def _brief(self) -> str:
@@ -100,7 +100,7 @@ class ArcPlan(PlainResult):
 
 
 #: What a noise factor compares with.
-_FACTOR = "  standard error of each order (1: of as many readings over whole turns)"
+_FACTOR = "  standard error of each order; 1 (ideal): as many readings over whole turns"
 
 
 def _worst(factor: float) -> str:
@@ -188,18 +188,18 @@ class CalibrationPlan(PlainResult):
                 f"  tolerance              offsets within {self.tolerance_deg:.2g} deg of these, "
                 "measured to 0.01 deg",
             ]
+        lines += [f"  note: {note}" for note in self.notes]
         if self.kind == "mounts":
             shifts = ", ".join(str(s) for s in self.facet_shifts)
-            facet = self.facet_noise_factor
-            factor = "impossible with one mount"
-            if math.isfinite(facet):
-                factor = f"standard errors {facet:.2f} times those of one mount"
-            lines += [
-                f"  turn the reference by  {shifts} of {self.positions} faces, mount by mount",
-                f"  its errors fitted too  {factor}",
-            ]
-        lines += [_worst(self.worst_noise_factor), _FACTOR, *factor_table(self.noise_factors)]
-        lines += [f"  note: {note}" for note in self.notes]
+            lines.append(
+                f"  turn the reference by  {shifts} of {self.positions} faces, mount by mount"
+            )
+        lines.append(_worst(self.worst_noise_factor))
+        if math.isfinite(self.facet_noise_factor):
+            # The attribute is relative to one mount, the ideal to as many readings.
+            fitted = math.sqrt(len(self.mount_offsets_deg)) * self.facet_noise_factor
+            lines.append(f"  reference fitted too   standard error {fitted:.2f} times the ideal")
+        lines += [_FACTOR, *factor_table(self.noise_factors)]
         return laid_out(lines)
 
     def _brief(self) -> str:
@@ -292,6 +292,7 @@ class SelfPlan(PlainResult):
         }
         steps = ", ".join(text.format(value) for text, value in parts.items() if value)
         lines = [f"{self.method}, without a reference: {steps}"]
+        lines += [f"  note: {note}" for note in self.notes]
         if self.speed_ratio is not None:
             table = ", ".join(f"{r:g}: {f:.2g}" for r, f in self.speed_ratio_factors.items())
             lines += [
@@ -310,7 +311,6 @@ class SelfPlan(PlainResult):
                 else f"  the given angles       standard error {factor}, {worse}"
             )
         lines += [_FACTOR, *factor_table(self.noise_factors)]
-        lines += [f"  note: {note}" for note in self.notes]
         return laid_out(lines)
 
     def _brief(self) -> str:

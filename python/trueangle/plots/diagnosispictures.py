@@ -181,7 +181,7 @@ def factor_title(factor: Factor) -> str:
     what = what.replace("_", " ")
     if factor.orders:
         what += f" (order{'s' * (len(factor.orders) > 1)} {order_ranges(factor.orders)})"
-    names = ", ".join(map(title_of, factor.named_by)).replace("_", " ")
+    names = ", ".join(map(title_of, factor.named_by))
     return f"{what}: {names or 'cause not determined'}"
 
 

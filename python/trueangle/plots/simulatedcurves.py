@@ -126,7 +126,7 @@ def finding_names(diagnosis: Diagnosis) -> list[str]:
 
 
 def _name(finding: Finding) -> str:
-    cause = title_of(finding.cause).replace("_", " ")
+    cause = title_of(finding.cause)
     values = {name: quantity.value for name, quantity in finding.parameters.items()}
     shaft, order = values.get("shaft"), values.get("order")
     if isinstance(shaft, str):

@@ -77,7 +77,7 @@ def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
         # The size of each uncertain cause, as findings are listed.
         spot["options"] = [
             {
-                "name": title_of(cause).replace("_", " "),
+                "name": title_of(cause),
                 "parameters": [
                     _parameter(i, parameter, entry, named=False)
                     for i, (parameter, entry) in enumerate(
@@ -143,7 +143,7 @@ def unknown_content(
         return _folded(selection) + _conditions(runs) + _held(runs)
     found = [
         _entry(
-            " or ".join(title_of(cause).replace("_", " ") for cause in entry["causes"])
+            " or ".join(title_of(cause) for cause in entry["causes"])
             + (" (something is detected)" if entry["supported"] else ""),
             "; ".join([entry["because"], *_estimates(entry)]),
             entry["measure"],
@@ -156,7 +156,7 @@ def unknown_content(
 def _estimates(entry: dict[str, Any]) -> list[str]:
     """The size of each uncertain cause, where something is found."""
     return [
-        f"if {title_of(cause).replace('_', ' ')}: "
+        f"if {title_of(cause)}: "
         + ", ".join(
             _estimate(name, q["value"], q["std"])
             for name, q in parameters.items()

@@ -35,7 +35,7 @@ def test_a_headline_says_which_line_and_how_large(geared):
     one, two = (f.parameters["amplitude_arcsec"] for f in geared.findings)
     sizes = [f"({x.value:.2f} +- {x.std:.2f} arcsec)" for x in (one, two)]
     what = f"periodic error of the output, order 1 {sizes[0]}, 2 {sizes[1]}"
-    assert first.startswith(f"Confirmed: {what}. The error follows the place ")
+    assert first.startswith(f"Confirmed: {what}. What to do: ")
     # One unit for all of a joint.
     in_degrees = geared.summary(errors_in="deg")
     assert f"order 1 ({one.value / 3600.0:.6f} +- {one.std / 3600.0:.6f} deg)" in in_degrees
@@ -77,7 +77,7 @@ def test_every_kind_of_size_has_its_unit():
     result = ta.diagnose(ta.simulate(sim.with_effects(hidden), 3), sim)
     first = " ".join(result.summary().split("\n\n")[0].split())
     (bump,) = [f.parameters["place_deg"].value for f in result.findings if "local" in f.cause]
-    for cause in ("backlash (", "zero_slip (", f"local_defect of the output at {bump:.3f} +- "):
+    for cause in ("backlash (", "zero slip (", f"local defect of the output at {bump:.3f} +- "):
         assert cause in first, first
     assert first.count("arcsec)") == 2
     assert "(half width 8.000" in first
@@ -109,10 +109,10 @@ def test_a_headline_ends_with_what_to_do(geared):
     # What is in question comes after it, by the runs that separate it or by a measurement.
     spot = replace(geared.not_identifiable[0], supported=True, common="", measure="turn the mount")
     open_still = replace(geared, not_identifiable=[spot])
-    assert open_still.next_steps[1:] == [f"to distinguish {', '.join(spot.causes)}: turn the mount"]
+    assert open_still.next_steps[1:] == ["to confirm backlash: turn the mount"]
     # What no corrector can subtract is told with its reason, and a doubt asks for more runs.
     jitter = replace(geared.findings[0], cause="timestamp_jitter", effects=[])
     (step,) = replace(geared, findings=[jitter], factors=[]).next_steps
-    assert step.startswith("timestamp_jitter cannot be corrected (scatter has no value")
+    assert step.startswith("timestamp jitter cannot be corrected (scatter has no value")
     doubt = replace(geared.findings[0], status="not_confirmed")
     assert "measure more runs" in replace(geared, findings=[doubt]).next_steps[-1]

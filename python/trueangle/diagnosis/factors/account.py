@@ -274,7 +274,7 @@ def factors_of(
                 _curve(account, members, mean, covariance),
                 curves_of(factor, shaft, groups, means, shafts),
                 _jumps(groups, means),
-                tuple(group.event for group in groups if group.event is not None),
+                tuple(sorted(group.event for group in groups if group.event is not None)),
                 fitted,
             )
         )

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...effects.curve import Curve
-from ...effects.effect import title_of
 from ...support.arrays import Array
 from ...support.display_units import ErrorUnit
 from ...support.layout import order_ranges
@@ -125,8 +124,9 @@ class Factor(PlainResult):
             self, f"factor shaft orders {sizes} named_by not_distinguished_from curve"
         )
 
-    def sentence(self, unit: ErrorUnit) -> str:
-        """The factor in words: what is followed, how much, and whether it has a name."""
+    @property
+    def followed(self) -> str:
+        """What is followed, in words: the factor, and those that are the same in these runs."""
         also = [WORDS[other] for other in self.not_distinguished_from]
         times = "the place, changing with "
         products = [word.removeprefix(times) for word in also if word.startswith(times)]
@@ -134,23 +134,28 @@ class Factor(PlainResult):
         text += f" or {times}{', '.join(products)}" if products else ""
         if (self.factor, self.curve.unit) == ("reversal_time", "deg"):
             text = text.replace(WORDS["reversal_time"], "the travel since the last reversal")
+        return text
+
+    @property
+    def status(self) -> str:
+        """What is known of it without a name: whether anything corrects it."""
+        at_run_time = any(not effect.not_at_run_time for effect in self.effects)
+        simulated = "the extended simulation only" if self.effects else "no correction"
+        of = "the correction" if at_run_time else simulated
+        return f"Cause not determined; {of} contains its curve"
+
+    def size(self, unit: ErrorUnit) -> str:
+        """Where it is and how large, with its 95 % interval."""
+        n, where = unit.number, []
         if self.orders:
             of = "" if self.shaft in (None, "output") else f" of the {self.shaft}"
             each = order_ranges([*{round(m, DECIMALS) for m in self.orders}]).split(", ")
             shown = ", ".join(each[:LISTED]) + " ..." * (len(each) > LISTED) + of.replace("_", " ")
-            text += f" (order{'s' if len(self.orders) > 1 else ''} {shown})"
-        n = unit.number
-        if self.jumps:
-            sizes = [f"{n(size)} {unit.name} at {at:.1f} deg" for at, size in self.jumps]
-            text += f" ({'jumps' if len(sizes) > 1 else 'a jump'} of {' and '.join(sizes)})"
-        if self.events:
-            shown = " and ".join(f"run {run + 1} at row {row + 1}" for run, row in self.events)
-            text += f" ({'events' if len(self.events) > 1 else 'an event'} in {shown})"
+            where.append(f"order{'s' * (len(self.orders) > 1)} {shown}")
+        where += [f"a jump of {n(size)} {unit.name} at {at:.1f} deg" for at, size in self.jumps]
+        where += [f"an event in run {run + 1} at row {row + 1}" for run, row in self.events]
         range_ = f"95 %: {n(self.low)} to" if self.low else "at most"
-        text += f", {n(self.rms)} {unit.name} rms ({range_} {n(self.high)})"
-        held = "; the extended simulation contains its curve" if self.effects else ""
-        names = ", ".join(map(title_of, self.named_by))
-        return f"{text}: {names or f'cause not determined{held}'}"
+        return ", ".join([*where, f"{n(self.rms)} {unit.name} rms ({range_} {n(self.high)})"])
 
     def _brief(self) -> str:
         return f"{self.factor}, {self.rms:.3g} arcsec rms, {', '.join(self.named_by) or 'no name'}"

@@ -92,7 +92,7 @@ def test_a_flat_facet_is_a_function_of_the_place_and_no_row_of_bumps(rng):
     (up, size), (down, fall) = found.factors[0].jumps
     assert (up, down) == (pytest.approx(133.0, abs=1.0), pytest.approx(147.0, abs=1.0))
     assert (size, fall) == (pytest.approx(9.0, abs=1.0), pytest.approx(-9.0, abs=1.0))
-    assert "jumps of" in found.summary()
+    assert "a jump of" in found.summary()
     theta = np.linspace(0.0, 360.0, 1500)
     fresh = ta.CalibrationRun(theta, theta, period=360.0, time=theta / 20.0)
     left = error(theta) - found.extended.predict(fresh)
