@@ -67,18 +67,16 @@ def _if_it_is(spot: Ambiguity, unit: ErrorUnit) -> Iterator[str]:
 
 def _sizes(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     """The error without and with what was found, and the noise of one reading."""
+    d, g, n = diagnosis.discrepancy, diagnosis.gain, unit.number
     used = counted(diagnosis.readings, "reading")
     if diagnosis.readings_used < diagnosis.readings:
-        used = f"{diagnosis.readings_used} of {used}, evenly spaced, without turning points"
-    without, extended = (
-        f"rms {unit.text(diagnosis.gain[f'rms_{when}_arcsec'])}, "
-        f"peak-to-peak {unit.number(diagnosis.gain[f'peak_to_peak_{when}_arcsec'])}, "
-        f"max abs {unit.number(diagnosis.gain[f'max_abs_{when}_arcsec'])}"
-        for when in ("before", "after")
-    )
-    yield f"Measured minus simulated: {without} ({used}).", 2, 0
-    if extended.split(",")[0] != without.split(",")[0]:
-        yield f"With what is confirmed added: {extended}.", 2, 0
+        used += f"; {diagnosis.readings_used} used, evenly spaced, without turning points"
+    whole = f"rms {unit.text(d.rms)}, peak-to-peak {n(d.peak_to_peak)}, max abs {n(d.max_abs)}"
+    yield f"Measured minus simulated: {whole} ({used}).", 2, 0
+    if any(f.confirmed for f in diagnosis.findings) or diagnosis.extended.effects:
+        left = f"rms {unit.text(g['rms_after_arcsec'])}, peak-to-peak "
+        left += f"{n(g['peak_to_peak_after_arcsec'])}, max abs {n(g['max_abs_after_arcsec'])}"
+        yield f"Measured minus the extended simulation: {left}.", 2, 0
     text = f"Noise of one reading: {unit.text(diagnosis.noise)}"
     if diagnosis.extended.sigma_arcsec:
         text += f" ({unit.number(diagnosis.extended.sigma_arcsec)} in the simulation)"
@@ -128,7 +126,7 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
         if share != "0 %":  # what is next to nothing comes last
             yield from unknown
             unknown = []
-    sure = "Confirmed" if diagnosis.complete else "Confirmed so far"
+    sure = "Confirmed" if diagnosis.complete else "Found so far"
     named = [brief_finding(f, unit) for f in diagnosis.findings if f.confirmed]
     if named:
         yield f"{sure}: {_by_cause(named)}.", 2, 0

@@ -87,6 +87,7 @@ def test_the_account_says_each_of_its_numbers_in_one_unit(result, unit, per_arcs
         gain=sizes,
         noise=77.0,
         correlation=0.42,
+        discrepancy=replace(result.discrepancy, rms=81.0, peak_to_peak=82.0, max_abs=83.0),
         findings=[FOUND],
         beliefs=[belief],
     )
@@ -99,8 +100,8 @@ def test_the_account_says_each_of_its_numbers_in_one_unit(result, unit, per_arcs
 
     close = {"rel": 2e-3}
     each = rf"rms # {unit}, peak-to-peak #, max abs #"
-    assert told(rf"simulated: {each} \(600 readings\)") == pytest.approx([71, 73, 75], **close)
-    assert told(rf"With what is confirmed added: {each}\.") == pytest.approx([72, 74, 76], **close)
+    assert told(rf"simulated: {each} \(600 readings\)") == pytest.approx([81, 82, 83], **close)
+    assert told(rf"minus the extended simulation: {each}\.") == pytest.approx([72, 74, 76], **close)
     assert told(rf"reading: # {unit}, correlation between neighbours 0.42") == pytest.approx(
         [77.0], **close
     )

@@ -145,7 +145,7 @@ def test_the_account_says_by_how_much_they_differ_and_what_each_would_be(seed):
     # Degrees of scatter for each degree per second.
     assert abs(sigma.value - 2.4e-5) < 4.0 * sigma.std
     assert "per_deg_s" in spot.estimates[UNEVEN]
-    assert "timestamp_jitter" in result.summary().split("Measured minus")[0]
+    assert "timestamp jitter" in result.summary().split("Measured minus")[0]
     assert not result.extended.effects
 
 
