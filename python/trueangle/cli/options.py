@@ -124,7 +124,8 @@ def show(
     if not args.json:
         print(result.summary(errors_in(args)))
         if saved is not None:
-            print(f"\nsaved {saved}")
+            corrects = named == "model" and bool(result.model.shafts or result.model.channels)
+            print(f"\nsaved {saved}" + f"; next: trueangle correct LOG -m {saved}" * corrects)
     elif named is not None:
         print(json_text({named: saved, **result.to_dict()}))
     else:

@@ -70,11 +70,7 @@ def run(args: argparse.Namespace) -> int:
     result = _calibrated(args)
     result.model.save(args.output)
     if not result.model.shafts and result.channels is None:
-        print(
-            "trueangle: warning: no order can be given as the encoder's: the model corrects "
-            "nothing",
-            file=sys.stderr,
-        )
+        print("trueangle: warning: the model corrects nothing", file=sys.stderr)
     show(args, result, args.output, named="model")
     return 0
 

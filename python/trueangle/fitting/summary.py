@@ -29,7 +29,6 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
         ("argument", f"{model.argument} angle"),
         ("zero", zero_text(model.constant, model.period) + _spread(fit, shown)),
         ("residual", f"{left}, {freedom:.6g} degree{'s' * (freedom != 1)} of freedom"),
-        ("condition", f"number {fit.condition_number:.3g}; 1 where all orders are independent"),
     ]
     if model.covariance is not None:
         head.append(("intervals", _intervals(fit)))
@@ -42,11 +41,11 @@ def fit_summary(fit: FittedCoefficients, errors_in: ErrorsIn = "auto") -> str:
     if not freedom:
         lines.append("No reading tests it: as many unknowns as readings; read at more positions.")
     lines += [*(note for note in fit.notes if note.startswith("One sweep ")), ""]
-    lines += [f"  {label:<10} {text}" for label, text in head]
-    if model.channels is not None:
-        lines += ["", *(f"  {line}" for line in model.channels.constant_lines())]
     if model.shafts or model.channels is None:
-        lines += ["", *_table(fit, shown)]
+        lines += [*_table(fit, shown), ""]
+    if model.channels is not None:
+        lines += [*(f"  {line}" for line in model.channels.constant_lines()), ""]
+    lines += [f"  {label:<10} {text}" for label, text in head]
     notes = [note for note in fit.notes if note not in lines]
     if notes:
         lines += ["", *(f"  [{i}] {note}" for i, note in enumerate(notes, 1))]

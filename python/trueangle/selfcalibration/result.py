@@ -247,6 +247,8 @@ def _summary(result: SelfCalibration, errors_in: ErrorsIn = "auto") -> str:
         f"{answer}calibrated without a reference ({result.method}): {result.readings} readings, "
         f"{result.turns:.1f} turns, noise {unit.text(result.noise_arcsec)}",
     ]
+    if not result.orders and result.channels is None:
+        lines += [f"What to do: {blind.measure}." for blind in result.blind if any(blind.orders)]
     if result.diagnosis is not None:
         lines += ["", *result.diagnosis.lines()]
     if result.channels is not None:

@@ -284,8 +284,6 @@ def _notes(
             f"one speed: orders {order_ranges([o.order for o in given])} are the encoder's if the "
             f"torque ripple at them is at most that at order 1{bound}"
         )
-    if not given and sums:
-        notes.append("no order can be given as the encoder's")
     return notes
 
 

@@ -25,7 +25,7 @@ def selection_summary(selection: OrderTable, errors_in: ErrorsIn = "auto") -> st
     if retained:
         sizes = f"{unit.number(before)} -> {unit.text(after)}"
         head = f"{counted(retained, 'order')} retained: held-out error {sizes} rms "
-        head += f"({selection.holdout})."
+        head += f"({selection.holdout}); next: `ta.fit(...)`."
     read = f"{counted(selection.samples, 'reading')} in {counted(selection.runs, 'run')}"
     notes = [note for note in selection.notes if note.startswith(UNDETERMINED)]
     lines = [*(f"{note}." for note in notes), head, f"  {read}, {selection.positions.describe()}"]

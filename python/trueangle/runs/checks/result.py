@@ -262,7 +262,7 @@ class Check(PlainResult):
         found = counted(self.data_faults, "fault")
         lines = [f"{found}; the data {'can' if self.usable else 'must not'} be used as they are."]
         if not self.data_faults:
-            lines = ["No fault found in the data."]
+            lines = ["No fault found in the data; next: `ta.fit(...)` or `ta.diagnose(...)`."]
         for fault in self.data_faults:
             lines += wrapped_lines(f"{fault.fault}: {fault.says}.", 2)
             lines += wrapped_lines(f"Remedy: {fault.mend}.", 4, 2)
@@ -272,25 +272,27 @@ class Check(PlainResult):
                 for role, (name, unit) in self.columns.items()
             ]
             lines += ["", *wrapped_lines(f"Columns: {'; '.join(told)}.", 2)]
+        levels = [
+            ("At rest", "One direction", "Both directions")[len(e.directions)],
+            _levels("speeds", e.speeds, "deg/s"),
+            _levels("loads", e.loads, "Nm", "torque" in e.swept),
+            _levels("temperatures", e.temperatures, "C", "temperature" in e.swept),
+            _levels("mounts", e.mounts, "deg", "mount" in e.swept),
+        ]
         ratio = "unknown" if self.ratio is None else f"{self.ratio:.6g}"
         lines += [
             "",
             f"{e.readings} readings in {e.runs} run{'s' * (e.runs != 1)}, {e.span_deg:.4g} deg "
             f"covered, longest run {e.turns:.4g} turns.",
             f"Indicated per reference: {ratio} ({self.suggests}).",
-            f"Directions: {_levels(e.directions)}; speeds: {_levels(e.speeds, 'deg/s')}; "
-            f"loads: {_levels(e.loads, 'Nm', 'torque' in e.swept)}; "
-            f"temperatures: {_levels(e.temperatures, 'C', 'temperature' in e.swept)}; "
-            f"mounts: {_levels(e.mounts, 'deg', 'mount' in e.swept)}.",
+            "; ".join(filter(None, levels)) + ".",
             "",
         ]
         lines += wrapped_lines(f"Identifiable: {'; '.join(self.can)}.", 2)
+        lines += ["Not identifiable, and what would show it:"] if self.cannot else []
         for entry in self.cannot:
-            lines += wrapped_lines(
-                f"Not identifiable: {entry['what']} ({entry['because']}). To find out: "
-                f"{entry['measure']}.",
-                2,
-            )
+            text = f"- {entry['what']} ({entry['because']}): {entry['measure']}"
+            lines += wrapped_lines(text, 4, 2)
         return laid_out(lines)
 
 
@@ -300,8 +302,6 @@ def _reversed(role: str, name: str) -> str:
     return " (a reversed sensor: models keep indicated_sign -1)" if is_reversed else ""
 
 
-def _levels(values: tuple[float, ...], unit: str = "", swept: bool = False) -> str:
-    if not values:
-        return "not recorded"
-    told = f"{', '.join(f'{value:g}' for value in values)} {unit}".rstrip()
-    return told + ", also between them within a run" * swept
+def _levels(name: str, values: tuple[float, ...], unit: str, swept: bool = False) -> str:
+    told = ", ".join(f"{value:g}" for value in values)
+    return f"{name}: {told} {unit}{', also between them within a run' * swept}" if told else ""
