@@ -132,10 +132,9 @@ def finding_lines(
     """A finding as readable text behind its number, without what those ``before`` have stated."""
     n = unit.number
     title = title_of(finding.cause)
-    lines = [number + finding.cause + f": {title}" * (title != finding.cause.replace("_", " "))]
-    if not finding.confirmed:
-        lines[0] += f" (NOT CONFIRMED: {unit.spoken(finding.reason)})"
-        lines = wrapped_lines(lines[0], 3)
+    head = number + finding.cause + f": {title}" * (title != finding.cause.replace("_", " "))
+    head += "" if finding.confirmed else f" (NOT CONFIRMED: {unit.spoken(finding.reason)})"
+    lines = wrapped_lines(head, 3)
     if finding.cause not in {other.cause for other in before}:
         lines += wrapped_lines(finding.sentence, 3, first=3)
     origins = [f.parameters["explanations"] for f in before if "explanations" in f.parameters]

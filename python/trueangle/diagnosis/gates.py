@@ -133,10 +133,7 @@ def many_causes(findings: Sequence[Finding]) -> str:
     factors = [EFFECTS[cause].factor for cause in causes]
     common = max(FOLLOWED, key=factors.count)
     shared = [c for c, factor in zip(causes, factors, strict=True) if factor == common]
-    text = (
-        f"{len(causes)} causes at once are unlikely in one joint; one unknown "
-        "cause may explain several"
-    )
+    text = f"{len(causes)} causes at once are unlikely; one unknown cause may explain several"
     if len(shared) > 1:
         text += f"; {', '.join(shared)} all follow {FOLLOWED[common]}"
     return text

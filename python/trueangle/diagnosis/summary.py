@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from typing import Any
 
 from ..effects.ambiguity import Ambiguity
 from ..effects.missing_order import MissingOrder
@@ -119,11 +120,12 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     yield from ((f"Fault of the data, {fault}.", 2, 0) for fault in diagnosis.data_faults)
     rest, unknown = diagnosis.unexplained, list[Entry]()
     if rest is not None and rest.found:
-        share = f"{100.0 * rest.share:.0f} %"
-        text = f"at least {unit.text(rest.rms)} rms ({share} of the residual variance) is not noise"
+        share = f"{100.0 * rest.share:.0f} % of the residual variance"
+        text = f"at least {unit.text(rest.rms)} rms ({share}) is not noise"
         unknown = [(f"NOT UNDERSTOOD: {text} and has no known cause.", 2, 0)]
         unknown += _items(rest.firing[:3], unit)
-        if share != "0 %":  # what is next to nothing comes last
+        before, after = (diagnosis.gain[f"rms_{when}_arcsec"] for when in ("before", "after"))
+        if rest.rms**2 >= before**2 - after**2:  # what is larger than all that is found comes first
             yield from unknown
             unknown = []
     sure = "Confirmed" if diagnosis.complete else "Found so far"
@@ -134,15 +136,12 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     torque = "; ".join(f.summary() for f in lacking if f.confirmed)
     if torque:
         yield f"{sure} in the drive's torque: {torque}.", 2, 0
-    nameless: dict[tuple[str, str], list[str]] = {}
-    for factor in (factor for factor in diagnosis.factors if not factor.named_by):
-        nameless.setdefault((factor.followed, factor.status), []).append(factor.size(unit))
-    for (what, status), each in nameless.items():
+    nameless = [factor for factor in diagnosis.factors if not factor.named_by]
+    followed = _grouped(((f.followed, f.status), f.size(unit)) for f in nameless)
+    for (what, status), each in followed.items():
         yield f"The error follows {what}: {'; '.join(each)}. {status}.", 2, 0
-    doubted: dict[str, list[str]] = {}
     doubtful = [finding for finding in diagnosis.findings if not finding.confirmed]
-    for finding in doubtful[:LISTED]:
-        doubted.setdefault(unit.spoken(finding.reason), []).append(brief_finding(finding, unit))
+    doubted = _grouped((unit.spoken(f.reason), brief_finding(f, unit)) for f in doubtful[:LISTED])
     for reason, each in doubted.items():
         yield f"Not confirmed: {_by_cause(each)}{f': {reason}' if reason else ''}.", 2, 0
     if len(doubtful) > LISTED:
@@ -150,20 +149,27 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     wrong = "; ".join(f"{b.what} {b.verdict.replace('_', ' ')}" for b in diagnosis.wrong[:4])
     if wrong:
         yield f"Wrong in the simulation: {wrong}.", 2, 0
-    for spot in {_seen(spot, unit): spot for spot in reversed(diagnosis.in_question)}.values():
-        detected = "not distinguished" if len(spot.causes) > 1 else "not confirmed"
-        why = re.split(r"; |\. | \(", spot.because)[0]
-        yield f"Detected, {detected}: {_seen(spot, unit)}; {why}.", 2, 0
+    spots = {_seen(spot, unit): spot for spot in reversed(diagnosis.in_question)}
+    asked = _grouped((re.split(r"; |\. | \(", s.because)[0], seen) for seen, s in spots.items())
+    for why, each in asked.items():
+        detected = "not distinguished" if " or " in each[0] else "not confirmed"
+        yield f"Detected, {detected}: {'; '.join(each)}: {why}.", 2, 0
     yield from unknown
     yield from notes
 
 
+def _grouped(pairs: Iterable[tuple[Any, str]]) -> dict[Any, list[str]]:
+    """Texts by their keys, in the order of the first of each."""
+    groups: dict[Any, list[str]] = {}
+    for key, text in pairs:
+        groups.setdefault(key, []).append(text)
+    return groups
+
+
 def _by_cause(named: Iterable[str]) -> str:
     """Findings in brief, those of one kind together: what they are once, then each size."""
-    sizes: dict[str, list[str]] = {}
-    for text in named:
-        what, *size = re.split(r" (?=[-\d(])", text, maxsplit=1)
-        sizes.setdefault(what, []).extend(size)
+    parts = (re.split(r" (?=[-\d(])", text, maxsplit=1) for text in named)
+    sizes = _grouped((what, ", ".join(size)) for what, *size in parts)
     return "; ".join(f"{what} {', '.join(each)}".strip() for what, each in sizes.items())
 
 

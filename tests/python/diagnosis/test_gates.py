@@ -93,7 +93,7 @@ def test_many_causes_are_said_to_be_implausible_with_what_they_share():
     doubtful = dataclasses.replace(found[3], status=NOT_CONFIRMED)
     assert gates.many_causes([*found[: gates.MANY], doubtful]) == ""
     told = gates.many_causes(found)
-    assert told.startswith("4 causes at once are unlikely in one joint")
+    assert told.startswith("4 causes at once are unlikely; one unknown cause")
     assert "backlash, presliding_hysteresis all follow the direction of travel" in told
     # One that follows a factor alone shares it with none.
     apart = ["backlash", "missing_order", "thermal_drift", "latency"]
