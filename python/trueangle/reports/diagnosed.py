@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
@@ -57,10 +58,7 @@ def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
     for name, finding in zip(finding_names(diagnosis), content["findings"], strict=True):
         finding["name"] = name
         finding["sentence"] = finding.pop("physics")
-        finding["parameters"] = [
-            _parameter(i, parameter, entry, named=":" in name)
-            for i, (parameter, entry) in enumerate(finding["parameters"].items())
-        ]
+        finding["parameters"] = _parameters(finding["parameters"], ":" in name)
         known = [q for q in finding["parameters"] if q["std"] is not None]
         sizes = [q for q in known if q["unit"].startswith("arcsec")]
         finding["sized"] = bool(sizes)
@@ -78,19 +76,22 @@ def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
         spot["options"] = [
             {
                 "name": title_of(cause),
-                "parameters": [
-                    _parameter(i, parameter, entry, named=False)
-                    for i, (parameter, entry) in enumerate(
-                        spot.get("estimates", {}).get(cause, {}).items()
-                    )
-                ],
+                "parameters": _parameters(spot.get("estimates", {}).get(cause, {}), False),
             }
             for cause in spot["causes"]
         ]
+    for factor, entry in zip(diagnosis.factors, content["factors"], strict=True):
+        entry["followed"], entry["status"] = factor.followed, factor.status
+    # Who reads a page has no result whose methods could be called.
+    content["steps"] = re.sub(r" \(`[^`]*`\)", "", "; ".join(diagnosis.next_steps))
     content["extended"] = diagnosis.extended.text()
     plan = diagnosis.next_runs
     content["next"] = plan.summary() if plan is not None and plan.runs else ""
     return content
+
+
+def _parameters(entries: dict[str, Any], named: bool) -> list[dict[str, Any]]:
+    return [_parameter(i, *entry, named=named) for i, entry in enumerate(entries.items())]
 
 
 def _parameter(index: int, name: str, entry: dict[str, Any], named: bool) -> dict[str, Any]:

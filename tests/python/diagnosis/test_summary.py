@@ -102,9 +102,8 @@ def test_the_account_says_each_of_its_numbers_in_one_unit(result, unit, per_arcs
     each = rf"rms # {unit}, peak-to-peak #, max abs #"
     assert told(rf"simulated: {each} \(600 readings\)") == pytest.approx([81, 82, 83], **close)
     assert told(rf"minus the extended simulation: {each}\.") == pytest.approx([72, 74, 76], **close)
-    assert told(rf"reading: # {unit}, correlation between neighbours 0.42") == pytest.approx(
-        [77.0], **close
-    )
+    noise = rf"reading: # {unit}, correlation between neighbours 0.42"
+    assert told(noise) == pytest.approx([77.0], **close)
     assert told(rf"runs: rms # -> # {unit}, peak-to-peak # -> #, max abs # -> #") == pytest.approx(
         [11.0, 21.0, 12.0, 22.0, 13.0, 23.0], **close
     )

@@ -96,6 +96,7 @@ def believed() -> Simulation:
 class Account(Diagnosis):
     """A diagnosis with a plan, which takes no time here."""
 
+    planned = frozenset()  # type: ignore[assignment]
     next_runs = SimpleNamespace(runs=[1], summary=lambda: "Measure next: one run at 30 deg/s.")  # type: ignore[assignment]
 
 
