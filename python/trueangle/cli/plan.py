@@ -256,7 +256,7 @@ def _run_after(args: argparse.Namespace) -> int:
     if args.output is not None:
         if not plan.runs:
             raise ArgumentError(
-                f"no run within the limits adds information: {args.output} is not written"
+                f"{args.output} is not written: no run found; allow wider limits or more time"
             )
         plan.save(args.output)
     return 0

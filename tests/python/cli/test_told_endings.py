@@ -253,7 +253,7 @@ def test_a_plan_without_runs_is_told_and_not_written(runs, tmp_path, monkeypatch
     monkeypatch.setattr("trueangle.rehearsal.after.plan_after", lambda *_, **__: plan)
     line = ["plan", "--after", "a.csv", "--simulation", "s.toml", "-o", "n.toml"]
     assert main(line) == (0 if runs else 1)
-    no = "trueangle: error: no run within the limits adds information: n.toml is not written\n"
+    no = "trueangle: error: n.toml is not written: no run found; allow wider limits or more time\n"
     wanted = ("What next.\nsaved n.toml\n", "") if runs else ("What next.\n", no)
     assert capsys.readouterr() == wanted
 

@@ -130,11 +130,10 @@ class Factor(PlainResult):
         also = [WORDS[other] for other in self.not_distinguished_from]
         times = "the place, changing with "
         products = [word.removeprefix(times) for word in also if word.startswith(times)]
-        text = " or ".join([WORDS[self.factor], *(w for w in also if not w.startswith(times))])
-        text += f" or {times}{', '.join(products)}" if products else ""
-        if (self.factor, self.curve.unit) == ("reversal_time", "deg"):
-            text = text.replace(WORDS["reversal_time"], "the travel since the last reversal")
-        return text
+        travelled = (self.factor, self.curve.unit) == ("reversal_time", "deg")
+        first = "the travel since the last reversal" if travelled else WORDS[self.factor]
+        text = " or ".join([first, *(word for word in also if not word.startswith(times))])
+        return text + (f" or {times}{', '.join(products)}" if products else "")
 
     @property
     def status(self) -> str:
@@ -153,7 +152,8 @@ class Factor(PlainResult):
             shown = ", ".join(each[:LISTED]) + " ..." * (len(each) > LISTED) + of.replace("_", " ")
             where.append(f"order{'s' * (len(self.orders) > 1)} {shown}")
         where += [f"a jump of {n(size)} {unit.name} at {at:.1f} deg" for at, size in self.jumps]
-        where += [f"an event in run {run + 1} at row {row + 1}" for run, row in self.events]
+        places = [f"run {run + 1} at row {row + 1}" for run, row in self.events]
+        where += [f"event{'s' * (len(places) > 1)} in {', '.join(places)}"] if places else []
         range_ = f"95 %: {n(self.low)} to" if self.low else "at most"
         return ", ".join([*where, f"{n(self.rms)} {unit.name} rms ({range_} {n(self.high)})"])
 

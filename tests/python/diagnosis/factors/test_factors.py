@@ -329,7 +329,7 @@ def test_a_slip_that_settles_is_an_event_of_its_run_and_no_lost_counts(rng, stay
     assert run == hit
     assert abs(row - 0.35 * 350) < 12
     assert not found.unexplained.found
-    assert f"an event in run {hit + 1}" in " ".join(found.summary().split())
+    assert f"event in run {hit + 1} at row" in " ".join(found.summary().split())
 
 
 def load(t, r):
