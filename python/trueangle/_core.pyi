@@ -227,7 +227,7 @@ class Evidence:
         NDArray[np.float64],
         NDArray[np.float64],
         list[tuple[float, list[float], list[float]]],
-        list[tuple[float, list[float], float]],
+        NDArray[np.float64],
         list[tuple[float, float, float, float] | None],
     ]: ...
 

@@ -65,8 +65,8 @@ pub struct Estimate {
     pub noise: Noise,
     /// Models of the mixture over these orders, best first: weight and prior variances.
     pub models: Vec<(f64, Model)>,
-    /// Gram matrices of these orders under the noise.
-    pub grams: Vec<Gram>,
+    /// Variance of the zero of each run beside known coefficients.
+    pub zeros: Vec<f64>,
     /// Every order beside those of the most probable set.
     pub alone: Vec<Candidate>,
 }
@@ -375,13 +375,18 @@ impl Readings {
             probabilities[place] = own.map(|(weight, _)| weight).sum::<f64>().min(1.0);
         }
         models.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let noise = mode.fit.noise;
+        let grams = readings.grams(noise).into_iter();
         Some(Estimate {
             probabilities,
             mean,
             covariance,
-            noise: mode.fit.noise,
+            noise,
             models,
-            grams: readings.grams(mode.fit.noise),
+            zeros: grams
+                .zip(readings.runs())
+                .map(|(gram, run)| run.zero_variance(noise, gram.information))
+                .collect(),
             alone: mode.others.clone(),
             places,
         })

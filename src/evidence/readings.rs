@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use super::rows::Rows;
-use super::whitening::{Terms, decays};
+use super::whitening::{Noise, Terms, decays};
 use crate::check::{finite, same_length};
 use crate::error::Error;
 use crate::memory::room;
@@ -134,6 +134,22 @@ impl Run {
     /// Mean of the errors.
     pub fn mean(&self) -> f64 {
         self.mean
+    }
+
+    /// Variance of the zero, of which the readings have this information under a noise.
+    ///
+    /// No two readings have a smaller covariance than the first and the last. So much is common to
+    /// all, and is a zero: what is left of an exponential is convex, and a covariance, too (Polya).
+    pub(super) fn zero_variance(&self, noise: Noise, information: f64) -> f64 {
+        let count = self.len() as f64;
+        let squares = |roots: &Vec<f64>| roots.iter().map(|r| r * r).sum();
+        let weights: f64 = self.roots.as_ref().map_or(count, squares);
+        let mut common = noise.terms;
+        for decay in self.decays.iter().skip(1) {
+            common.iter_mut().zip(decay).for_each(|(own, d)| *own *= d);
+        }
+        let left = 1.0 / information - common.iter().sum::<f64>() * count / weights;
+        left.max(noise.white / weights)
     }
 
     /// First reading and length of each chunk.

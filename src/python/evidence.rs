@@ -31,14 +31,12 @@ pub(super) type Solution<'py> = (f64, Vector<'py>, Matrix<'py>);
 /// Weight, tau and omega of a model.
 type Weighted = (f64, Vec<f64>, Vec<f64>);
 
-/// Information about a run's zero, weighted means of the columns, and level.
-type Zero = (f64, Vec<f64>, f64);
-
 /// Cosine and sine of an order beside the others, and their variances.
 type Alone = (f64, f64, f64, f64);
 
 /// Probabilities, places of the orders that some model has, their mean and covariance, variances of
-/// the noise, models, zeros of the runs, and each order by itself (None where the others hold it).
+/// the noise, models, variances of the zeros of runs, and each order by itself (None where the
+/// others hold it).
 type Estimated<'py> = (
     Vector<'py>,
     Vec<usize>,
@@ -46,7 +44,7 @@ type Estimated<'py> = (
     Matrix<'py>,
     Vector<'py>,
     Vec<Weighted>,
-    Vec<Zero>,
+    Vector<'py>,
     Vec<Option<Alone>>,
 );
 
@@ -161,10 +159,6 @@ impl PyEvidence {
             let (b, variance) = own.alone()?;
             Some((b[0], b[1], variance[(0, 0)], variance[(1, 1)]))
         });
-        let zeros = found.grams.iter().zip(self.0.runs()).map(|(gram, run)| {
-            let level = run.mean() + gram.level;
-            (gram.information, gram.means.as_slice().to_vec(), level)
-        });
         Ok((
             vector(py, &found.probabilities)?,
             found.places,
@@ -172,7 +166,7 @@ impl PyEvidence {
             columns(py, found.covariance.as_slice(), &[n, n])?,
             vector(py, &found.noise.variances())?,
             weighted(found.models),
-            zeros.collect(),
+            vector(py, &found.zeros)?,
             alone.collect(),
         ))
     }

@@ -28,14 +28,6 @@ class RunReadings(NamedTuple):
     weights: Array | None = None  #: Above 0; the noise of a reading is over their roots.
 
 
-class RunZero(NamedTuple):
-    """Information in the readings about the zero of a run."""
-
-    information: float  #: Inverse variance, where the coefficients are known.
-    columns: Array  #: Weighted mean of each column, as that of ``level``.
-    level: float  #: Weighted mean of the errors.
-
-
 class WeightedModel(NamedTuple):
     """One model of a mixture."""
 
@@ -78,8 +70,9 @@ class EvidenceEstimate:
         the correlation times `CORRELATION_TIMES`.
     models : tuple of WeightedModel
         Models of the mixture over ``told``, the most probable first.
-    zeros : tuple of RunZero
-        Of the runs in turn.
+    zeros : ndarray, shape (R,)
+        Variance of the zero of each run, where the coefficients are known; what all readings of a
+        run have in common is its zero, and not noise.
     readings : int
     alone : tuple of Alone or None
         Each of ``orders`` by itself; None where the readings do not distinguish it from the others.
@@ -96,7 +89,7 @@ class EvidenceEstimate:
     covariance: Array
     noise: Array
     models: tuple[WeightedModel, ...]
-    zeros: tuple[RunZero, ...]
+    zeros: Array
     alone: tuple[Alone | None, ...]
     readings: int
     runs: tuple[RunReadings, ...] = field(repr=False)
@@ -138,14 +131,13 @@ class EvidenceEstimate:
         models = tuple(WeightedModel(w, np.array(tau), np.array(own)) for w, tau, own in found)
         probability = np.zeros_like(self.probability)
         probability[places] = np.sum([m.weight * (m.tau > 0.0) for m in models], axis=0).clip(max=1)
-        zeros = tuple(zero for r, zero in enumerate(self.zeros) if r not in left_out)
         return replace(
             self,
             probability=probability,
             mean=mean,
             covariance=covariance,
             models=models,
-            zeros=zeros,
+            zeros=np.delete(self.zeros, list(left_out)),
             readings=sum(len(run.theta) for run in runs),
             runs=runs,
         )
@@ -322,7 +314,7 @@ def estimate_by_evidence(
         covariance,
         noise,
         tuple(WeightedModel(w, np.array(tau), np.array(omega)) for w, tau, omega in models),
-        tuple(RunZero(n, np.array(columns), level) for n, columns, level in zeros),
+        zeros,
         tuple(None if own is None else Alone(*own) for own in alone),
         sum(len(run.theta) for run in runs),
         tuple(runs),

@@ -139,7 +139,7 @@ def _fitted(
         squares += float(weight @ (left - own) ** 2)
     used = sum(int(np.count_nonzero(weight)) for weight in weights)
     freedom = max(float(used - len(offsets) - mean.size), 1.0)
-    zeros = float(np.mean([1.0 / zero.information for zero in estimate.zeros]))
+    zeros = float(np.mean(estimate.zeros))
     parts = np.array(means)
     common = parts.mean(axis=0)
     whole = np.empty((mean.size + 1, mean.size + 1))
