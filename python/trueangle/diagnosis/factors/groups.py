@@ -103,7 +103,7 @@ def factor_groups(
                 asked += spectrum.peaks(spectrum.powers(left * (column - column.mean())))
             groups += [axis.times(theta, order, product) for order in dict.fromkeys(asked)]
     groups += _of_one_way(signals)
-    groups += _of_runs(signals, [*ALWAYS, *known[:2], *drawn])
+    groups += _of_runs(signals, [*ALWAYS, *known[:2], *drawn], left, spectrum)
     groups += _of_frequencies(signals, frequencies)
     groups += step_events(signals, events)
     given = {*ALWAYS, *known, *drawn}
@@ -338,8 +338,10 @@ def _of_one_way(signals: Signals) -> Iterator[Group]:
         )
 
 
-def _of_runs(signals: Signals, lines: Sequence[float]) -> Iterator[Group]:
-    """Zeros of the runs, their trend, and a pattern of each run."""
+def _of_runs(
+    signals: Signals, lines: Sequence[float], left: Array, spectrum: PeakSpectrum
+) -> Iterator[Group]:
+    """Zeros of the runs, their trend, and a pattern of each run, also of lines that one run has."""
     if signals.runs < 2:
         return
     run = signals.run.astype(np.float64)
@@ -353,7 +355,10 @@ def _of_runs(signals: Signals, lines: Sequence[float]) -> Iterator[Group]:
     if signals.runs > 2:
         yield Axis("run", run, _in_order, at, "run").alone()
     if signals.runs <= MOST_RUNS:
-        yield from (zeros.times(signals.theta, m, each) for m in dict.fromkeys(lines))
+        powers = [spectrum.powers(left * (own - own.mean())) for own in each(run).T]
+        # The strongest alone: a group has two columns for every run.
+        asked = dict.fromkeys([*lines, *spectrum.peaks(np.max(powers, axis=0))[:1]])
+        yield from (zeros.times(signals.theta, m, each) for m in asked)
     mount = signals.mount
     if mount is not None and np.ptp(mount) > 0.0:
         degrees = np.degrees(signals.theta - mount)

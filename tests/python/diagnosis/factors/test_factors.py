@@ -143,6 +143,18 @@ def test_late_readings_of_one_segment_are_events_and_no_lost_counts(rng):
     assert [rows[0], rows[-1]] == pytest.approx([0.4 * 300, 0.7 * 300], abs=12)
 
 
+@pytest.mark.parametrize("order", [3, 9])
+def test_an_order_that_one_run_alone_has_follows_run_and_place_and_is_no_event(rng, order):
+    def error(theta, d, v, t, r):
+        return 20.0 * (r == 3) * np.cos(np.radians(order * theta))
+
+    found = ta.diagnose(measured(rng, error), EMPTY)
+    first = found.factors[0]
+    assert (first.factor, first.orders) == ("run_place", (float(order),))
+    assert not any(factor.events for factor in found.factors)
+    assert first.curve.value[3] == pytest.approx(20.0, abs=1.0)
+
+
 def test_what_one_speed_cannot_tell_is_stated_together(rng):
     runs = measured(rng, lambda theta, d, *_: 4.0 * d, speeds=(20.0,), repeats=4)
     found = ta.diagnose(runs, EMPTY)
