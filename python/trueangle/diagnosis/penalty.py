@@ -23,34 +23,17 @@ def total_penalty(regression: Regression) -> float:
     return regression.bic + penalty_of(regression.terms)
 
 
-def _exact_terms(regression: Regression) -> list[Extension]:
-    """Terms whose forms leave nothing of them."""
-    return [term for term in regression.terms if EFFECTS[term.cause].has_exact_form]
-
-
 def misfit_of_scatter(start: Regression, chosen: Regression) -> float:
     """Deviance that the causes found may leave because their forms are not exact.
 
-    By how much smaller the readings' scatter has become: correlated noise absorbs a part of what is
-    not yet explained, and hides it from a likelihood. A count of teeth has no form to be inexact.
+    `FORM` of the energy by which the readings' scatter has become smaller: correlated noise absorbs
+    a part of what is not yet explained, and hides it from a likelihood. A count of teeth has no
+    form to be inexact.
     """
-    exact = _exact_terms(chosen)
-    before, after = (
-        float(np.var(one.left_within_runs))
-        for one in (start.with_terms(exact) if exact else start, chosen)
-    )
-    ratio = before / max(after, 1e-300)
-    return deviance_of_form_errors(chosen.n * float(np.log(max(ratio, 1.0))), chosen.n)
-
-
-def deviance_of_form_errors(deviance: float, readings: int) -> float:
-    """Deviance of a share of the energy that a deviance represents.
-
-    n readings of noise 1 with an error of energy n E give a deviance of
-    ``n ln(1 + E)``; `FORM` of that energy one of ``n ln(1 + FORM E)``.
-    """
-    energy = np.expm1(min(max(deviance, 0.0) / readings, 500.0))
-    return float(readings * np.log1p(FORM * energy))
+    exact = [term for term in chosen.terms if EFFECTS[term.cause].has_exact_form]
+    without = start.with_terms(exact) if exact else start
+    before, after = (float(np.var(one.left_within_runs)) for one in (without, chosen))
+    return chosen.n * math.log1p(FORM * max(before / max(after, 1e-300) - 1.0, 0.0))
 
 
 def penalty_of(terms: Sequence[Extension]) -> float:

@@ -11,7 +11,6 @@ import pytest
 from trueangle.diagnosis.penalty import (
     NEW_CAUSE,
     deviance_lost,
-    deviance_of_form_errors,
     finding_groups,
     misfit_of_scatter,
     net_deviance_lost,
@@ -74,16 +73,6 @@ def test_every_finding_costs_one_cause(causes: list[str], groups: list[list[int]
     # A line of a declared shaft was expected.
     declared = [*terms, SimpleNamespace(cause=LINE, log_grid=0.0)]
     assert penalty_of(declared) == penalty_of(terms)
-
-
-@pytest.mark.parametrize("n", [50, 4000])
-def test_a_form_may_leave_a_thousandth_of_the_energy(n: int) -> None:
-    for energy in (1e-4, 1.0, 1e4):
-        deviance = n * np.log1p(energy)
-        assert deviance_of_form_errors(deviance, n) == pytest.approx(n * np.log1p(1e-3 * energy))
-    assert deviance_of_form_errors(-3.0, n) == 0.0
-    # Nothing of it overflows.
-    assert deviance_of_form_errors(1e9 * n, n) == pytest.approx(n * (500.0 + np.log(1e-3)))
 
 
 def test_only_causes_with_a_form_may_leave_a_part_of_what_they_explain() -> None:
