@@ -114,7 +114,7 @@ def test_command_prints_text_and_passes_its_arguments(tmp_path, capsys):
     text = capsys.readouterr().out
     assert "14 may be 202 (tooth mesh with the circular spline)" in text
     assert main(["orders", path, "--method", "paper", "--orders", "1-17"]) == 0
-    assert "rms (the last run)." in capsys.readouterr().out
+    assert "rms (the last run)" in capsys.readouterr().out
     assert main(["orders", path, "--reference-orders", "14", "--json"]) == 0
     rows = {row["order"]: row for row in json.loads(capsys.readouterr().out)["orders"]}
     assert rows[14]["verdict"] == "reference"
