@@ -240,7 +240,7 @@ class Comparison(PlainResult):
         unit = error_unit(errors_in, self.max_abs_arcsec)
         lines = [
             *self._verdict(unit),
-            f"Largest difference {unit.text(self.max_abs_arcsec)}; zero of B less that of A "
+            f"Largest difference {unit.text(self.max_abs_arcsec)}; zero of B minus zero of A "
             f"{zero_text(self.zero_deg, 360.0)} (not tested).",
             *self._arithmetic(unit),
             f"  order  {f'amplitude/{unit.name}':>16}  phase/deg  {f'+-/{unit.name}':>10}",

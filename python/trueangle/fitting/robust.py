@@ -319,10 +319,10 @@ def robust_breakdown_sentence(problem: Problem, weighted: RobustFit) -> str:
     bent = scale > 3.0 * near
     if robust and share > (MANY if bent else _MOST):
         return (
-            f"{100.0 * share:.0f} % of the readings are beyond {FAR:g} robust standard "
-            "deviations (normal noise: 0.7 %): a robust fit fails if they are adjacent. The "
-            "coefficients may be wrong by far more than their standard errors. Look at "
-            "the residuals, and give wrong readings weight 0"
+            f"{100.0 * share:.0f} % of the readings are far from the curve (beyond {FAR:g} robust "
+            "standard deviations; normal noise: 0.7 %). If they are adjacent, the coefficients are "
+            "wrong by far more than their standard errors: look at the residuals, and fit without "
+            "these readings, or without the run that has them"
         )
     # Most neighbours are equal where a joint rests or a grid is coarse: they give no scale.
     if not bent or near == 0.0:

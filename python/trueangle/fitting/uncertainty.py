@@ -307,8 +307,7 @@ def _correlated(
     note = f"neighbours in time correlate by {near}: standard errors allow for it"
     if len(used) < _ENOUGH_RUNS:
         runs = "one run" if len(used) == 1 else f"{len(used)} runs"
-        more = f"measure {_ENOUGH_RUNS} runs and more"
-        note += f". A slower drift cannot be estimated from {runs}: {more}"
+        note += f". Drift slower than a run does not show in {runs}: measure {_ENOUGH_RUNS} or more"
     return Uncertainty("correlated", *_with_constant(plain.covariance, covariance, freedom), note)
 
 

@@ -200,6 +200,6 @@ def zeros_follow_speed_sentence(delay: float, chance: float) -> str:
     """A sentence on zeros that follow the speed."""
     return (
         f"the zeros of the runs follow their speed, as with a delay of {brief_number(1e3 * delay)} "
-        f"ms (p = {chance:.1g}): the model has only their mean. Run diagnose, which separates a "
-        "delay from a reversal error, and compare by rms, which includes the zero"
+        f"ms (p = {chance:.1g}): the model corrects only their mean. Run diagnose, which separates "
+        "a delay from a reversal error"
     )

@@ -175,8 +175,8 @@ def _judged_fleet(
         )
     elif chosen.deviates.outlying.any():
         notes.append(
-            f"{int(chosen.deviates.outlying.sum())} of {n} units are outliers, too many for "
-            "damage: probably several designs. All units are included in the spread and limits."
+            f"{int(chosen.deviates.outlying.sum())} of {n} units are outliers: so many are rather "
+            "of another design than damaged. The spread and the limits include them."
         )
     names = [(shaft.name, k) for shaft in units.shafts for k in shaft.orders]
     repeats = _repeatability(units)

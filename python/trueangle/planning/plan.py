@@ -136,8 +136,8 @@ def plan_mounts(
         crowded = _crowded_class(positions, seen)
         raise NoModelError(
             f"{mounts} mount{'s' if mounts > 1 else ''} of {positions} positions cannot separate "
-            f"orders {', '.join(f'{m:g}' for m in crowded)}: there they look the same; "
-            f"use at least {need} mounts (`mounts={need}`), or a free reference encoder"
+            f"orders {', '.join(f'{m:g}' for m in crowded)}: they look the same there; "
+            f"use at least {need} mounts (`mounts={need}`), or a reference that stops at any angle"
         )
     offsets = search_offsets(positions, mounts, seen)
     factors = dict(zip(seen, mount_noise_factors(positions, offsets, seen).tolist(), strict=True))

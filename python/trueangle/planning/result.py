@@ -185,15 +185,13 @@ class CalibrationPlan(PlainResult):
             mounts = counted(self.mount_offsets_deg, self.kind.removesuffix("s"))
             lines = [
                 f"{mounts} of {self.positions} positions, offset by {offsets} deg: {total}",
-                f"  tolerance              offsets within {self.tolerance_deg:.2g} deg of these, "
-                "measured to 0.01 deg",
+                f"  tolerance              {self.tolerance_deg:.2g} deg for each offset; record "
+                "it to 0.01 deg",
             ]
         lines += [f"  note: {note}" for note in self.notes]
         if self.kind == "mounts":
             shifts = ", ".join(str(s) for s in self.facet_shifts)
-            lines.append(
-                f"  turn the reference by  {shifts} of {self.positions} faces, mount by mount"
-            )
+            lines.append(f"  turn the reference by  {shifts} faces at the mounts in this order")
         lines.append(_worst(self.worst_noise_factor))
         if math.isfinite(self.facet_noise_factor):
             # The attribute is relative to one mount, the ideal to as many readings.

@@ -178,16 +178,15 @@ def _of_table(table: FileReadings, reading: ReadingOptions) -> list[Recording]:
         for role, column in table.roles.items()
         if role not in LABELS
     }
-    if not (
-        any(role in channels for role in ("indicated", "motor", "head1"))
-        or {"sine", "cosine"} <= channels.keys()
-    ):
+    angles = {"indicated", "motor", "head1"} & channels.keys()
+    if not (angles or {"sine", "cosine"} <= channels.keys()):
         names = list(table.columns)
-        channels_are = channels_code(names) or "`signals={'sine': 'NAME', 'cosine': 'NAME'}`"
+        named = channels_code(names) or "`signals={'sine': 'NAME', 'cosine': 'NAME'}`"
         raise FileError(
             table.path,
             "no column indicated_deg (or _rad, _turn, _count), head1_deg, motor_deg, or sine and "
-            f"cosine: name channels with {channels_are}; {listed_columns(names)}",
+            "cosine: name an angle with `signals={'indicated': ('NAME', 'deg')}`, channels with "
+            f"{named}; {listed_columns(names)}",
             line=1,
         )
     labels = [table.columns[table.roles[role].name] for role in _LABELS if role in table.roles]

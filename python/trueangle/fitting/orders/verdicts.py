@@ -290,5 +290,5 @@ def _between(positions: Positions, candidates: Candidates) -> bool:
 def _sentence(positions: Positions, candidates: Candidates) -> str:
     where = f"verified at {positions.describe()}"
     if _between(positions, candidates):
-        return f"{where}, and in between for the orders that these distinguish"
-    return f"{where} only; between them higher orders look like those retained"
+        return f"{where}, and between them if there are no higher orders than these distinguish"
+    return f"{where} only, not between them: there a higher order would look like one of these"
