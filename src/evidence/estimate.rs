@@ -28,7 +28,7 @@ const MODELS: usize = 64;
 /// Searches for a mode at most.
 const ROUNDS: usize = 10;
 
-/// Predicted increase of the log evidence below which noise is known well enough for a search.
+/// Predicted increase of the log evidence below which noise is known well enough for a first search.
 const ROUGH: f64 = 0.1;
 
 /// Strongest orders that the second search starts from.
@@ -188,19 +188,17 @@ impl Readings {
             if (round == 1 || found != now) && round < ROUNDS {
                 now = found;
                 let sought = self.among(&now.0);
-                fit = sought.noise_within(&now.1, noise_prior, fit.position, ROUGH)?;
+                fit = sought.noise(&now.1, noise_prior, fit.position)?;
                 if is_known(&fit) {
                     return Some(None);
                 }
                 continue;
             }
-            now = found;
-            fit = self.among(&now.0).noise(&now.1, noise_prior, fit.position)?;
-            let posterior = now.1.posterior(&fit.grams)?;
-            let active = now.1.active();
+            let posterior = best.posterior(&grams)?;
+            let active = best.active();
             let inside = Inside {
-                places: &active.iter().map(|&k| now.0[k]).collect::<Vec<_>>(),
-                tau: &active.iter().map(|&k| now.1.tau[k]).collect::<Vec<_>>(),
+                places: &active.iter().map(|&k| looked[k]).collect::<Vec<_>>(),
+                tau: &active.iter().map(|&k| best.tau[k]).collect::<Vec<_>>(),
                 mean: posterior.mean.as_slice(),
                 covariance: &posterior.covariance(),
             };

@@ -13,7 +13,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::gram::Sums;
+use super::gram::{Gram, Sums};
 use super::model::Model;
 use super::posterior::Posterior;
 
@@ -38,16 +38,6 @@ impl Candidate {
             s[(i, i)] -= 1.0 / tau;
         }
         Self { s, q }
-    }
-
-    /// As if an effect of this variance, which is in, were not: `(I - omega s)^-1 s`.
-    pub(super) fn without(&self, omega: f64) -> Option<Self> {
-        let inner = DMatrix::identity(self.q.len(), self.q.len()) - &self.s * omega;
-        let inverse = Cholesky::new(inner)?.inverse();
-        Some(Self {
-            s: &inverse * &self.s,
-            q: inverse * &self.q,
-        })
     }
 
     /// Least squares of its coefficients: `s^-1 q` and `s^-1`; None where the others hold it.
@@ -220,9 +210,8 @@ impl Solved {
         Some(Wide { root, tau })
     }
 
-    /// What differs of each group in each run from the shared coefficients, of the sums of each run
-    /// without its effects.
-    pub(super) fn differences(&self, runs: &[Sums]) -> Vec<Vec<Candidate>> {
+    /// What differs of each group in each run from the shared coefficients.
+    pub(super) fn differences(&self, grams: &[Gram]) -> Vec<Vec<Candidate>> {
         let mut mean = DVector::zeros(self.moments.nrows());
         for (k, &(from, to)) in self.bounds.iter().enumerate() {
             if self.model.tau[k] > 0.0 {
@@ -230,8 +219,9 @@ impl Solved {
                 mean.rows_mut(from, to - from).copy_from(&own);
             }
         }
-        let mut found = vec![Vec::with_capacity(runs.len()); self.bounds.len()];
-        for sums in runs {
+        let mut found = vec![Vec::with_capacity(grams.len()); self.bounds.len()];
+        for gram in grams {
+            let sums = self.model.sums(std::slice::from_ref(gram));
             let left = sums.moments.column(0) - &sums.products * &mean;
             for (own, &(from, to)) in found.iter_mut().zip(&self.bounds) {
                 let s = sums.products.view((from, from), (to - from, to - from));

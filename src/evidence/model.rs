@@ -85,27 +85,17 @@ impl Model {
     /// Sums over runs of all columns, without the effects of runs:
     /// `G_r - G_r W (I + W G_r W)^-1 W G_r` with `W` the roots of `omega` (Woodbury).
     pub fn sums(&self, grams: &[Gram]) -> Sums {
-        self.left_of(grams.iter().map(|gram| &gram.sums), &self.all())
-    }
-
-    /// The same of each run.
-    pub(super) fn sums_of_runs(&self, grams: &[Gram]) -> Vec<Sums> {
-        let own = |gram: &Gram| self.left_of(std::iter::once(&gram.sums), &self.all());
-        grams.iter().map(own).collect()
-    }
-
-    fn all(&self) -> Vec<usize> {
-        (0..self.widths.iter().sum()).collect()
+        let all: Vec<usize> = (0..self.widths.iter().sum()).collect();
+        self.sums_of(grams, &all)
     }
 
     /// Of some columns.
-    fn left_of<'a>(&self, runs: impl Iterator<Item = &'a Sums>, columns: &[usize]) -> Sums {
+    fn sums_of(&self, grams: &[Gram], columns: &[usize]) -> Sums {
         let omega = self.by_column(&self.omega);
-        let mut runs = runs.peekable();
-        let targets = runs.peek().map_or(1, |sums| sums.moments.ncols());
+        let targets = grams.first().map_or(1, |gram| gram.sums.moments.ncols());
         let mut total = Sums::zeros(columns.len(), targets);
-        for sums in runs {
-            sums.add_without_effects(&omega, columns, &mut total);
+        for gram in grams {
+            gram.sums.add_without_effects(&omega, columns, &mut total);
         }
         total
     }
@@ -114,17 +104,9 @@ impl Model {
     ///
     /// It is computed from the columns of groups that are in.
     pub fn posterior(&self, grams: &[Gram]) -> Option<Posterior> {
-        self.posterior_of(grams.iter().map(|gram| &gram.sums))
-    }
-
-    /// The same, of sums that runs have without the effects of other groups.
-    pub(super) fn posterior_of<'a>(
-        &self,
-        runs: impl Iterator<Item = &'a Sums>,
-    ) -> Option<Posterior> {
         let tau = self.by_column(&self.tau);
         let active: Vec<usize> = (0..tau.len()).filter(|&c| tau[c] > 0.0).collect();
-        let sums = self.left_of(runs, &active);
+        let sums = self.sums_of(grams, &active);
         let own: Vec<f64> = active.iter().map(|&c| tau[c]).collect();
         Posterior::of(&sums, &own, active)
     }
@@ -152,7 +134,7 @@ impl Sums {
         };
         let x = effects.whitened(picked(&on));
         let y = effects.whitened(self.moments.select_rows(&on));
-        total.products.gemm(-1.0, &x.transpose(), &x, 1.0);
+        total.products -= x.tr_mul(&x);
         total.moments -= x.tr_mul(&y);
         total.squares -= y.tr_mul(&y);
         total.log_scale -= effects.log_root();

@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-use super::gains::{Candidate, Solved, Wide};
+use super::gains::{Solved, Wide};
 use super::gram::{Gram, Sums};
 use super::model::Model;
 use super::prior::Prior;
@@ -45,45 +45,8 @@ pub struct Search<'a> {
     best: f64,
     /// The best sizes of each set of groups with their effects of runs (bits of `omega`).
     met: BTreeMap<Vec<(usize, bool, u64)>, Found>,
-    /// For the variances from run to run used last.
-    left: Option<Left>,
-}
-
-/// Sums without the effects of runs.
-#[derive(Debug)]
-struct Left {
-    omega: Vec<f64>,
-    runs: Vec<Sums>,
-    total: Sums,
-}
-
-impl Left {
-    fn of(model: &Model, grams: &[Gram]) -> Self {
-        let runs = model.sums_of_runs(grams);
-        let mut total = runs[0].clone();
-        for sums in &runs[1..] {
-            total.merge(sums);
-        }
-        Self {
-            omega: model.omega.clone(),
-            runs,
-            total,
-        }
-    }
-
-    /// The part of a model that these are to be without yet: None where they are without more.
-    fn rest(&self, model: &Model) -> Option<Model> {
-        let mut rest = model.clone();
-        for (own, known) in rest.omega.iter_mut().zip(&self.omega) {
-            if *known > 0.0 {
-                if own != known {
-                    return None;
-                }
-                *own = 0.0;
-            }
-        }
-        Some(rest)
-    }
+    /// Sums without the effects of runs, for the variances used last.
+    sums: Option<(Vec<f64>, Sums)>,
 }
 
 impl<'a> Search<'a> {
@@ -95,7 +58,7 @@ impl<'a> Search<'a> {
             window,
             best: f64::NEG_INFINITY,
             met: BTreeMap::new(),
-            left: None,
+            sums: None,
         }
     }
 
@@ -165,11 +128,15 @@ impl<'a> Search<'a> {
     }
 
     fn solved(&mut self, model: Model) -> Option<Solved> {
-        let known = self.left.take().filter(|left| left.omega == model.omega);
-        let left = known.unwrap_or_else(|| Left::of(&model, self.grams));
-        let solved = Solved::of(model, &left.total);
-        self.left = Some(left);
-        solved
+        if self
+            .sums
+            .as_ref()
+            .is_none_or(|(omega, _)| *omega != model.omega)
+        {
+            self.sums = Some((model.omega.clone(), model.sums(self.grams)));
+        }
+        let (_, sums) = self.sums.as_ref()?;
+        Solved::of(model, sums)
     }
 
     fn meet(&mut self, model: &Model, score: f64) {
@@ -246,16 +213,12 @@ impl<'a> Search<'a> {
         if prior.effects.is_empty() {
             return found;
         }
-        let left = self.left.as_ref().filter(|left| left.omega == now.model.omega);
-        let apart = now.differences(&left.expect("solved last").runs);
+        let apart = now.differences(self.grams);
         for k in 0..now.model.tau.len() {
             let (tau, own) = (now.model.tau[k], now.model.omega[k]);
             let mut offer = |tau: f64, omega: f64, gain: f64| {
                 let reached = score + gain + prior.change(&now.model, k, tau, omega);
-                // What is lost where less differs is less than this, which the shared coefficients
-                // being held makes of it: it tells what is tried first, and rules nothing out.
-                let loss = if own > 0.0 { gain.min(0.0) } else { 0.0 };
-                if reached - loss > self.best - self.window {
+                if reached > self.best - self.window {
                     found.push((reached, k, tau, omega));
                 }
             };
@@ -265,18 +228,14 @@ impl<'a> Search<'a> {
                 now.outside(k).best(&prior.sizes)
             };
             if own > 0.0 {
-                // Its neighbours in size, and none. What runs share comes with less that differs.
-                let plain: Vec<_> = apart[k].iter().filter_map(|run| run.without(own)).collect();
-                let changed = |omega: f64| -> f64 {
-                    let of_run = |run: &Candidate| run.gain(omega) - run.gain(own);
-                    plain.iter().map(of_run).sum()
-                };
+                // Its neighbours in size, and none; how much that takes is not known. What runs
+                // share comes with less that differs.
                 let at = prior.effects.iter().position(|&omega| omega == own);
                 let next = |step: isize| prior.effects.get(at?.checked_add_signed(step)?).copied();
                 let sizes = [Some(0.0), next(-1), next(1)];
                 for omega in sizes.into_iter().flatten() {
-                    offer(size, omega, comes + changed(omega));
-                    offer(0.0, omega, changed(omega));
+                    offer(size, omega, comes);
+                    offer(0.0, omega, 0.0);
                 }
                 offer(0.0, own, 0.0);
                 continue;
@@ -403,12 +362,7 @@ impl<'a> Search<'a> {
 
     /// A model by its factorisation.
     fn factorised(&mut self, model: Model, best: &mut Option<Found>) -> Option<()> {
-        let known = self.left.as_ref();
-        let posterior = match known.and_then(|left| Some((left, left.rest(&model)?))) {
-            Some((left, rest)) => rest.posterior_of(left.runs.iter()),
-            None => model.posterior(self.grams),
-        };
-        let evidence = posterior?.log_evidence;
+        let evidence = model.posterior(self.grams)?.log_evidence;
         let score = evidence + self.prior.log_probability(&model);
         self.offer(|| model.clone(), score, best);
         Some(())
