@@ -165,13 +165,13 @@ impl Near {
     fn slopes(&self, at: &[f64; VARIANCES], damping: f64) -> (DVector<f64>, DMatrix<f64>) {
         let (change, slope) = self.changes(at);
         let each = (&self.found.gradient - &self.found.average * change).component_mul(&slope);
-        let (mut gradient, prior) = (&each + self.prior.slopes(at), self.prior.precision());
+        let mut gradient = each.clone() + DVector::from(self.prior.slopes(at).to_vec());
         let scale = DMatrix::from_diagonal(&slope);
-        let mut precision = &scale * &self.found.average * &scale + &prior;
+        let mut precision = &scale * &self.found.average * &scale;
         for j in 0..VARIANCES {
             let apart = at[j] - self.position[j];
             let own = self.found.average[(j, j)] + f64::max(-self.found.gradient[j], 0.0);
-            let held = damping * (own + prior[(j, j)]);
+            let held = damping * (own + self.prior.precision());
             gradient[j] -= held * apart;
             // A slope is curvature in the logarithm, too.
             let bend = if apart > 0.0 {
@@ -179,7 +179,7 @@ impl Near {
             } else {
                 f64::max(-each[j], 0.0)
             };
-            precision[(j, j)] += bend + held;
+            precision[(j, j)] += self.prior.precision() + bend + held;
         }
         (gradient, precision)
     }

@@ -1,7 +1,5 @@
 //! What is assumed before any reading: sizes of groups, which are in, and the noise.
 
-use nalgebra::{DMatrix, DVector};
-
 use super::model::Model;
 use super::whitening::{Noise, VARIANCES};
 
@@ -151,10 +149,7 @@ impl Count {
     }
 }
 
-/// Prior of the logarithms of the noise's variances: normal.
-///
-/// Half of the prior variance is common to all terms: noise that has one has others, for most spectra
-/// are smooth. The white variance is independent of them.
+/// Prior of the logarithms of the noise's variances: independent normal ones.
 #[derive(Clone, Copy, Debug)]
 pub struct NoisePrior {
     /// Variance of residuals, which they are relative to.
@@ -176,30 +171,20 @@ impl NoisePrior {
 
     /// Logarithm of the density, but for a constant.
     pub fn log_density(&self, position: &[f64; VARIANCES]) -> f64 {
-        0.5 * self.apart(position).dot(&self.slopes(position))
+        let own = position.iter().zip(self.centre());
+        own.map(|(x, centre)| -0.5 * ((x - centre) / SPREAD).powi(2))
+            .sum()
     }
 
     /// Slopes of the logarithm of the density.
-    pub fn slopes(&self, position: &[f64; VARIANCES]) -> DVector<f64> {
-        -(self.precision() * self.apart(position))
+    pub fn slopes(&self, position: &[f64; VARIANCES]) -> [f64; VARIANCES] {
+        let centre = self.centre();
+        std::array::from_fn(|j| (centre[j] - position[j]) / (SPREAD * SPREAD))
     }
 
     /// Curvature of the logarithm of the density, with the other sign.
-    pub fn precision(&self) -> DMatrix<f64> {
-        DMatrix::from_fn(VARIANCES, VARIANCES, |i, j| {
-            let unit = if i == j { 1.0 } else { 0.0 };
-            let own = match (i, j) {
-                (0, _) | (_, 0) => unit,
-                // The inverse of (I + 1 1') / 2.
-                _ => 2.0 * (unit - 1.0 / VARIANCES as f64),
-            };
-            own / (SPREAD * SPREAD)
-        })
-    }
-
-    fn apart(&self, position: &[f64; VARIANCES]) -> DVector<f64> {
-        let centre = self.centre();
-        DVector::from_fn(VARIANCES, |j, _| position[j] - centre[j])
+    pub fn precision(&self) -> f64 {
+        1.0 / (SPREAD * SPREAD)
     }
 
     /// The position within the smallest and greatest variances that is nearest.
