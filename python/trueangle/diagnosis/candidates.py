@@ -10,7 +10,14 @@ from ..estimation.cache import CachedProposal
 from ..estimation.regression import Extension, Regression
 from ..support.deadline import current_deadline
 from .formerrors import told_from_form_errors
-from .penalty import penalty_of, total_penalty
+from .penalty import (
+    deviance_before_forms,
+    deviance_of_form_errors,
+    form_misfit,
+    forms_before,
+    penalty_of,
+    total_penalty,
+)
 
 #: An extension, what it extends, and its net BIC gain.
 Candidate: TypeAlias = tuple[Extension, Regression, float]
@@ -100,7 +107,16 @@ class CandidateScores:
     def score(self, candidate: Candidate) -> float:
         """Net gain less what a cause costs beyond its parameters."""
         extension, start, gain = candidate
-        return gain - (penalty_of([*start.terms, extension]) - penalty_of(start.terms))
+        explained = deviance_before_forms(start) - start.deviance
+        if not EFFECTS[extension.cause].has_exact_form:
+            explained += extension.deviance
+        before = forms_before(start)
+        left = deviance_of_form_errors(explained, start.n)
+        after = penalty_of([*start.terms, extension], left, before)
+        paid: float = start.cache.of_fit(
+            "penalty", lambda: penalty_of(start.terms, form_misfit(start), before)
+        )
+        return gain - (after - paid)
 
     def told_score(self, candidate: Candidate) -> float:
         """Score less what form errors of the causes found explain as well."""

@@ -2,8 +2,7 @@
 
 Forward and backward steps make one change at a time. The gain of a cause in addition to others,
 and which readings are outliers, may differ once another cause is replaced. Of two overlapping
-causes the first was chosen while it explained both. Over a part of a turn all low orders are
-exchanged at once: 6 and 7 may be there for 5.
+causes the first was chosen while it explained both: over a part of a turn orders 6 and 7 for 5.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from .candidates import propose_candidates
 from .overlap import finding_overlaps
 from .penalty import finding_groups, regression_without, total_penalty
 from .selection import is_flexible, select_again
-from .unseenorders import with_likeliest_orders
 
 #: Exchanges at most, and findings up to which others are tried in the place of each: of more, which
 #: are implausible together, that would take as long as the whole choice.
@@ -72,16 +70,18 @@ def _better_pair(regression: Regression) -> Regression | None:
 
 def _better(regression: Regression) -> Regression | None:
     limit = total_penalty(regression) - BETTER
-    for other in (_reshaped(regression), with_likeliest_orders(regression)):
-        if total_penalty(other) < limit:
-            return other
+    reshaped = _reshaped(regression)
+    if total_penalty(reshaped) < limit:
+        return reshaped
     groups = finding_groups(regression.terms)
     groups.sort(key=lambda group: sum(regression.terms[k].bic_gain for k in group))
     for group in groups:
         rest = regression_without(regression, group)
-        for other in (rest, _reshaped(rest)):
-            if total_penalty(other) < limit:
-                return other
+        if total_penalty(rest) < limit:
+            return rest
+        reshaped = _reshaped(rest)
+        if reshaped is not rest and total_penalty(reshaped) < limit:
+            return reshaped
         own = regression.terms[group[0]].cause
         if len(groups) > LOOKED_AT and not EFFECTS[own].flexible_below:
             continue

@@ -21,7 +21,10 @@ from .penalty import (
     NEW_CAUSE,
     deviance_lost,
     finding_groups,
+    form_misfit,
+    forms_before,
     net_deviance_lost,
+    penalty_of,
     regression_without,
     total_penalty,
 )
@@ -224,16 +227,25 @@ def _with_declared_lines(regression: Regression) -> Regression:
 
 
 def _made_specific(regression: Regression) -> Regression:
-    """With a specific cause in place of a flexible one where that explains more."""
+    """With a specific cause in place of a flexible one where that explains more.
+
+    What the form of a law leaves, the flexible one explains in its place: this counts in the
+    evidence, and no additional allowance for it is charged.
+    """
     for term in [t for t in regression.terms if is_flexible(EFFECTS[t.cause])]:
+        left = form_misfit(regression)
+
+        def price(account: Regression, left: float = left) -> float:
+            return account.bic + penalty_of(account.terms, left, forms_before(account))
+
         rest = regression.with_terms(t for t in regression.terms if t.cause != term.cause)
         tried = [
             start.with_terms([*start.terms, extension])
             for extension, start, gain in candidate_extensions(rest, acts_on_runs())
-            if total_penalty(rest) - gain < total_penalty(regression)
+            if price(rest) - gain < price(regression)
         ]
-        best = min(tried, key=total_penalty, default=regression)
-        if total_penalty(best) < total_penalty(regression):
+        best = min(tried, key=price, default=regression)
+        if price(best) < price(regression):
             regression = _pruned(_forward(best, list(EFFECTS)))
     return regression
 

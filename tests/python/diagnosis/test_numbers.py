@@ -21,6 +21,7 @@ from trueangle.diagnosis.gain import _exchanged, _level
 from trueangle.diagnosis.gearedlines import PLAIN, GearedLines
 from trueangle.diagnosis.gearratio import find_ratio
 from trueangle.diagnosis.holdout import reducible_share
+from trueangle.diagnosis.overlap import finding_overlaps
 from trueangle.diagnosis.remainder import share_of_run
 from trueangle.diagnosis.rivals import rivals_of
 from trueangle.diagnosis.wrongplace import misplaced_beliefs
@@ -99,6 +100,20 @@ def test_time_is_in_shares_of_its_own_run(signals):
         clock = signals.clock[start:stop]
         wanted = (clock - clock[0]) / (clock[-1] - clock[0])
         np.testing.assert_allclose(found[start:stop], wanted, atol=1e-12)
+
+
+def test_columns_that_oppose_each_other_overlap_as_much_as_those_that_do_not(signals):
+    rng = np.random.default_rng(9)
+    one = rng.normal(size=len(signals))
+    for sign in (1.0, -1.0):
+        other = sign * one + 0.5 * rng.normal(size=len(signals))
+        start = regression(signals, 3.0 * one + 3.0 * other)
+        terms = [
+            start.propose(c, {}, x[:, None]) for c, x in (("backlash", one), ("latency", other))
+        ]
+        ((i, j, found),) = finding_overlaps(start.with_terms(terms), [[0], [1]])
+        assert (i, j) == (0, 1)
+        assert found == pytest.approx(1.0 / np.sqrt(1.25), abs=0.03)
 
 
 def test_the_interval_of_a_share_is_that_of_95_of_100():

@@ -11,7 +11,9 @@ import pytest
 from trueangle.diagnosis.penalty import (
     NEW_CAUSE,
     deviance_lost,
+    deviance_of_form_errors,
     finding_groups,
+    form_misfit,
     misfit_of_scatter,
     net_deviance_lost,
     penalty_of,
@@ -35,7 +37,7 @@ ROUNDING = 1e-6
 def test_a_cause_is_worth_what_the_account_without_it_lacks(
     step: float, line: float, searched: tuple[float, float]
 ) -> None:
-    """Its deviance less its parameters, its search and its cause."""
+    """Its deviance less its parameters, its search, its cause and its form."""
     sim = Simulation(runs=2 * (RunDesign(samples=300, reversals=(0.4,)),))
     signals = join_runs(simulate(sim, SEED))
     error = np.random.default_rng(SEED).normal(size=len(signals))
@@ -56,27 +58,41 @@ LINE, LOAD, STIFF = "missing_order", "torsional_compliance", "stiffening_complia
 
 
 @pytest.mark.parametrize(
-    ("causes", "groups"),
+    ("causes", "groups", "further"),
     [
-        ([], []),
-        ([LINE, LINE, LINE], [[0], [1], [2]]),
-        (["missed_counts", LINE, "missed_counts"], [[0, 2], [1]]),
-        (["local_defect", "backlash", "local_defect", "backlash"], [[0], [1, 3], [2]]),
-        (["joint_coupling", "joint_coupling", LOAD], [[0], [1], [2]]),
-        ([STIFF, STIFF, LINE], [[0, 1], [2]]),
+        ([], [], 0),
+        ([LINE, LINE, LINE], [[0], [1], [2]], 0),
+        (["missed_counts", LINE, "missed_counts"], [[0, 2], [1]], 0),
+        (["local_defect", "backlash", "local_defect", "backlash"], [[0], [1, 3], [2]], 0),
+        (["joint_coupling", "joint_coupling", LOAD], [[0], [1], [2]], 0),
+        ([STIFF, STIFF, LINE], [[0, 1], [2]], 1),  # its own form, and that of the spring it holds
     ],
 )
-def test_every_finding_costs_one_cause(causes: list[str], groups: list[list[int]]) -> None:
+def test_every_finding_costs_one_cause_and_every_further_form_what_forms_leave(
+    causes: list[str], groups: list[list[int]], further: int
+) -> None:
     terms = [SimpleNamespace(cause=cause, log_grid=2.0) for cause in causes]
     assert finding_groups(terms) == groups
-    assert penalty_of(terms) == NEW_CAUSE * len(groups)
+    assert penalty_of(terms, 0.0) == NEW_CAUSE * len(groups)
+    forms = max(len(groups) + further - 1, 0)
+    assert penalty_of(terms, 7.0) == NEW_CAUSE * len(groups) + 7.0 * forms
     # A line of a declared shaft was expected.
     declared = [*terms, SimpleNamespace(cause=LINE, log_grid=0.0)]
-    assert penalty_of(declared) == penalty_of(terms)
+    assert penalty_of(declared, 7.0) == penalty_of(terms, 7.0)
+
+
+@pytest.mark.parametrize("n", [50, 4000])
+def test_a_form_may_leave_a_thousandth_of_the_energy(n: int) -> None:
+    for energy in (1e-4, 1.0, 1e4):
+        deviance = n * np.log1p(energy)
+        assert deviance_of_form_errors(deviance, n) == pytest.approx(n * np.log1p(1e-3 * energy))
+    assert deviance_of_form_errors(-3.0, n) == 0.0
+    # Nothing of it overflows.
+    assert deviance_of_form_errors(1e9 * n, n) == pytest.approx(n * (500.0 + np.log(1e-3)))
 
 
 def test_only_causes_with_a_form_may_leave_a_part_of_what_they_explain() -> None:
-    """Play and a lost count, by the scatter that each takes away."""
+    """Play and a lost count, by the fits without either and the scatter that each takes away."""
     sim = Simulation(runs=2 * (RunDesign(samples=300, reversals=(0.4,)),))
     signals = join_runs(simulate(sim, SEED))
     error = np.random.default_rng(SEED).normal(size=len(signals)) + 20.0 * signals.direction
@@ -87,7 +103,10 @@ def test_only_causes_with_a_form_may_leave_a_part_of_what_they_explain() -> None
     step = start.propose("missed_counts", shape, columns)
     play = EFFECTS["backlash"].propose(start)
     counts, backlash, both = (start.with_terms(t, 0.0) for t in ([step], [play], [step, play]))
+    assert form_misfit(start) == form_misfit(counts) == 0.0
     for without, chosen in ((start, backlash), (counts, both)):
+        saved = without.deviance - chosen.deviance
+        assert form_misfit(chosen) == pytest.approx(deviance_of_form_errors(saved, start.n))
         ratio = np.var(without.left_within_runs) / np.var(chosen.left_within_runs)
         assert ratio > 1.1
         wanted = start.n * np.log1p(1e-3 * (ratio - 1.0))

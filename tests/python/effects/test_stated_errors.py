@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import trueangle as ta
+from diagnosis.test_findings_told import SIM as FEWER
 from trueangle.effects import EFFECTS
 from trueangle.estimation.regression import Regression
 from trueangle.joint.signals import join_runs
-from trueangle.simulation import Harmonic, Joint, RunDesign, Simulation
 
 #: A stated error is an estimate: the residual of 3 840 readings tells it to 1.2 %, and the
 #: linearised bound is that of the true parameters, not of the found ones.
@@ -18,30 +18,8 @@ NEAR = (0.85, 1.15)
 #: Arcsec: not one, whose root and square are itself.
 NOISE = 1.4
 
-LEVELS = [(v, load, t) for v in (5.0, 30.0) for load in (-5.0, 5.0) for t in (20.0, 35.0)]
-SIM = Simulation(
-    Joint(50.0, "circular_spline", "motor"),
-    (
-        Harmonic("output", 1, 14.0, 243.0),
-        Harmonic("motor", 2, 10.0, 248.0),
-        Harmonic("wave_generator", 2, 33.0, 115.0),
-    ),
-    sigma_arcsec=1.0,
-    runs=tuple(
-        RunDesign(
-            direction=1 if k % 2 else -1,
-            speed_deg_s=v,
-            samples=480,
-            start_deg=37.0 * k,
-            turns=1.4,
-            reversals=(0.3, 0.6),
-            gravity_Nm=load,
-            temperature_C=t,
-            mount_deg=(0.0, 130.0, 250.0)[k % 3],
-        )
-        for k, (v, load, t) in enumerate(LEVELS)
-    ),
-)
+#: More readings of the runs that show every effect.
+SIM = replace(FEWER, runs=tuple(replace(run, samples=480) for run in FEWER.runs))
 
 #: What is hidden, and which of its fields are reported under their own names.
 HIDDEN = {
