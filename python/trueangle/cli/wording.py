@@ -76,6 +76,9 @@ _OWN = frozenset(
     {"help", "debug", "output", "corrected_model", "extend", "checksums", "one_pass", "scheduler"}
 )
 
+#: What a diagnosis may do where no order is supported: there may be no model at all.
+_PERHAPS = "; to look for causes other than an order (--corrected-model FILE writes their model)"
+
 
 class Wording:
     """What a text is to those who typed a command; until one is known, the text itself.
@@ -220,8 +223,10 @@ def command_that_helps(error: TrueAngleError, args: argparse.Namespace, build: _
     words = _words(error, args, build)
     if not words:
         return ""
-    other = isinstance(error, NoOrderError) and words[0] == "diagnose"
-    return f"; {'for other causes, ' * other}run: {join(['trueangle', *words])}"
+    perhaps = ""
+    if isinstance(error, NoOrderError) and words[0] == "diagnose":
+        perhaps = _PERHAPS
+    return f"{perhaps}; run: {join(['trueangle', *words])}"
 
 
 def _words(error: TrueAngleError, args: argparse.Namespace, build: _Build) -> list[str]:

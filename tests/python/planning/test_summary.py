@@ -63,7 +63,7 @@ def test_of_mounts():
         math.sqrt(3) * plan.facet_noise_factor, abs=CENTS
     )
     assert f"{plan.readings} readings in all, {plan.readings // 108}" in " ".join(text.split())
-    assert f"{', '.join(map(str, plan.facet_shifts))} of 36 faces" in text
+    assert f"{', '.join(map(str, plan.facet_shifts))} faces at the mounts" in text
     pairs = dict(re.findall(r"(\d+) +(\d+\.\d\d)\b", text.partition("each order; 1")[2]))
     for order, factor in plan.noise_factors.items():
         assert float(pairs[f"{order:g}"]) == pytest.approx(factor, abs=CENTS)
