@@ -150,9 +150,9 @@ def _found(diagnosis: DiagnosisData, unit: ErrorUnit) -> Iterator[Entry]:
     if wrong:
         yield f"Wrong in the simulation: {wrong}.", 2, 0
     spots = {_seen(spot, unit): spot for spot in reversed(diagnosis.in_question)}
-    asked = _grouped((re.split(r"; |\. | \(", s.because)[0], seen) for seen, s in spots.items())
-    for why, each in asked.items():
-        detected = "not distinguished" if " or " in each[0] else "not confirmed"
+    keys = ((len(s.causes) > 1, re.split(r"; |\. | \(", s.because)[0]) for s in spots.values())
+    for (several, why), each in _grouped(zip(keys, spots, strict=True)).items():
+        detected = "not distinguished" if several else "not confirmed"
         yield f"Detected, {detected}: {'; '.join(each)}: {why}.", 2, 0
     yield from unknown
     yield from notes
