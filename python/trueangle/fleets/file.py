@@ -67,9 +67,7 @@ class _FleetReader(Decoder):
         if not isinstance(aligned, bool):
             raise self.error("true or false is needed", "common.aligned")
         shared = self.rows(CommonOrder, common["orders"], "common.orders")
-        scatter = tuple(
-            self.each(between["orders"], "between.orders", partial(self.row, BetweenOrder))
-        )
+        scatter = self.rows(BetweenOrder, between["orders"], "between.orders")
         if [order.order for order in scatter] != [order.order for order in shared]:
             raise self.error("the orders of common.orders are needed", "between.orders")
         return Fleet(
@@ -77,9 +75,7 @@ class _FleetReader(Decoder):
             shared,
             scatter,
             self.row(Tolerance, content["tolerance"], "tolerance"),
-            tuple(
-                self.each(content["history"], "history", partial(self.row, HistoryRow), _MOST_UNITS)
-            ),
+            self.rows(HistoryRow, content["history"], "history", _MOST_UNITS),
             aligned,
             prior,
             tuple(self.each(content["notes"], "notes", self.text)),

@@ -16,8 +16,9 @@ from ..joint.shafts import resolve_orders
 from ..runs.files import each_runs
 from ..support.angles import ARCSEC_PER_TURN, arcsec
 from ..support.argumentkinds import told_kinds
+from ..support.arrays import median
+from ..support.display_units import brief_number
 from ..support.suggestions import check_choice
-from .calibration import Calibration
 from .history import Change, changes_of
 from .outliers import Deviates
 from .result import VERDICTS, BetweenOrder, CommonOrder, Fleet, FleetUnit, UnitOrder, Verdict
@@ -164,10 +165,8 @@ def _judged_fleet(
             "4 are needed."
         )
     belong = chosen.belong
-    # Below rounding the logarithms are of nothing.
-    least = ROUNDING * units.period
-    sizes, left = (np.maximum(v[belong], least) for v in (units.peak_to_peak, units.left))
-    bound = tolerance_of(sizes, left, share, confidence)
+    sizes = np.maximum(units.peak_to_peak, ROUNDING * units.period)[belong]
+    bound = tolerance_of(sizes, np.exp(units.log_left[belong, 0]), share, confidence)
     if not belong.all():
         notes.append(
             f"Common pattern, spread and tolerance limits are those of the {int(belong.sum())} "
@@ -203,7 +202,7 @@ def _judged_fleet(
             )
         ),
         bound,
-        tuple(row for dates in again for row in _rows(dates, changes)),
+        tuple(row for change in changes.values() for row in change.rows),
         chosen.aligned,
         _prior(units, chosen),
         tuple(notes),
@@ -213,11 +212,6 @@ def _judged_fleet(
 def _polar(cosine: float, sine: float) -> tuple[float, float]:
     """Amplitude, and phase in [0, 360) degrees."""
     return math.hypot(cosine, sine), math.degrees(math.atan2(cosine, sine)) % 360.0
-
-
-def _rows(dates: Sequence[tuple[Calibration, float]], changes: Mapping[str, Change]) -> Any:
-    change = changes.get(dates[0][0].unit)
-    return () if change is None else change.rows
 
 
 def _prior(units: Units, chosen: SharedPattern) -> Prior:
@@ -272,14 +266,9 @@ def _unit_row(
         verdict,
         because,
         tuple(
-            UnitOrder(
-                order,
-                *_polar(a, b),
-                float(std),
-                float(z),
-            )
+            UnitOrder(order, *_polar(a, b), float(std), float(z))
             for order, (a, b), std, z in zip(
-                units.orders.tolist(), pairs.tolist(), stds, found.size[u], strict=True
+                units.orders.tolist(), pairs.tolist(), stds, found.size[u, :-1], strict=True
             )
         ),
         float(units.peak_to_peak[u]),
@@ -300,12 +289,20 @@ def _among_tails(count: int) -> str:
 
 
 def _outlying(units: Units, u: int, found: Deviates, joint: Joint) -> str:
-    """Which orders, and what they are likely to be."""
-    places = found.orders(u)
-    first, *others = (f"order {units.orders[k]:g} is {found.size[u, k]:.1f}" for k in places[:3])
-    told = ", ".join([f"{first} standard deviations from the others", *others])
-    whose = f"; order {units.orders[places[0]]:g}" if others else ""
-    return f"{told}{whose}: {joint.explanations(float(units.orders[places[0]]))[0]}"
+    """Which orders, and what they are likely to be; and by how much the residual differs."""
+    outside, orders, told = found.outside(u), units.orders.tolist(), []
+    if places := [k for k in outside if k < len(orders)]:
+        first, *others = (f"order {orders[k]:g} is {found.size[u, k]:.1f}" for k in places[:3])
+        sizes = ", ".join([f"{first} standard deviations from the others", *others])
+        whose = f"; order {orders[places[0]]:g}" if others else ""
+        told = [f"{sizes}{whose}: {joint.explanations(orders[places[0]])[0]}"]
+    if len(places) < len(outside):
+        left = arcsec(np.exp(units.log_left[:, 0]), units.period)
+        told.append(
+            f"residual of {left[u]:.3g} arcsec is {brief_number(left[u] / median(left))} times the "
+            "fleet's median: its noise, slip or drift differs; diagnose its runs"
+        )
+    return "; ".join(told)
 
 
 def _moved(units: Units, u: int, change: Change, joint: Joint) -> tuple[Verdict, str]:

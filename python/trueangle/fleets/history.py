@@ -121,7 +121,7 @@ def changes_of(
     found = []
     for u, calibrations in enumerate(dated):
         moved, zero_moved = bool(pattern.outlying[u]), bool(zero.outlying[u])
-        places = tuple(pattern.orders(u, 0.5 * LEVEL))
+        places = tuple(pattern.outside(u, 0.5 * LEVEL))
         grows = _grows(calibrations, places[0], pattern) if moved else None
         change = np.concatenate([value[u] for value in values])
         squares = (change.reshape(-1, 2) ** 2).sum(axis=1)

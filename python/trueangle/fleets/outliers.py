@@ -1,4 +1,4 @@
-"""Units that do not belong: extreme studentized deviates per order, at one level for the fleet."""
+"""Units that do not belong: extreme studentized deviates per order and of the residual."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class Deviates(NamedTuple):
     variances: Array
     limit: float
 
-    def orders(self, unit: int, level: float = LEVEL) -> list[int]:
-        """Orders in which a unit lies outside, the first the farthest."""
+    def outside(self, unit: int, level: float = LEVEL) -> list[int]:
+        """Places of the values in which a unit lies outside, the first the farthest."""
         rows = self.chance[unit]
         limit = level / max(self.chance.size, 1)
         found = [int(k) for k in np.argsort(rows) if rows[k] <= limit]
@@ -98,11 +98,11 @@ def deviates(
     Parameters
     ----------
     values : sequence of ndarray, shape (n, d)
-        Of every order: cosine and sine (d = 2), or a zero (d = 1).
+        Of every order: cosine and sine (d = 2); or a zero, or the logarithm of a residual (d = 1).
     own : sequence of ndarray, shape (n, d, d)
         Covariance of each.
     aligned : bool
-        Whether the units share a mean; else it is 0.
+        Whether cosines and sines share a mean; else it is 0. Single numbers always do.
     level : float
         Probability of naming a unit where none is outlying.
     shares : ndarray, shape (K,), optional
@@ -122,12 +122,10 @@ def deviates(
     share_of = np.full(len(values), 1.0 / len(values)) if shares is None else shares
     inside = np.ones(n, dtype=bool)
     aside: list[int] = []
-    last, first = 0, None
+    last = 0
     # This share of the units and one more can be outliers: they are judged by the others.
     for step in range(1 + int(0.25 * n)):
-        chance, size = _chances(values, weights, inside, aligned)
-        unit = _combined(chance, share_of)
-        first = (chance, size, unit) if first is None else first
+        unit = _combined(_chances(values, weights, inside, aligned)[0], share_of)
         worst = int(np.argmin(np.where(inside, unit, np.inf)))
         share = _HIDDEN if step > last else 1.0 - _HIDDEN
         if unit[worst] * inside.sum() <= share * level:
@@ -153,8 +151,7 @@ def _variance(values: Array, own: Array, aligned: bool) -> float:
     if values.shape[1] == 2:
         return robust_variance(values, own, aligned)
     # One dimension: the median square of a normal number is 0.455 of its variance.
-    centre = np.median(values, axis=0) if aligned else 0.0
-    square = float(np.median((values - centre) ** 2)) / 0.45493642311957283
+    square = float(np.median((values - np.median(values)) ** 2)) / 0.45493642311957283
     return max(square - float(own.mean()), 0.0)
 
 
@@ -165,14 +162,15 @@ def _chances(
     chances, sizes = [], []
     for value, weight in zip(values, weights, strict=True):
         d = value.shape[1]
+        has_mean = aligned or d == 1
         share = weight * inside
         every = float(share.sum())
-        mean = share @ value / every if aligned else np.zeros(d)
+        mean = share @ value / every if has_mean else np.zeros(d)
         square = weight * ((value - mean) ** 2).sum(axis=1)
         # Of a unit inside, what the mean took of it; one outside adds the mean's own error.
-        leverage = weight / every if aligned else np.zeros(len(weight))
+        leverage = weight / every if has_mean else np.zeros(len(weight))
         apart = np.where(inside, square / np.maximum(1.0 - leverage, 1e-9), square / (1 + leverage))
-        freedom = d * (float(inside.sum()) - float(aligned))
+        freedom = d * (float(inside.sum()) - float(has_mean))
         rest = float((square * inside).sum()) - np.where(inside, apart, 0.0)
         free = np.where(inside, freedom - d, freedom)
         scale = np.maximum(rest, 0.0) / np.maximum(free, 1.0)

@@ -55,7 +55,7 @@ class FleetUnit:
         Standard deviation of the readings about the unit's own pattern.
     p : float
         Probability that a sound unit deviates or, where it moved, changes this much, allowing for
-        the number of its orders.
+        the number of its orders and its residual.
     limit : float
         At or below which ``p`` is reported: in 1 % of sound fleets, for all units together.
     """

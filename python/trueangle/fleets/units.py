@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fitting.fit import ROUNDING
 from ..joint.shafts import ShaftOrders
 from ..support.arrays import Array
 from ..support.distributions import (
@@ -68,6 +69,10 @@ class Units:
         curves = coefficients @ order_columns(places, self.orders, period).T
         self.peak_to_peak = np.ptp(curves, axis=1)
         self.left = np.sqrt([max(one.squares / one.freedom, 0.0) for one, _ in self.last])
+        # Residuals are compared by their logarithms; below rounding these are of nothing.
+        self.log_left = np.log(np.maximum(self.left, ROUNDING * period))[:, None]
+        freedom = np.array([one.freedom for one, _ in self.last])
+        self.log_left_own = 0.25 * trigamma(0.5 * freedom)[:, None, None]
 
 
 class SharedPattern(NamedTuple):
@@ -90,11 +95,11 @@ def shared_pattern(units: Units) -> SharedPattern:
     outlier that only one of them detects would else decide for all.
     """
     n = len(units.last)
-    shares = level_by_order(units.orders)
+    # The residual has the share of an order that shows no damage.
+    shares = level_by_order(np.append(units.orders, 0.0))
     choices = (False, True) if n > 2 else (False,)
-    found = {
-        aligned: deviates(units.values, units.own, aligned, shares=shares) for aligned in choices
-    }
+    values, own = [*units.values, units.log_left], [*units.own, units.log_left_own]
+    found = {aligned: deviates(values, own, aligned, shares=shares) for aligned in choices}
     judged = ~np.any([one.outlying for one in found.values()], axis=0)
     if n < FEWEST:
         judged[:] = True

@@ -1,5 +1,6 @@
 """Outliers among units: how often a clean fleet is told of one, and what is found."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from trueangle.fleets.calibration import Calibration
 from trueangle.fleets.outliers import _variance, deviates, level_by_order
 from trueangle.fleets.units import Units, louder_orders
 from trueangle.joint.shafts import ShaftOrders
+from trueangle.reports.fleet import FleetReport
 
 from .made import ARCSEC, pattern, units
 
@@ -84,20 +86,26 @@ def test_several_outliers_do_not_hide_each_other():
 
 
 def test_the_unit_its_order_and_the_likely_cause_are_named():
+    """And the unit whose residual is eight times that of the others, in text and report."""
     print("seed", SEED)
     rng = np.random.default_rng(SEED + 2)
 
     def eccentric(u, t, b):
-        if u == 11:
-            b[0] += [65.0, 0.0]
-        return b, 0.0
+        return b + (u == 11) * np.array([[65.0, 0.0], *3 * [[0.0, 0.0]]]), 0.0
 
-    found = ta.fleet(units(rng, change=eccentric), orders=range(1, 5))
-    first = found.units[0]
+    runs = units(rng, change=eccentric)
+    for k, run in enumerate(runs):
+        further = rng.normal(0.0, 63.0**0.5 * 3.0 * ARCSEC, len(run)) * (run.unit == "u7")
+        runs[k] = replace(run, indicated=run.indicated + further)
+    found = ta.fleet(runs, orders=range(1, 5))
+    first, louder = sorted(found.units[:2], key=lambda unit: unit.unit)
     assert (first.unit, first.verdict) == ("u11", "outlier")
     assert "order 1" in first.because
     assert "eccentricity" in first.because
-    assert all(unit.verdict == "fine" for unit in found.units[1:])
+    assert (louder.unit, louder.verdict) == ("u7", "outlier")
+    assert re.match(r"residual of 2\d.* arcsec is (7|8)(\.\d)? times the fleet's", louder.because)
+    assert all("u7" in page and "median" in page for page in (found.summary(), FleetReport(found).html))
+    assert all(unit.verdict == "fine" for unit in found.units[2:])
     assert found.aligned
 
 
