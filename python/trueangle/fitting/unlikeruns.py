@@ -170,22 +170,15 @@ def zeros_follow_speed(
     with ``s²`` the variance of the zeros about the line and ``u`` their standard error. None of
     fewer than 3 timed runs, of one speed, and where the p-value is above 0.001.
     """
-    moving = [run.time is not None and np.ptp(run.time) > 0.0 for run in runs]
-    timed = np.array(moving) & np.isfinite(zeros)
-    known = [run for run, is_timed in zip(runs, timed, strict=True) if is_timed]
+    means = np.array([np.nan if (v := run.speed) is None else v.mean() for run in runs])
+    timed = np.isfinite(means) & np.isfinite(zeros)
     # Runs from which on a line through their zeros can fail.
-    if len(known) < 3:
+    if timed.sum() < 3:
         return None
-    ends = [
-        (run.unwrapped_reference[[0, -1]], run.time[[0, -1]])
-        for run in known
-        if run.time is not None
-    ]
-    speed = np.array([np.diff(angle)[0] / np.diff(time)[0] for angle, time in ends])
-    period = known[0].period
+    speed, period = means[timed], runs[0].period
     zero = wrap(zeros[timed] - circular_mean(zeros[timed], period), period)
     speed, zero = speed - speed.mean(), zero - zero.mean()
-    energy, freedom = float(speed @ speed), len(known) - 2
+    energy, freedom = float(speed @ speed), int(timed.sum()) - 2
     if energy == 0.0:
         return None
     slope = float(speed @ zero) / energy

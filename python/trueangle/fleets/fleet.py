@@ -297,7 +297,7 @@ def _outlying(units: Units, u: int, found: Deviates, joint: Joint) -> str:
         whose = f"; order {orders[places[0]]:g}" if others else ""
         told = [f"{sizes}{whose}: {joint.explanations(orders[places[0]])[0]}"]
     if len(places) < len(outside):
-        left = arcsec(np.exp(units.log_left[:, 0]), units.period)
+        left = arcsec(1.0, units.period) * np.exp(units.log_left[:, 0])
         told.append(
             f"residual of {left[u]:.3g} arcsec is {brief_number(left[u] / median(left))} times the "
             "fleet's median: its noise, slip or drift differs; diagnose its runs"

@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 from ..effects.effect import title_of
 from ..plots.orderlines import likely_aliases
 from ..plots.simulatedcurves import finding_names
+from ..runs.checks.record import records_of
+from ..runs.checks.result import REPEATABILITY, extent_of, extent_verdicts
 from ..runs.run import CalibrationRun
 from ..support.display_units import ErrorUnit
 from .wording import shortened_list
@@ -37,12 +37,8 @@ _UNITS: Final = {
 #: Parameters that the name of a finding states already.
 _NAMED: Final = ("shaft", "order", "carrier")
 
-#: Speeds (relative), temperatures (K) and torques (Nm) that differ by less are one.
-_SPEED, _TEMPERATURE, _TORQUE = 0.05, 1.0, 0.1
-
 #: Aliases and orders reported.
-_MOST_ALIASES: Final = 3
-_MOST_FOLDED: Final = 4
+_MOST_ALIASES, _MOST_FOLDED = 3, 4
 
 
 def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -137,11 +133,12 @@ def unknown_content(
 ) -> list[dict[str, str]]:
     """``{what, because, measure}``: from the diagnosis where there is one.
 
-    A diagnosis works out itself what the conditions of the runs leave open; without one
-    the usual conditions are gone through.
+    A diagnosis works out itself what the conditions of the runs leave open, but for repeatability;
+    without one it is what `trueangle.check` finds.
     """
+    cannot = extent_verdicts(extent_of(records_of(runs)))[1]
     if diagnosis is None:
-        return _folded(selection) + _conditions(runs) + _held(runs)
+        return _folded(selection) + cannot
     found = [
         _entry(
             " or ".join(title_of(cause) for cause in entry["causes"])
@@ -151,7 +148,9 @@ def unknown_content(
         )
         for entry in sorted(diagnosis["not_identifiable"], key=lambda e: not e["supported"])
     ]
-    return found + _folded(selection) + _held(runs)
+    return (
+        found + _folded(selection) + [entry for entry in cannot if entry["what"] == REPEATABILITY]
+    )
 
 
 def _estimates(entry: dict[str, Any]) -> list[str]:
@@ -173,59 +172,6 @@ def _estimate(name: str, value: float, std: float) -> str:
     unit = "" if stem == name and name != "amplitudes" else " arcsec"
     shown, spread = ErrorUnit("", 1.0).pair(abs(value) if stem == "half_width" else value, std)
     return f"{stem.replace('_', ' ')} {shown}{unit} +- {spread}{unit}"
-
-
-def _held(runs: Sequence[CalibrationRun]) -> list[dict[str, str]]:
-    if len(runs) > 1:
-        return []
-    return [
-        _entry(
-            "repeatability, and the gain on new data",
-            "there is one run only",
-            "repeat the run, on another day if possible",
-        )
-    ]
-
-
-def _conditions(runs: Sequence[CalibrationRun]) -> list[dict[str, str]]:
-    entries = []
-    ways = {float(d) for run in runs for d in np.unique(run.direction) if d}
-    if len(ways) < 2:
-        entries.append(
-            _entry(
-                "reversal error: backlash, hysteresis",
-                "all readings were approached from one direction",
-                "repeat the runs backwards",
-            )
-        )
-    speeds = [np.median(np.abs(run.speed)) for run in runs if run.speed is not None]
-    if not speeds or np.ptp(speeds) <= _SPEED * max(speeds):
-        entries.append(
-            _entry(
-                "latency and filters",
-                "there is one speed only" if speeds else "no time was recorded",
-                "measure at a second speed at least three times as high, in both directions",
-            )
-        )
-    for name, unit, least, what, measure in (
-        ("temperature", "temperature", _TEMPERATURE, "thermal drift", "10 K warmer or colder"),
-        ("torque", "load", _TORQUE, "compliance and load-dependent gear error", "under two loads"),
-    ):
-        values = [getattr(r, name) for r in runs if getattr(r, name) is not None]
-        if not values or np.ptp(np.concatenate(values)) < least:
-            because = f"there is one {unit} only" if values else f"no {unit} was recorded"
-            verb = "repeat a run" if name == "temperature" else "repeat a run in both directions"
-            entries.append(_entry(what, because, f"{verb} {measure}"))
-    mounts = [run.mount for run in runs if run.mount is not None]
-    if not mounts or float(np.ptp(np.concatenate(mounts))) == 0.0:
-        entries.append(
-            _entry(
-                "the reference's own errors, which look like the joint's",
-                "the reference was never turned on its mount",
-                "remount it as the command trueangle plan proposes (three mounts do well)",
-            )
-        )
-    return entries
 
 
 def _folded(selection: OrderSelection | None) -> list[dict[str, str]]:

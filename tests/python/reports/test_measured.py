@@ -114,14 +114,14 @@ def test_what_is_unknown_follows_from_what_was_not_done():
         quick.reference, quick.indicated, 360.0, time=0.3 * quick.time, **first
     )
     for more, said in (
-        (faster, "latency and filters"),
+        (faster, "delay"),
         (run(**{**first, "temperature": 30.0}), "thermal drift"),
         (run(**{**first, "torque": 5.0}), "compliance"),
-        (run(**{**first, "mount": 130.0}), "the reference's own errors"),
+        (run(**{**first, "mount": 130.0}), "the reference's own error"),
     ):
         assert said in every
         assert said not in told(run(**first), more)
-        others = [s for s in ("latency", "thermal", "compliance", "own errors") if s not in said]
+        others = [s for s in ("delay", "thermal", "compliance", "own error") if s not in said]
         assert all(s in told(run(**first), more) for s in others), said
 
 

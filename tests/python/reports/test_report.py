@@ -93,7 +93,7 @@ def test_one_run_has_no_gain_and_says_so(runs) -> None:
     assert made.content["gain"] is None
     assert "One run only" in made.content["why_no_gain"]
     assert "Not verified" in made.html
-    assert any("repeatability" in e["what"] for e in made.content["unknowns"])
+    assert any("run to run" in e["what"] for e in made.content["unknowns"])
 
 
 def test_a_reversed_sensor_is_stated_with_the_model(runs) -> None:
@@ -107,12 +107,12 @@ def test_a_reversed_sensor_is_stated_with_the_model(runs) -> None:
 
 def test_unknowns_follow_from_the_conditions(runs) -> None:
     whats = [e["what"] for e in ta.report(runs, orders=[1]).content["unknowns"]]
-    assert not any("latency" in w or "reversal" in w for w in whats)
+    assert not any("delay" in w or "reversal" in w for w in whats)
     assert any("thermal" in w for w in whats)
     theta = np.arange(0.0, 360.0, 10.0)
     static = ta.CalibrationRun(theta, theta + 0.01 * np.sin(np.radians(theta)), period=360.0)
     whats = [e["what"] for e in ta.report(static, orders=[1]).content["unknowns"]]
-    assert any("latency" in w for w in whats)
+    assert any("delay" in w for w in whats)
     assert any("reversal" in w for w in whats)
 
 

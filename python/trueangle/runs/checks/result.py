@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ...support.arrays import Array, median, quantile
+from ...support.arrays import Array, distinct, median, quantile
 from ...support.layout import counted, laid_out, wrapped_lines
 from ...support.plainresult import PlainResult, plain_fields
 from ..outliers import FEWEST
@@ -16,8 +16,11 @@ from .angles import BLOCKS
 from .fault import DataFault
 from .record import LEAST_READINGS, Record
 
-#: Levels are apart by this share of their range, and by so much at least.
-_LEAST_GAP = {"torque": 0.05, "temperature": 1.0, "mount": 0.5, "speed": 0.5}
+#: Levels are apart by so much at least: Nm, kelvin, degrees; of speeds a share of the fastest.
+_LEAST_GAP = {"torque": 0.05, "temperature": 1.0, "mount": 0.5, "speed": 0.05}
+#: What one run or two cannot show.
+REPEATABILITY = "what changes from run to run"
+
 _SIGNALS = ("torque", "temperature", "mount")
 
 #: Share of the widest gap within which readings are of one place, and of a turn that all such
@@ -64,7 +67,7 @@ class Extent:
 def extent_of(records: list[Record]) -> Extent:
     """Extent of some records."""
     places = np.concatenate([np.mod(record.reference, 360.0) for record in records])
-    travels, directions, speeds = [], set[int](), []
+    travels, directions = [], set[int]()
     for record in records:
         reference, _ = record.unwrapped
         travels.append(float(np.ptp(reference)) / 360.0)
@@ -72,10 +75,6 @@ def extent_of(records: list[Record]) -> Extent:
         least = 0.25 * float(quantile(np.abs(steps), 0.9)) if steps.size else 0.0
         moving = np.sign(steps[np.abs(steps) > least])
         directions |= {sign for sign in (-1, 1) if (moving == sign).sum() > 0.05 * moving.size}
-        if record.velocity is not None:
-            speeds.append(float(median(np.abs(record.velocity))))
-        elif record.time is not None and np.ptp(record.time) > 0.0:
-            speeds.append(float(np.abs(steps).sum() / np.ptp(record.time)))
     loads, temperatures, mounts = found = [_signal_levels(records, name) for name in _SIGNALS]
     return Extent(
         sum(len(record) for record in records),
@@ -83,7 +82,7 @@ def extent_of(records: list[Record]) -> Extent:
         _span(places),
         max(travels, default=0.0),
         tuple(sorted(directions)),
-        _levels_of(speeds, "speed"),
+        _levels_of(list(_usual_speeds(records)), "speed"),
         loads[0],
         temperatures[0],
         mounts[0],
@@ -119,7 +118,11 @@ def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
     elif len(extent.speeds) > 1:
         can.append("delay and filters (several speeds)")
     else:
-        no("delay apart from reversal error or zero", "one speed", "runs at another speed")
+        no(
+            "delay apart from reversal error or zero",
+            "one speed",
+            "runs at a second speed, 3 times as high",
+        )
     for name, what, levels, measure in (
         ("torque", "compliance", extent.loads, "runs at several loads, torque_Nm logged"),
         (
@@ -142,8 +145,25 @@ def extent_verdicts(extent: Extent) -> tuple[list[str], list[dict[str, str]]]:
     if extent.runs > 2:
         can.append("how far the zero and the pattern repeat from run to run")
     else:
-        no("what changes from run to run", counted(extent.runs, "run"), "more runs")
+        no(REPEATABILITY, counted(extent.runs, "run"), "more runs")
     return can, cannot
+
+
+def _usual_speeds(records: list[Record]) -> Iterator[float]:
+    """Speed of each run in either direction, the median of its blocks, where time runs.
+
+    A pause is in one block, and a step over which a clock is set back in none.
+    """
+    for record in records:
+        if record.velocity is not None:
+            yield float(median(np.abs(record.velocity)))
+        elif record.time is not None:
+            steps = np.stack([np.abs(np.diff(record.unwrapped[0])), np.diff(record.time)])
+            steps = steps[:, steps[1] > 0.0]
+            at = distinct(np.linspace(0.0, steps.shape[1], BLOCKS, endpoint=False).astype(int))
+            if steps.size:
+                far, long = np.add.reduceat(steps, at, axis=1)
+                yield float(median(far / long))
 
 
 def _signal_levels(records: list[Record], name: str) -> tuple[tuple[float, ...], bool]:
@@ -181,7 +201,8 @@ def _groups(values: Array, kind: str) -> list[Array]:
     if not values.size:
         return []
     ordered = np.sort(values)
-    gap = max(0.1 * float(np.ptp(ordered)), _LEAST_GAP[kind])
+    least = _LEAST_GAP[kind] * (float(ordered[-1]) if kind == "speed" else 1.0)
+    gap = max(0.1 * float(np.ptp(ordered)), least)
     return np.split(ordered, np.flatnonzero(np.diff(ordered) > gap) + 1)
 
 

@@ -247,6 +247,10 @@ def test_levels_directions_and_speeds_of_the_runs() -> None:
     assert found.directions == (-1, 1)
     speed = 300.0 / 15.9
     assert found.speeds == (float(f"{speed:.4g}"), float(f"{2 * speed:.4g}"))
+    for jump in (99.0, -99.0):  # of a pause and of a clock that is set back, no speed
+        assert (
+            extent_of([record(SWEEP, time=time + jump * (time > 5.0))]).speeds == found.speeds[:1]
+        )
     assert found.loads == (-2.0, 3.02)
     assert found.temperatures == (20.0, 21.1)
     assert found.mounts == (30.0,)
