@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from ..errors import ArgumentError, NoModelError
 from ..model.model import HarmonicModel
+from ..runs.checks.record import records_of
+from ..runs.checks.result import extent_of
 from ..simulation.simulation import Simulation
 from ..support.angles import ARCSEC_PER_TURN
 from ..support.argumentkinds import of_type
@@ -21,10 +23,20 @@ if TYPE_CHECKING:
 
 
 #: What to do where nothing else is known.
-MEASURE_MORE = "measure more runs, in both directions and at two speeds, then diagnose again"
+MEASURE_MORE = "measure more runs, then diagnose again"
 
 #: The same where the runs are planned.
 PLANNED = "measure the planned runs (`diagnosis.plan()`)"
+
+
+def measure_more(runs: Sequence[CalibrationRun]) -> str:
+    """`MEASURE_MORE`, with the motion that these runs lack."""
+    if not runs:
+        return MEASURE_MORE
+    extent = extent_of(records_of(runs))
+    lacks = ["in both directions"] * (len(extent.directions) < 2)
+    lacks += ["at two speeds"] * (len(extent.speeds) < 2)
+    return MEASURE_MORE.replace("runs", f"runs, {' and '.join(lacks)}") if lacks else MEASURE_MORE
 
 
 class Correctable(PlainResult):

@@ -127,21 +127,22 @@ class Factor(PlainResult):
     @property
     def followed(self) -> str:
         """What is followed, in words: the factor, and those that are the same in these runs."""
-        also = [WORDS[other] for other in self.not_distinguished_from]
         times = "the place, changing with "
-        products = [word.removeprefix(times) for word in also if word.startswith(times)]
         travelled = (self.factor, self.curve.unit) == ("reversal_time", "deg")
         first = "the travel since the last reversal" if travelled else WORDS[self.factor]
-        text = " or ".join([first, *(word for word in also if not word.startswith(times))])
-        return text + (f" or {times}{', '.join(products)}" if products else "")
+        words = [first, *(WORDS[other] for other in self.not_distinguished_from)]
+        products = [word.removeprefix(times) for word in words if word.startswith(times)]
+        single = [word for word in words if not word.startswith(times)]
+        return " or ".join([*single, *([times + " or ".join(products)] if products else [])])
 
     @property
     def status(self) -> str:
         """What is known of it without a name: whether anything corrects it."""
         at_run_time = any(not effect.not_at_run_time for effect in self.effects)
-        simulated = "the extended simulation only" if self.effects else "no correction"
-        of = "the correction" if at_run_time else simulated
-        return f"Cause not determined; {of} contains its curve"
+        simulated = (
+            "only the extended simulation contains" if self.effects else "no correction removes"
+        )
+        return f"Cause not determined; {'the correction removes' if at_run_time else simulated} it"
 
     def size(self, unit: ErrorUnit) -> str:
         """Where it is and how large, with its 95 % interval."""

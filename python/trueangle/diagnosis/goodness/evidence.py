@@ -37,6 +37,8 @@ class Evidence:
         Frequency (per s, or per turn) of the line that it shows, where it shows one.
     looks_like : str
         What such structure resembles.
+    lines : tuple of float
+        Output orders that it shows with one phase at every reading.
     """
 
     test: str
@@ -47,6 +49,7 @@ class Evidence:
     rms: float = 0.0
     at: float | None = None
     looks_like: str = ""
+    lines: tuple[float, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The entry of ``unexplained.evidence``."""

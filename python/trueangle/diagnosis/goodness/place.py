@@ -173,6 +173,7 @@ def _judged(
     whole = max(float((modulator.values**2).sum()), 1e-300)
     excess = np.abs(z.sum(axis=1)) ** 2 - (np.abs(z) ** 2).sum(axis=1)
     power = 2.0 * np.maximum(excess, 0.0) / whole**2
+    is_clear = np.exp(-logs) * count < 0.01
     if band > 0.0:
         detail = f"strongest in the orders up to {band * step:.4g}"
         rms = float(np.sqrt(power[: int(band)].sum()))
@@ -182,10 +183,11 @@ def _judged(
     else:
         amplitude = float(np.sqrt(2.0 * power[k]))
         detail = f"strongest at order {(k + 1) * step:.4g}, about {brief_number(amplitude)} arcsec"
-        rms = float(np.sqrt(power[np.exp(-logs) * count < 0.01].sum()))
+        rms = float(np.sqrt(power[is_clear].sum()))
     says = f"the residual {modulator.what}: {detail}"
+    lines = tuple((step * (1.0 + np.flatnonzero(is_clear))).tolist()) if alone is None else ()
     looks_like = modulator.looks_like
-    return Evidence(modulator.name, statistic, p, says, rms=rms, looks_like=looks_like)
+    return Evidence(modulator.name, statistic, p, says, rms=rms, looks_like=looks_like, lines=lines)
 
 
 def _smallest(

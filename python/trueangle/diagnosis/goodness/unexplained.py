@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from ...estimation.linear import linear_residual
+from ...joint.pattern import lines_columns
 from ...support.plainresult import ShownResult, plain_fields
 from .events import reversal_test, start_test, steps_test
 from .evidence import Evidence
@@ -40,21 +41,21 @@ class TestedResidual:
     top: float
 
 
-#: Every test, in the order in which equally sure ones are reported.
-DECIDING: tuple[Callable[[TestedResidual], Iterable[Evidence | None]], ...] = (
-    lambda asked: place_tests(asked.left, asked.top),
-    lambda asked: [order_test(asked.left, asked.top, asked.noise.correlation)],
-    lambda asked: [time_test(asked.left, asked.noise.correlation)],
-    lambda asked: [run_test(asked.left, asked.noise)],
-    lambda asked: [reversal_test(asked.loose)],
-    lambda asked: [start_test(asked.loose)],
-    lambda asked: [steps_test(asked.loose)],
-)
-
-
 def evidence_of_tests(asked: TestedResidual) -> list[Evidence]:
-    """Evidence of every test that can be made of such readings."""
-    return [item for test in DECIDING for item in test(asked) if item is not None]
+    """Evidence of every test that can be made of such readings.
+
+    Lines that are new in every run, or in time, are looked for in what those of the place leave:
+    an order that every run has is an alias in time, and another order over a part of a run.
+    """
+    left, loose, noise = asked.left, asked.loose, asked.noise
+    found: list[Evidence | None] = [*place_tests(left, asked.top)]
+    lines = np.array([order for item in found if item is not None for order in item.lines])
+    if lines.size:
+        columns = np.column_stack([np.ones(len(left)), lines_columns(left.theta, lines)])
+        left = replace(left, residual=linear_residual(columns, left.residual))
+    found += [order_test(left, asked.top, noise.correlation), time_test(left, noise.correlation)]
+    found += [run_test(asked.left, noise), reversal_test(loose), start_test(loose)]
+    return [item for item in [*found, steps_test(loose)] if item is not None]
 
 
 #: What a path in time looks like that no law prescribes.
