@@ -94,8 +94,9 @@ def run(args: argparse.Namespace) -> int:
             if args.plot is not None or args.report is not None:
                 kept.append(window)
             print(_line(window, model, args), flush=True)
-    if not watched.windows:
-        print("trueangle: warning: not one window ended", file=sys.stderr)
+    # Later windows are compared with the mean and the scatter of the first eight.
+    if (n := watched.windows) < 8:
+        print(f"trueangle: warning: only {n} windows of 8: changes may be missed", file=sys.stderr)
     if kept and args.plot is not None:
         from ..plots.controlcharts import watched_windows
 

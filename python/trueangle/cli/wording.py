@@ -77,7 +77,7 @@ _OWN = frozenset(
 )
 
 #: What a diagnosis may do where no order is supported: there may be no model at all.
-_PERHAPS = "; to look for causes other than an order (--corrected-model FILE writes their model)"
+_PERHAPS = "; to find causes that are no order (--corrected-model FILE writes their model)"
 
 
 class Wording:

@@ -275,7 +275,7 @@ class Comparison(PlainResult):
                 use = "Which is right now: trueangle watch READINGS -m A, then B."
         known = f"Standard error over the turn: {unit.text(a)} rms of A, {unit.text(b)} of B."
         p = "< 1e-12" if self.p < 1e-12 else f"= {self.p:.2g}"
-        p = f"By noise alone: p {p}; below {self.false_alarms:g} is a change."
+        p = f"p {p}: as much by noise alone; below {self.false_alarms:g} it is a change."
         return [first, f"{use} {known}", p]
 
     def _moved(self, unit: ErrorUnit) -> list[str]:

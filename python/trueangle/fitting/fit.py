@@ -412,7 +412,7 @@ def _selected(
     selection = _choice(runs, {**sought, "summed": summed})
     # Constants of channels are a model of themselves: nothing need be left of the angle.
     if not selection.orders and any(run.channels is None for run in runs):
-        raise NoOrderError(f"no order is supported by the data: {selection.reason}")
+        raise NoOrderError(f"no model: {selection.reason}")
     return selection, selection.by_shaft
 
 

@@ -189,7 +189,9 @@ def _others(fit: FitResult, fold: Sequence[int]) -> HarmonicModel:
     beside = fit.evidence.left_out
     chosen = others.carriers(travel, beside)
     if not chosen:
-        raise NoOrderError("no order is supported by the other runs; record more runs")
+        raise NoOrderError(
+            "no model: the other runs show no order above the noise; record more runs"
+        )
     # An order need not be a whole number: each is order 1 of its own shaft.
     lines = {f"order {k:g}": k for k in chosen}
     if fit.known is None:

@@ -79,7 +79,7 @@ def fit_mixture(
         weights = after
         selection = choose([replace(r, weights=w) for r, w in zip(runs, weights, strict=True)])
         if not selection.orders:
-            raise NoOrderError(f"no order is supported by the data: {selection.reason}")
+            raise NoOrderError(f"no model: {selection.reason}")
     wild = rejected(weights, given)
     weighted = RobustFit(fitted, weights if wild else None, wild, far, 0 if same else _ROUNDS)
     return MixtureFit(selection, problem, weighted, uncertainty)

@@ -242,13 +242,13 @@ def three() -> list[ta.CalibrationRun]:
 
 #: What is refused: readings, the command, words of the message, the command that helps.
 REFUSALS: dict[str, tuple[Callable[[], list[ta.CalibrationRun]], list[str], str, str]] = {
-    "no order": (noise, ["fit", "R", "-o", "m.json"], "no order is supported", "diagnose"),
+    "no order": (noise, ["fit", "R", "-o", "m.json"], "no order is above the noise", "diagnose"),
     "no order, few readings": (few, ["fit", "R", "-o", "m.json"], "take 20 readings", "plan"),
     "no order, 3 readings": (three, ["fit", "R", "-o", "m.json"], "1 zero and one order", "plan"),
     "no order, a gear": (
         noise,
         ["fit", "R", "-o", "m.json", "--gear-ratio", "50.5", "--fixed-member", "none"],
-        "no order is supported",
+        "no order is above the noise",
         "diagnose",
     ),
     "too steep": (steep, ["fit", "R", "-o", "m.json", "--orders", "24"], "may reach", "fit"),

@@ -34,7 +34,7 @@ def test_an_error_that_changes_from_pass_to_pass_is_refused(seed):
     turned = np.where(np.arange(x.size) < 1100, 1.0, -1.0)
     error = turned * 0.1 * np.sin(np.radians(2 * x) + seed)
     run = run_of(x, error, noise=0.02, seed=seed)
-    with pytest.raises(NoModelError, match="no order is supported"):
+    with pytest.raises(NoModelError, match="no model: "):
         ta.fit(run)
     assert ta.fit(run, [2]).orders == (2,)
 

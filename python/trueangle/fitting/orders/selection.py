@@ -358,21 +358,23 @@ class EvidenceSelection:
         best = max(rows, key=lambda row: row.probability)
         count = len(self.orders)
         beside = (
-            f"order {best.order:g}, the {f'strongest of {count}' if count > 1 else 'only one'},"
+            f"order {best.order:g}, the {f'likeliest of {count}' if count > 1 else 'only one'},"
         )
         if best.verdict == "reference":
             return "the only significant orders are the reference's own"
         if best.verdict not in ("noise", "alias"):
             return f"{beside} {verdict_reason(best.verdict)}"
-        chance = f"is there with a probability of only {brief_number(100.0 * best.probability)} %"
+        chance = f"has a probability of only {brief_number(100.0 * best.probability)} %"
         why = [f"{beside} {chance}", *drift_of_a_sweep(self.runs, estimate)]
         if self.samples < FEW:
+            why[0] = f"{counted(self.samples, 'reading')} are too few: {why[0]}"
             why.append(f"take {FEW} readings or more; {plan}")
         elif len(why) == 1 and (known := [r.needed for r in rows if math.isfinite(r.needed)]):
             least = arcsec(max(known), self.period)
             unit = error_unit("auto", sine_of_rms(least), self.period)
             size = f"{brief_number(least * unit.per_arcsec)} {unit.name}"
-            why.append(f"nothing to correct: an order above about {size} would be retained")
+            why[0] = f"no order is above the noise: {why[0]}"
+            why.append(f"an order above about {size} would be found; nothing to correct")
         return "; ".join(why)
 
     def _held_out(

@@ -123,7 +123,7 @@ def test_a_refusal_tells_the_chance_of_its_strongest_order(seed: int) -> None:
     print("seed", seed)
     found = ta.select_orders(runs_of(noise(seed, 6, THETA.size)))
     best = max(found.table, key=lambda row: row.probability)
-    said = re.search(r"order (\d+), the strongest of (\d+), .* of only (\S+) %", found.reason)
+    said = re.search(r"order (\d+), the likeliest of (\d+), .* of only (\S+) %", found.reason)
     assert said is not None
     assert (int(said[2]), int(said[1])) == (len(found.table), best.order)
     assert float(said[3]) == float(f"{100.0 * best.probability:.2g}")
