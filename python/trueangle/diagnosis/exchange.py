@@ -7,6 +7,8 @@ causes the first was chosen while it explained both: over a part of a turn order
 
 from __future__ import annotations
 
+import itertools
+
 from ..effects import EFFECTS
 from ..estimation.regression import Regression
 from ..support.deadline import current_deadline
@@ -15,13 +17,10 @@ from .overlap import finding_overlaps
 from .penalty import finding_groups, regression_without, total_penalty
 from .selection import is_flexible, select_again
 
-#: Exchanges at most, and findings up to which others are tried in the place of each: of more, which
-#: are implausible together, that would take as long as the whole choice.
-MOST_EXCHANGES, LOOKED_AT = 3, 2
-
-#: Pairs that are exchanged at most, and the partial correlation from which on a pair is tried: the
-#: other could explain half of what one explains.
-MOST_PAIRS, OVERLAP = 6, 0.5
+#: Exchanges at most; findings up to which others are tried in the place of each: of more, which are
+#: implausible together, that would take as long as the whole choice; and the partial correlation
+#: from which on two are exchanged together: one could explain half of what the other does.
+MOST_EXCHANGES, LOOKED_AT, OVERLAP = 9, 2, 0.5
 
 #: Criterion by which another account must be better: nothing worth more than a bare mention.
 BETTER = 2.0
@@ -45,27 +44,7 @@ def exchanged_causes(regression: Regression) -> Regression:
         if better is None:
             break
         regression = better
-    for _ in range(MOST_PAIRS):
-        better = _better_pair(regression)
-        if better is None:
-            return regression
-        regression = better
     return regression
-
-
-def _better_pair(regression: Regression) -> Regression | None:
-    """With others in the place of two causes that overlap, those that do so most first."""
-    limit = total_penalty(regression) - BETTER
-    groups = finding_groups(regression.terms)
-    pairs = [pair for pair in finding_overlaps(regression, groups) if pair[2] > OVERLAP]
-    specific = [name for name, effect in EFFECTS.items() if not is_flexible(effect)]
-    for i, j, _ in sorted(pairs, key=lambda pair: -pair[2]):
-        if current_deadline().over:
-            return None
-        tried = select_again(regression_without(regression, [*groups[i], *groups[j]]), specific)
-        if total_penalty(tried) < limit and not current_deadline().over:
-            return tried
-    return None
 
 
 def _better(regression: Regression) -> Regression | None:
@@ -75,21 +54,21 @@ def _better(regression: Regression) -> Regression | None:
         return reshaped
     groups = finding_groups(regression.terms)
     groups.sort(key=lambda group: sum(regression.terms[k].bic_gain for k in group))
-    for group in groups:
-        rest = regression_without(regression, group)
-        if total_penalty(rest) < limit:
-            return rest
-        reshaped = _reshaped(rest)
-        if reshaped is not rest and total_penalty(reshaped) < limit:
-            return reshaped
-        own = regression.terms[group[0]].cause
-        if len(groups) > LOOKED_AT and not EFFECTS[own].flexible_below:
+    overlaps = [pair for pair in finding_overlaps(regression, groups) if pair[2] > OVERLAP]
+    # One finding, then two that overlap, those that do so most first.
+    taken = [[group] for group in groups]
+    taken += [[groups[i], groups[j]] for i, j, _ in sorted(overlaps, key=lambda pair: -pair[2])]
+    for one, *two in taken:
+        rest = regression_without(regression, [*one, *itertools.chain(*two)])
+        for other in (rest, _reshaped(rest)):
+            if total_penalty(other) < limit:
+                return other
+        own = regression.terms[one[0]].cause
+        if len(groups) > LOOKED_AT and not (two or EFFECTS[own].flexible_below):
             continue
         # A flexible cause explains more than any law, and is none.
-        others = [
-            name for name, effect in EFFECTS.items() if not (name == own or is_flexible(effect))
-        ]
-        tried = select_again(rest, others, limit)
+        others = [name for name, effect in EFFECTS.items() if not is_flexible(effect)]
+        tried = select_again(rest, [name for name in others if two or name != own], limit)
         if total_penalty(tried) < limit and not current_deadline().over:
             return tried
     return None

@@ -8,8 +8,6 @@ from dataclasses import replace
 from ..effects import EFFECTS
 from ..effects.ambiguity import Ambiguity
 from ..effects.effect import Effect, ScatterFinding
-from ..effects.missing_order import MissingOrder
-from ..effects.scale_error import ScaleError
 from ..estimation.quantity import Parameters, Quantity, quantity
 from ..estimation.regression import Regression
 from ..runs.checks.fault import DataFault
@@ -17,13 +15,14 @@ from ..support.deadline import current_deadline
 from .confirmation import CONFIRMED, NOT_CONFIRMED, confirmation_status
 from .correctable import MEASURE_MORE
 from .finding import Finding
-from .formerrors import with_form_errors, with_unseen_orders
+from .formerrors import with_form_errors
 from .gain import Gain, measure_gain
 from .gates import gated_findings
 from .goodness import Unexplained
 from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE, finding_groups
 from .rivals import alike_causes, ambiguity_in_doubt, dependence, equal_causes, rivals_of
+from .unseenorders import with_unseen_orders
 
 #: Findings, in the order found, for which rivals are tried.
 RIVALLED = 4
@@ -63,7 +62,7 @@ def findings_of(
     gains: Sequence[Gain | None] = [None] * len(named)
     if with_gain and named:
         gains = measure_gain(regression, named) or gains
-    widened = with_form_errors(regression)
+    widened = with_unseen_orders(with_form_errors(regression))
     findings: list[Finding] = []
     exchanged: list[tuple[list[int], Ambiguity]] = []
     for group, gain in zip(named, gains, strict=True):
@@ -109,15 +108,6 @@ def findings_of(
     findings, alike, shared = gated_findings(regression, beside)
     shared |= dependent
     doubtful = [k for f in findings if not f.confirmed for k in f.group if k not in shared]
-    # Over an arc names are those of the fewest causes, and errors are not of those alone.
-    stated = with_unseen_orders(widened)
-    if stated is not widened:
-        findings = [
-            replace(f, parameters=_reported(regression, stated, f.group, origins[f.group[0]])[0])
-            if f.cause in (MissingOrder.kind, ScaleError.kind)
-            else f
-            for f in findings
-        ]
     return findings, spots + alike, doubtful
 
 

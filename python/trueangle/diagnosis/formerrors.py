@@ -11,7 +11,6 @@ from ..effects import EFFECTS
 from ..estimation.extension import Extension
 from ..estimation.regression import Regression
 from ..support.arrays import Array
-from .unseenorders import unseen_order_columns
 
 #: Share of a cause's energy that its form may leave: one known to 3 %.
 FORM = 1e-3
@@ -90,30 +89,13 @@ def with_form_errors(regression: Regression) -> Regression:
     where it is hardly better than none), and ``ξ`` has its mean and covariance given
     the residual.
     """
-    shifts = _shifts(regression, form_error_columns(regression), None)
-    return regression if shifts is None else replace(regression, form_errors=shifts)
-
-
-def with_unseen_orders(regression: Regression) -> Regression:
-    """The same with what orders that were not found may do over an arc (κ = 1).
-
-    They are nearly collinear with those found, and the residual does not determine them.
-    """
-    shifts = _shifts(regression, unseen_order_columns(regression), 1.0)
-    if shifts is None:
+    bends = form_error_columns(regression)
+    count = bends.shape[1]
+    if not count:
         return regression
-    before = 0.0 if regression.form_errors is None else regression.form_errors
-    return replace(regression, form_errors=before + shifts)
-
-
-def _shifts(regression: Regression, bends: Array, size: float | None) -> Array | None:
-    """Covariance of the shifts by form errors of a size, or of the likeliest; None without any."""
     columns = regression.whiten(bends)
     known = regression.q.T @ columns
     rest = columns - regression.q @ known
-    count = columns.shape[1]
-    if not count:
-        return None
     _, s, vt = np.linalg.svd(rest, full_matrices=False)
     kept = s > DISTINCT * s[0]
     s, vt = s[kept], vt[kept]
@@ -124,9 +106,9 @@ def _shifts(regression: Regression, bends: Array, size: float | None) -> Array |
         wider = 1.0 + (kappa * s) ** 2 / variance
         return float(np.sum(moment**2 / variance * (1.0 - 1.0 / wider) - np.log(wider)))
 
-    kappa = max(SIZES, key=deviance) if size is None else size
-    if size is None and deviance(kappa) < SHOWN:
-        return None
+    kappa = max(SIZES, key=deviance)
+    if deviance(kappa) < SHOWN:
+        return regression
     wider = variance + (kappa * s) ** 2
     mean = vt.T @ (kappa**2 * s * moment / wider)
     # The mean, what the residual determines of the form errors, and what it does not: as roots,
@@ -134,4 +116,4 @@ def _shifts(regression: Regression, bends: Array, size: float | None) -> Array |
     told = vt.T * (kappa * np.sqrt(variance / wider))
     untold = kappa * (np.eye(count) - vt.T @ vt)
     roots = regression.back @ known @ np.column_stack([mean, told, untold])
-    return np.asarray(roots @ roots.T)
+    return replace(regression, form_errors=np.asarray(roots @ roots.T))

@@ -118,19 +118,14 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
     are measured on held-out levels as well. None where the time is up before
     (`trueangle.support.deadline`).
     """
-    rng = np.random.default_rng(_SEED)
-    unit, what = _units(regression)
-    count = int(unit.max()) + 1
-    folds = rng.permutation(count) % min(FOLDS, count)
+    rng, unit, parts, holdout = _parts(regression)
     own_zero = any(EFFECTS[term.cause].draws_zeros for term in regression.terms)
     left = np.zeros((len(groups) + 1, regression.n))
-    parts = int(folds.max()) + 1
     at = current_deadline()
-    for fold in range(parts):
-        at.at("holding out parts", fold, parts)
+    for fold, test in enumerate(parts):
+        at.at("holding out parts", fold, len(parts))
         if at.over:
             return None
-        test = folds[unit] == fold
         for k, values in enumerate(held_out_residuals(regression, groups, test, own_zero)):
             left[k, test] = values
     if at.over:
@@ -150,19 +145,10 @@ def measure_gain(regression: Regression, groups: Sequence[Sequence[int]]) -> lis
         if transfers:
             share, interval = reducible_share(before, after, unit[clean], regression.variance, rng)
             control = _control(regression, group, unit, rng)
-        found.append(
-            Gain(
-                f"{what} ({parts} parts)"
-                + (", each held-out run with its own zero" if within else ""),
-                error_numbers(before),
-                error_numbers(after),
-                share,
-                interval,
-                control,
-                _note(share),
-                by_level.get(k),
-            )
-        )
+        numbers = error_numbers(before), error_numbers(after)
+        told = holdout + ", each held-out run with its own zero" * within
+        note, levels = _note(share), by_level.get(k)
+        found.append(Gain(told, *numbers, share, interval, control, note, levels))
     return found
 
 
@@ -172,18 +158,13 @@ def measure_delay_gain(without: Regression, delayed: Regression) -> Gain:
     Both are fitted to the other runs alone; ``delayed`` has the change that these make of the
     delay among its columns.
     """
-    rng = np.random.default_rng(_SEED)
-    unit, what = _units(delayed)
-    folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
-    parts = int(folds.max()) + 1
+    rng, unit, parts, holdout = _parts(delayed)
     own_zero = any(EFFECTS[term.cause].draws_zeros for term in delayed.terms)
     before, after = np.zeros(delayed.n), np.zeros(delayed.n)
-    for fold in range(parts):
-        test = folds[unit] == fold
+    for test in parts:
         for values, regression in ((before, without), (after, delayed)):
             values[test] = held_out_residuals(regression, (), test, own_zero, search=False)[0]
     clean = ~delayed.outlying
-    holdout = f"{what} ({parts} parts)"
     return _gain(holdout, before[clean], after[clean], unit[clean], delayed.variance, rng)
 
 
@@ -198,14 +179,11 @@ def measure_belief_gains(
     ``changes`` are the errors of effects as assumed and as measured, at every reading. The
     strength of an effect is measured again in the other runs.
     """
-    rng = np.random.default_rng(_SEED)
-    unit, what = _units(regression)
-    folds = rng.permutation(int(unit.max()) + 1) % min(FOLDS, int(unit.max()) + 1)
+    rng, unit, parts, holdout = _parts(regression)
     own_zero = any(EFFECTS[term.cause].draws_zeros for term in regression.terms)
     count = len(columns) + len(changes)
     before, after = np.zeros((count, regression.n)), np.zeros((count, regression.n))
-    for fold in range(int(folds.max()) + 1):
-        test = folds[unit] == fold
+    for test in parts:
         fitted = regression.of_rows(~test).with_terms(
             rebuilt_term(t, ~test) for t in regression.terms
         )
@@ -224,7 +202,6 @@ def measure_belief_gains(
             before[k, test] += (new - old - (new - old).mean())[test]
             after[k, test] -= fitted.gain(own[~test, None])[1][0] * own[test]
     clean = ~regression.outlying
-    holdout = f"{what} ({int(folds.max()) + 1} parts)"
     return [
         _gain(holdout, was, is_now, unit[clean], regression.variance, rng)
         for was, is_now in zip(before[:, clean], after[:, clean], strict=True)
@@ -259,13 +236,23 @@ def _note(share: float | None) -> str:
     return ""
 
 
-def _units(regression: Regression) -> tuple[NDArray[np.int64], str]:
-    """What is held out as a whole: the runs, or segments of the one run there is."""
+def _parts(
+    regression: Regression,
+) -> tuple[np.random.Generator, NDArray[np.int64], list[Rows], str]:
+    """What is held out as a whole, the runs or segments of the one run there is, and with which.
+
+    Also given is the generator that the parts were drawn by.
+    """
     # Not by `np.unique`, which would import `numpy.ma`.
     present = np.flatnonzero(np.bincount(regression.signals.run))
-    if present.size > 1:
-        return np.searchsorted(present, regression.signals.run), "whole runs"
-    return (np.arange(regression.n) * 2 * FOLDS) // regression.n, "segments of the one run"
+    unit, what = np.searchsorted(present, regression.signals.run), "whole runs"
+    if present.size == 1:
+        unit = (np.arange(regression.n) * 2 * FOLDS) // regression.n
+        what = "segments of the one run"
+    rng, count = np.random.default_rng(_SEED), int(unit.max()) + 1
+    parts = min(FOLDS, count)
+    fold = (rng.permutation(count) % parts)[unit]
+    return rng, unit, [fold == k for k in range(parts)], f"{what} ({parts} parts)"
 
 
 def _control(

@@ -19,10 +19,10 @@ from ..simulation.simulation import Simulation
 from ..support.arrays import Array
 from ..support.distributions import normal_tail
 from .beliefs import LEVEL, Belief, is_changed, judge_line, verdict_of_factor
-from .formerrors import with_unseen_orders
 from .gain import measure_belief_gains
 from .identifiability import ambiguity_of_cause, open_origins, with_open_origins
 from .penalty import NEW_CAUSE
+from .unseenorders import with_unseen_orders
 
 #: Fields of effects, in addition to those in arcsec, that their signal is proportional to.
 LINEAR = ("delay_s", "relative_error", "pattern_per_K", "coefficient")

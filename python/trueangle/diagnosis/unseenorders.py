@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from ..effects.local_defect import WHOLE_TURN
-from ..effects.missing_order import MissingOrder
 from ..effects.scale_error import ScaleError
-from ..estimation.extension import Extension
+from ..estimation.linear import NormalEquations
 from ..estimation.regression import Regression
 from ..joint.pattern import lines_columns
 from ..support.arrays import Array
@@ -15,29 +17,88 @@ from ..support.arrays import Array
 #: Cycles over the travel up to which an order takes part of its neighbours'.
 FEW_CYCLES = 5.0
 
+#: ln of the odds below which a model is not gone on from, and models at most.
+NEGLIGIBLE, MOST_MODELS = 12.0, 4000
 
-def unseen_order_columns(regression: Regression) -> Array:
-    """Columns of the orders up to the highest found and one more, as large as what was found.
 
-    With a ramp, where none was found. Over a whole turn there are none: what was not found is not
-    there.
+def with_unseen_orders(regression: Regression) -> Regression:
+    """The regression with what other low orders, or a ramp, may be over an arc.
+
+    They are nearly collinear with those found, and may be in their place or beside them.
+    Coefficients have the mixture over models of low orders, about those of the fit.
     """
-    theta, turns = regression.signals.theta, _turns(regression)
-    orders = _low_orders(regression)
-    if not orders:
-        return np.zeros((regression.n, 0))
-    found = [(term, c) for term, c in regression.fitted() if _is_low(term, turns)]
-    known = orders | {float(k) for k in regression.around.pattern.orders}
-    more = [float(k) for k in range(1, int(max(orders)) + 2) if float(k) not in known]
-    columns = lines_columns(theta, np.array(more))
-    if all(term.cause != ScaleError.kind for term, _ in found):
-        columns = np.column_stack([columns, (theta - theta.mean()) / theta.std()])
-    return np.asarray(columns * np.std(sum(term.columns @ c for term, c in found)))
+    low = _low_terms(regression)
+    if not low:
+        return regression
+    beyond: Array = regression.cache.of_fit("unseen orders", lambda: _beyond(regression, low))
+    before = 0.0 if regression.form_errors is None else regression.form_errors
+    return replace(regression, form_errors=before + beyond)
+
+
+def _beyond(regression: Regression, low: Sequence[int]) -> Array:
+    """Second moment of the account's coefficients about theirs, beyond their own variances.
+
+    Over models S of the low orders found, all others up to the highest and one more, and a ramp,
+    beside all other columns:
+
+    ::
+
+        ln p(S) = 1/2 m_S' C_S m_S + 1/2 ln|C_S P_S|,    C_S = (G_SS + P_S)⁻¹
+
+    with G and m of the whitened columns in units of the noise, and P the information that they are
+    as large as what was found. Before any reading each is as likely as not: over an arc a smooth
+    error has no reason to be the fewest orders.
+    """
+    theta, design = regression.signals.theta, regression.design
+    names = [regression.terms[k].line for k in low]
+    up_to = np.arange(1.0, max(filter(None, names)) + 2.0)
+    others = np.setdiff1d(up_to, regression.around.pattern.orders)
+    blocks = [lines_columns(theta, np.array([k])) for k in others]
+    blocks += [] if None in names else [theta[:, None]]
+    places = [regression.place(k) for k in low]
+    for block in blocks:
+        places.append(np.arange(block.shape[1]) + design.shape[1])
+        design = np.hstack([design, block])
+    fitted, count = np.zeros(design.shape[1]), len(regression.coefficients)
+    fitted[:count] = regression.coefficients
+    found = sum(t.columns @ c for t, c in (regression.fitted()[k] for k in low))
+    known = np.zeros(fitted.size)
+    for at in places:
+        # Of an amplitude, or of the rms of a ramp about its mean.
+        known[at] = (1.0 if at.size > 1 else np.var(design[:, at])) / np.var(found)
+    free = np.flatnonzero(known == 0.0)
+    white = regression.whiten(design) / np.sqrt(regression.variance)
+    left = regression.r / np.sqrt(regression.variance)
+    sums = NormalEquations.of_rows(white, left + white @ fitted)
+
+    def of_model(model: frozenset[int]) -> tuple[float, Array, Array]:
+        """Ln of its probability up to a constant, means and variances of all coefficients."""
+        at = np.concatenate([free, *(places[k] for k in model)])
+        own, prior = sums.among(at), known[at]
+        solved = NormalEquations(own.gram + np.diag(prior), own.moment).solved()
+        mean, variance = np.zeros((2, fitted.size))
+        mean[at], variance[at] = solved.coefficients[:, 0], solved.inverse.diagonal()
+        log = own.moment @ mean[at] + np.log(prior[free.size :]).sum() - solved.log_determinant
+        return 0.5 * float(log), mean, variance
+
+    # The account's, and all near the most probable, one change after another.
+    models: dict[frozenset[int], tuple[float, Array, Array]] = {}
+    new = {frozenset(range(len(low)))}
+    while new and len(models) < MOST_MODELS:
+        models |= {model: of_model(model) for model in new}
+        least = max(found[0] for found in models.values()) - NEGLIGIBLE
+        near = [model for model in new if models[model][0] > least]
+        new = {model ^ {k} for model in near for k in range(len(places))} - models.keys()
+    odds, means, variances = map(np.array, zip(*models.values(), strict=True))
+    weights = np.exp(odds - np.logaddexp.reduce(odds))
+    off = (means - fitted)[:, :count]
+    wider = weights @ variances[:, :count] - variances[0, :count]
+    return np.asarray((off.T * weights) @ off + np.diag(np.maximum(wider, 0.0)))
 
 
 def arc_note(regression: Regression) -> str:
     """What the names of orders over an arc rest on; nothing over a whole turn."""
-    if not _low_orders(regression):
+    if not _low_terms(regression):
         return ""
     turns = _turns(regression)
     return (
@@ -51,21 +112,15 @@ def _turns(regression: Regression) -> float:
     return float(np.ptp(regression.signals.theta)) / (2.0 * np.pi)
 
 
-def _low_orders(regression: Regression) -> set[float]:
-    """Orders found over an arc that are nearly others; none over a whole turn."""
+def _low_terms(regression: Regression) -> list[int]:
+    """Over an arc: terms that are whole orders of few cycles over it, and a ramp beside them."""
     turns = _turns(regression)
     if turns >= WHOLE_TURN:
-        return set()
-    lines = (term for term in regression.terms if term.cause == MissingOrder.kind)
-    return {float(term.shape["output_order"]) for term in lines if _is_low(term, turns)}
-
-
-def _is_low(term: Extension, turns: float) -> bool:
-    """Whether a cause is a ramp, or a whole order of few cycles over the travel."""
-    if term.cause != MissingOrder.kind:
-        return term.cause == ScaleError.kind
-    return _is_of_few(float(term.shape["output_order"]), turns)
-
-
-def _is_of_few(order: float, turns: float) -> bool:
-    return order == round(order) and order * turns <= FEW_CYCLES
+        return []
+    low = {
+        k: term.line
+        for k, term in enumerate(regression.terms)
+        if term.cause == ScaleError.kind
+        or (term.line is not None and term.line % 1.0 == 0.0 and term.line * turns <= FEW_CYCLES)
+    }
+    return [*low] if any(low.values()) else []

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
 import trueangle as ta
-from trueangle.diagnosis.unseenorders import unseen_order_columns
+from trueangle.diagnosis.unseenorders import with_unseen_orders
 from trueangle.effects.missing_order import MissingOrder
 from trueangle.effects.scale_error import ScaleError
 from trueangle.estimation.regression import Regression
@@ -25,10 +27,8 @@ def swept(rng: np.random.Generator, turns: float, orders: tuple[int, ...], scale
     runs = []
     for x in (way, way[::-1]):
         place = np.radians(x + start)
-        error = sum(
-            a * np.sin(k * place + q) for k, a, q in zip(orders, sizes, phases, strict=True)
-        )
-        error = scale * x + (error + rng.normal(0.0, 5.0, x.size)) / 3600.0
+        waves = np.sin(np.multiply.outer(orders, place) + phases[:, None])
+        error = scale * x + (sizes @ waves + rng.normal(0.0, 5.0, x.size)) / 3600.0
         time = np.arange(x.size) / 20.0
         runs.append(ta.CalibrationRun(x + start, x + start + error, period=360.0, time=time))
     return runs, dict(zip(orders, sizes, strict=True))
@@ -68,50 +68,50 @@ def test_what_is_confirmed_is_as_uncertain_as_it_is_wrong(turns, orders, scale):
 def found_in(turns: float, error: dict[float, float], ramp: float = 0.0) -> Regression:
     """What is found of lines of some sizes over some turns, and of a ramp in arcsec a radian."""
     theta = np.linspace(0.5, 0.5 + 2.0 * np.pi * turns, 400)
-    run = ta.CalibrationRun(theta, theta)
-    signals = join_runs([run])
+    signals = join_runs([ta.CalibrationRun(theta, theta)])
     lines = sum(size * np.sin(k * theta + 0.3) for k, size in error.items())
-    noise = np.random.default_rng(SEED).normal(size=theta.size)
-    error_of_all = noise + lines + ramp * theta
+    error_of_all = lines + ramp * theta + np.random.default_rng(SEED).normal(size=theta.size)
     regression = Regression.of(signals, error_of_all, BELIEVED.surroundings, rho=0.0)
-    if ramp:
-        found = ScaleError.propose(regression)
-        assert found is not None
-        regression = regression.with_terms([found])
-    for _ in error:
-        found = MissingOrder.propose(regression)
+    for effect in [ScaleError] * bool(ramp) + [MissingOrder] * len(error):
+        found = effect.propose(regression)
         assert found is not None
         regression = regression.with_terms([*regression.terms, found])
     assert {t.shape.get("output_order") for t in regression.terms} - {None} == {*error}
     return regression
 
 
-@pytest.mark.parametrize("turns", [0.5, 0.89, 0.9, 1.0])
-@pytest.mark.parametrize("error", [{2.0: 80.0}, {3.0: 200.0}, {2.0: 80.0, 40.0: 50.0}], ids=str)
-def test_orders_that_were_not_found_are_those_up_to_one_more(error, turns):
-    """And a ramp, each as large as what the low orders make of the readings."""
-    regression = found_in(turns, error)
-    columns = unseen_order_columns(regression)
-    if turns >= 0.9:
-        assert columns.shape == (400, 0)
-        return
-    low = min(error)
-    size = float(np.std(error[low] * np.sin(low * regression.signals.theta + 0.3)))
-    theta = regression.signals.theta
-    others = [k for k in range(1, int(low) + 2) if k != low]
-    expected = [f(k * theta) for k in others for f in (np.cos, np.sin)]
-    expected.append((theta - theta.mean()) / theta.std())
-    np.testing.assert_allclose(columns, size * np.column_stack(expected), atol=0.03 * size)
+@pytest.mark.parametrize(("turns", "more", "ramp"), [(0.5, {}, 0.0), (0.8, {40.0: 50.0}, 900.0)])
+def test_other_orders_than_those_found_count_by_their_evidence(turns, more, ramp):
+    """Slow: every model of orders 1 to one more than the highest, by the covariance of readings."""
+    found, low = found_in(turns, {2.0: 80.0} | more, ramp), 2
+    theta = found.signals.theta
+    groups = {k: np.column_stack([np.cos(k * theta), np.sin(k * theta)]) for k in (1, 2, 3)}
+    groups[0] = theta[:, None] / theta.std()
+    other = [t for t in found.terms if t.shape.get("output_order") == 40.0]
+    beside = np.hstack([np.ones((theta.size, 1)), *(t.columns for t in other)])
+    tau = np.std(sum(t.columns @ c for t, c in found.fitted() if t not in other))
+    logs, means, variances = [], [], []
+    models = [m for n in range(len(groups) + 1) for m in itertools.combinations(groups, n)]
+    for model in models:
+        drawn = np.hstack([*(tau * groups[k] for k in model), 1e4 * beside])  # as good as free
+        whole = found.variance * np.eye(theta.size) + drawn @ drawn.T
+        weighed = np.linalg.solve(whole, np.column_stack([found.residual, groups[low]]))
+        logs.append(-0.5 * (np.linalg.slogdet(whole)[1] + found.residual @ weighed[:, 0]))
+        size = tau**2 * (low in model)
+        means.append(size * groups[low].T @ weighed[:, 0])
+        variances.append(size - size**2 * np.diag(groups[low].T @ weighed[:, 1:]))
+    weights = np.exp(np.array(logs) - np.logaddexp.reduce(logs))
+    (k,) = [k for k, t in enumerate(found.terms) if t.shape.get("output_order") == low]
+    own = variances[[set(m) for m in models].index({low, 0} if ramp else {low})]
+    off = np.array(means) - found.coefficients[found.place(k)]
+    wanted = weights @ off**2 + np.maximum(weights @ (np.array(variances) - own), 0.0)
+    given = np.diag(with_unseen_orders(found).form_errors)[found.place(k)]
+    np.testing.assert_allclose(given, wanted, rtol=1e-3, atol=1e-3 * found.variance)
 
 
-def test_a_line_of_many_cycles_stands_by_itself():
-    assert unseen_order_columns(found_in(0.6, {40.0: 50.0})).shape == (400, 0)
-
-
-def test_beside_a_ramp_that_was_found_there_is_no_other():
-    without, beside = (unseen_order_columns(found_in(0.8, {2.0: 80.0}, r)) for r in (0.0, 900.0))
-    assert without.shape[1] - beside.shape[1] == 1
-    assert beside.std() > 5.0 * without.std()  # of what both make of the readings
+def test_nothing_is_in_the_place_of_an_order_over_a_whole_turn_or_of_many_cycles():
+    for whole in (found_in(0.9, {2.0: 80.0}), found_in(0.6, {40.0: 50.0})):
+        assert with_unseen_orders(whole) is whole
 
 
 def arc_runs(rng, error, span: float, runs: int = 3, readings: int = 350):
@@ -139,9 +139,8 @@ def test_over_an_arc_a_belief_that_may_be_right_stays_and_the_rest_is_a_curve(
     middle = 30.0 + 0.5 * span
 
     def error(theta):
-        order = (52.0 if refuted else 40.0) * np.sin(
-            np.radians(theta + (85.0 if refuted else 70.0))
-        )
+        size, phase = (52.0, 85.0) if refuted else (40.0, 70.0)
+        order = size * np.sin(np.radians(theta + phase))
         return order + smooth * ((theta - middle) / (0.5 * span)) ** 3
 
     found = ta.diagnose(arc_runs(rng, error, span), believed)

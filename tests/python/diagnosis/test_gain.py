@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from trueangle.diagnosis.gain import Gain, _control, _shuffled, _units, measure_delay_gain
+from trueangle.diagnosis.gain import Gain, _control, _parts, _shuffled, measure_delay_gain
 from trueangle.diagnosis.holdout import HoldOutModel, error_numbers, residual_at_held_out
 from trueangle.diagnosis.levels import LevelGain, _reach, gains_by_level, levels_of_runs
 from trueangle.effects import EFFECTS
@@ -135,15 +135,16 @@ def test_the_share_of_a_control_is_that_of_columns_with_other_labels(size: float
 def test_one_run_is_held_out_in_ten_stretches_of_its_record() -> None:
     one = signals_of(np.zeros(1), 205)
     fitted = Regression.of(one, np.zeros(len(one)), Simulation().surroundings, rho=0.0)
-    unit, what = _units(fitted)
-    assert what == "segments of the one run"
+    _, unit, parts, what = _parts(fitted)
+    assert what == "segments of the one run (5 parts)"
+    assert (np.sum(parts, axis=0) == 1).all()  # each reading is held out once
     assert np.bincount(unit).tolist() == [21, 20, 21, 20, 21, 20, 21, 20, 21, 20]
     assert (np.diff(unit) >= 0).all()
     several = signals_of(np.zeros(3))
     several = several.take(several.run != 1)
     fitted = Regression.of(several, np.zeros(len(several)), Simulation().surroundings, rho=0.0)
-    unit, what = _units(fitted)
-    assert (what, np.unique(unit).tolist()) == ("whole runs", [0, 1])
+    _, unit, _, what = _parts(fitted)
+    assert (what, np.unique(unit).tolist()) == ("whole runs (2 parts)", [0, 1])
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
