@@ -292,11 +292,10 @@ class SelfPlan(PlainResult):
         lines = [f"{self.method}, without a reference: {steps}"]
         lines += [f"  note: {note}" for note in self.notes]
         if self.speed_ratio is not None:
-            table = ", ".join(f"{r:g}: {f:.2g}" for r, f in self.speed_ratio_factors.items())
-            lines += [
-                f"  factor by ratio        {table}",
-                f"  knots per turn         at most {self.knots_per_turn:g}, in the slowest part",
-            ]
+            table = ", ".join(f"{f:.2g} at {r:g}" for r, f in self.speed_ratio_factors.items())
+            lines.append(f"  error by speed ratio   times the ideal: {table}")
+            knots = f"at most {self.knots_per_turn:g} knots per turn, in the slowest part"
+            lines.append(f"  spline of the motion   {knots}")
         lines.append(_worst(self.worst_noise_factor))
         if self.given:
             given: Any = self.given

@@ -198,13 +198,11 @@ class Rehearsal(PlainResult):
         for note in self.notes:
             if note.startswith("INCOMPLETE"):
                 lines += [*wrapped_lines(f"{note}.", 2), ""]
-        lines += wrapped_lines(
-            f"{counted(self.runs, 'run')}, {counted(self.readings, 'reading')}, noise "
-            f"{self.noise:g} arcsec; {counted(self.trials, 'diagnosis', 'diagnoses')}, at most "
-            f"{self.seeds} of a cause, seed {self.seed}.",
-            2,
-        )
         tried = [cause for cause in self.causes if cause.ever_named]
+        text = f"{len(tried)} of {counted(self.causes, 'cause')} named in these runs. "
+        text += f"{counted(self.runs, 'run')}, {counted(self.readings, 'reading')}, noise "
+        text += f"{self.noise:g} arcsec; {counted(self.trials, 'diagnosis', 'diagnoses')}, at most "
+        lines += wrapped_lines(f"{text}{self.seeds} of a cause, seed {self.seed}.", 2)
         if tried:
             lines += ["", *wrapped_lines(OPEN, 2)]
             for cause in tried:
