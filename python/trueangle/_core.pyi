@@ -226,6 +226,7 @@ class Evidence:
         NDArray[np.float64],
         NDArray[np.float64],
         NDArray[np.float64],
+        NDArray[np.float64],
         list[tuple[float, list[float], list[float]]],
         NDArray[np.float64],
         list[tuple[float, float, float, float] | None],

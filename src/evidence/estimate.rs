@@ -14,9 +14,9 @@ use super::model::Model;
 use super::noise::NoiseFit;
 use super::posterior::Posterior;
 use super::prior::{NoisePrior, Prior};
-use super::readings::Readings;
+use super::readings::{Readings, Run};
 use super::search::{Found, Search};
-use super::whitening::Noise;
+use super::whitening::{Noise, VARIANCES};
 use crate::threads;
 
 /// Log probability ratio to the best model up to which a model counts.
@@ -63,6 +63,8 @@ pub struct Estimate {
     pub covariance: DMatrix<f64>,
     /// The noise of most evidence.
     pub noise: Noise,
+    /// What of its variances readings of a run do not have in common, in the mean of the readings.
+    pub within: [f64; VARIANCES],
     /// Models of the mixture over these orders, best first: weight and prior variances.
     pub models: Vec<(f64, Model)>,
     /// Variance of the zero of each run beside known coefficients.
@@ -113,7 +115,7 @@ impl Readings {
             (Vec::new(), Model::of_orders(0, 0.0)),
         ];
         if self.runs().len() > 1 {
-            let fewest = self.runs().iter().map(super::Run::len).min().unwrap_or(0);
+            let fewest = self.runs().iter().map(Run::len).min().unwrap_or(0);
             let mut different = every;
             for omega in different.omega.iter_mut().take(fewest / READINGS) {
                 *omega = total;
@@ -267,7 +269,7 @@ impl Readings {
 
     /// Variance of the errors.
     fn variance(&self) -> f64 {
-        let squares = |run: &super::Run| run.error().iter().map(|e| e * e).sum::<f64>();
+        let squares = |run: &Run| run.error().iter().map(|e| e * e).sum::<f64>();
         let total: f64 = self.runs().iter().map(squares).sum();
         (total / self.len() as f64).max(NOTHING)
     }
@@ -377,11 +379,22 @@ impl Readings {
         models.sort_by(|a, b| b.0.total_cmp(&a.0));
         let noise = mode.fit.noise;
         let grams = readings.grams(noise).into_iter();
+        let mut within = [0.0; VARIANCES];
+        let count: usize = readings.runs().iter().map(Run::len).sum();
+        for run in readings.runs() {
+            let share = run.len() as f64 / count as f64;
+            let own = run.within(noise).variances();
+            within
+                .iter_mut()
+                .zip(own)
+                .for_each(|(sum, v)| *sum += share * v);
+        }
         Some(Estimate {
             probabilities,
             mean,
             covariance,
             noise,
+            within,
             models,
             zeros: grams
                 .zip(readings.runs())

@@ -112,12 +112,24 @@ impl Readings {
     }
 
     /// The Gram matrix of all runs with one zero, in one pass.
+    ///
+    /// Its noise is without what all readings of a run have in common: `C - c 1 1'`, whose inverse
+    /// differs by the information about the zero.
     pub fn pooled(&self, noise: Noise) -> Gram {
-        let work = |r: usize| {
-            let (products, whitened) = self.products(r, noise);
-            (products, whitened.factor.log_root)
-        };
         let (columns, stride) = (self.columns(), Rows::width(self.columns()));
+        let work = |r: usize| {
+            let (mut products, whitened) = self.products(r, noise);
+            let n = products[0];
+            let variance = self.runs()[r].zero_variance(noise, n);
+            let zero: Vec<f64> = products[..columns].iter().map(|own| own / n).collect();
+            for i in 0..columns {
+                for j in i..columns {
+                    products[i * stride + j] += (1.0 / variance - n) * zero[i] * zero[j];
+                }
+            }
+            let root = whitened.factor.log_root + 0.5 * (n * variance).ln();
+            (products, root)
+        };
         let count = self.len() as f64;
         let level = |run: &Run| run.mean() * run.len() as f64 / count;
         let mean: f64 = self.runs().iter().map(level).sum();

@@ -1,13 +1,20 @@
 //! What is assumed before any reading: sizes of groups, which are in, and the noise.
 
 use super::model::Model;
-use super::whitening::{Noise, VARIANCES};
+use super::whitening::{CORRELATION_TIMES, Noise, VARIANCES};
 
 /// Standard deviation of the logarithm of each variance of the noise.
 const SPREAD: f64 = 2.5;
 
-/// Share of the variance of residuals at which the white variance and each of the terms are centred.
-const SHARES: [f64; VARIANCES] = [0.5, 0.003, 0.003, 0.003, 0.003, 0.003];
+/// Share of the variance of residuals at which the white variance is centred.
+const WHITE: f64 = 0.5;
+
+/// The same of each term, over its correlation time.
+///
+/// Above the frequencies of their correlation times all terms then have one spectrum, that of a
+/// random walk: how slow a noise is that readings show at some frequency is left open, so that what
+/// low orders may hold is not taken for theirs because a term of that time is expected to be small.
+const WALK: f64 = 1e-4;
 
 /// Of the share of groups in the model that differ from run to run: a beta distribution.
 ///
@@ -166,7 +173,11 @@ impl NoisePrior {
 
     /// Where it is greatest.
     pub fn centre(&self) -> [f64; VARIANCES] {
-        SHARES.map(|share| (self.scale * share).ln())
+        let share = |j| match j {
+            0 => WHITE,
+            _ => WALK * CORRELATION_TIMES[j - 1],
+        };
+        std::array::from_fn(|j| (self.scale * share(j)).ln())
     }
 
     /// Logarithm of the density, but for a constant.

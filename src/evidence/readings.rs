@@ -144,12 +144,21 @@ impl Run {
         let count = self.len() as f64;
         let squares = |roots: &Vec<f64>| roots.iter().map(|r| r * r).sum();
         let weights: f64 = self.roots.as_ref().map_or(count, squares);
-        let mut common = noise.terms;
+        let common = noise.total() - self.within(noise).total();
+        (1.0 / information - common * count / weights).max(noise.white / weights)
+    }
+
+    /// What is left of a noise without the part that all readings have in common.
+    pub(super) fn within(&self, noise: Noise) -> Noise {
+        let mut terms = noise.terms;
         for decay in self.decays.iter().skip(1) {
-            common.iter_mut().zip(decay).for_each(|(own, d)| *own *= d);
+            terms.iter_mut().zip(decay).for_each(|(own, d)| *own *= d);
         }
-        let left = 1.0 / information - common.iter().sum::<f64>() * count / weights;
-        left.max(noise.white / weights)
+        terms
+            .iter_mut()
+            .zip(noise.terms)
+            .for_each(|(own, whole)| *own = whole - *own);
+        Noise { terms, ..noise }
     }
 
     /// First reading and length of each chunk.

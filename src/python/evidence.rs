@@ -35,13 +35,14 @@ type Weighted = (f64, Vec<f64>, Vec<f64>);
 type Alone = (f64, f64, f64, f64);
 
 /// Probabilities, places of the orders that some model has, their mean and covariance, variances of
-/// the noise, models, variances of the zeros of runs, and each order by itself (None where the
-/// others hold it).
+/// the noise, and of what of it differs within runs, models, variances of the zeros of runs, and each
+/// order by itself (None where the others hold it).
 type Estimated<'py> = (
     Vector<'py>,
     Vec<usize>,
     Vector<'py>,
     Matrix<'py>,
+    Vector<'py>,
     Vector<'py>,
     Vec<Weighted>,
     Vector<'py>,
@@ -165,6 +166,7 @@ impl PyEvidence {
             vector(py, found.mean.as_slice())?,
             columns(py, found.covariance.as_slice(), &[n, n])?,
             vector(py, &found.noise.variances())?,
+            vector(py, &found.within)?,
             weighted(found.models),
             vector(py, &found.zeros)?,
             alone.collect(),

@@ -68,6 +68,8 @@ class EvidenceEstimate:
     noise : ndarray, shape (6,)
         Variances of the noise at the maximum of the evidence: its white part, and the terms with
         the correlation times `CORRELATION_TIMES`.
+    within : ndarray, shape (6,)
+        The same without what all readings of a run have in common, which is its zero.
     models : tuple of WeightedModel
         Models of the mixture over ``told``, the most probable first.
     zeros : ndarray, shape (R,)
@@ -88,6 +90,7 @@ class EvidenceEstimate:
     mean: Array
     covariance: Array
     noise: Array
+    within: Array
     models: tuple[WeightedModel, ...]
     zeros: Array
     alone: tuple[Alone | None, ...]
@@ -183,11 +186,11 @@ class EvidenceEstimate:
 
         ::
 
-            b_S = M b,   M = argmin |X_S M - X|² / N + v |M / 3 s|²
+            b_S = M b,   M = argmin |X_S M - X|² / N + v |M / 3 s|² / p
 
         so that an order that is not among those wanted is held by those it looks like. With the
-        variance v of the curve and s² = E b_S² + Σ E b², the sum over the orders not wanted, no
-        order becomes larger than it may be.
+        variance v of the curve, which p coefficients hold, and s² = E b_S² + Σ E b², the sum over
+        the orders not wanted, no order becomes larger than it may be.
         """
         wanted = [2 * list(orders).index(k) if k in orders else -1 for k in self.told]
         onto = np.zeros((2 * len(orders), 2 * len(self.told)))
@@ -202,7 +205,7 @@ class EvidenceEstimate:
                 others.append(i)
         if others and len(orders):
             size += square[others].sum()
-            bound = np.sqrt(np.mean(self._curve(theta, beside)[1] ** 2) / size) / 3.0
+            bound = np.sqrt(np.mean(self._curve(theta, beside)[1] ** 2) / (len(onto) * size)) / 3.0
             columns = _columns(theta, orders) / math.sqrt(len(theta))
             rows = np.vstack([columns, np.diag(np.repeat(bound, 2))])
             looks = _columns(theta, [self.told[i] for i in others]) / math.sqrt(len(theta))
@@ -303,9 +306,9 @@ def estimate_by_evidence(
     if probability is None:
         probability = [1.0 / max(len(orders), 2)] * len(orders)
     given = [tuple(map(_column, run)) for run in runs]
-    own, places, mean, covariance, noise, models, zeros, alone = Evidence(given, orders).estimate(
-        probability
-    )
+    own, places, mean, covariance, noise, within, models, zeros, alone = Evidence(
+        given, orders
+    ).estimate(probability)
     return EvidenceEstimate(
         tuple(orders),
         own,
@@ -313,6 +316,7 @@ def estimate_by_evidence(
         mean,
         covariance,
         noise,
+        within,
         tuple(WeightedModel(w, np.array(tau), np.array(omega)) for w, tau, omega in models),
         zeros,
         tuple(None if own is None else Alone(*own) for own in alone),
@@ -376,21 +380,18 @@ class CorrelatedNoise:
         )
         return float(own - other)
 
-    def correlation(self, count: int) -> Array:
-        """Of readings 0 to ``count - 1`` steps apart."""
+    def covariances(self, count: int) -> Array:
+        """Of readings 0 to ``count - 1`` steps apart; all have the last in common: it is a zero."""
         decay = np.exp(-np.arange(count)[:, None] / np.array(CORRELATION_TIMES))
-        found = decay @ self.variances[1:]
-        found[0] += self.variances[0]
-        return np.asarray(found / found[0])
+        white = self.variances[0] * np.eye(1, count)[0]
+        return np.asarray(white + decay @ self.variances[1:])
 
     def covariance_times(self, rows: Array) -> Array:
         """Its covariance times columns of a run, by a cyclic convolution."""
         count = len(rows)
         size = 1 << (2 * count - 1).bit_length()
-        near = float(self.variances.sum()) * self.correlation(count)
-        around = np.zeros(size)
-        around[:count], around[size - count + 1 :] = near, near[:0:-1]
-        spectrum = np.fft.rfft(around)
+        near = self.covariances(count)
+        spectrum = np.fft.rfft([*near, *np.zeros(size - 2 * count + 1), *near[:0:-1]])
         back = [np.fft.irfft(spectrum * np.fft.rfft(x, size), size)[:count] for x in rows.T]
         return np.column_stack(back)
 
@@ -416,7 +417,8 @@ class CorrelatedNoise:
 
             (tr C)² / n tr C² = 1 / (2 Σ_l (1 - l/n) ρ_l² - 1)
         """
-        squares = self.correlation(count) ** 2 * (1.0 - np.arange(count) / count)
+        near = self.covariances(count) - self.covariances(count)[-1]
+        squares = (near / near[0]) ** 2 * (1.0 - np.arange(count) / count)
         return float(1.0 / (2.0 * squares.sum() - 1.0))
 
 
@@ -427,9 +429,10 @@ def noise_information(
 
     ::
 
-        X' C^-1 X,    C = w I + sum_j a_j exp(-|dt| / T_j)   in every run
+        X' C^-1 X,    C = w I + sum_j a_j exp(-|dt| / T_j) - c   in every run
 
-    with the variances of most evidence for what a fit of the columns leaves (`CorrelatedNoise`).
+    with the variances of most evidence for what a fit of the columns leaves (`CorrelatedNoise`)
+    and the least covariance c: what all readings of a run have in common is a zero, and no noise.
 
     Parameters
     ----------

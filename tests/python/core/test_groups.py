@@ -31,18 +31,18 @@ def made(seed, runs=3, n=60):
 
 
 def dense(parts, noise, tau):
-    """Log density and mean of the coefficients: all readings at once, one zero for all runs."""
+    """Log density and mean of the coefficients, one zero for all; what a run shares is no noise."""
     blocks = []
     for _, _, t in parts:
         apart = np.abs(t[:, None] - t) / np.median(np.diff(t))
         terms = zip(noise[1:], Evidence.CORRELATION_TIMES, strict=True)
-        blocks.append(noise[0] * np.eye(len(t)) + sum(a * np.exp(-apart / s) for a, s in terms))
+        slow = sum(a * np.exp(-apart / s) for a, s in terms)
+        blocks.append(noise[0] * np.eye(len(t)) + slow - slow.min())
     x, y = np.vstack([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
     prior = np.repeat(tau, WIDTHS)
     v = block_diag(*blocks) + (x * prior) @ x.T
     inverse = np.linalg.inv(v)
-    one = np.ones(len(y))
-    own, both = one @ inverse @ one, one @ inverse @ y
+    own, both = inverse.sum(), (inverse @ y).sum()
     square = y @ inverse @ y - both**2 / own
     log = -0.5 * (np.linalg.slogdet(v)[1] + np.log(own) + square)
     mean = prior * (x.T @ inverse @ (y - both / own))

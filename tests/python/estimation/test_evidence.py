@@ -53,6 +53,7 @@ def test_information_is_that_of_the_dense_covariance() -> None:
     dense = np.zeros((150, 150))
     for a, b in bounds:
         dense[a:b, a:b] = covariance(noise.tolist(), np.arange(float(b - a)))
+        dense[a:b, a:b] -= dense[a, b - 1]
     expected = columns.T @ np.linalg.solve(dense, columns)
     np.testing.assert_allclose(noise_information(columns, left, bounds, scale), expected, rtol=1e-9)
 
@@ -243,8 +244,8 @@ def test_as_good_as_least_squares_that_knows_orders_and_noise(arc: float) -> Non
     sizes = np.stack([sizes * np.cos(phases), -sizes * np.sin(phases)], axis=1).ravel()
     columns = harmonics(span * places, [1, 2, 4])
     columns -= columns.mean(axis=0)
-    ours, theirs, held = np.zeros((3, len(KINDS), 6))
-    for kind, seed in itertools.product(range(len(KINDS)), range(6)):
+    ours, theirs, held = np.zeros((3, len(KINDS), 12))
+    for kind, seed in itertools.product(range(len(KINDS)), range(12)):
         rng = np.random.default_rng(6400 + seed)
         theta = [np.sort(span * rng.beta(1.2, 1.2, 300))[::way] for way in (1, -1)]
         runs = noisy_runs(KINDS[kind], theta, sizes, rng)
@@ -256,8 +257,8 @@ def test_as_good_as_least_squares_that_knows_orders_and_noise(arc: float) -> Non
         held[kind, seed] = np.mean(np.abs(apart) < 1.96 * std)
         assert arc < 360.0 or found.included == (1, 2, 4), (KINDS[kind], seed)
     assert ours.sum() <= 1.25**2 * theirs.sum()
-    # Of each noise alone six pairs of runs scatter more.
-    assert (ours.sum(axis=1) <= 1.5**2 * theirs.sum(axis=1)).all()
+    # Of each noise alone twelve pairs of runs scatter more.
+    assert (ours.sum(axis=1) <= 1.4**2 * theirs.sum(axis=1)).all()
     assert held.mean() > 0.9
 
 
@@ -453,9 +454,7 @@ def test_noise_beside_many_columns_is_that_of_what_they_leave():
         waves = np.multiply.outer(theta, np.arange(1.0, orders + 1.0))
         columns = np.column_stack([np.cos(waves), np.sin(waves)])
         left = noise - columns @ np.linalg.lstsq(columns, noise, rcond=None)[0]
-        scale = float(left @ left) / (theta.size - 2 * orders)
-        found.append(CorrelatedNoise.of([columns], [left], scale))
-    exact, quick = found
-    assert quick.variances.sum() == pytest.approx(exact.variances.sum(), rel=0.02)
-    np.testing.assert_allclose(quick.correlation(20), exact.correlation(20), atol=0.03)
-    np.testing.assert_allclose(exact.correlation(3), [1.0, 0.8, 0.64], atol=0.05)
+        found.append(CorrelatedNoise.of([columns], [left], left @ left / (theta.size - 2 * orders)))
+    near, other = (noise.covariances(theta.size)[:20] for noise in found)
+    np.testing.assert_allclose(other / near[0], near / near[0], atol=0.03)
+    np.testing.assert_allclose(near[:3] / near[0], [1.0, 0.8, 0.64], atol=0.05)

@@ -104,7 +104,8 @@ def test_orders_are_chosen_anew_without_the_run(seed, amplitude):
         # The noise is that of all runs, which makes order 7 a little more or less probable.
         own = ta.fit(others(runs, i), argument="reference")
         assert {*found.model.orders} ^ {*own.orders} <= {7}
-        assert found.model.amplitudes[0] == pytest.approx(own.model.amplitudes[0], abs=2e-4)
+        half = 0.5 * own.amplitude_std[0]
+        assert found.model.amplitudes[0] == pytest.approx(own.model.amplitudes[0], abs=half)
     assert any(7 not in found.model.orders for found in held.runs)
 
 

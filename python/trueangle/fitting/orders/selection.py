@@ -196,7 +196,7 @@ class EvidenceSelection:
         chosen, dropped = self._at_places(chosen, dropped, estimate)
         unknowns = len(self.units) + 2 * len(chosen)
         freedom = max(sum(unit.turns.size for unit in self.units) - unknowns, 1)
-        noise = ReadingVariance(float(estimate.noise.sum()), freedom, "evidence")
+        noise = ReadingVariance(float(estimate.within.sum()), freedom, "evidence")
         chosen, dropped = self._beyond_rounding(chosen, dropped, estimate)
         return self._report(estimate, noise, chosen, dropped)
 
@@ -207,7 +207,7 @@ class EvidenceSelection:
         mean, _ = estimate.among(carriers, self.travel, reference)
         amplitude = np.hypot(*mean.reshape(-1, 2).T)
         share = amplitude / max(math.sqrt(float((amplitude**2).sum())), 1e-300)
-        scatter = math.sqrt(float(estimate.noise.sum()))
+        scatter = math.sqrt(float(estimate.within.sum()))
         small = (share < NEGLIGIBLE_SHARE) & (amplitude < NEGLIGIBLE_NOISE * scatter)
         small |= amplitude < _ROUNDING * self.period
         places = [self.orders.index(k) for k in carriers]

@@ -112,7 +112,7 @@ def _source(selection: OrderTable, unit: ErrorUnit) -> str:
     """How the noise was estimated, or its parts in a reading."""
     noise = selection.noise
     if selection.estimate is not None:
-        white, *drifts = (arcsec(math.sqrt(v), selection.period) for v in selection.estimate.noise)
+        white, *drifts = (arcsec(math.sqrt(v), selection.period) for v in selection.estimate.within)
         # Least share of the noise's standard deviation from which a part of it is reported.
         least = 0.2 * arcsec(noise.standard_deviation, selection.period)
         parts = [
