@@ -50,7 +50,7 @@ def test_even_steps_of_a_load_are_levels_however_many_they_are(count):
     sizes = [np.unique(torque).size for torque in of_level]
     assert max(sizes) <= 2 * min(sizes)
     (found,) = ta.diagnose(
-        simulate(known.with_effects([TorsionalCompliance(1.0)]), 1), known
+        simulate(known.with_effects([TorsionalCompliance(1.0)]), 2), known
     ).findings
     assert found.cause == "torsional_compliance"
     assert found.gain.by_level.held_out

@@ -146,7 +146,7 @@ def test_the_command_prints_the_verdict(tmp_path, capsys):
     for path, size in zip(paths, (0.0, 3.0), strict=True):
         calibrated(rng, added=(2, size)).save(path)
     assert main(["compare", *paths]) == 0
-    assert "below 0.01 is a change" in capsys.readouterr().out.replace("\n", " ")
+    assert "below 0.01 it is a change" in capsys.readouterr().out.replace("\n", " ")
     assert main(["compare", *paths, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["verdict"] == "changed"

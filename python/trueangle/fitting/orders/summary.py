@@ -113,16 +113,15 @@ def _source(selection: OrderTable, unit: ErrorUnit) -> str:
     noise = selection.noise
     if selection.estimate is not None:
         white, *drifts = (arcsec(math.sqrt(v), selection.period) for v in selection.estimate.within)
+        longest = max(len(run.theta) for run in selection.estimate.runs)
         # Least share of the noise's standard deviation from which a part of it is reported.
         least = 0.2 * arcsec(noise.standard_deviation, selection.period)
         parts = [
-            f"drift {unit.text(size)} over {length:g} readings"
+            f"drift {unit.text(size)} over {min(length, longest):g} readings"
             for size, length in zip(drifts, CORRELATION_TIMES, strict=True)
             if size > least
         ]
-        if not parts:
-            return ", white"
-        return f": {', '.join([f'white {unit.text(white)}', *parts])}"
+        return f": {', '.join([f'white {unit.text(white)}', *parts])}" if parts else ", white"
     repeats = "repeats at the same positions"
     what = repeats if noise.source == "repeats" else "the residual of all candidates"
     return f", from {what} ({counted(noise.degrees_of_freedom, 'degree')} of freedom)"
