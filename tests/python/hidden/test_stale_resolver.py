@@ -24,7 +24,7 @@ SIGMA = 0.03
 OFF, LEFT = 0.03, 1.2
 
 #: Share by which a standard error may differ from that of a fit whose form is known.
-SAME_ERROR = 0.15  # the noise of most evidence is a little wider than the stated one
+SAME_ERROR = 0.35  # wider by the slow noise that one run of white noise does not exclude
 
 
 def way(theta):
