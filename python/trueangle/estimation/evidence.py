@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .._core import Evidence, Groups
 from ..support.arrays import Array
+from .factor import orthonormal_basis
 from .linear import pseudo_inverse
 
 #: Correlation times of the noise's exponential terms, in median steps of a run's time.
@@ -356,12 +357,12 @@ class CorrelatedNoise:
             columns = [x[:, :1] for x in columns]
             held = math.sqrt(scale / np.mean(np.concatenate(left) ** 2))
             left = [held * y for y in left]
-        pairs = []
-        for x, y in zip(columns, left, strict=True):
-            if room > 0:
-                pairs.append((x[:room], y[:room], None))
-                room -= len(y)
-        readings = Groups(pairs, [columns[0].shape[1]])
+        sizes = np.diff(np.minimum(np.cumsum([0, *map(len, left)]), room)).tolist()
+        # Over the arc of the first readings the columns may be alike.
+        rows = orthonormal_basis(np.vstack([x[:n] for x, n in zip(columns, sizes, strict=True)]))
+        parts = np.split(rows, np.cumsum(sizes)[:-1])
+        pairs = [(x, y[:n], None) for x, y, n in zip(parts, left, sizes, strict=True) if n]
+        readings = Groups(pairs, [rows.shape[1]])
         return cls(readings, [1e6 * scale * sum(map(len, left))], scale)
 
     @cached_property
