@@ -380,9 +380,8 @@ impl Readings {
         let noise = mode.fit.noise;
         let grams = readings.grams(noise).into_iter();
         let mut within = [0.0; VARIANCES];
-        let count: usize = readings.runs().iter().map(Run::len).sum();
         for run in readings.runs() {
-            let share = run.len() as f64 / count as f64;
+            let share = run.len() as f64 / readings.len() as f64;
             let own = run.within(noise).variances();
             within
                 .iter_mut()

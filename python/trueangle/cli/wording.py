@@ -223,9 +223,7 @@ def command_that_helps(error: TrueAngleError, args: argparse.Namespace, build: _
     words = _words(error, args, build)
     if not words:
         return ""
-    perhaps = ""
-    if isinstance(error, NoOrderError) and words[0] == "diagnose":
-        perhaps = _PERHAPS
+    perhaps = _PERHAPS if isinstance(error, NoOrderError) and words[0] == "diagnose" else ""
     return f"{perhaps}; run: {join(['trueangle', *words])}"
 
 

@@ -373,8 +373,7 @@ class CorrelatedNoise:
     @property
     def odds(self) -> float:
         """Logarithm of its evidence over that of white noise."""
-        white = np.zeros_like(self.variances)
-        white[0] = self.scale
+        white = self.scale * np.eye(1, len(self.variances))[0]
         own, other = (
             self.readings.sums(noise, self.scale).posterior(self.tau)[0]
             for noise in (self.variances, white)
@@ -382,17 +381,21 @@ class CorrelatedNoise:
         return float(own - other)
 
     def covariances(self, count: int) -> Array:
-        """Of readings 0 to ``count - 1`` steps apart; all have the last in common: it is a zero."""
+        """Of readings 0 to ``count - 1`` steps apart."""
         decay = np.exp(-np.arange(count)[:, None] / np.array(CORRELATION_TIMES))
-        white = self.variances[0] * np.eye(1, count)[0]
-        return np.asarray(white + decay @ self.variances[1:])
+        return np.asarray(decay @ self.variances[1:] + self.variances[0] * np.eye(1, count)[0])
+
+    def correlation(self, count: int) -> Array:
+        """Of ``count`` readings of a run, without what all have in common, which is its zero."""
+        near = self.covariances(count)
+        return np.asarray((near - near[-1]) / (near[0] - near[-1]))
 
     def covariance_times(self, rows: Array) -> Array:
         """Its covariance times columns of a run, by a cyclic convolution."""
         count = len(rows)
         size = 1 << (2 * count - 1).bit_length()
         near = self.covariances(count)
-        spectrum = np.fft.rfft([*near, *np.zeros(size - 2 * count + 1), *near[:0:-1]])
+        spectrum = 2.0 * np.fft.rfft(near, size).real - near[0]
         back = [np.fft.irfft(spectrum * np.fft.rfft(x, size), size)[:count] for x in rows.T]
         return np.column_stack(back)
 
@@ -418,8 +421,7 @@ class CorrelatedNoise:
 
             (tr C)² / n tr C² = 1 / (2 Σ_l (1 - l/n) ρ_l² - 1)
         """
-        near = self.covariances(count) - self.covariances(count)[-1]
-        squares = (near / near[0]) ** 2 * (1.0 - np.arange(count) / count)
+        squares = self.correlation(count) ** 2 * (1.0 - np.arange(count) / count)
         return float(1.0 / (2.0 * squares.sum() - 1.0))
 
 

@@ -303,8 +303,8 @@ def _correlated(
     covariance = plain.covariance[1:, 1:] * np.outer(wider, wider)
     count = max(map(len, columns))
     freedom = np.maximum(plain.freedom[1:] * noise.share(count), 1.0)
-    near = noise.covariances(count) - noise.covariances(count)[-1]
-    note = f"neighbours in time correlate by {near[1] / near[0]:.2f}: standard errors allow for it"
+    near = noise.correlation(count)[1]
+    note = f"neighbours in time correlate by {near:.2f}: standard errors allow for it"
     if len(used) < _ENOUGH_RUNS:
         runs = "one run" if len(used) == 1 else f"{len(used)} runs"
         note += f". Drift slower than a run does not show in {runs}: measure {_ENOUGH_RUNS} or more"
