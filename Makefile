@@ -115,7 +115,7 @@ readings:           ## time and memory up to 10^8 readings, beside the model of 
 	$(PYTHON) benches/scaling.py --largest 1e8
 
 kills:              ## 40 kills of each of five commands at random moments; logs of any size
-	TRUEANGLE_KILLS=40 $(PYTHON) -m pytest -q tests/python/injection tests/python/logs tests/python/recording
+	TRUEANGLE_KILLS=40 $(PYTHON) -m pytest -q tests/python/injection tests/python/recording
 
 asan:               ## tests of the core under AddressSanitizer, by the compiler's unstable flag
 	ASAN_OPTIONS=allocator_may_return_null=1 \

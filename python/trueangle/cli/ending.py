@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from types import FrameType
 from typing import Any, Final, NoReturn, Self
 
-_ENDINGS: Final = ("SIGINT", "SIGTERM", "SIGHUP")
+from ..support.deadline import ENDINGS
+
 #: Handlers of signals that end a process at once.
 _AT_ONCE: Final = (signal.SIG_DFL, signal.default_int_handler)
 #: The signal of a timer, which Windows has none of, and seconds after which one is raised again.
@@ -40,34 +41,6 @@ class _Interrupted(KeyboardInterrupt):
 
     def __del__(self) -> None:
         self._gone()
-
-
-@contextlib.contextmanager
-def put_off_ending() -> Iterator[Callable[[], bool]]:
-    """Within it the first signal is noted and takes effect at the end; a second one kills.
-
-    It gives what returns whether one has come. Threads other than the main one take no signals.
-    """
-    came: list[int] = []
-    before: dict[int, Any] = {}
-
-    def note(number: int, frame: FrameType | None) -> None:
-        came.append(number)
-        for other in before:
-            signal.signal(other, signal.SIG_DFL)
-
-    for name in _ENDINGS:
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
-            with contextlib.suppress(ValueError):
-                before[number] = signal.signal(number, note)
-    try:
-        yield lambda: bool(came)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-    if came:
-        signal.raise_signal(came[0])
 
 
 class Ending:
@@ -105,7 +78,7 @@ class Ending:
 
     def __enter__(self) -> Self:
         self._unraisable = sys.unraisablehook
-        for name in _ENDINGS:
+        for name in ENDINGS:
             number = getattr(signal, name, None)
             if number is not None and signal.getsignal(number) in _AT_ONCE:
                 with contextlib.suppress(ValueError):  # outside the main thread

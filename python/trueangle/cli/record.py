@@ -7,7 +7,7 @@ import math
 from functools import partial
 from pathlib import Path
 
-from .ending import put_off_ending
+from ..support.deadline import put_off_ending
 from .options import add_shared, errors_in
 from .parser import declare
 from .signal_options import (

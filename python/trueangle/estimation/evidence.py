@@ -100,11 +100,6 @@ class EvidenceEstimate:
     prior: Array = field(repr=False)
 
     @property
-    def included(self) -> tuple[float, ...]:
-        """Orders that are more probably in the error than not."""
-        return tuple(k for k, p in zip(self.orders, self.probability, strict=True) if p > 0.5)
-
-    @property
     def present(self) -> tuple[float, ...]:
         """Orders that runs more probably share or differ by than not."""
         return self._probable([(m.tau > 0.0) | (m.omega > 0.0) for m in self.models])
@@ -301,7 +296,7 @@ def estimate_by_evidence(
     >>> theta = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
     >>> ripple = 0.3 * np.cos(np.arange(90.0) ** 2)
     >>> runs = [RunReadings(theta, 5.0 * np.cos(2.0 * theta) + s * ripple) for s in (1.0, -1.0)]
-    >>> estimate_by_evidence(runs, [1, 2, 3, 4]).included
+    >>> estimate_by_evidence(runs, [1, 2, 3, 4]).present
     (2,)
     """
     if probability is None:

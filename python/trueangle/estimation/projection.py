@@ -98,12 +98,8 @@ class Projection:
         """-2 ln of the likelihood, up to a constant of the readings."""
         return float(self.n * np.log(self.rss / self.n)) + float(self.whiten.log_determinant)
 
-    def as_deviance(self, saved: float) -> float:
-        """``n ln(RSS/(RSS - saved))``."""
-        return float(self.as_deviances(np.array([saved]))[0])
-
     def as_deviances(self, saved: Array) -> Array:
-        """`as_deviance` of each."""
+        """``n ln(RSS/(RSS - saved))`` of each."""
         share = np.minimum(saved / self.rss, 1.0 - 1e-15)
         return np.asarray(-self.n * np.log1p(-share))
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
+from ..support.deadline import put_off_ending
 from .budget import FileExtent
 from .damage import damage_told
 from .format import Addition, Batch, Contents, CopyTask, Selection, note
@@ -115,7 +116,12 @@ def copy(task: CopyTask) -> Contents:
     before = contents(task.source)  # an earlier correction, of another joint
     rows, done = before.rows, 0
     sums: dict[str, Checksum] = {}
-    with _WrittenFile(task.target, "r+b") as output, _opened(task.target, output) as file:
+    # HDF5 that an interrupt leaves in the middle of a write ends the process with a fault.
+    with (
+        put_off_ending() as stopped,
+        _WrittenFile(task.target, "r+b") as output,
+        _opened(task.target, output) as file,
+    ):
         for channel in channels:
             indicated = cached(file, channel.column)
             used = {signal: cached(file, name) for signal, name in channel.signals.items()}
@@ -130,6 +136,8 @@ def copy(task: CopyTask) -> Contents:
                 after = channel.correct(given, signals).astype(corrected.dtype, copy=False)
                 put(corrected, start, stop, after)
                 output.check()
+                if stopped():
+                    raise KeyboardInterrupt
                 for check, values in zip(checks, (given, after), strict=True):
                     check.update(values)
                 done += stop - start
@@ -237,11 +245,8 @@ def _names(
 
 def _create_like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) -> None:
     """Make an empty data set next to ``indicated``, laid out and compressed like it."""
-    kind = (
-        np.float32
-        if indicated.dtype.kind == "f" and indicated.dtype.itemsize == 4
-        else (np.float64)
-    )
+    is_single = indicated.dtype.kind == "f" and indicated.dtype.itemsize == 4
+    kind = np.float32 if is_single else np.float64
     made = file.create_dataset(
         channel.added,
         indicated.shape,
@@ -254,7 +259,7 @@ def _create_like(file: h5py.File, indicated: h5py.Dataset, channel: Addition) ->
         fletcher32=indicated.fletcher32 or None,
     )
     if "MATLAB_class" in indicated.attrs:
-        made.attrs["MATLAB_class"] = np.bytes_("single" if kind is np.float32 else "double")
+        made.attrs["MATLAB_class"] = np.bytes_("single" if is_single else "double")
     for name in ("units", "DIMENSION_LABELS"):
         told = _text(indicated, name)
         if told is not None:

@@ -58,8 +58,8 @@ class Limits:
     Examples
     --------
     >>> limits = Limits(arc_deg=(0.0, 270.0), temperature_C=(20.0, 35.0))
-    >>> limits.span_deg, limits.turns_freely
-    (270.0, False)
+    >>> limits.span_deg
+    270.0
     """
 
     arc_deg: tuple[float, float] = (0.0, 360.0)
@@ -96,11 +96,6 @@ class Limits:
     def span_deg(self) -> float:
         """Degrees from one end to the other."""
         return self.arc_deg[1] - self.arc_deg[0]
-
-    @property
-    def turns_freely(self) -> bool:
-        """A whole turn is possible."""
-        return self.span_deg >= WHOLE
 
     @classmethod
     def of(cls, signals: Signals) -> Limits:

@@ -23,6 +23,9 @@ from .suggestions import check_choice
 #: for each item where that is more. Ordinary readings take a twentieth to a sixth of that.
 LEAST, PER_ITEM = 2e8, 1.2e4
 
+#: Signals that end a process.
+ENDINGS: Final = ("SIGINT", "SIGTERM", "SIGHUP")
+
 #: Ways of showing progress.
 STYLES: Final = ("auto", "text", "json", "none")
 
@@ -289,6 +292,34 @@ def ending_early() -> Iterator[_Interruption]:
     finally:
         if signal.getsignal(signal.SIGINT) is stop:  # who took it meanwhile keeps it
             signal.signal(signal.SIGINT, before)
+
+
+@contextlib.contextmanager
+def put_off_ending() -> Iterator[Callable[[], bool]]:
+    """Within it the first signal is noted and takes effect at the end; a second one kills.
+
+    It gives what returns whether one has come. Threads other than the main one take no signals.
+    """
+    came: list[int] = []
+    before: dict[int, Any] = {}
+
+    def note(number: int, frame: FrameType | None) -> None:
+        came.append(number)
+        for other in before:
+            signal.signal(other, signal.SIG_DFL)
+
+    for name in ENDINGS:
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            with contextlib.suppress(ValueError):
+                before[number] = signal.signal(number, note)
+    try:
+        yield lambda: bool(came)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if came:
+            signal.raise_signal(came[0])
 
 
 def clock_text(seconds: float) -> str:
