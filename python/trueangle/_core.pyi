@@ -714,6 +714,8 @@ class ClosedWindow:
 class Monitor:
     """A running joint against its model."""
 
+    BASELINE: int
+
     def __new__(
         cls,
         period: float,

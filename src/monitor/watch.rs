@@ -4,8 +4,8 @@ use super::chart::{Cusum, Scale};
 use super::recent::Recent;
 use super::window::Window;
 
-/// Windows after which their mean is held against the model.
-const FIRST: f64 = 8.0;
+/// Windows of the baseline: their mean is compared with the model, later ones with theirs.
+pub const FIRST: f64 = 8.0;
 
 /// Turns that the sum of a window's steps may lack of whole turns.
 const ROUNDING: f64 = 1e-9;

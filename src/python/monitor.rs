@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use super::release::detached;
 use crate::angle::Period;
 use crate::check::same_length;
-use crate::monitor::watch::Limits;
+use crate::monitor::watch::{FIRST, Limits};
 use crate::monitor::window::Window;
 use crate::monitor::{Closed, Monitor, Moved};
 
@@ -46,6 +46,10 @@ fn plain(moved: Moved) -> (usize, f64, f64, f64) {
 
 #[pymethods]
 impl PyMonitor {
+    /// Windows of the baseline.
+    #[classattr]
+    const BASELINE: u64 = FIRST as u64;
+
     #[new]
     fn new(
         period: f64,

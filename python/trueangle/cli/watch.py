@@ -94,9 +94,9 @@ def run(args: argparse.Namespace) -> int:
             if args.plot is not None or args.report is not None:
                 kept.append(window)
             print(_line(window, model, args), flush=True)
-    # Later windows are compared with the mean and the scatter of the first eight.
-    if (n := watched.windows) < 8:
-        print(f"trueangle: warning: only {n} windows of 8: changes may be missed", file=sys.stderr)
+    if (n := watched.windows) < watched.baseline:
+        told = f"only {n} windows; the baseline needs {watched.baseline}: record longer"
+        print(f"trueangle: warning: {told}, or lower --every", file=sys.stderr)
     if kept and args.plot is not None:
         from ..plots.controlcharts import watched_windows
 
@@ -143,6 +143,7 @@ def _batches(
 
 def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace) -> str:
     """One window in one line."""
+    from .._core import Monitor
     from ..support.angles import arcsec
     from ..support.display_units import error_unit
 
@@ -152,8 +153,9 @@ def _line(window: WatchedWindow, model: HarmonicModel, args: argparse.Namespace)
     largest = max(window.orders, key=lambda row: row.amplitude)
     size = scale * largest.amplitude
     shown = error_unit(errors_in(args), size, model.period)
-    text = (
-        f"window {window.window:5d}  order {largest.order:g} is off by {shown.text(size)}; "
-        f"score {window.statistic:.2f}, alarm from {window.limit:.2f}"
-    )
+    change = f"change {window.statistic:.2f}, alarm from {window.limit:.2f}"
+    if window.window <= Monitor.BASELINE:
+        change = f"baseline {window.window} of {Monitor.BASELINE}"
+    text = f"window {window.window:5d}  order {largest.order:g} differs from the model by "
+    text += f"{shown.text(size)}; {change}"
     return f"{text}  ALARM {shown.spoken(window.because)}" if window.alarm else text

@@ -94,8 +94,8 @@ class Monitor(ShownResult):
         C± <- max(0, C± ± z - δ/2)
 
     alarms above the h that gives the run length to all charts together. The zero, which
-    remounting and temperature move, has a chart of its steps. The mean of the first eight windows
-    is compared with the model itself.
+    remounting and temperature move, has a chart of its steps. The first eight windows are the
+    baseline: their mean is compared with the model itself.
 
     Parameters
     ----------
@@ -133,6 +133,9 @@ class Monitor(ShownResult):
     'order 1 moved'
     """
 
+    #: Windows of the baseline: their mean is compared with the model, later windows with them.
+    baseline: Final = _core.Monitor.BASELINE
+
     def __init__(
         self,
         model: HarmonicModel,
@@ -156,7 +159,7 @@ class Monitor(ShownResult):
         charts = 1.25 * (2 * len(orders) + 1)  # that of the zero's steps included
         allowance = 0.5 * self.shift
         self.limit = chart_limit(allowance, self.run_length * charts)
-        step = two_sided_quantile(1.0 / (self.run_length * charts))
+        self._step = step = two_sided_quantile(1.0 / (self.run_length * charts))
         known = [0.0] * (2 * len(orders))
         if model.covariance is not None:
             known = _variances(model, orders)
@@ -166,7 +169,6 @@ class Monitor(ShownResult):
         known = [variance + rounding**2 for variance in known]
         limits = (allowance, self.limit, step, step)
         self._core = _core.Monitor(model.period, orders, cosine, sine, known, self.every, limits)
-        self._step = step
 
     @property
     def windows(self) -> int:

@@ -147,7 +147,7 @@ def test_a_size_is_in_the_unit_asked_for(asked, readings):
     for alarm in (False, True):
         line = _line(window(turn, alarm), model, args)
         found = re.match(
-            r"window +7  order 3 is off by (\S+) (\w+); score 9.00, alarm from 8.50", line
+            r"window +7  order 3 differs from the model by (\S+) (\w+); baseline 7 of 8", line
         )
         assert float(found[1]) == pytest.approx(value, rel=1e-3)
         assert found[2] == unit
@@ -164,7 +164,7 @@ def test_by_itself_it_is_in_degrees_from_one_on(scale, unit, readings):
     turn = TURNS[readings]
     model = ta.HarmonicModel([ta.Shaft("output", 1, [1], [0.0], [0.0])], period=turn)
     args = argparse.Namespace(json=False, errors_in="auto", counts_per_turn=None)
-    assert f" {unit}; score" in _line(window(turn, scale=scale), model, args)
+    assert f" {unit}; baseline" in _line(window(turn, scale=scale), model, args)
     args.json = True
     plain = json.loads(_line(window(turn, scale=scale), model, args))
     sizes = [row["amplitude_arcsec"] for row in plain["orders"]]
